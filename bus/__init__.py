@@ -1,0 +1,1 @@
+"""What everything on the mesh shares: topics, keys, messages, sessions, requests, presence, services."""

@@ -1,0 +1,41 @@
+"""Errors of the bus.
+
+BusError
+├── KeyNameError            a site, robot, topic or operator name that no key can hold
+├── UnknownTopicError       a topic that the table does not have
+├── MessageError            bytes or JSON that are not the message they should be
+├── SessionError            a session that cannot be opened as it is configured
+├── RefusedError            a request that its owner refused, with the reason
+└── NoAnswerError           a request that nobody answered in time
+"""
+
+
+class BusError(Exception):
+    """Base of the bus's errors; its text is one line for people."""
+
+
+class KeyNameError(BusError):
+    """A name that cannot stand in a key."""
+
+
+class UnknownTopicError(BusError):
+    """A topic that is not in the table of `bus.topics`."""
+
+
+class MessageError(BusError):
+    """A payload that is not the message that it should be."""
+
+
+class SessionError(BusError):
+    """A session that cannot be opened as it is configured."""
+
+
+class RefusedError(BusError):
+    """A request that was refused; the text says what was wrong and what would be right.
+
+    Raised by a request's handler to refuse it, and by `ask` at the other end.
+    """
+
+
+class NoAnswerError(BusError):
+    """Nobody answered a request in time: no owner, no route, or too slow."""
