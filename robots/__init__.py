@@ -1,1 +1,1 @@
-"""TBD."""
+"""What an arm is and can do: descriptions, D-H, meshes, kinematics, URDF and GLB."""

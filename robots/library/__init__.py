@@ -1,1 +1,1 @@
-"""TBD."""
+"""A folder a robot: its description and its meshes. To add one, see CONTRIBUTING."""
