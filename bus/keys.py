@@ -61,7 +61,8 @@ def check_chunk(name: str, what: str = "operator") -> str:
     """
     if not _CHUNK.fullmatch(name):
         raise KeyNameError(
-            f"{what} {name!r} cannot be used: letters, digits, '_', '.' and '-', beginning with a letter or digit"
+            f"{what} {name!r} cannot be used: letters, digits, '_', '.' and '-', "
+            "beginning with a letter or digit"
         )
     return name
 

@@ -159,7 +159,7 @@ _TOPICS = (
         history_schema=schema.EventList,
         recovered=True,
         priority=Priority.INTERACTIVE_LOW,
-        publishers=frozenset({Role.GATEWAY, Role.KINEMATICS, Role.RECORDER, Role.RENDERER}),
+        publishers=_GATEWAY,
     ),
     Topic(
         name="audit",
@@ -274,9 +274,7 @@ def _row_name(name: str, rows: Mapping[str, object]) -> str | None:
     chunks = name.split("/")
     for row in rows:
         pattern = row.split("/")
-        if len(pattern) == len(chunks) and all(
-            p in ("*", c) for p, c in zip(pattern, chunks, strict=True)
-        ):
+        if len(pattern) == len(chunks) and all(p in ("*", c) for p, c in zip(pattern, chunks, strict=True)):
             return row
     return None
 

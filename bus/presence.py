@@ -1,0 +1,44 @@
+"""Presence: who is alive, told by Zenoh's liveliness."""
+
+import asyncio
+from collections.abc import AsyncIterator
+
+import zenoh
+
+from bus import keys
+from bus.errors import KeyNameError
+
+EVERYBODY = f"{keys.ROOT}/*/*/alive/*/*"
+
+
+class PresenceWatch:
+    """Who comes alive and who goes, as an asynchronous iterator; who is there already comes first."""
+
+    def __init__(self, session: zenoh.Session, key_expr: str = EVERYBODY) -> None:
+        loop = asyncio.get_running_loop()
+        self._changes: asyncio.Queue[tuple[keys.PresenceKey, bool] | None] = asyncio.Queue()
+
+        def on_change(sample: zenoh.Sample) -> None:
+            try:
+                key = keys.parse_presence_key(str(sample.key_expr))
+            except KeyNameError:
+                return
+            if not loop.is_closed():
+                alive = sample.kind == zenoh.SampleKind.PUT
+                loop.call_soon_threadsafe(self._changes.put_nowait, (key, alive))
+
+        self._subscriber = session.liveliness().declare_subscriber(key_expr, on_change, history=True)
+
+    def __aiter__(self) -> AsyncIterator[tuple[keys.PresenceKey, bool]]:
+        return self
+
+    async def __anext__(self) -> tuple[keys.PresenceKey, bool]:
+        change = await self._changes.get()
+        if change is None:
+            raise StopAsyncIteration
+        return change
+
+    def close(self) -> None:
+        """Watch no more; the iterator ends."""
+        self._subscriber.undeclare()
+        self._changes.put_nowait(None)

@@ -1,0 +1,154 @@
+"""Publishers: they number and date what they publish, and answer late joiners."""
+
+import asyncio
+import secrets
+import threading
+import time
+from collections import deque
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import zenoh
+import zenoh.ext
+from google.protobuf.message import Message
+
+from bus import keys
+from bus.header import Header, pack
+from bus.messages import PROTOBUF
+from bus.schemas.robomesh_pb2 import VideoFrames
+from bus.topics import History, Topic, topic
+
+LIST_LENGTH = 100
+# Two key frame intervals at 30 Hz: a publisher that never marks a key frame must not grow.
+_MOST_FRAMES = 150
+
+OnGet = Callable[[], Awaitable[Message | None]]
+
+
+class Publisher:
+    """The publisher of one topic of one robot.
+
+    Safe to use from any one thread at a time; late joiners are answered on Zenoh's.
+    """
+
+    def __init__(
+        self, session: zenoh.Session, site: str, robot: str, name: str, *, on_get: OnGet | None = None
+    ) -> None:
+        self.key = keys.robot_key(site, robot, name)
+        self.topic: Topic = topic(name)
+        # New at each start, so that a number that begins again is not taken for an old one.
+        self._identity = secrets.randbits(64)
+        self._sequence = 0
+        self._lock = threading.Lock()
+        self._history: deque[tuple[Header, Message]] = deque(maxlen=_history_length(self.topic))
+        self._publisher: Any = _declare(session, self.key, self.topic)
+        self._queryable: zenoh.Queryable[None] | None = None
+        if on_get is not None:
+            loop = asyncio.get_running_loop()
+            self._queryable = session.declare_queryable(self.key, lambda q: self._hand_over(q, on_get, loop))
+        elif self.topic.history is not History.NONE:
+            self._queryable = session.declare_queryable(self.key, self._answer)
+
+    def put(self, message: Message, *, source_time_ns: int | None = None, key_frame: bool = False) -> Header:
+        """Publish a message of the topic's schema.
+
+        Args:
+            source_time_ns: When what it tells was so, ns since the Unix epoch; now, unless given.
+            key_frame: Of a video topic: the joiner's frames begin here.
+
+        Returns:
+            The header that it was published with.
+        """
+        if source_time_ns is None:
+            source_time_ns = time.time_ns()
+        with self._lock:
+            self._sequence += 1
+            header = Header(self._identity, self._sequence, source_time_ns)
+            if key_frame:
+                self._history.clear()
+            if not (self.topic.history is History.KEY_FRAME and not (key_frame or self._history)):
+                self._history.append((header, message))
+        self._publisher.put(message.SerializeToString(), attachment=pack(header))
+        return header
+
+    @property
+    def watched(self) -> bool:
+        """Whether anybody subscribes to it now; recovered topics always are, they are rare and small."""
+        if not isinstance(self._publisher, zenoh.Publisher):
+            return True
+        # Typed as bool, but it is an object that is always true.
+        status: Any = self._publisher.matching_status
+        return bool(status.matching)
+
+    def close(self) -> None:
+        """Publish and answer no more."""
+        if self._queryable is not None:
+            self._queryable.undeclare()
+        self._publisher.undeclare()
+
+    def _answer(self, query: zenoh.Query) -> None:
+        with self._lock:
+            history = list(self._history)
+        with query:
+            if history:
+                self._reply(query, history[-1][0], _history_message(self.topic, history))
+
+    def _reply(self, query: zenoh.Query, header: Header, message: Message) -> None:
+        query.reply(self.key, message.SerializeToString(), encoding=PROTOBUF, attachment=pack(header))
+
+    def _hand_over(self, query: zenoh.Query, on_get: OnGet, loop: asyncio.AbstractEventLoop) -> None:
+        async def answer() -> None:
+            with query:
+                message = await on_get()
+                if message is not None:
+                    self._reply(query, Header(self._identity, self._sequence, time.time_ns()), message)
+
+        if not loop.is_closed():
+            asyncio.run_coroutine_threadsafe(answer(), loop)
+
+
+def _history_length(row: Topic) -> int:
+    match row.history:
+        case History.LAST_100:
+            return LIST_LENGTH
+        case History.KEY_FRAME:
+            return _MOST_FRAMES
+        case _:
+            return 1
+
+
+def _history_message(row: Topic, history: list[tuple[Header, Message]]) -> Message:
+    """What a late joiner gets, as one message."""
+    if row.history_schema is None:
+        return history[-1][1]
+    if row.history is History.KEY_FRAME:
+        frames = VideoFrames(publisher=history[0][0].publisher)
+        for header, message in history:
+            frames.frames.add(
+                sequence=header.sequence,
+                source_time_ns=header.source_time_ns,
+                data=message.SerializeToString(),
+            )
+        return frames
+    answer = row.history_schema()
+    (items,) = answer.DESCRIPTOR.fields
+    getattr(answer, items.name).extend(message for _, message in history)
+    return answer
+
+
+def _declare(session: zenoh.Session, key: str, row: Topic) -> zenoh.Publisher | zenoh.ext.AdvancedPublisher:
+    priority = getattr(zenoh.Priority, row.priority.value)
+    if row.recovered:
+        return zenoh.ext.declare_advanced_publisher(
+            session,
+            key,
+            encoding=PROTOBUF,
+            priority=priority,
+            congestion_control=zenoh.CongestionControl.DROP,
+            cache=zenoh.ext.CacheConfig(LIST_LENGTH),
+            sample_miss_detection=zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=0.5),
+            publisher_detection=True,
+        )
+    return session.declare_publisher(
+        key, encoding=PROTOBUF, priority=priority, congestion_control=zenoh.CongestionControl.DROP
+    )

@@ -1,0 +1,71 @@
+"""The running of a service: logs, signals, session, presence, and an end that comes in time."""
+
+import asyncio
+import contextlib
+import logging
+import os
+import signal
+import threading
+from collections.abc import Awaitable, Callable, Coroutine, Iterable
+from typing import Any, TypeVar
+
+from bus.session import Session, SessionSettings, open_session
+
+AnySettings = TypeVar("AnySettings")
+
+# A site is down within 2 s of Ctrl-C, whatever hangs.
+_LAST_MOMENT_S = 1.7
+
+
+def run(
+    serve: Callable[[Session, AnySettings], Awaitable[None]],
+    settings: AnySettings,
+    *,
+    service: str,
+    session_settings: SessionSettings,
+    present_for: Iterable[tuple[str, str]],
+) -> None:
+    """Run a service of the mesh until it is told to end.
+
+    Args:
+        serve: Its coroutine; cancelled by SIGINT and SIGTERM.
+        service: Its name in presence keys.
+        present_for: The (site, robot) pairs that it serves; `-` as the robot for a whole site.
+    """
+
+    async def serve_present() -> None:
+        async with open_session(session_settings) as session:
+            for site, robot in present_for:
+                session.declare_presence(site, robot, service)
+            await serve(session, settings)
+
+    run_until_signalled(serve_present())
+
+
+def run_until_signalled(main: Coroutine[Any, Any, None]) -> None:
+    """Run a coroutine; SIGINT and SIGTERM cancel it, and it ends within 1.7 s."""
+
+    async def guarded() -> None:
+        task = asyncio.ensure_future(main)
+        loop = asyncio.get_running_loop()
+
+        def end() -> None:
+            task.cancel()
+            watchdog = threading.Timer(_LAST_MOMENT_S, os._exit, (1,))
+            watchdog.daemon = True
+            watchdog.start()
+
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(number, end)
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+
+    asyncio.run(guarded())
+
+
+def log_to_stderr(level: int = logging.INFO) -> None:
+    """One line a record on standard error, in words."""
+    logging.basicConfig(level=level, format="%(levelname)s %(message)s", force=True)
+    logging.addLevelName(logging.INFO, "info")
+    logging.addLevelName(logging.WARNING, "warning")
+    logging.addLevelName(logging.ERROR, "error")
