@@ -1,0 +1,267 @@
+"""The audit log of one robot: who asked for what, and what became of it. Append-only, hash-chained.
+
+A line an entry, JSON; `hash` is the SHA-256 of the same object without `hash`, keys sorted, no blanks:
+
+    {"hash":"5f…","number":7,"operator":"li","outcome":"ACCEPTED","previous":"c0…","repeated_count":0,
+     "request":"MOVE_ABSOLUTE","source":"mesh","text":"","time_ns":1790000000000000000,"values":{"id":"3"}}
+
+`previous` is the hash of the entry before, 64 zeros in the first, so a changed, missing or moved line
+shows; a cut tail shows to whoever knows a later hash (the head, published on the mesh). The lease's
+secret is never in it.
+"""
+
+import asyncio
+import hashlib
+import json
+import os
+from collections import deque
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from enum import StrEnum
+from io import BufferedRandom
+from pathlib import Path
+
+from protocol_gateway.errors import AuditError
+
+NOTHING_BEFORE = "0" * 64
+# Stops are noted after the wire, also while the disk is full: this many wait for it to be mended.
+MOST_OWED = 1000
+
+
+class Outcome(StrEnum):
+    """What became of a request. FAILED: accepted, but it did not reach the controller."""
+
+    ACCEPTED = "ACCEPTED"
+    REFUSED = "REFUSED"
+    FAILED = "FAILED"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """A line of the log; number, previous and hash are the log's to give.
+
+    Attributes:
+        time_ns: When it was asked, ns since the Unix epoch.
+        source: Where it came from: "mesh", "gateway".
+        values: What was asked for, as text.
+    """
+
+    time_ns: int
+    operator: str
+    source: str
+    request: str
+    outcome: Outcome
+    text: str = ""
+    values: Mapping[str, str] = field(default_factory=dict)
+    repeated_count: int = 0
+    number: int = 0
+    previous: str = NOTHING_BEFORE
+    hash: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verification:
+    """Whether a log is whole; `first_break`: number of the first entry that is not as it was written."""
+
+    ok: bool
+    entries: int
+    first_break: int | None
+    text: str
+
+
+def chained(entry: Entry, *, number: int, previous: str) -> Entry:
+    """The entry in its place in the chain, with its hash."""
+    placed = replace(entry, number=number, previous=previous)
+    return replace(placed, hash=_hash(placed))
+
+
+def _hash(entry: Entry) -> str:
+    return hashlib.sha256(_canonical(entry, with_hash=False)).hexdigest()
+
+
+def _canonical(entry: Entry, *, with_hash: bool = True) -> bytes:
+    row = asdict(entry)
+    if not with_hash:
+        del row["hash"]
+    return json.dumps(row, ensure_ascii=False, separators=(",", ":"), sort_keys=True).encode()
+
+
+def parse_line(line: bytes) -> Entry:
+    """An entry from its line.
+
+    Raises:
+        AuditError: If the line is not one.
+    """
+    try:
+        row = json.loads(line)
+        return Entry(**{**row, "outcome": Outcome(row["outcome"])})
+    except (ValueError, KeyError, TypeError) as error:
+        raise AuditError(f"not an audit entry: {line[:80]!r} ({error})") from None
+
+
+def read_entries(path: Path) -> Iterator[Entry]:
+    """Every readable entry of a log, oldest first; no file: none."""
+    if not path.exists():
+        return
+    with path.open("rb") as file:
+        for line in file:
+            try:
+                yield parse_line(line)
+            except AuditError:
+                continue  # `verify` tells where; who only looks for something goes on
+
+
+def verify(path: Path, head: str | None = None) -> Verification:
+    """Check a log's chain, and that the entry whose hash is `head` is still in it.
+
+    Raises:
+        OSError: If the file cannot be read.
+    """
+    previous, number, found = NOTHING_BEFORE, 0, head is None
+    with path.open("rb") as file:
+        for line in file:
+            number += 1
+            try:
+                entry = parse_line(line)
+                whole = line.endswith(b"\n") and line[:-1] == _canonical(entry)
+            except AuditError as error:
+                return _broken(number, str(error))
+            if not whole or entry.hash != _hash(entry):
+                return _broken(number, f"entry {number} was changed: its hash does not fit its contents")
+            if entry.number != number or entry.previous != previous:
+                return _broken(number, f"something before entry {number} was taken out, put in or changed")
+            previous = entry.hash
+            found = found or entry.hash == head
+    if not found:
+        return _broken(number + 1, f"the log ends after entry {number}, but no entry has the hash {head}")
+    return Verification(ok=True, entries=number, first_break=None, text=f"{number} entries, unbroken")
+
+
+def _broken(number: int, text: str) -> Verification:
+    return Verification(ok=False, entries=number - 1, first_break=number, text=text)
+
+
+class AuditLog:
+    """The open log of one robot; one at a time may have a file open for writing.
+
+    Attributes:
+        mended: What was found wrong with the file when it was opened, in words; empty: nothing.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Open the log, or begin one; a torn last line (power cut) is cut off.
+
+        Raises:
+            AuditError: If the folder or file cannot be written.
+        """
+        self.path = path
+        self._waiting: deque[tuple[Entry, asyncio.Future[Entry]]] = deque()
+        self._owed: deque[Entry] = deque(maxlen=MOST_OWED)
+        self._writer: asyncio.Task[None] | None = None
+        self._torn = False
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.touch()
+            self._file: BufferedRandom = path.open("r+b")
+            self.mended = self._find_end()
+        except OSError as error:
+            raise AuditError(
+                f"audit log {path} cannot be written ({error.strerror}): without it no robot is moved"
+            ) from None
+
+    @property
+    def head(self) -> tuple[int, str]:
+        """Number and hash of the last entry."""
+        return self._number, self._previous
+
+    def _find_end(self) -> str:
+        self._number, self._previous, self._length = 0, NOTHING_BEFORE, 0
+        mended = ""
+        for line in self._file:
+            if not line.endswith(b"\n"):
+                self._file.truncate(self._length)
+                mended = f"a torn last line of {len(line)} bytes was cut off after entry {self._number}"
+                break
+            self._length += len(line)
+            self._number += 1
+            try:
+                entry = parse_line(line)
+            except AuditError:
+                mended = f"entry {self._number} cannot be read"
+                continue
+            if entry.number != self._number or entry.previous != self._previous or entry.hash != _hash(entry):
+                mended = mended or f"the chain is broken at entry {self._number}"
+            self._previous = entry.hash
+        return mended
+
+    async def append(self, entry: Entry) -> Entry:
+        """Write an entry; it is on disk when this returns. Entries stand in the order of the calls.
+
+        Returns:
+            The entry with its number and hashes.
+
+        Raises:
+            AuditError: If it could not be written; then it is not in the log.
+        """
+        future: asyncio.Future[Entry] = asyncio.get_running_loop().create_future()
+        self._waiting.append((entry, future))
+        if self._writer is None or self._writer.done():
+            self._writer = asyncio.create_task(self._write_waiting())
+        return await future
+
+    async def append_or_owe(self, entry: Entry) -> Entry | None:
+        """As `append`, for what has happened already: what cannot be written now is written with the next.
+
+        Raises:
+            AuditError: If it could not be written yet.
+        """
+        try:
+            return await self.append(entry)
+        except AuditError:
+            self._owed.append(entry)
+            raise
+
+    async def _write_waiting(self) -> None:
+        """Everything that waits, in one write and one fsync, until nothing does."""
+        while self._waiting:
+            waiting = list(self._waiting)
+            self._waiting.clear()
+            owed = list(self._owed)
+            placed, number, previous = [], self._number, self._previous
+            for entry in (*owed, *(entry for entry, _ in waiting)):
+                number += 1
+                placed.append(chained(entry, number=number, previous=previous))
+                previous = placed[-1].hash
+            try:
+                # An fsync takes milliseconds, and seconds on a busy disk: the joint stream must not wait for it.
+                await asyncio.to_thread(self._write, placed)
+            except OSError as error:
+                problem = f"audit log {self.path.name} cannot be written ({error.strerror})"
+                for _, future in waiting:
+                    if not future.done():
+                        future.set_exception(AuditError(problem))
+                continue
+            self._number, self._previous = number, previous
+            for _ in owed:
+                self._owed.popleft()
+            for (_, future), entry in zip(waiting, placed[len(owed) :], strict=True):
+                if not future.done():
+                    future.set_result(entry)
+
+    def _write(self, entries: list[Entry]) -> None:
+        if self._torn:
+            self._file.truncate(self._length)
+        self._torn = True
+        lines = b"".join(_canonical(entry) + b"\n" for entry in entries)
+        self._file.seek(self._length)
+        self._file.write(lines)
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self._length += len(lines)
+        self._torn = False
+
+    async def close(self) -> None:
+        """Write what waits, then close the file."""
+        if self._writer is not None:
+            await self._writer
+        await asyncio.to_thread(self._file.close)

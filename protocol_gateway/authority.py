@@ -1,0 +1,399 @@
+"""Who may move a robot: lease, once-only commands, latched stop. No I/O; time is an argument.
+
+Two states that do not know each other, the lease's and the stop's:
+
+    lease     ACQUIRE   RENEW   RELEASE, expiry, TAKE by another   motion command   motion over   foreign motion
+    --------  --------  ------  ---------------------------------  ---------------  ------------  --------------
+    free      held      no      no                                 no               -             free
+    held      no*       held    free                               moving           -             free
+    moving    no*       moving  free, and the robot is stopped     moving           held          -
+
+    stop      STOP      RESET of this stop   RESET of another   motion command
+    --------  --------  -------------------  -----------------  --------------
+    clear     latched   no                   no                 yes
+    latched   latched   clear                no                 no
+
+"no" is a refusal in words, *but the holder's own ACQUIRE renews. OFFER and ACCEPT pass a lease that
+does not move on to another operator; TAKE gives a reason. Every stop has a number of its own, so a
+RESET never clears a stop that its sender has not seen. "moving" covers motion that is held (HOLD):
+it would go on with anybody's RESUME.
+"""
+
+import hmac
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
+
+DEFAULT_TTL_S = 2.0
+SHORTEST_TTL_S = 0.5
+LONGEST_TTL_S = 5.0
+
+# Servos and brakes take their time: no motion within this long after a command means that there is none to come.
+START_S = 2.0
+# A controller that goes from one motion to the next is idle for a moment in between.
+SETTLE_S = 0.5
+# A robot that was moved by others this short a while ago may go on: no surprise to the next operator.
+RECENT_S = 10.0
+
+_C = CommandRequest.Command
+MOTION_COMMANDS = frozenset({_C.HOME, _C.RESUME, _C.MOVE_ABSOLUTE, _C.MOVE_RELATIVE, _C.RUN_PROGRAM})
+
+
+class Now(NamedTuple):
+    """The two clocks: what has passed is measured on the first, dates are told on the second."""
+
+    monotonic_s: float
+    wall_ns: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """The holder's motion, from the command that began it.
+
+    Attributes:
+        last_s: When it was last commanded, or seen to move (monotonic).
+        seen: It was seen to move.
+        held: HOLD was sent; it goes on with RESUME.
+    """
+
+    last_s: float
+    seen: bool = False
+    held: bool = False
+
+
+class Answer(NamedTuple):
+    """What became of a request, for its sender."""
+
+    accepted: bool
+    text: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lease:
+    """Control of a robot by one operator, for a time.
+
+    Attributes:
+        until_s: End, monotonic; `until_ns` is the same moment on the wall clock.
+        last_id: Highest command id so far, and `last_answer` what it got.
+        tolerates_motion: The robot moved by itself when the lease began, so that is no surprise.
+    """
+
+    holder: str
+    secret: str = field(repr=False)
+    since_ns: int
+    ttl_s: float
+    until_s: float
+    until_ns: int
+    last_id: int = 0
+    last_answer: Answer = Answer(False, "")
+    offered_to: str = ""
+    renewals: int = 0
+    motion: Motion | None = None
+    tolerates_motion: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stop:
+    """A latched stop; `sent_s`: when its unit reached the controller's socket (monotonic)."""
+
+    id: int
+    by: str
+    reason: str
+    since_ns: int
+    sent_s: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeaseEnd:
+    """A lease that is over. `stop`: its holder's motion ran, the robot must be stopped."""
+
+    holder: str
+    why: str
+    renewals: int
+    stop: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Authority:
+    """The whole state. `moving`: what was last seen, None before anything was."""
+
+    lease: Lease | None = None
+    stop: Stop | None = None
+    last_stop_id: int = 0
+    moving: bool | None = None
+    # When motion was last seen that nobody commanded (monotonic).
+    foreign_s: float | None = None
+
+
+class LeaseOutcome(NamedTuple):
+    """A lease request's outcome; `granted`: the lease to show to the asker, with its secret."""
+
+    authority: Authority
+    answer: Answer
+    granted: Lease | None = None
+    ended: LeaseEnd | None = None
+
+
+class Verdict(NamedTuple):
+    """Whether a command may go on; `repeat`: it was answered before, and is not done again."""
+
+    answer: Answer
+    repeat: bool = False
+    counted: bool = False  # its id is the holder's, so the answer is kept for a repeat
+
+
+# ---------------------------------------------------------------------- lease
+
+
+def request_lease(
+    authority: Authority, request: LeaseRequest, *, operator: str, now: Now, secret: str
+) -> LeaseOutcome:
+    """Answer ACQUIRE, RENEW, RELEASE, OFFER, ACCEPT, TAKE.
+
+    Args:
+        operator: Who asks, as the router vouches for it.
+        secret: Fresh; becomes the lease's if one is granted.
+    """
+    lease = authority.lease
+    action = LeaseRequest.Action
+    mine = lease is not None and holds(authority, operator, request.lease)
+    match request.action:
+        case action.ACQUIRE if lease is None:
+            return _grant(authority, request, operator=operator, now=now, secret=secret, text="control taken")
+        case action.ACQUIRE | action.RENEW if mine and lease is not None:
+            renewed = replace(_timed(lease, request.ttl_s, now), renewals=lease.renewals + 1)
+            return LeaseOutcome(replace(authority, lease=renewed), Answer(True, "control renewed"), renewed)
+        case action.RELEASE if mine and lease is not None:
+            free, ended = end_lease(authority, f"{operator} gave control back")
+            return LeaseOutcome(free, Answer(True, "control given back"), ended=ended)
+        case action.OFFER if mine and lease is not None:
+            offered = replace(lease, offered_to="" if request.to == operator else request.to)
+            text = f"control offered to {offered.offered_to}" if offered.offered_to else "offer withdrawn"
+            return LeaseOutcome(replace(authority, lease=offered), Answer(True, text), offered)
+        case action.ACCEPT if lease is not None and lease.offered_to == operator:
+            if lease.motion is not None:
+                return _refused(
+                    authority, f"{lease.holder}'s motion still runs: wait until it ends, then accept"
+                )
+            free, ended = end_lease(authority, f"handed over to {operator}")
+            text = f"control taken over from {lease.holder}"
+            granted = _grant(free, request, operator=operator, now=now, secret=secret, text=text)
+            return granted._replace(ended=ended)
+        case action.TAKE if lease is None or mine or request.reason.strip():
+            free, ended = end_lease(authority, f"taken by {operator}: {request.reason.strip()}")
+            granted = _grant(free, request, operator=operator, now=now, secret=secret, text="control taken")
+            return granted._replace(ended=ended)
+        case action.ACCEPT:
+            return _refused(authority, f"control was not offered to {operator}: ask its holder, or ACQUIRE")
+        case action.TAKE:
+            return _refused(authority, "TAKE needs a reason: say in `reason` why control is taken away")
+    return _refused(authority, _why_not_holder(authority, operator))
+
+
+def holds(authority: Authority, operator: str, secret: str) -> bool:
+    """Whether the operator holds the lease, and this is its secret."""
+    lease = authority.lease
+    # Compared in constant time: how long a refusal takes must not spell the secret.
+    return (
+        lease is not None
+        and hmac.compare_digest(lease.secret.encode(), secret.encode())
+        and lease.holder == operator
+    )
+
+
+def expire(authority: Authority, now: Now) -> tuple[Authority, LeaseEnd | None]:
+    """End the lease when its time is over."""
+    lease = authority.lease
+    if lease is None or now.monotonic_s < lease.until_s:
+        return authority, None
+    return end_lease(authority, f"{lease.holder}'s lease was not renewed within {lease.ttl_s:g} s")
+
+
+def end_lease(authority: Authority, why: str) -> tuple[Authority, LeaseEnd | None]:
+    """End the lease, if there is one; says whether its holder's motion has to be stopped."""
+    lease = authority.lease
+    if lease is None:
+        return authority, None
+    ended = LeaseEnd(
+        holder=lease.holder, why=why, renewals=lease.renewals, stop=lease.motion is not None
+    )
+    return replace(authority, lease=None), ended
+
+
+def _grant(
+    authority: Authority, request: LeaseRequest, *, operator: str, now: Now, secret: str, text: str
+) -> LeaseOutcome:
+    foreign_s = authority.foreign_s
+    recently = foreign_s is not None and now.monotonic_s - foreign_s < RECENT_S
+    lease = Lease(
+        holder=operator,
+        secret=secret,
+        since_ns=now.wall_ns,
+        ttl_s=0.0,
+        until_s=0.0,
+        until_ns=0,
+        tolerates_motion=recently,
+    )
+    lease = _timed(lease, request.ttl_s, now)
+    return LeaseOutcome(replace(authority, lease=lease), Answer(True, text), lease)
+
+
+def _timed(lease: Lease, ttl_s: float, now: Now) -> Lease:
+    kept = min(max(ttl_s or DEFAULT_TTL_S, SHORTEST_TTL_S), LONGEST_TTL_S)
+    return replace(
+        lease,
+        ttl_s=kept,
+        until_s=now.monotonic_s + kept,
+        until_ns=now.wall_ns + round(kept * 1e9),
+    )
+
+
+def _refused(authority: Authority, text: str) -> LeaseOutcome:
+    return LeaseOutcome(authority, Answer(False, text))
+
+
+def _why_not_holder(authority: Authority, operator: str) -> str:
+    lease = authority.lease
+    if lease is None:
+        return "nobody is in control, or the lease has ended: take control first (ACQUIRE)"
+    if lease.holder != operator:
+        return f"{lease.holder} is in control: wait until it is given back, or ask for it"
+    return f"{operator} is in control with another lease (another window or program?): this one is not valid"
+
+
+# ------------------------------------------------------------------- commands
+
+
+def admit(authority: Authority, request: CommandRequest, *, operator: str, now: Now) -> Verdict:
+    """Whether a command comes from the holder, in time and for the first time, and no stop forbids it.
+
+    What the controller's state and the joints' limits forbid is `protocol_gateway.obstacles`' to say.
+    """
+    if not holds(authority, operator, request.lease) or authority.lease is None:
+        return Verdict(Answer(False, f"Not sent: {_why_not_holder(authority, operator)}."))
+    lease = authority.lease
+    if request.id == lease.last_id and request.id:
+        return Verdict(lease.last_answer, repeat=True)
+    if request.id <= lease.last_id:
+        return Verdict(
+            Answer(
+                False,
+                f"Not sent: id {request.id} is not higher than {lease.last_id}, the last one under this lease: "
+                "count up with each command.",
+            )
+        )
+    refusal = lateness(request, now) or stop_refusal(authority, request)
+    if refusal:
+        return Verdict(Answer(False, refusal), counted=True)
+    return Verdict(Answer(True, ""), counted=True)
+
+
+def lateness(request: CommandRequest, now: Now) -> str:
+    """Why a command comes too late; empty: it does not."""
+    if not request.HasField("not_after"):
+        return ""
+    late_s = (now.wall_ns - request.not_after.ToNanoseconds()) * 1e-9
+    if late_s <= 0:
+        return ""
+    return (
+        f"Not sent: it came {late_s:.2f} s after its not_after: delayed on the way, or dated by another clock "
+        "than the gateway's (`now` in each lease answer)."
+    )
+
+
+def stop_refusal(authority: Authority, request: CommandRequest) -> str:
+    """Why a latched stop forbids a command; empty: it does not."""
+    stop = authority.stop
+    if request.command == _C.RESET:
+        if stop is None and request.stop_id:
+            return f"Not sent: stop {request.stop_id} is not latched; nothing is."
+        if stop is not None and stop.id != request.stop_id:
+            return (
+                f"Not sent: RESET names stop {request.stop_id}, but stop {stop.id} is latched "
+                f"({stop.by}: {stop.reason}): see to it, then send RESET with stop_id {stop.id}."
+            )
+    elif stop is not None and request.command in MOTION_COMMANDS:
+        return (
+            f"Not sent: stop {stop.id} is latched ({stop.by}: {stop.reason}): "
+            f"see to it, then send RESET with stop_id {stop.id}."
+        )
+    return ""
+
+
+def remember(authority: Authority, request: CommandRequest, answer: Answer) -> Authority:
+    """Keep a command's answer for its repeat; the id is used up from now on."""
+    lease = authority.lease
+    if lease is None or not hmac.compare_digest(lease.secret.encode(), request.lease.encode()):
+        return authority
+    return replace(authority, lease=replace(lease, last_id=request.id, last_answer=answer))
+
+
+def command_sent(authority: Authority, request: CommandRequest, now: Now) -> Authority:
+    """The command's unit is on the controller's socket."""
+    lease = authority.lease
+    if request.command == _C.RESET and authority.stop is not None and authority.stop.id == request.stop_id:
+        authority = replace(authority, stop=None)
+    if lease is None:
+        return authority
+    motion = lease.motion
+    if request.command in MOTION_COMMANDS:
+        motion = Motion(last_s=now.monotonic_s)
+    elif request.command == _C.HOLD and motion is not None:
+        motion = replace(motion, held=True)
+    return replace(authority, lease=replace(lease, motion=motion, tolerates_motion=False))
+
+
+# ----------------------------------------------------------------------- stop
+
+
+def stop(authority: Authority, *, by: str, reason: str, now: Now) -> Authority:
+    """Latch a stop under a number of its own, and forget the motion that it ends."""
+    number = authority.last_stop_id + 1
+    latched = Stop(id=number, by=by, reason=reason or "no reason given", since_ns=now.wall_ns)
+    lease = authority.lease
+    if lease is not None:
+        lease = replace(lease, motion=None)
+    return replace(authority, stop=latched, last_stop_id=number, lease=lease)
+
+
+def stop_sent(authority: Authority, stop_id: int, now: Now) -> Authority:
+    """The stop's unit is on the controller's socket."""
+    if authority.stop is None or authority.stop.id != stop_id:
+        return authority
+    return replace(authority, stop=replace(authority.stop, sent_s=now.monotonic_s))
+
+
+# --------------------------------------------------------------------- motion
+
+
+def observe(authority: Authority, *, moving: bool, pending: bool, now: Now) -> tuple[Authority, bool]:
+    """Follow the robot's motion.
+
+    Args:
+        moving: Whether it moves now.
+        pending: A held motion may still be waiting for RESUME: the controller says so, or does not say.
+
+    Returns:
+        The state, and whether motion began that nobody commanded.
+    """
+    began = moving and authority.moving is not True
+    authority = replace(authority, moving=moving)
+    lease = authority.lease
+    if lease is not None and lease.motion is not None:
+        return replace(authority, lease=replace(lease, motion=_follow(lease.motion, moving, pending, now))), False
+    foreign_s = authority.foreign_s
+    goes_on = foreign_s is not None and now.monotonic_s - foreign_s < SETTLE_S
+    # A robot that is still slowing down from a stop is neither.
+    if moving and (began or goes_on):
+        authority = replace(authority, foreign_s=now.monotonic_s)
+    return authority, began
+
+
+def _follow(motion: Motion, moving: bool, pending: bool, now: Now) -> Motion | None:
+    if moving:
+        return replace(motion, last_s=now.monotonic_s, seen=True)
+    if motion.held and pending:
+        return motion
+    patience_s = SETTLE_S if motion.seen else START_S
+    return motion if now.monotonic_s - motion.last_s < patience_s else None
