@@ -11,14 +11,13 @@ secret is never in it.
 """
 
 import asyncio
+import fcntl
 import hashlib
 import json
 import os
-from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
-from io import BufferedRandom
 from pathlib import Path
 
 from protocol_gateway.errors import AuditError
@@ -142,28 +141,33 @@ def _broken(number: int, text: str) -> Verification:
 
 
 class AuditLog:
-    """The open log of one robot; one at a time may have a file open for writing.
+    """The open log of one robot. Its file is locked: two gateways must not write one chain.
 
     Attributes:
         mended: What was found wrong with the file when it was opened, in words; empty: nothing.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, on_written: Callable[[Entry], None] = lambda entry: None) -> None:
         """Open the log, or begin one; a torn last line (power cut) is cut off.
 
+        Args:
+            on_written: Told of every entry that is on disk, in order.
+
         Raises:
-            AuditError: If the folder or file cannot be written.
+            AuditError: If the folder or file cannot be written, or another process has it open.
         """
         self.path = path
-        self._waiting: deque[tuple[Entry, asyncio.Future[Entry]]] = deque()
-        self._owed: deque[Entry] = deque(maxlen=MOST_OWED)
+        self._on_written = on_written
+        self._waiting: list[tuple[Entry, asyncio.Future[Entry]]] = []
+        self._owed: list[Entry] = []
         self._writer: asyncio.Task[None] | None = None
         self._torn = False
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.touch()
-            self._file: BufferedRandom = path.open("r+b")
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o640)
+            _lock(self._file, path)
             self.mended = self._find_end()
+            os.fsync(self._file)
         except OSError as error:
             raise AuditError(
                 f"audit log {path} cannot be written ({error.strerror}): without it no robot is moved"
@@ -177,21 +181,21 @@ class AuditLog:
     def _find_end(self) -> str:
         self._number, self._previous, self._length = 0, NOTHING_BEFORE, 0
         mended = ""
-        for line in self._file:
-            if not line.endswith(b"\n"):
-                self._file.truncate(self._length)
-                mended = f"a torn last line of {len(line)} bytes was cut off after entry {self._number}"
-                break
-            self._length += len(line)
-            self._number += 1
-            try:
-                entry = parse_line(line)
-            except AuditError:
-                mended = f"entry {self._number} cannot be read"
-                continue
-            if entry.number != self._number or entry.previous != self._previous or entry.hash != _hash(entry):
-                mended = mended or f"the chain is broken at entry {self._number}"
-            self._previous = entry.hash
+        with self.path.open("rb") as file:
+            for line in file:
+                if not line.endswith(b"\n"):
+                    os.ftruncate(self._file, self._length)
+                    return f"a torn last line of {len(line)} bytes was cut off after entry {self._number}"
+                self._length += len(line)
+                self._number += 1
+                try:
+                    entry = parse_line(line)
+                except AuditError:
+                    mended = mended or f"entry {self._number} cannot be read"
+                    continue
+                if (entry.number, entry.previous, entry.hash) != (self._number, self._previous, _hash(entry)):
+                    mended = mended or f"the chain is broken at entry {self._number}"
+                self._previous = entry.hash
         return mended
 
     async def append(self, entry: Entry) -> Entry:
@@ -205,12 +209,11 @@ class AuditLog:
         """
         future: asyncio.Future[Entry] = asyncio.get_running_loop().create_future()
         self._waiting.append((entry, future))
-        if self._writer is None or self._writer.done():
-            self._writer = asyncio.create_task(self._write_waiting())
+        self._start_writer()
         return await future
 
-    async def append_or_owe(self, entry: Entry) -> Entry | None:
-        """As `append`, for what has happened already: what cannot be written now is written with the next.
+    async def append_or_owe(self, entry: Entry) -> Entry:
+        """As `append`, for what has happened already: what cannot be written now is kept, and written later.
 
         Raises:
             AuditError: If it could not be written yet.
@@ -218,15 +221,31 @@ class AuditLog:
         try:
             return await self.append(entry)
         except AuditError:
-            self._owed.append(entry)
+            if len(self._owed) < MOST_OWED:
+                self._owed.append(entry)
             raise
 
+    def pay(self) -> None:
+        """Try again to write what is owed; to be called now and then."""
+        if self._owed:
+            self._start_writer()
+
+    async def close(self) -> None:
+        """Write what waits, then close the file."""
+        self.pay()
+        if self._writer is not None:
+            await self._writer
+        os.close(self._file)
+
+    def _start_writer(self) -> None:
+        if self._writer is None or self._writer.done():
+            self._writer = asyncio.create_task(self._write_waiting())
+
     async def _write_waiting(self) -> None:
-        """Everything that waits, in one write and one fsync, until nothing does."""
-        while self._waiting:
-            waiting = list(self._waiting)
-            self._waiting.clear()
-            owed = list(self._owed)
+        """Everything that waits, in one write and one fsync, again until nothing does."""
+        while True:
+            waiting, self._waiting = self._waiting, []
+            owed = self._owed[:]
             placed, number, previous = [], self._number, self._previous
             for entry in (*owed, *(entry for entry, _ in waiting)):
                 number += 1
@@ -236,32 +255,37 @@ class AuditLog:
                 # An fsync takes milliseconds, and seconds on a busy disk: the joint stream must not wait for it.
                 await asyncio.to_thread(self._write, placed)
             except OSError as error:
-                problem = f"audit log {self.path.name} cannot be written ({error.strerror})"
+                problem = f"the audit log {self.path.name} cannot be written ({error.strerror})"
                 for _, future in waiting:
                     if not future.done():
                         future.set_exception(AuditError(problem))
-                continue
-            self._number, self._previous = number, previous
-            for _ in owed:
-                self._owed.popleft()
-            for (_, future), entry in zip(waiting, placed[len(owed) :], strict=True):
-                if not future.done():
-                    future.set_result(entry)
+            else:
+                self._number, self._previous = number, previous
+                del self._owed[: len(owed)]
+                for entry in placed:
+                    self._on_written(entry)
+                for (_, future), entry in zip(waiting, placed[len(owed) :], strict=True):
+                    if not future.done():
+                        future.set_result(entry)
+            if not self._waiting:
+                return
 
     def _write(self, entries: list[Entry]) -> None:
         if self._torn:
-            self._file.truncate(self._length)
+            os.ftruncate(self._file, self._length)
         self._torn = True
         lines = b"".join(_canonical(entry) + b"\n" for entry in entries)
-        self._file.seek(self._length)
-        self._file.write(lines)
-        self._file.flush()
-        os.fsync(self._file.fileno())
-        self._length += len(lines)
+        written = 0
+        while written < len(lines):
+            written += os.pwrite(self._file, lines[written:], self._length + written)
+        os.fsync(self._file)
+        self._length += written
         self._torn = False
 
-    async def close(self) -> None:
-        """Write what waits, then close the file."""
-        if self._writer is not None:
-            await self._writer
-        await asyncio.to_thread(self._file.close)
+
+def _lock(file: int, path: Path) -> None:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(file)
+        raise AuditError(f"audit log {path} is open in another gateway: stop that one first") from None

@@ -8,7 +8,9 @@ ProtocolGatewayError
 ├── LinkError               a unit that did not reach the controller's socket
 │   ├── LinkDownError       there is no connection
 │   └── LinkCloggedError    the controller does not read: the connection was given up
-└── AuthorityError          see `authority` and `audit`
+├── AuthorityError          a failure of what guards the robot
+│   └── AuditError          an audit entry that is not on disk, or a line that is not an entry
+└── GatewaySettingsError    settings that no gateway can run with
 """
 
 
@@ -45,4 +47,12 @@ class LinkCloggedError(LinkError):
 
 
 class AuthorityError(ProtocolGatewayError):
-    """A failure of what guards the robot; see `authority` and `audit`."""
+    """A failure of what guards the robot."""
+
+
+class AuditError(AuthorityError):
+    """An entry that could not be written to the audit log, or a line that is not an entry."""
+
+
+class GatewaySettingsError(ProtocolGatewayError):
+    """Settings that no gateway can run with."""
