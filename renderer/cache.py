@@ -1,0 +1,65 @@
+"""What was got or computed once, kept by its content in the user's cache folder."""
+
+import contextlib
+import hashlib
+import os
+import tempfile
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+
+from renderer import mesh as mesh_module
+from renderer.mesh import Mesh, prepared
+
+# Counted up whenever a mesh is prepared differently.
+_VERSION = 1
+
+
+def cache_folder() -> Path:
+    """`robomesh/renderer` in the user's cache folder."""
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path("~/.cache").expanduser()) / "robomesh" / "renderer"
+
+
+def stored_glb(sha256: str, folder: Path) -> bytes | None:
+    """A mesh that came over the mesh before; None where it is not there, or not what it was."""
+    try:
+        data = (folder / f"{sha256}.glb").read_bytes()
+    except OSError:
+        return None
+    return data if hashlib.sha256(data).hexdigest() == sha256 else None
+
+
+def store_glb(data: bytes, folder: Path) -> None:
+    """Keep a mesh by its hash; a folder that cannot be written costs time later, no more."""
+    with contextlib.suppress(OSError):
+        _write_whole(folder / f"{hashlib.sha256(data).hexdigest()}.glb", data)
+
+
+def prepared_once(glb: bytes, *, color: str, folder: Path) -> Mesh:
+    """As `renderer.mesh.prepared`, from the cache where it was done before.
+
+    Raises:
+        GlbError: If it is not GLB.
+    """
+    version = f"{_VERSION} {mesh_module.MOST_TRIANGLES} {color} "
+    path = folder / f"{hashlib.sha256(version.encode() + glb).hexdigest()}.npz"
+    names = [field.name for field in fields(Mesh)]
+    with contextlib.suppress(OSError, ValueError, KeyError, EOFError), np.load(path) as stored:
+        return Mesh(**{name: stored[name] for name in names})
+    mesh = prepared(glb, color=color)
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".npz", delete=False) as file:
+            np.savez(file, **{name: getattr(mesh, name) for name in names})
+        Path(file.name).replace(path)
+    return mesh
+
+
+def _write_whole(path: Path, data: bytes) -> None:
+    """All of it or nothing: several renderers share the folder."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
+        file.write(data)
+    Path(file.name).replace(path)

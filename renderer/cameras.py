@@ -1,0 +1,125 @@
+"""Cameras: where they stand, what they see, and where a point lands in the picture.
+
+Camera frame: x right, y up, looking along -z. Pixels count from the picture's upper left corner.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+FIELD_OF_VIEW = float(np.deg2rad(30.0))
+_NEAREST_M = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A camera in the site's frame.
+
+    Attributes:
+        eye: (3,) [m].
+        target: (3,) what is in the picture's middle [m].
+        up: (3,) direction that is upwards in the picture.
+        half_height: Half of what an orthographic picture's height shows [m]; None: perspective.
+        field_of_view: Of a perspective picture's height [rad].
+    """
+
+    eye: FloatArray
+    target: FloatArray
+    up: FloatArray
+    half_height: float | None = None
+    field_of_view: float = FIELD_OF_VIEW
+
+    @property
+    def orthographic(self) -> bool:
+        """Whether lines that are parallel in space are so in the picture."""
+        return self.half_height is not None
+
+    @property
+    def forward(self) -> FloatArray:
+        """(3,) unit vector from the eye to the target."""
+        return _unit(self.target - self.eye)
+
+
+def site_to_camera(camera: Camera) -> FloatArray:
+    """(4, 4) transform from the site's frame to the camera's."""
+    backward = -camera.forward
+    right = np.cross(camera.up, backward)
+    if np.linalg.norm(right) < 1e-9 * np.linalg.norm(camera.up):
+        # Looking along "up": any right will do, and the picture must not be empty.
+        right = np.cross([0.0, 1.0, 0.0] if abs(backward[1]) < 0.9 else [1.0, 0.0, 0.0], backward)
+    right = _unit(right)
+    transform = np.eye(4)
+    transform[:3, :3] = [right, np.cross(backward, right), backward]
+    transform[:3, 3] = -transform[:3, :3] @ camera.eye
+    return transform
+
+
+def projection(camera: Camera, aspect: float, *, near: float, far: float) -> FloatArray:
+    """(4, 4) camera frame to clip coordinates, y **down**: the first row drawn is the picture's first.
+
+    Turning the picture here costs nothing; turning it after it was read costs a copy a frame.
+    """
+    matrix = np.zeros((4, 4))
+    if camera.half_height is not None:
+        matrix[0, 0] = 1.0 / (camera.half_height * aspect)
+        matrix[1, 1] = -1.0 / camera.half_height
+        matrix[2, 2] = -2.0 / (far - near)
+        matrix[2, 3] = -(far + near) / (far - near)
+        matrix[3, 3] = 1.0
+    else:
+        scale = 1.0 / np.tan(camera.field_of_view / 2.0)
+        matrix[0, 0] = scale / aspect
+        matrix[1, 1] = -scale
+        matrix[2, 2] = -(far + near) / (far - near)
+        matrix[2, 3] = -2.0 * far * near / (far - near)
+        matrix[3, 2] = -1.0
+    return matrix
+
+
+def site_to_clip(camera: Camera, aspect: float, *, center: FloatArray, radius: float) -> FloatArray:
+    """(4, 4) site frame to clip coordinates, with the depth that a sphere's content needs."""
+    distance = float((center - camera.eye) @ camera.forward)
+    far = max(distance + radius, 2.0 * _NEAREST_M)
+    near = distance - radius
+    if not camera.orthographic:
+        near = max(near, _NEAREST_M, far * 1e-4)
+    return projection(camera, aspect, near=near, far=far) @ site_to_camera(camera)
+
+
+def pixels(camera: Camera, size: tuple[int, int], points: FloatArray) -> FloatArray:
+    """(n, 2) where points land, x to the right and y downwards from the upper left corner [px].
+
+    Args:
+        size: Width and height [px].
+        points: (n, 3) in the site's frame [m], in front of a perspective camera.
+    """
+    width, height = size
+    matrix = projection(camera, width / height, near=0.1, far=100.0) @ site_to_camera(camera)
+    clip = np.c_[points, np.ones(len(points))] @ matrix.T
+    landed: FloatArray = (clip[:, :2] / clip[:, 3:] + 1.0) / 2.0 * np.array(size)
+    return landed
+
+
+def fitted(camera: Camera, aspect: float, points: FloatArray, *, margin: float = 1.08) -> Camera:
+    """The camera with everything in the picture, its direction and its target kept.
+
+    An orthographic one is given its scale, a perspective one stands back as far as it must.
+
+    Args:
+        points: (n, 3) in the site's frame [m].
+    """
+    seen = np.c_[points - camera.target, np.zeros(len(points))] @ site_to_camera(camera).T
+    x, y, z = np.abs(seen[:, 0]), np.abs(seen[:, 1]), seen[:, 2]
+    if camera.orthographic:
+        return replace(camera, half_height=float(max(y.max(), x.max() / aspect, 1e-3) * margin))
+    slope = np.tan(camera.field_of_view / 2.0) / margin
+    distance = float(max((z + y / slope).max(), (z + x / (slope * aspect)).max(), 1e-3))
+    return replace(camera, eye=camera.target - camera.forward * distance)
+
+
+def _unit(vector: FloatArray) -> FloatArray:
+    length = float(np.linalg.norm(vector))
+    return vector / length if length > 0 else np.array([0.0, 0.0, -1.0])

@@ -1,0 +1,78 @@
+"""Smooth where a surface is round, sharp where it is not: normals and edges by the crease angle."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+# Below this angle between two faces the surface is round.
+CREASE = float(np.deg2rad(38.0))
+# Vertices nearer than this are one: exporters split them for their normals' sake.
+_WELD_M = 1e-5
+
+
+def weld(positions: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
+    """The same triangles with one vertex a place; those without an area are left out."""
+    _, first, number = np.unique(
+        np.round(positions / _WELD_M).astype(np.int64), axis=0, return_index=True, return_inverse=True
+    )
+    welded = number.reshape(-1)[triangles]
+    a, b, c = welded.T
+    kept = welded[(a != b) & (b != c) & (c != a)]
+    points = positions[first]
+    return points, kept[np.linalg.norm(face_vectors(points, kept), axis=1) > 1e-14]
+
+
+def face_vectors(positions: FloatArray, triangles: IntArray) -> FloatArray:
+    """(t, 3) outward normals, twice the area long."""
+    a, b, c = (positions[triangles[:, corner]] for corner in range(3))
+    vectors: FloatArray = np.cross(b - a, c - a)
+    return vectors
+
+
+def crease_normals(positions: FloatArray, triangles: IntArray, *, crease: float = CREASE) -> FloatArray:
+    """(t, 3, 3) a normal for each corner: the mean of the faces around it that are not across a crease.
+
+    Args:
+        positions: (v, 3), welded.
+        triangles: (t, 3).
+        crease: Angle between two faces from which the edge is sharp [rad].
+    """
+    vectors = face_vectors(positions, triangles)
+    unit = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    corners = triangles.reshape(-1)
+    order = np.argsort(corners, kind="stable")
+    face_of = order // 3
+    counts = np.bincount(corners, minlength=len(positions))
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    # Every pair (corner, face at the same vertex), in one array.
+    sizes = counts[corners[order]]
+    mine = np.repeat(np.arange(len(order)), sizes)
+    ends = np.cumsum(sizes)
+    within = np.arange(len(mine)) - np.repeat(ends - sizes, sizes)
+    others = face_of[starts[corners[order]][mine] + within]
+    together = (unit[face_of[mine]] * unit[others]).sum(axis=1) > np.cos(crease)
+    sums = np.zeros((len(order), 3))
+    for axis in range(3):
+        sums[:, axis] = np.bincount(
+            mine[together], weights=vectors[others[together], axis], minlength=len(order)
+        )
+    normals = np.empty_like(sums)
+    normals[order] = sums / np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), 1e-20)
+    return normals.reshape(-1, 3, 3)
+
+
+def sharp_edges(positions: FloatArray, triangles: IntArray, *, crease: float = CREASE) -> FloatArray:
+    """(e, 2, 3) ends of the edges between faces that a crease divides."""
+    vectors = face_vectors(positions, triangles)
+    unit = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    faces = np.tile(np.arange(len(triangles)), 3)
+    keys = np.sort(sides, axis=1)
+    order = np.lexsort((keys[:, 1], keys[:, 0]))
+    keys, faces = keys[order], faces[order]
+    pair = np.nonzero((keys[1:] == keys[:-1]).all(axis=1))[0]
+    sharp = (unit[faces[pair]] * unit[faces[pair + 1]]).sum(axis=1) < np.cos(crease)
+    ends: FloatArray = positions[keys[pair[sharp]]]
+    return ends

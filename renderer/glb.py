@@ -1,0 +1,199 @@
+"""Reading GLB: a link's mesh as it comes over the mesh, to arrays.
+
+Triangles, node placements, base colours, roughness and metalness. No textures, skins or
+animations: a link is one rigid, painted body. Source: glTF 2.0, Khronos Group.
+"""
+
+import json
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.errors import GlbError
+
+_MAGIC = 0x46546C67
+_JSON_CHUNK = 0x4E4F534A
+_BINARY_CHUNK = 0x004E4942
+_TRIANGLES = 4
+
+_COMPONENTS: dict[int, str] = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Triangles of one material, in the file's frame.
+
+    Attributes:
+        positions: (v, 3) float64 [m].
+        normals: (v, 3) unit vectors, or None where the file has none.
+        triangles: (t, 3) vertex numbers.
+        color: (4,) sRGB and opacity, 0 to 1; None where the file gives none.
+        colors: (v, 4) the same for each vertex, or None.
+    """
+
+    positions: NDArray[np.float64]
+    normals: NDArray[np.float64] | None
+    triangles: NDArray[np.int64]
+    color: tuple[float, float, float, float] | None
+    colors: NDArray[np.float64] | None
+    roughness: float
+    metallic: float
+
+
+def read_glb(data: bytes) -> tuple[Surface, ...]:
+    """The surfaces of a GLB file.
+
+    Raises:
+        GlbError: If it is no GLB, is cut short, or holds what is not drawn here.
+    """
+    document, binary = _chunks(data)
+    try:
+        return tuple(_surfaces(document, binary))
+    except (KeyError, IndexError, TypeError, ValueError) as error:
+        raise GlbError(f"a GLB whose content does not fit together: {error!r}") from None
+
+
+def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
+    if len(data) < 20 or struct.unpack_from("<I", data)[0] != _MAGIC:
+        raise GlbError(f"{len(data)} bytes that are not GLB: it begins with 'glTF'")
+    _, version, length = struct.unpack_from("<III", data)
+    if version != 2 or length > len(data):
+        raise GlbError(
+            f"GLB version {version} of {length} bytes, {len(data)} came: version 2, whole, is read"
+        )
+    document: dict[str, Any] | None = None
+    binary = b""
+    at = 12
+    while at + 8 <= length:
+        size, kind = struct.unpack_from("<II", data, at)
+        body = data[at + 8 : at + 8 + size]
+        if kind == _JSON_CHUNK:
+            try:
+                document = json.loads(body)
+            except ValueError as error:
+                raise GlbError(f"a GLB with a broken JSON chunk: {error}") from None
+        elif kind == _BINARY_CHUNK:
+            binary = body
+        at += 8 + size
+    if document is None:
+        raise GlbError("a GLB without its JSON chunk")
+    return document, binary
+
+
+def _surfaces(document: dict[str, Any], binary: bytes) -> Iterator[Surface]:
+    for mesh_number, node_to_file in _meshes(document):
+        for primitive in document["meshes"][mesh_number]["primitives"]:
+            if primitive.get("mode", _TRIANGLES) == _TRIANGLES:
+                yield _surface(document, binary, primitive, node_to_file)
+
+
+def _meshes(document: dict[str, Any]) -> Iterator[tuple[int, NDArray[np.float64]]]:
+    """(mesh number, node_to_file) of every node that has one."""
+    scenes = document.get("scenes", [])
+    roots = scenes[document.get("scene", 0)].get("nodes", []) if scenes else range(len(document["nodes"]))
+    waiting = [(number, np.eye(4)) for number in roots]
+    while waiting:
+        number, parent_to_file = waiting.pop()
+        node = document["nodes"][number]
+        node_to_file = parent_to_file @ _placement(node)
+        if "mesh" in node:
+            yield node["mesh"], node_to_file
+        waiting += [(child, node_to_file) for child in node.get("children", [])]
+
+
+def _placement(node: dict[str, Any]) -> NDArray[np.float64]:
+    if "matrix" in node:
+        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+    x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
+    rotation = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    placement = np.eye(4)
+    placement[:3, :3] = rotation * np.array(node.get("scale", (1.0, 1.0, 1.0)))
+    placement[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
+    return placement
+
+
+def _surface(
+    document: dict[str, Any], binary: bytes, primitive: dict[str, Any], node_to_file: NDArray[np.float64]
+) -> Surface:
+    attributes = primitive["attributes"]
+    positions = _accessor(document, binary, attributes["POSITION"])
+    if "indices" in primitive:
+        triangles = _accessor(document, binary, primitive["indices"]).astype(np.int64).reshape(-1, 3)
+    else:
+        triangles = np.arange(len(positions), dtype=np.int64).reshape(-1, 3)
+    if len(triangles) and not 0 <= triangles.min() <= triangles.max() < len(positions):
+        raise GlbError(f"a GLB whose triangles name vertex {triangles.max()} of {len(positions)}")
+    normals = None
+    if "NORMAL" in attributes:
+        # Normals go by the inverse transposed: a scaled node tilts them otherwise.
+        normals = _accessor(document, binary, attributes["NORMAL"]) @ np.linalg.inv(node_to_file[:3, :3])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    if np.linalg.det(node_to_file[:3, :3]) < 0:
+        triangles = triangles[:, ::-1]
+    color, roughness, metallic = _material(document, primitive.get("material"))
+    colors = None
+    if "COLOR_0" in attributes:
+        colors = np.ones((len(positions), 4))
+        given = _accessor(document, binary, attributes["COLOR_0"])
+        colors[:, : given.shape[1]] = given
+    return Surface(
+        positions=positions @ node_to_file[:3, :3].T + node_to_file[:3, 3],
+        normals=normals,
+        triangles=triangles,
+        color=color,
+        colors=colors,
+        roughness=roughness,
+        metallic=metallic,
+    )
+
+
+def _accessor(document: dict[str, Any], binary: bytes, number: int) -> NDArray[np.float64]:
+    """(n, width) values; normalised integers become 0 to 1."""
+    accessor = document["accessors"][number]
+    view = document["bufferViews"][accessor["bufferView"]]
+    component = np.dtype(_COMPONENTS[accessor["componentType"]])
+    width = _WIDTHS[accessor["type"]]
+    start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+    values = np.ndarray(
+        (accessor["count"], width),
+        component,
+        binary,
+        start,
+        (view.get("byteStride", component.itemsize * width), component.itemsize),
+    ).astype(np.float64)
+    if accessor.get("normalized"):
+        values /= np.iinfo(component).max
+    return values
+
+
+def _material(
+    document: dict[str, Any], number: int | None
+) -> tuple[tuple[float, float, float, float] | None, float, float]:
+    """Colour, roughness and metalness.
+
+    glTF's defaults are 1 for both; exporters that leave them out mean paint, not rough iron.
+    """
+    if number is None:
+        return None, 0.5, 0.0
+    surface = document["materials"][number].get("pbrMetallicRoughness", {})
+    roughness, metallic = surface.get("roughnessFactor", 0.5), surface.get("metallicFactor", 0.0)
+    if "baseColorFactor" not in surface:
+        return None, roughness, metallic
+    linear = surface["baseColorFactor"]
+    red, green, blue = (_linear_to_srgb(value) for value in linear[:3])
+    return (red, green, blue, float(linear[3])), roughness, metallic
+
+
+def _linear_to_srgb(value: float) -> float:
+    return float(12.92 * value if value <= 0.0031308 else 1.055 * value ** (1 / 2.4) - 0.055)
