@@ -50,7 +50,7 @@ class Publisher:
             self._queryable = session.declare_queryable(self.key, self._answer)
 
     def put(self, message: Message, *, source_time_ns: int | None = None, key_frame: bool = False) -> Header:
-        """Publish a message of the topic's schema.
+        """Publish a message of the topic's schema; it is kept for late joiners, so change it no more.
 
         Args:
             source_time_ns: When what it tells was so, ns since the Unix epoch; now, unless given.
@@ -70,6 +70,11 @@ class Publisher:
                 self._history.append((header, message))
         self._publisher.put(message.SerializeToString(), attachment=pack(header))
         return header
+
+    def remember(self, message: Message, *, source_time_ns: int) -> None:
+        """Answer late joiners with it, and publish nothing: what is old gets no new number."""
+        with self._lock:
+            self._history.append((Header(self._identity, self._sequence, source_time_ns), message))
 
     @property
     def watched(self) -> bool:

@@ -1,1 +1,5 @@
-"""TBD."""
+"""A site's router: every service and monitor of the site is its client; sites link router to router."""
+
+from services.router.router import Settings, serve
+
+__all__ = ["Settings", "serve"]

@@ -1,0 +1,243 @@
+"""The site file: what runs at a site. Every service gets its part from here, as Settings.
+
+Degrees and millimetres in the file, SI in what is read from it.
+"""
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+
+from bus import keys
+from bus.endpoints import Tls
+from bus.errors import KeyNameError
+from services.errors import ListenError, SiteFileError
+from services.listen import split_address
+
+Triple = tuple[float, float, float]
+Quiet = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Pose(BaseModel):
+    """Where something stands: millimetres, and degrees about fixed x, y, z."""
+
+    model_config = Quiet
+    xyz: Triple = (0.0, 0.0, 0.0)
+    rpy: Triple = (0.0, 0.0, 0.0)
+
+
+class TlsFiles(BaseModel):
+    """Certificates of this end (PEM)."""
+
+    model_config = Quiet
+    ca: Path
+    certificate: Path
+    key: Path
+
+
+class Router(BaseModel):
+    """The site's router."""
+
+    model_config = Quiet
+    listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)
+    connect: tuple[str, ...] = ()
+    tls: TlsFiles | None = None
+    insecure: bool = False
+
+
+class LegacyClients(BaseModel):
+    """Old client programs that attach to the gateway as if it were the controller."""
+
+    model_config = Quiet
+    listen: str = "127.0.0.1:5401"
+    commanders: tuple[str, ...] = ()
+
+
+class Robot(BaseModel):
+    """An arm and its controller."""
+
+    model_config = Quiet
+    name: str
+    model: str
+    pose: Pose = Pose()
+    cell: str = ""
+    controller: str = "simulated"
+    protocol: Literal["unit"] = "unit"
+    codes: dict[int, str] = Field(default_factory=dict)
+    accept_unknown: tuple[Literal["mode", "homed"], ...] = ()
+    check: Literal["warn", "require", "off"] = "warn"
+    stop_proven: bool = True
+    stale_after_s: Annotated[float, Field(gt=0.05, le=60)] = 1.0
+    demo: bool = False
+    legacy_clients: LegacyClients | None = None
+
+    @field_validator("name")
+    @classmethod
+    def _name(cls, name: str) -> str:
+        return _checked_name(name, "robot")
+
+    @field_validator("codes", mode="before")
+    @classmethod
+    def _codes(cls, codes: Any) -> Any:
+        # TOML's keys are text.
+        return {int(k): v for k, v in codes.items()} if isinstance(codes, dict) else codes
+
+    @field_validator("controller")
+    @classmethod
+    def _controller(cls, controller: str) -> str:
+        if controller == "simulated":
+            return controller
+        scheme, _, address = controller.partition("://")
+        if scheme != "tcp":
+            raise ValueError("should be 'simulated' or tcp://HOST:PORT, as in tcp://10.0.0.7:5400")
+        try:
+            split_address(address)
+        except ListenError:
+            raise ValueError("should be 'simulated' or tcp://HOST:PORT, as in tcp://10.0.0.7:5400") from None
+        return controller
+
+    @property
+    def simulated(self) -> bool:
+        """Whether its controller is ours, and simulated."""
+        return self.controller == "simulated"
+
+
+class Fixture(BaseModel):
+    """Something that stands in a cell."""
+
+    model_config = Quiet
+    cell: str = ""
+    name: str
+    box: Triple | None = None
+    cylinder: tuple[float, float] | None = None
+    sphere: float | None = None
+    mesh: str | None = None
+    pose: Pose = Pose()
+    color: str = "#8a8f94"
+
+
+class Recorder(BaseModel):
+    """Where recordings go."""
+
+    model_config = Quiet
+    folder: Path = Path("recordings")
+
+
+class Renderer(BaseModel):
+    """Which views are rendered, and how large."""
+
+    model_config = Quiet
+    views: tuple[str, ...] = ("front", "top", "left", "free")
+    size: tuple[Annotated[int, Field(ge=64, le=4096)], Annotated[int, Field(ge=64, le=4096)]] = (1280, 720)
+    fps: Annotated[float, Field(ge=1, le=120)] = 30
+
+
+class Console(BaseModel):
+    """Where the page is served."""
+
+    model_config = Quiet
+    listen: str = "127.0.0.1:8080"
+    insecure: bool = False
+
+
+class Audit(BaseModel):
+    """Where the gateway keeps what was asked of each robot."""
+
+    model_config = Quiet
+    folder: Path = Path("audit")
+
+
+class Site(BaseModel):
+    """A whole site."""
+
+    model_config = Quiet
+    site: str
+    router: Router = Router()
+    robot: tuple[Robot, ...] = ()
+    fixture: tuple[Fixture, ...] = ()
+    recorder: Recorder = Recorder()
+    renderer: Renderer = Renderer()
+    console: Console = Console()
+    audit: Audit = Audit()
+
+    @field_validator("site")
+    @classmethod
+    def _site(cls, name: str) -> str:
+        return _checked_name(name, "site")
+
+    @field_validator("robot")
+    @classmethod
+    def _robots(cls, robots: tuple[Robot, ...]) -> tuple[Robot, ...]:
+        names = [robot.name for robot in robots]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"two robots are named {name!r}: every robot needs a name of its own")
+        return robots
+
+    @property
+    def tls(self) -> Tls | None:
+        """Certificates for the site's own sessions."""
+        files = self.router.tls
+        return None if files is None else Tls(ca=files.ca, certificate=files.certificate, key=files.key)
+
+
+DEMO = Site(site="demo", robot=(Robot(name="pt600", model="pt600", demo=True),))
+
+
+def load(path: Path | None) -> Site:
+    """The site of a file; without one the built-in site `demo`.
+
+    Paths in the file are taken from the file's own folder.
+
+    Raises:
+        SiteFileError: A line a problem: file, key, value, and what would be right.
+    """
+    if path is None:
+        return DEMO
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise SiteFileError(f"{path}: cannot be read: {reason}") from None
+    try:
+        site = Site.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise SiteFileError(f"{path}: not TOML: {error}") from None
+    except ValidationError as error:
+        raise SiteFileError("\n".join(_sentence(path, problem) for problem in error.errors())) from None
+    return _beside(site, path.parent)
+
+
+def _beside(site: Site, folder: Path) -> Site:
+    robots = tuple(
+        robot.model_copy(update={"model": str(folder / robot.model)})
+        if robot.model.endswith((".toml", ".urdf")) and not Path(robot.model).is_absolute()
+        else robot
+        for robot in site.robot
+    )
+    return site.model_copy(
+        update={
+            "robot": robots,
+            "recorder": site.recorder.model_copy(update={"folder": folder / site.recorder.folder}),
+            "audit": site.audit.model_copy(update={"folder": folder / site.audit.folder}),
+        }
+    )
+
+
+def _sentence(path: Path, problem: Any) -> str:
+    where = ".".join(str(part) for part in problem["loc"])
+    message = problem["msg"].removeprefix("Value error, ")
+    value = problem["input"]
+    if problem["type"] == "missing":
+        return f"{path}: {where} is missing"
+    if problem["type"] == "extra_forbidden":
+        return f"{path}: {where} is not a key that a site file has"
+    return f"{path}: {where} = {value!r}: {message}"
+
+
+def _checked_name(name: str, what: str) -> str:
+    try:
+        return keys.check_name(name, what)
+    except KeyNameError as error:
+        raise ValueError(str(error)) from None
