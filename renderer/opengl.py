@@ -5,6 +5,7 @@ A context belongs to the thread that made it: make, use and close a `Drawing` in
 
 import ctypes
 from collections.abc import Iterable
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -35,9 +36,11 @@ def open_context(device: int | None = None) -> moderngl.Context:
         NoOpenGLError: If there is no EGL or OpenGL library, or no such device.
     """
     _keep_freed_memory()
-    options = {} if device is None else {"device_index": device}
+    options: dict[str, Any] = {"standalone": True, "backend": "egl", "require": 330}
+    if device is not None:
+        options["device_index"] = device
     try:
-        return moderngl.create_context(standalone=True, backend="egl", require=330, **options)
+        return moderngl.create_context(**options)
     except Exception as error:  # moderngl raises bare Exception, ImportError and OSError here.
         raise NoOpenGLError(" ".join(str(error).split()) or type(error).__name__) from None
 
@@ -100,13 +103,12 @@ class Drawing:
             context.depth_renderbuffer(size, samples=samples),
         )
         self._plain = context.framebuffer([context.renderbuffer(size, 4)]) if samples else self._multi
-        self.body_program = context.program(shaders.BODY_VERTEX.strip(), shaders.BODY_FRAGMENT.strip())
-        self.edge_program = context.program(shaders.EDGE_VERTEX.strip(), shaders.EDGE_FRAGMENT.strip())
-        self.shadow_program = context.program(shaders.SHADOW_VERTEX.strip(), shaders.SHADOW_FRAGMENT.strip())
-        self._plane_program = context.program(shaders.PLANE_VERTEX.strip(), shaders.PLANE_FRAGMENT.strip())
-        self._backdrop = context.vertex_array(
-            context.program(shaders.FULL_PICTURE_VERTEX.strip(), shaders.BACKDROP_FRAGMENT.strip()), []
-        )
+        self.body_program = context.program(shaders.BODY_VERTEX, shaders.BODY_FRAGMENT)
+        self.edge_program = context.program(shaders.EDGE_VERTEX, shaders.EDGE_FRAGMENT)
+        self.shadow_program = context.program(shaders.SHADOW_VERTEX, shaders.SHADOW_FRAGMENT)
+        self._plane_program = context.program(shaders.PLANE_VERTEX, shaders.PLANE_FRAGMENT)
+        self._backdrop_program = context.program(shaders.FULL_PICTURE_VERTEX, shaders.BACKDROP_FRAGMENT)
+        self._backdrop = context.vertex_array(self._backdrop_program, [])
         self._plane = context.vertex_array(self._plane_program, [])
         self._line_buffer = context.buffer(reserve=24)
         self._line = context.vertex_array(self.edge_program, [(self._line_buffer, "3f", "position")])
@@ -151,6 +153,8 @@ class Drawing:
         self._multi.clear(depth=1.0)
         context.disable(moderngl.CULL_FACE | moderngl.BLEND)
         context.disable(moderngl.DEPTH_TEST)
+        # Looked at from above, there is no horizon to shade towards.
+        _set(self._backdrop_program, level=1.0 - abs(float(camera.forward[2])) ** 4)
         self._backdrop.render(vertices=3)
         context.enable(moderngl.DEPTH_TEST | moderngl.BLEND)
         context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
@@ -171,15 +175,17 @@ class Drawing:
 
     def _draw_bodies(self, scene: Scene, camera: Camera, matrix: NDArray[np.float64]) -> None:
         context = self.context
-        for program in (self.body_program, self.edge_program):
-            program["site_to_clip"].write(_columns(matrix))
-        body = self.body_program
-        body["eye"].value = tuple(camera.eye)
-        body["forward"].value = tuple(camera.forward)
-        body["orthographic"].value = float(camera.orthographic)
-        body["stale"].value = scene.stale
-        body["floor_height"].value = scene.floor
-        self.edge_program["tone"].value = (*_EDGE_TONE[:3], _EDGE_TONE[3] * (1.0 - 0.5 * scene.stale))
+        _set(
+            self.body_program,
+            site_to_clip=_columns(matrix),
+            eye=tuple(camera.eye),
+            forward=tuple(camera.forward),
+            orthographic=float(camera.orthographic),
+            stale=scene.stale,
+            floor_height=scene.floor,
+        )
+        tone = (*_EDGE_TONE[:3], _EDGE_TONE[3] * (1.0 - 0.5 * scene.stale))
+        _set(self.edge_program, site_to_clip=_columns(matrix), tone=tone)
         # The projection turns the picture over, and with it which way round a face goes.
         context.front_face = "cw"
         context.enable(moderngl.CULL_FACE)
@@ -190,10 +196,13 @@ class Drawing:
                 continue
             placement = _columns(part.part_to_site)
             if uploaded.body is not None:
-                body["part_to_site"].write(placement)
+                # Faces a little back, so that the edges drawn over them are whole.
+                context.polygon_offset = 1.0, 2.0
+                _set(self.body_program, part_to_site=placement)
                 uploaded.body.render()
+                context.polygon_offset = 0.0, 0.0
             if uploaded.edges is not None:
-                self.edge_program["part_to_site"].write(placement)
+                _set(self.edge_program, part_to_site=placement)
                 uploaded.edges.render()
 
     def _is_transparent(self, part: Part) -> bool:
@@ -208,27 +217,31 @@ class Drawing:
         floor = np.array([scene.center[0], scene.center[1], scene.floor])
         # Lines stay where they are in the site, wherever the scene's middle is.
         floor[:2] = np.round(floor[:2])
-        program = self._plane_program
-        program["site_to_clip"].write(_columns(matrix))
-        program["extent"].value = extent
-        program["fine"].value, program["coarse"].value = 0.1, 0.5
-        program["strength"].value = 0.55 if edge_on else 1.0
-        program["shade"].value = 0.0 if edge_on else 1.0 - 0.5 * scene.stale
         if edge_on:
             right = np.cross(forward, [0.0, 0.0, 1.0])
             origin, u, v = floor + forward * 3.5 * scene.radius, right, np.array([0.0, 0.0, 1.0])
         else:
             origin, u, v = floor, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
-        program["origin"].value, program["u"].value, program["v"].value = tuple(origin), tuple(u), tuple(v)
-        program["shadow_center"].value = tuple(scene.center[:2] - floor[:2])
-        program["shadow_extent"].value = _shadow_extent(scene)
+        _set(
+            self._plane_program,
+            site_to_clip=_columns(matrix),
+            origin=tuple(origin),
+            u=tuple(u),
+            v=tuple(v),
+            extent=extent,
+            fine=0.1,
+            coarse=0.5,
+            strength=0.55 if edge_on else 1.0,
+            shade=0.0 if edge_on else 1.0 - 0.5 * scene.stale,
+            shadow_center=tuple(scene.center[:2] - floor[:2]),
+            shadow_extent=_shadow_extent(scene),
+        )
         self._shadow.use(0)
         self._multi.depth_mask = False
         self._plane.render(moderngl.TRIANGLE_STRIP, vertices=4)
         if edge_on:
-            self.edge_program["site_to_clip"].write(_columns(matrix))
-            self.edge_program["part_to_site"].write(_columns(np.eye(4)))
-            self.edge_program["tone"].value = _LINE_TONE
+            identity = _columns(np.eye(4))
+            _set(self.edge_program, site_to_clip=_columns(matrix), part_to_site=identity, tone=_LINE_TONE)
             behind = floor + forward * 3.0 * scene.radius
             self._line_buffer.write(
                 np.array([behind - u * extent, behind + u * extent], dtype=np.float32).tobytes()
@@ -246,14 +259,17 @@ class Drawing:
         self._heights.use()
         self._heights.clear(NOTHING, depth=1.0)
         context.enable_only(moderngl.DEPTH_TEST)
-        program["center"].value = tuple(scene.center[:2])
-        program["extent"].value = extent
-        program["floor_height"].value = scene.floor
-        program["tallest"].value = 4.0 * scene.radius
+        _set(
+            program,
+            center=tuple(scene.center[:2]),
+            extent=extent,
+            floor_height=scene.floor,
+            tallest=4.0 * scene.radius,
+        )
         for part in scene.parts:
             uploaded = self._uploaded(part)
             if uploaded is not None and uploaded.shadow is not None:
-                program["part_to_site"].write(_columns(part.part_to_site))
+                _set(program, part_to_site=_columns(part.part_to_site))
                 uploaded.shadow.render()
         n = _SHADOW_TEXELS
         heights = np.frombuffer(self._heights.read(components=1, dtype="f4"), dtype=np.float32).reshape(n, n)
@@ -269,3 +285,14 @@ def _shadow_extent(scene: Scene) -> float:
 def _columns(matrix: NDArray[np.float64]) -> bytes:
     """A matrix as OpenGL takes it: float32, by columns."""
     return np.ascontiguousarray(matrix.T, dtype=np.float32).tobytes()
+
+
+def _set(program: moderngl.Program, **values: bytes | float | tuple[float, ...]) -> None:
+    """Give a program its uniforms; those that its compiler found no use for are left out."""
+    for name, value in values.items():
+        uniform = program.get(name, None)
+        if isinstance(uniform, moderngl.Uniform):
+            if isinstance(value, bytes):
+                uniform.write(value)
+            else:
+                uniform.value = value

@@ -3,8 +3,7 @@
 Colours are computed in linear light and written as sRGB.
 """
 
-_COMMON = """
-#version 330
+_COMMON = """#version 330
 vec3 to_linear(vec3 c) { return pow(c, vec3(2.2)); }
 vec3 to_srgb(vec3 c) { return pow(clamp(c, 0.0, 1.0), vec3(1.0 / 2.2)); }
 vec3 backdrop(float height) {
@@ -30,7 +29,8 @@ BACKDROP_FRAGMENT = (
     + """
 in vec2 place;
 out vec4 color;
-void main() { color = vec4(backdrop(place.y), 1.0); }
+uniform float level;                  // 1: seen from the side; 0: from above
+void main() { color = vec4(backdrop(mix(0.35, place.y, level)), 1.0); }
 """
 )
 
@@ -71,7 +71,7 @@ float line(float step_m, float width_px) {
 }
 void main() {
     float far = 1.0 - smoothstep(0.35, 1.0, length(place) / extent);
-    float lines = max(0.30 * line(fine, 0.6), 0.62 * line(coarse, 0.8)) * strength;
+    float lines = max(0.20 * line(fine, 0.55), 0.42 * line(coarse, 0.7)) * strength;
     float dark = 0.0;
     if (shade > 0.0) {
         vec2 at = (place - shadow_center) / (2.0 * shadow_extent) + 0.5;
@@ -137,9 +137,8 @@ void main() {
     float sky = open * mix(1.0, 0.55 + 0.45 * near_floor, 1.0 - up);
     vec3 diffuse = mix(vec3(0.26, 0.255, 0.25), vec3(0.66, 0.69, 0.73), up * up) * sky;
     diffuse += vec3(0.74, 0.71, 0.66) * max(dot(n, KEY), 0.0) * mix(0.55, 1.0, open);
-    diffuse += vec3(0.10, 0.12, 0.15) * max(dot(n, normalize(vec3(-0.7, -0.5, 0.25))), 0.0);
-
     float facing_eye = max(dot(n, to_eye), 0.0);
+    diffuse += vec3(0.26, 0.27, 0.29) * facing_eye * open;
     vec3 base = mix(vec3(0.04), albedo, metallic);
     vec3 fresnel = base + (max(vec3(1.0 - roughness), base) - base) * pow(1.0 - facing_eye, 5.0);
     vec3 mirror = studio(reflect(-to_eye, n), roughness) * fresnel * mix(0.4, 1.0, open) * sky;
@@ -164,21 +163,18 @@ uniform mat4 site_to_clip, part_to_site;
 in vec3 position;
 void main() {
     gl_Position = site_to_clip * part_to_site * vec4(position, 1.0);
-    gl_Position.z -= 2e-4 * gl_Position.w;    // in front of the faces that it divides
 }
 """
 )
 
-EDGE_FRAGMENT = """
-#version 330
+EDGE_FRAGMENT = """#version 330
 uniform vec4 tone;
 out vec4 color;
 void main() { color = tone; }
 """
 
 # Seen from below against the light: the height of the lowest thing above each place of the floor.
-SHADOW_VERTEX = """
-#version 330
+SHADOW_VERTEX = """#version 330
 uniform mat4 part_to_site;
 uniform vec2 center;
 uniform float extent, floor_height, tallest;
@@ -193,8 +189,7 @@ void main() {
 }
 """
 
-SHADOW_FRAGMENT = """
-#version 330
+SHADOW_FRAGMENT = """#version 330
 in float height;
 out float lowest;
 void main() { lowest = height; }

@@ -11,10 +11,10 @@ NOTHING = 1e6
 
 # (up to this height, blurred by this much, this dark), heights and widths over the scene's radius.
 _LAYERS = (
-    (0.05, 0.02, 0.55),
-    (0.20, 0.05, 0.38),
-    (0.50, 0.11, 0.26),
-    (1e9, 0.20, 0.16),
+    (0.05, 0.025, 0.62),
+    (0.25, 0.05, 0.36),
+    (0.60, 0.09, 0.34),
+    (1e9, 0.15, 0.26),
 )
 
 
