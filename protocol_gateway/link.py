@@ -9,11 +9,13 @@ Data is dated once, when its last byte was read from the socket, and never again
 
 import asyncio
 import logging
+import os
 import random
 import socket
 import time
+from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from enum import Enum
 
 from protocol_gateway.driver import (
@@ -32,6 +34,8 @@ logger = logging.getLogger(__name__)
 _SEND_BUFFER_BYTES = 4096
 _FIRST_PAUSE_S = 0.2
 _LONGEST_PAUSE_S = 5.0
+# What we wrote and the controller's host has not acknowledged for this long breaks the connection.
+_UNACKNOWLEDGED_MS = 3000
 
 
 class LinkState(Enum):
@@ -111,40 +115,243 @@ class ControllerLink:
         monotonic_s: Callable[[], float] = time.monotonic,
         wall_ns: Callable[[], int] = time.time_ns,
     ) -> None:
-        raise NotImplementedError
+        self._settings = settings
+        self._driver = driver
+        self._on_event = on_event
+        self._on_status = on_status
+        self._monotonic_s = monotonic_s
+        self._wall_ns = wall_ns
+        self._where = f"{settings.host}:{settings.port}"
+        self._connection: _Connection | None = None
+        self._status = LinkStatus(LinkState.DOWN, f"connecting to {self._where}")
+        self._counts: Counter[str] = Counter()
+        self._last_received: Received | None = None
+        self._refusal = ""
+        self._rate = _Rate()
 
     @property
     def status(self) -> LinkStatus:
         """State of the link, in words too."""
-        raise NotImplementedError
+        return self._status
 
     @property
     def counters(self) -> LinkCounters:
         """Counts so far."""
-        raise NotImplementedError
+        return LinkCounters(units_received=self._driver.units_received, **self._counts)
 
     @property
     def last_received(self) -> Received | None:
         """When the last well-formed unit came; None: none yet."""
-        raise NotImplementedError
+        return self._last_received
 
     @property
     def rate_hz(self) -> float:
-        """Units a second, over the last second."""
-        raise NotImplementedError
+        """Units a second, over the last second or so; 0 when none came."""
+        return self._rate.at(self._monotonic_s())
 
     async def run(self) -> None:
         """Keep the link until cancelled; the connection is closed then."""
-        raise NotImplementedError
+        pause_s = _FIRST_PAUSE_S
+        while True:
+            if await self._attempt():
+                pause_s = _FIRST_PAUSE_S
+            # Spread: the gateways of a hall must not all knock on a restarted controller at once.
+            await asyncio.sleep(pause_s * random.uniform(0.8, 1.2))
+            pause_s = min(pause_s * 2.0, _LONGEST_PAUSE_S)
 
     def send(self, data: bytes) -> None:
         """Write a whole unit to the socket, now. Nothing is ever queued, so nothing goes before it.
 
         On return the unit is in the hands of the operating system, whole. After an error it is not,
-        and it will not be done later.
+        and it will not be done later. Works on a SILENT link too: a stop is worth trying there.
 
         Raises:
             LinkDownError: If there is no connection.
             LinkCloggedError: If the socket does not take it whole; the connection is given up then.
         """
-        raise NotImplementedError
+        if self._connection is None:
+            raise LinkDownError(f"not sent: {self._status.text}")
+        self._connection.write(data)
+        self._counts["units_sent"] += 1
+        self._counts["bytes_sent"] += len(data)
+
+    async def _attempt(self) -> bool:
+        """One connection, from the attempt to its end; whether units came over it."""
+        loop = asyncio.get_running_loop()
+        try:
+            async with asyncio.timeout(self._settings.connect_timeout_s):
+                _, connection = await loop.create_connection(
+                    lambda: _Connection(self._made, self._receive), self._settings.host, self._settings.port
+                )
+        except TimeoutError:
+            self._tell(LinkState.DOWN, f"{self._where} does not answer")
+            return False
+        except OSError as error:
+            self._tell(LinkState.DOWN, f"cannot connect to {self._where}: {_reason(error)}")
+            return False
+        units_before = self._driver.units_received
+        text = "the link was closed"
+        try:
+            text = await self._watch(connection)
+        finally:
+            self._connection = None
+            await connection.end()
+            self._tell(LinkState.DOWN, text)
+        return self._driver.units_received > units_before and not self._refusal
+
+    async def _watch(self, connection: "_Connection") -> str:
+        """Wait for the connection's end, telling silence; the reason of the end in words."""
+        connected_s = self._monotonic_s()
+        patience_s, limit_s = self._settings.stale_after_s, self._settings.reconnect_after_s
+        while not connection.lost.done():
+            last_s = self._last_received.monotonic_s if self._last_received else connected_s
+            quiet_s = self._monotonic_s() - max(last_s, connected_s)
+            if quiet_s >= limit_s:
+                return f"{self._where} sent nothing for {limit_s:g} s; connecting again"
+            if quiet_s >= patience_s and self._status.state is LinkState.UP:
+                self._tell(LinkState.SILENT, f"{self._where} has sent nothing for {patience_s:g} s")
+            deadline_s = patience_s if quiet_s < patience_s else limit_s
+            await asyncio.wait([connection.lost], timeout=deadline_s - quiet_s)
+        end = connection.lost.result()
+        return (
+            f"{self._where} refused the connection: {self._refusal}"
+            if self._refusal
+            else f"{self._where}: {end}"
+        )
+
+    def _made(self, connection: "_Connection") -> None:
+        self._driver.connected()
+        self._connection = connection
+        self._refusal = ""
+        self._counts["connections"] += 1
+        self._tell(LinkState.SILENT, f"connected to {self._where}, no unit yet")
+
+    def _receive(self, data: bytes) -> None:
+        # Dated before it is parsed: what we do with it is not part of its age.
+        received = Received(self._monotonic_s(), self._wall_ns())
+        units_before = self._driver.units_received
+        events = self._driver.receive(data)
+        units = self._driver.units_received - units_before
+        self._counts["bytes_received"] += len(data)
+        if units:
+            self._last_received = received
+            self._rate.count(units, received.monotonic_s)
+        for event in events:
+            self._count(event)
+        # A refusal is an answer, not a sign that the arm's state comes.
+        if units and self._status.state is not LinkState.UP and not self._refusal:
+            self._tell(LinkState.UP, f"connected to {self._where}")
+        for event in events:
+            self._on_event(event, received)
+
+    def _count(self, event: ControllerEvent) -> None:
+        match event:
+            case MalformedReceived():
+                self._counts["units_malformed"] += 1
+            case UnknownReceived():
+                self._counts["records_unknown"] += 1
+            case Refused(_, text):
+                self._counts["refusals"] += 1
+                if self._status.state is not LinkState.UP:
+                    self._refusal = text
+
+    def _tell(self, state: LinkState, text: str) -> None:
+        status = LinkStatus(state, text)
+        if status == self._status:
+            return
+        self._status = status
+        logger.info("link %s: %s", state.value, text)
+        self._on_status(status)
+
+
+class _Connection(asyncio.Protocol):
+    """One TCP connection; `lost` is done, with the reason in words, when it has ended."""
+
+    _transport: asyncio.Transport
+
+    def __init__(self, made: Callable[["_Connection"], None], receive: Callable[[bytes], None]) -> None:
+        self._made = made
+        self._receive = receive
+        loop = asyncio.get_running_loop()
+        self.lost: asyncio.Future[str] = loop.create_future()
+        self._closed: asyncio.Future[None] = loop.create_future()
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        self._transport = transport
+        _configure(transport.get_extra_info("socket"))
+        self._guarded(lambda: self._made(self))
+
+    def data_received(self, data: bytes) -> None:
+        self._guarded(lambda: self._receive(data))
+
+    def connection_lost(self, error: Exception | None) -> None:
+        reason = _reason(error) if isinstance(error, OSError) else "the controller closed the connection"
+        if not self.lost.done():
+            self.lost.set_result(reason)
+        self._closed.set_result(None)
+
+    def write(self, data: bytes) -> None:
+        if self._transport.is_closing():
+            raise LinkDownError("not sent: the connection has just ended")
+        # asyncio writes at once when its buffer is empty, and here it always is: what does not
+        # fit ends the connection, so that half a unit can never be completed later.
+        self._transport.write(data)
+        if self._transport.is_closing():
+            raise LinkDownError("not sent: the connection broke while it was written")
+        if self._transport.get_write_buffer_size():
+            self._transport.abort()
+            raise LinkCloggedError("not sent: the controller does not read; connecting again")
+
+    async def end(self) -> None:
+        self._transport.abort()
+        await self._closed
+
+    def _guarded(self, call: Callable[[], None]) -> None:
+        """Bad code ends `run` with its own exception; asyncio would only log it."""
+        try:
+            call()
+        except Exception as error:
+            if not self.lost.done():
+                self.lost.set_exception(error)
+            self._transport.abort()
+
+
+class _Rate:
+    """Units a second, counted over bins of a second."""
+
+    def __init__(self) -> None:
+        self._begin_s = 0.0
+        self._units = 0
+        self._hz = 0.0
+        self._last_s = 0.0
+
+    def count(self, units: int, now_s: float) -> None:
+        elapsed_s = now_s - self._begin_s
+        if elapsed_s >= 1.0:
+            # After a pause there is no rate to tell yet.
+            self._hz = self._units / elapsed_s if elapsed_s < 2.0 else 0.0
+            self._begin_s, self._units = now_s, 0
+        self._units += units
+        self._last_s = now_s
+
+    def at(self, now_s: float) -> float:
+        return self._hz if now_s - self._last_s < 2.0 else 0.0
+
+
+def _configure(connected: socket.socket) -> None:
+    """Units go out at once; a host that vanished is noticed in seconds."""
+    connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connected.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
+    connected.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, 2)
+    connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, 1)
+    connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT, 3)
+    connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _UNACKNOWLEDGED_MS)
+
+
+def _reason(error: OSError) -> str:
+    # asyncio's own text repeats the address; the system's says what is wrong.
+    if error.errno is not None and error.errno > 0:
+        return os.strerror(error.errno).lower()
+    return (error.strerror or str(error)).lower()

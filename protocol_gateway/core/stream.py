@@ -1,0 +1,104 @@
+"""Units out of a stream of bytes that comes in any pieces.
+
+    between units --bytes--> in a unit --"@"--> Unit or Malformed, between units
+    in a unit --64 KiB without "@"--> Malformed, lost --"@"--> between units
+
+What is malformed harms nothing before its first byte or after its "@".
+"""
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from protocol_gateway.core import codes
+from protocol_gateway.core.codes import CodeTable
+from protocol_gateway.core.grammar import TERMINATOR
+from protocol_gateway.core.records import Record, read_records
+from protocol_gateway.errors import UnitError
+
+LONGEST_UNIT_BYTES = 64 * 1024
+"""With its "@"."""
+
+_LONGEST_TEXT = 256
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A well-formed unit.
+
+    Attributes:
+        records: In the order in which they are done.
+        data: Its bytes, up to its "@", without it.
+        offset: Of its first byte in the stream.
+    """
+
+    records: tuple[Record, ...]
+    data: bytes
+    offset: int
+
+
+@dataclass(frozen=True, slots=True)
+class Malformed:
+    """Bytes that are no unit; nothing in them was done.
+
+    Attributes:
+        offset: Of their first byte in the stream.
+        text: The first 256 of them, printable.
+        reason: What is wrong.
+    """
+
+    offset: int
+    text: str
+    reason: str
+
+
+StreamEvent: TypeAlias = Unit | Malformed
+
+
+class UnitStream:
+    """One direction of one connection."""
+
+    def __init__(self, table: CodeTable = codes.NAMES) -> None:
+        self._table = table
+        self._buffer = bytearray()
+        self._offset = 0  # of the buffer's first byte
+        self._lost = False  # past 64 KiB: skipping to the next "@"
+
+    def receive(self, data: bytes) -> list[StreamEvent]:
+        """Events of the next bytes; the same however they are cut."""
+        events: list[StreamEvent] = []
+        # Only the new bytes can hold an "@": pieces of one byte each stay linear.
+        searched = len(self._buffer)
+        self._buffer += data
+        begin = 0
+        while (end := self._buffer.find(TERMINATOR, max(begin, searched))) >= 0:
+            if self._lost:
+                self._lost = False
+            else:
+                events.append(self._unit(bytes(self._buffer[begin:end]), self._offset + begin))
+            begin = end + 1
+        self._offset += begin
+        del self._buffer[:begin]
+        if len(self._buffer) >= LONGEST_UNIT_BYTES:
+            if not self._lost:
+                events.append(self._too_long(bytes(self._buffer), self._offset))
+                self._lost = True
+            self._offset += len(self._buffer)
+            self._buffer.clear()
+        return events
+
+    def _unit(self, data: bytes, offset: int) -> StreamEvent:
+        if len(data) >= LONGEST_UNIT_BYTES:
+            return self._too_long(data, offset)
+        try:
+            return Unit(read_records(data, self._table), data, offset)
+        except UnitError as error:
+            return Malformed(offset, _printable(data), str(error))
+
+    def _too_long(self, data: bytes, offset: int) -> Malformed:
+        return Malformed(offset, _printable(data), f"no '@' within {LONGEST_UNIT_BYTES} bytes")
+
+
+def _printable(data: bytes) -> str:
+    text = data[:_LONGEST_TEXT].decode("ascii", "backslashreplace")
+    shown = "".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in text)
+    return shown + "…" if len(data) > _LONGEST_TEXT else shown
