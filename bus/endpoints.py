@@ -53,6 +53,8 @@ def router_config(
             "mode": "router",
             "listen/endpoints": list(listen),
             "connect/endpoints": [_two_links(router) for router in connect],
+            # Nobody is scouted for; the default waits half a second for nobody.
+            "scouting/delay": 1,
             # Another site may be away for days: this site starts without it.
             "connect/exit_on_failure": False,
             "connect/timeout_ms": -1,

@@ -1,0 +1,144 @@
+"""The supervisor: a process a service, prefixed logs, restarts with back-off, all down in time.
+
+It holds no robot state and is on no data path: killed, it takes its processes with it; a killed
+process comes back, and the others do not notice.
+"""
+
+import asyncio
+import contextlib
+import ctypes
+import os
+import random
+import signal
+import sys
+import time
+from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import dataclass
+
+from services.errors import ServiceError
+
+# Together less than the 2 s in which a site must be down.
+_ASK_S = 1.3
+_SHORTEST_WAIT_S = 0.3
+_LONGEST_WAIT_S = 10.0
+# What ran this long is taken for well: its next failure waits the shortest time again.
+_WELL_AFTER_S = 20.0
+_COULD_NOT = 2
+_PR_SET_PDEATHSIG = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Program:
+    """A process to keep running.
+
+    Attributes:
+        needed: The site cannot do without it: when it cannot start at all, nothing starts.
+    """
+
+    name: str
+    arguments: tuple[str, ...]
+    needed: bool = True
+
+
+class CouldNotStartError(ServiceError):
+    """A needed service says that it cannot run as it is configured; its own line said why."""
+
+
+async def supervise(
+    programs: Sequence[Program],
+    *,
+    ready: Callable[[], Awaitable[None]],
+    write: Callable[[str], None],
+) -> None:
+    """Run the programs, in order, until cancelled.
+
+    Args:
+        ready: Runs beside them; for whoever waits until the site is up.
+        write: Takes a line of log.
+
+    Raises:
+        CouldNotStartError: If a needed one exits with status 2 before it ever ran well.
+    """
+    width = max(len(program.name) for program in programs)
+    running: dict[str, asyncio.subprocess.Process] = {}
+    try:
+        async with asyncio.TaskGroup() as group:
+            for program in programs:
+                prefix = f"{program.name:<{width}} | "
+                group.create_task(_keep(program, running, lambda line, p=prefix: write(p + line)))
+            group.create_task(_once(ready))
+    except* ServiceError as errors:
+        raise errors.exceptions[0] from None
+    finally:
+        await _end(running.values())
+
+
+async def _once(ready: Callable[[], Awaitable[None]]) -> None:
+    await ready()
+
+
+async def _keep(
+    program: Program, running: dict[str, asyncio.subprocess.Process], write: Callable[[str], None]
+) -> None:
+    wait_s = _SHORTEST_WAIT_S
+    ran_well = False
+    while True:
+        started = time.monotonic()
+        process = await _start(program)
+        running[program.name] = process
+        assert process.stdout is not None
+        async for line in process.stdout:
+            write(line.decode(errors="replace").rstrip())
+        status = await process.wait()
+        ran_s = time.monotonic() - started
+        if status == _COULD_NOT and not ran_well and ran_s < _WELL_AFTER_S:
+            if program.needed:
+                raise CouldNotStartError(f"{program.name} could not start, so the site does not")
+            write("could not start; everything else runs without it")
+            return
+        if ran_s > _WELL_AFTER_S:
+            ran_well, wait_s = True, _SHORTEST_WAIT_S
+        write(f"ended ({_status(status)}); again in {wait_s:.1f} s")
+        await asyncio.sleep(wait_s * random.uniform(0.8, 1.2))
+        wait_s = min(2 * wait_s, _LONGEST_WAIT_S)
+
+
+async def _start(program: Program) -> asyncio.subprocess.Process:
+    supervisor = os.getpid()
+
+    def die_with_the_supervisor() -> None:
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+        if os.getppid() != supervisor:
+            os._exit(0)
+
+    return await asyncio.create_subprocess_exec(
+        sys.executable,
+        "-m",
+        "services.command_line.main",
+        *program.arguments,
+        stdin=asyncio.subprocess.DEVNULL,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.STDOUT,
+        # A terminal's Ctrl-C is for the supervisor, which ends the others in order.
+        start_new_session=True,
+        preexec_fn=die_with_the_supervisor,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )
+
+
+async def _end(processes: Sequence[asyncio.subprocess.Process]) -> None:
+    for process in processes:
+        with contextlib.suppress(ProcessLookupError):
+            process.send_signal(signal.SIGTERM)
+    try:
+        async with asyncio.timeout(_ASK_S):
+            await asyncio.gather(*(process.wait() for process in processes))
+    except TimeoutError:
+        for process in processes:
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+        await asyncio.gather(*(process.wait() for process in processes))
+
+
+def _status(status: int) -> str:
+    return f"killed by {signal.Signals(-status).name}" if status < 0 else f"exit status {status}"

@@ -1,0 +1,63 @@
+"""Check that generated files are current and lock files hold no address: `./dev check` runs it.
+
+Usage: check_generated.py UV LOCK_ARGUMENT...
+"""
+
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+SCHEMAS = ROOT / "bus" / "schemas"
+PACKAGE_LOCK = ROOT / "services" / "console" / "page" / "package-lock.json"
+LOCK = ROOT / "requirements.lock"
+
+
+def generated_modules() -> list[str]:
+    """Problems with the modules that protoc writes."""
+    with tempfile.TemporaryDirectory() as folder:
+        protoc = [sys.executable, "-m", "grpc_tools.protoc", f"-I{SCHEMAS}"]
+        outputs = [f"--python_out={folder}", f"--pyi_out={folder}"]
+        if subprocess.run([*protoc, *outputs, "robomesh.proto"]).returncode:
+            return ["robomesh.proto: protoc refuses it"]
+        return [
+            f"bus/schemas/{new.name} is not what robomesh.proto makes: run "
+            "./dev run python -m grpc_tools.protoc -Ibus/schemas --python_out=bus/schemas "
+            "--pyi_out=bus/schemas robomesh.proto"
+            for new in Path(folder).iterdir()
+            if new.read_bytes() != (SCHEMAS / new.name).read_bytes()
+        ]
+
+
+def requirements_lock(uv: str, arguments: list[str]) -> list[str]:
+    """Problems with requirements.lock: what it is made of asks for something else."""
+    with tempfile.TemporaryDirectory() as folder:
+        # With the old file as output, versions are kept where they still fit.
+        again = Path(folder) / LOCK.name
+        again.write_bytes(LOCK.read_bytes())
+        subprocess.run([uv, *arguments, "--output-file", str(again)], cwd=ROOT, check=True)
+        if _pins(again) != _pins(LOCK):
+            return ["requirements.lock is not what pyproject.toml asks for: run ./dev lock"]
+    return []
+
+
+def addresses() -> list[str]:
+    """Problems with lock files that would work behind one mirror only."""
+    return [
+        f"{path.relative_to(ROOT)}:{number}: an address: {line.strip()}"
+        for path in (LOCK, PACKAGE_LOCK)
+        for number, line in enumerate(path.read_text().splitlines(), 1)
+        if re.search(r'"resolved"|index-url|find-links|registry\.|https?://[^"\s]*\.(whl|tgz|gz)', line)
+    ]
+
+
+def _pins(path: Path) -> list[str]:
+    return [line for line in path.read_text().splitlines() if line and not line.lstrip().startswith("#")]
+
+
+if __name__ == "__main__":
+    problems = [*generated_modules(), *requirements_lock(sys.argv[1], sys.argv[2:]), *addresses()]
+    print("\n".join(problems) if problems else "generated code and lock files are current")
+    sys.exit(1 if problems else 0)
