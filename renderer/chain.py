@@ -1,0 +1,157 @@
+"""The links of a URDF: where they are at given joint positions, and how far they come.
+
+What a description tells over the mesh is enough for both, so the renderer needs no robot model.
+"""
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.errors import ChainError
+
+FloatArray = NDArray[np.float64]
+
+_SAMPLES = 600
+
+
+@dataclass(frozen=True, eq=False)
+class ChainJoint:
+    """A joint of the chain; `kind` as in URDF."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    origin: FloatArray
+    axis: FloatArray
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """Joints from the root outwards: each one's parent link comes before its child."""
+
+    root: str
+    joints: tuple[ChainJoint, ...]
+
+
+def read_chain(urdf: str) -> Chain:
+    """The chain of a URDF.
+
+    Raises:
+        ChainError: If it is no URDF, or its joints do not hang together.
+    """
+    try:
+        robot = ElementTree.fromstring(urdf)
+        waiting = [_joint(element) for element in robot.findall("joint")]
+        links = [link.attrib["name"] for link in robot.findall("link")]
+    except (ElementTree.ParseError, KeyError, ValueError) as error:
+        raise ChainError(f"a description whose URDF cannot be read: {error!r}") from None
+    children = {joint.child for joint in waiting}
+    roots = [link for link in links if link not in children]
+    if len(roots) != 1:
+        raise ChainError(f"a URDF with {len(roots)} root links ({', '.join(roots)}): one is right")
+    placed, ordered = {roots[0]}, list[ChainJoint]()
+    while waiting:
+        ready = [joint for joint in waiting if joint.parent in placed]
+        if not ready:
+            raise ChainError(f"a URDF whose joint {waiting[0].name!r} hangs on nothing")
+        ordered += ready
+        placed |= {joint.child for joint in ready}
+        waiting = [joint for joint in waiting if joint.parent not in placed or joint.child not in placed]
+    return Chain(roots[0], tuple(ordered))
+
+
+def placements(chain: Chain, positions: Mapping[str, float]) -> dict[str, FloatArray]:
+    """(4, 4) link to base of every link; joints that are not named stand at 0.
+
+    Args:
+        positions: By joint [rad] or [m].
+    """
+    placed = {chain.root: np.eye(4)}
+    for joint in chain.joints:
+        placed[joint.child] = (
+            placed[joint.parent] @ joint.origin @ _motion(joint, positions.get(joint.name, 0.0))
+        )
+    return placed
+
+
+def reach(chain: Chain) -> FloatArray:
+    """(n, 3) where the links' origins come within the joints' limits, in the base frame [m].
+
+    A sample of it, the same each time; and how the arm stands with every joint at 0.
+    """
+    random = np.random.default_rng(0)
+    points = [[placement[:3, 3] for placement in placements(chain, {}).values()]]
+    for _ in range(_SAMPLES):
+        # Towards the limits more often than not: that is where an arm is longest.
+        share = random.beta(0.7, 0.7, len(chain.joints))
+        positions = {
+            joint.name: joint.lower + share[index] * (joint.upper - joint.lower)
+            for index, joint in enumerate(chain.joints)
+        }
+        points.append([placement[:3, 3] for placement in placements(chain, positions).values()])
+    return np.concatenate([np.array(each) for each in points])
+
+
+def _joint(element: ElementTree.Element) -> ChainJoint:
+    limit = element.find("limit")
+    bounds = limit.attrib if limit is not None else {}
+    axis = element.find("axis")
+    kind = element.attrib["type"]
+    full_turn = np.pi if kind == "continuous" else 0.0
+    return ChainJoint(
+        name=element.attrib["name"],
+        kind=kind,
+        parent=_link(element, "parent"),
+        child=_link(element, "child"),
+        origin=_origin(element.find("origin")),
+        axis=_numbers(axis.attrib.get("xyz", "1 0 0") if axis is not None else "1 0 0"),
+        lower=float(bounds.get("lower", -full_turn)),
+        upper=float(bounds.get("upper", full_turn)),
+    )
+
+
+def _link(element: ElementTree.Element, end: str) -> str:
+    child = element.find(end)
+    if child is None:
+        raise ValueError(f"joint {element.attrib['name']!r} has no {end}")
+    return child.attrib["link"]
+
+
+def _origin(element: ElementTree.Element | None) -> FloatArray:
+    placement = np.eye(4)
+    if element is not None:
+        roll, pitch, yaw = _numbers(element.attrib.get("rpy", "0 0 0"))
+        z, y, x = np.eye(3)[::-1]
+        placement[:3, :3] = rotation(z, yaw) @ rotation(y, pitch) @ rotation(x, roll)
+        placement[:3, 3] = _numbers(element.attrib.get("xyz", "0 0 0"))
+    return placement
+
+
+def _numbers(text: str) -> FloatArray:
+    values = np.array([float(part) for part in text.split()])
+    if len(values) != 3:
+        raise ValueError(f"{text!r} is not three numbers")
+    return values
+
+
+def _motion(joint: ChainJoint, position: float) -> FloatArray:
+    motion = np.eye(4)
+    if joint.kind in ("revolute", "continuous"):
+        motion[:3, :3] = rotation(joint.axis, position)
+    elif joint.kind == "prismatic":
+        motion[:3, 3] = joint.axis * position
+    return motion
+
+
+def rotation(axis: FloatArray, angle: float) -> FloatArray:
+    """(3, 3) rotation about a unit axis by an angle [rad] (Rodrigues)."""
+    x, y, z = axis
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    matrix: FloatArray = np.eye(3) + np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across
+    return matrix
