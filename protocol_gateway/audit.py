@@ -252,7 +252,7 @@ class AuditLog:
                 placed.append(chained(entry, number=number, previous=previous))
                 previous = placed[-1].hash
             try:
-                # An fsync takes milliseconds, and seconds on a busy disk: the joint stream must not wait for it.
+                # An fsync takes milliseconds, seconds on a busy disk: the joint stream must not wait for it.
                 await asyncio.to_thread(self._write, placed)
             except OSError as error:
                 problem = f"the audit log {self.path.name} cannot be written ({error.strerror})"

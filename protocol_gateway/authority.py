@@ -2,18 +2,18 @@
 
 Two states that do not know each other, the lease's and the stop's:
 
-    lease     ACQUIRE   RENEW   RELEASE, expiry, TAKE by another   motion command   motion over   foreign motion
-    --------  --------  ------  ---------------------------------  ---------------  ------------  --------------
-    free      held      no      no                                 no               -             free
-    held      no*       held    free                               moving           -             free
-    moving    no*       moving  free, and the robot is stopped     moving           held          -
+    lease    ACQUIRE  RENEW   RELEASE, expiry, another's TAKE  motion command  motion over  foreign motion
+    -------  -------  ------  -------------------------------  --------------  -----------  --------------
+    free     held     no      no                               no              -            free
+    held     no*      held    free                             moving          -            free
+    moving   no*      moving  free, and the robot is stopped   moving          held         -
 
     stop      STOP      RESET of this stop   RESET of another   motion command
     --------  --------  -------------------  -----------------  --------------
     clear     latched   no                   no                 yes
     latched   latched   clear                no                 no
 
-"no" is a refusal in words, *but the holder's own ACQUIRE renews. OFFER and ACCEPT pass a lease that
+"no" is a refusal in words, * but the holder's own ACQUIRE renews. OFFER and ACCEPT pass a lease that
 does not move on to another operator; TAKE gives a reason. Every stop has a number of its own, so a
 RESET never clears a stop that its sender has not seen. "moving" covers motion that is held (HOLD):
 it would go on with anybody's RESUME.
@@ -29,7 +29,7 @@ DEFAULT_TTL_S = 2.0
 SHORTEST_TTL_S = 0.5
 LONGEST_TTL_S = 5.0
 
-# Servos and brakes take their time: no motion within this long after a command means that there is none to come.
+# Servos and brakes take their time: no motion within this long after a command, and none will come.
 START_S = 2.0
 # A controller that goes from one motion to the next is idle for a moment in between.
 SETTLE_S = 0.5
@@ -86,7 +86,7 @@ class Lease:
     until_s: float
     until_ns: int
     last_id: int = 0
-    last_answer: Answer = Answer(False, "")
+    last_answer: Answer | None = None
     offered_to: str = ""
     renewals: int = 0
     motion: Motion | None = None
@@ -135,17 +135,6 @@ class LeaseOutcome(NamedTuple):
     ended: LeaseEnd | None = None
 
 
-class Verdict(NamedTuple):
-    """Whether a command may go on; `repeat`: it was answered before, and is not done again."""
-
-    answer: Answer
-    repeat: bool = False
-    counted: bool = False  # its id is the holder's, so the answer is kept for a repeat
-
-
-# ---------------------------------------------------------------------- lease
-
-
 def request_lease(
     authority: Authority, request: LeaseRequest, *, operator: str, now: Now, secret: str
 ) -> LeaseOutcome:
@@ -188,7 +177,7 @@ def request_lease(
             return _refused(authority, f"control was not offered to {operator}: ask its holder, or ACQUIRE")
         case action.TAKE:
             return _refused(authority, "TAKE needs a reason: say in `reason` why control is taken away")
-    return _refused(authority, _why_not_holder(authority, operator))
+    return _refused(authority, why_not_holder(authority, operator))
 
 
 def holds(authority: Authority, operator: str, secret: str) -> bool:
@@ -215,17 +204,13 @@ def end_lease(authority: Authority, why: str) -> tuple[Authority, LeaseEnd | Non
     lease = authority.lease
     if lease is None:
         return authority, None
-    ended = LeaseEnd(
-        holder=lease.holder, why=why, renewals=lease.renewals, stop=lease.motion is not None
-    )
+    ended = LeaseEnd(holder=lease.holder, why=why, renewals=lease.renewals, stop=lease.motion is not None)
     return replace(authority, lease=None), ended
 
 
 def _grant(
     authority: Authority, request: LeaseRequest, *, operator: str, now: Now, secret: str, text: str
 ) -> LeaseOutcome:
-    foreign_s = authority.foreign_s
-    recently = foreign_s is not None and now.monotonic_s - foreign_s < RECENT_S
     lease = Lease(
         holder=operator,
         secret=secret,
@@ -233,7 +218,7 @@ def _grant(
         ttl_s=0.0,
         until_s=0.0,
         until_ns=0,
-        tolerates_motion=recently,
+        tolerates_motion=moved_recently(authority, now),
     )
     lease = _timed(lease, request.ttl_s, now)
     return LeaseOutcome(replace(authority, lease=lease), Answer(True, text), lease)
@@ -253,80 +238,14 @@ def _refused(authority: Authority, text: str) -> LeaseOutcome:
     return LeaseOutcome(authority, Answer(False, text))
 
 
-def _why_not_holder(authority: Authority, operator: str) -> str:
+def why_not_holder(authority: Authority, operator: str) -> str:
+    """Why a request in an operator's name is not its lease's holder's, and what to do."""
     lease = authority.lease
     if lease is None:
         return "nobody is in control, or the lease has ended: take control first (ACQUIRE)"
     if lease.holder != operator:
         return f"{lease.holder} is in control: wait until it is given back, or ask for it"
     return f"{operator} is in control with another lease (another window or program?): this one is not valid"
-
-
-# ------------------------------------------------------------------- commands
-
-
-def admit(authority: Authority, request: CommandRequest, *, operator: str, now: Now) -> Verdict:
-    """Whether a command comes from the holder, in time and for the first time, and no stop forbids it.
-
-    What the controller's state and the joints' limits forbid is `protocol_gateway.obstacles`' to say.
-    """
-    if not holds(authority, operator, request.lease) or authority.lease is None:
-        return Verdict(Answer(False, f"Not sent: {_why_not_holder(authority, operator)}."))
-    lease = authority.lease
-    if request.id == lease.last_id and request.id:
-        return Verdict(lease.last_answer, repeat=True)
-    if request.id <= lease.last_id:
-        return Verdict(
-            Answer(
-                False,
-                f"Not sent: id {request.id} is not higher than {lease.last_id}, the last one under this lease: "
-                "count up with each command.",
-            )
-        )
-    refusal = lateness(request, now) or stop_refusal(authority, request)
-    if refusal:
-        return Verdict(Answer(False, refusal), counted=True)
-    return Verdict(Answer(True, ""), counted=True)
-
-
-def lateness(request: CommandRequest, now: Now) -> str:
-    """Why a command comes too late; empty: it does not."""
-    if not request.HasField("not_after"):
-        return ""
-    late_s = (now.wall_ns - request.not_after.ToNanoseconds()) * 1e-9
-    if late_s <= 0:
-        return ""
-    return (
-        f"Not sent: it came {late_s:.2f} s after its not_after: delayed on the way, or dated by another clock "
-        "than the gateway's (`now` in each lease answer)."
-    )
-
-
-def stop_refusal(authority: Authority, request: CommandRequest) -> str:
-    """Why a latched stop forbids a command; empty: it does not."""
-    stop = authority.stop
-    if request.command == _C.RESET:
-        if stop is None and request.stop_id:
-            return f"Not sent: stop {request.stop_id} is not latched; nothing is."
-        if stop is not None and stop.id != request.stop_id:
-            return (
-                f"Not sent: RESET names stop {request.stop_id}, but stop {stop.id} is latched "
-                f"({stop.by}: {stop.reason}): see to it, then send RESET with stop_id {stop.id}."
-            )
-    elif stop is not None and request.command in MOTION_COMMANDS:
-        return (
-            f"Not sent: stop {stop.id} is latched ({stop.by}: {stop.reason}): "
-            f"see to it, then send RESET with stop_id {stop.id}."
-        )
-    return ""
-
-
-def remember(authority: Authority, request: CommandRequest, answer: Answer) -> Authority:
-    """Keep a command's answer for its repeat; the id is used up from now on."""
-    lease = authority.lease
-    if lease is None or not hmac.compare_digest(lease.secret.encode(), request.lease.encode()):
-        return authority
-    return replace(authority, lease=replace(lease, last_id=request.id, last_answer=answer))
 
 
 def command_sent(authority: Authority, request: CommandRequest, now: Now) -> Authority:
@@ -344,17 +263,14 @@ def command_sent(authority: Authority, request: CommandRequest, now: Now) -> Aut
     return replace(authority, lease=replace(lease, motion=motion, tolerates_motion=False))
 
 
-# ----------------------------------------------------------------------- stop
-
-
-def stop(authority: Authority, *, by: str, reason: str, now: Now) -> Authority:
+def stop(authority: Authority, *, by: str, reason: str, now: Now) -> tuple[Authority, Stop]:
     """Latch a stop under a number of its own, and forget the motion that it ends."""
     number = authority.last_stop_id + 1
     latched = Stop(id=number, by=by, reason=reason or "no reason given", since_ns=now.wall_ns)
     lease = authority.lease
     if lease is not None:
         lease = replace(lease, motion=None)
-    return replace(authority, stop=latched, last_stop_id=number, lease=lease)
+    return replace(authority, stop=latched, last_stop_id=number, lease=lease), latched
 
 
 def stop_sent(authority: Authority, stop_id: int, now: Now) -> Authority:
@@ -362,9 +278,6 @@ def stop_sent(authority: Authority, stop_id: int, now: Now) -> Authority:
     if authority.stop is None or authority.stop.id != stop_id:
         return authority
     return replace(authority, stop=replace(authority.stop, sent_s=now.monotonic_s))
-
-
-# --------------------------------------------------------------------- motion
 
 
 def observe(authority: Authority, *, moving: bool, pending: bool, now: Now) -> tuple[Authority, bool]:
@@ -381,13 +294,20 @@ def observe(authority: Authority, *, moving: bool, pending: bool, now: Now) -> t
     authority = replace(authority, moving=moving)
     lease = authority.lease
     if lease is not None and lease.motion is not None:
-        return replace(authority, lease=replace(lease, motion=_follow(lease.motion, moving, pending, now))), False
+        return replace(
+            authority, lease=replace(lease, motion=_follow(lease.motion, moving, pending, now))
+        ), False
     foreign_s = authority.foreign_s
     goes_on = foreign_s is not None and now.monotonic_s - foreign_s < SETTLE_S
     # A robot that is still slowing down from a stop is neither.
     if moving and (began or goes_on):
         authority = replace(authority, foreign_s=now.monotonic_s)
     return authority, began
+
+
+def moved_recently(authority: Authority, now: Now) -> bool:
+    """Whether the robot was just moved by somebody who did not command it through the gateway."""
+    return authority.foreign_s is not None and now.monotonic_s - authority.foreign_s < RECENT_S
 
 
 def _follow(motion: Motion, moving: bool, pending: bool, now: Now) -> Motion | None:

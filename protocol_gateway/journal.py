@@ -1,0 +1,69 @@
+"""A robot's events, on the mesh and in the log: each kind at a limited rate, the rest counted."""
+
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from bus.publisher import Publisher
+from bus.schemas.robomesh_pb2 import Event
+
+log = logging.getLogger(__name__)
+
+# A controller that sends rubbish must not fill logs and recordings: so many of a kind within so long.
+_MOST = 5
+_WINDOW_S = 1.0
+_LONGEST_VALUE = 200
+
+_LEVELS = {
+    Event.Severity.DEBUG: logging.DEBUG,
+    Event.Severity.INFO: logging.INFO,
+    Event.Severity.WARNING: logging.WARNING,
+    Event.Severity.ERROR: logging.ERROR,
+    Event.Severity.CRITICAL: logging.CRITICAL,
+}
+
+
+@dataclass
+class _Kind:
+    began_s: float
+    said: int = 0
+    left_out: int = 0
+
+
+class Journal:
+    """Says events of one robot on its `events` topic."""
+
+    def __init__(
+        self, publisher: Publisher, robot: str, *, monotonic_s: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._publisher = publisher
+        self._robot = robot
+        self._monotonic_s = monotonic_s
+        self._kinds: dict[str, _Kind] = {}
+
+    def say(self, severity: Event.Severity, code: str, text: str, **values: object) -> None:
+        """Publish an event, unless five of its code were within the last second; then it is counted.
+
+        Args:
+            code: Stable, for programs: "unit.malformed".
+            text: For people.
+        """
+        now_s = self._monotonic_s()
+        kind = self._kinds.setdefault(code, _Kind(now_s))
+        if now_s - kind.began_s >= _WINDOW_S:
+            kind.began_s, kind.said = now_s, 0
+        if kind.said >= _MOST:
+            kind.left_out += 1
+            return
+        kind.said += 1
+        if kind.left_out:
+            values["left_out"] = kind.left_out
+            text = f"{text} (and {kind.left_out} more like it before)"
+            kind.left_out = 0
+        event = Event(severity=severity, code=code, text=text, source="gateway")
+        event.timestamp.GetCurrentTime()
+        for name, value in values.items():
+            event.values[name] = str(value)[:_LONGEST_VALUE]
+        self._publisher.put(event)
+        log.log(_LEVELS[severity], "%s: %s", self._robot, text)

@@ -1,0 +1,55 @@
+"""Whether a robot moves: told by its controller, or seen from its positions. No I/O."""
+
+from collections import deque
+
+from protocol_gateway.driver import Activity
+
+# A window long enough to tell the slowest motion (1 % of 20 degrees a second) from a sensor's last digit.
+WINDOW_S = 0.5
+_SAMPLE_S = 0.1
+_STILL_ROTARY = 1e-3  # rad
+_STILL_PRISMATIC = 1e-4  # m
+
+
+class PositionWatch:
+    """Sees motion in positions, for controllers that do not tell their activity."""
+
+    def __init__(self, prismatic: tuple[bool, ...]) -> None:
+        self._still = tuple(_STILL_PRISMATIC if each else _STILL_ROTARY for each in prismatic)
+        self._samples: deque[tuple[float, tuple[float, ...]]] = deque()
+
+    def see(self, positions: tuple[float, ...], time_s: float) -> None:
+        """Take note of positions [rad] or [m] at a monotonic time; more than ten a second are passed over."""
+        if self._samples and time_s - self._samples[-1][0] < _SAMPLE_S:
+            return
+        self._samples.append((time_s, positions))
+        while len(self._samples) > 2 and self._samples[1][0] <= time_s - WINDOW_S:
+            self._samples.popleft()
+
+    def forget(self) -> None:
+        """The link was lost: what comes next is no continuation."""
+        self._samples.clear()
+
+    @property
+    def moving(self) -> bool | None:
+        """Whether it moved within the last half second; None: too little was seen."""
+        if len(self._samples) < 2:
+            return None
+        last = self._samples[-1][1]
+        return any(
+            abs(there - here) > still
+            for _, sample in self._samples
+            for there, here, still in zip(sample, last, self._still, strict=True)
+        )
+
+
+def is_moving(activity: Activity | None, watch: PositionWatch) -> bool | None:
+    """Whether the robot moves: the controller's word where it gives one; None: not known."""
+    if activity is None:
+        return watch.moving
+    return activity in (Activity.MOVING, Activity.HOMING)
+
+
+def motion_may_be_held(activity: Activity | None) -> bool:
+    """Whether a held motion may be waiting: the controller says that it holds, or does not say."""
+    return activity is None or activity is Activity.HOLDING

@@ -1,0 +1,161 @@
+"""Why a command cannot go to a controller as it is now: its state, the joints' limits. No I/O.
+
+    command                     link  mode  stopped, fault  homed  limits
+    --------------------------  ----  ----  --------------  -----  ------
+    HOLD                        x
+    RESET TRACE_ON TRACE_OFF    x     x
+    SPEED                       x     x                            1-100 %
+    HOME                        x     x     x
+    RESUME                      x     x     x               x
+    MOVE_ABSOLUTE MOVE_RELATIVE x     x     x               x      x
+
+HOLD only ever makes a robot slower, so a mode that nobody knows does not forbid it.
+"""
+
+from dataclasses import dataclass
+
+from bus.schemas.robomesh_pb2 import CommandRequest
+from protocol_gateway.authority import MOTION_COMMANDS
+from protocol_gateway.driver import (
+    Activity,
+    ControllerCommand,
+    Hold,
+    Home,
+    Mode,
+    MoveAbsolute,
+    MoveRelative,
+    Reset,
+    Resume,
+    Speed,
+    StatusReceived,
+    Trace,
+)
+from protocol_gateway.link import LinkState, LinkStatus
+from robots.joints import Joints, violations
+
+_C = CommandRequest.Command
+_MOVES = frozenset({_C.MOVE_ABSOLUTE, _C.MOVE_RELATIVE})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Controller:
+    """What is known of a controller now.
+
+    Attributes:
+        positions: Where its joints are [rad] or [m]; None: not told yet.
+        read_only: No stop unit is configured and proven for it.
+        accept_unknown: What it never tells and the site file says to do without: "mode", "homed".
+    """
+
+    link: LinkStatus
+    status: StatusReceived
+    fault: str = ""
+    positions: tuple[float, ...] | None = None
+    read_only: bool = False
+    accept_unknown: frozenset[str] = frozenset()
+
+
+def obstacle(request: CommandRequest, controller: Controller, joints: Joints) -> str:
+    """Why the command cannot be sent: what, why and what next; empty: it can."""
+    why = (
+        _link_obstacle(controller)
+        or _mode_obstacle(request, controller)
+        or _state_obstacle(request, controller)
+        or _value_obstacle(request, controller, joints)
+    )
+    return f"Not sent: {why}." if why else ""
+
+
+def _link_obstacle(controller: Controller) -> str:
+    if controller.read_only:
+        return "this controller is read-only: no stop unit is configured and proven for it"
+    match controller.link.state:
+        case LinkState.DOWN:
+            return f"the link to the controller is down ({controller.link.text})"
+        case LinkState.SILENT:
+            return f"the controller is silent, where the robot is now is not known ({controller.link.text})"
+        case LinkState.UP:
+            return ""
+
+
+def _mode_obstacle(request: CommandRequest, controller: Controller) -> str:
+    match controller.status.mode:
+        case Mode.LOCAL:
+            return "the controller is in local mode: switch it to remote at the controller"
+        case None if request.command != _C.HOLD and "mode" not in controller.accept_unknown:
+            return (
+                "the controller does not tell whether it is in remote or local mode; for one that "
+                'never does, the site file can say accept_unknown = ["mode"]'
+            )
+    return ""
+
+
+def _state_obstacle(request: CommandRequest, controller: Controller) -> str:
+    if request.command == _C.RUN_PROGRAM:
+        return "programs cannot be run yet: send the moves one by one (MOVE_ABSOLUTE)"
+    if request.command not in MOTION_COMMANDS:
+        return ""
+    status = controller.status
+    if status.activity is Activity.STOPPED:
+        return "the controller is stopped: see to it, then send RESET"
+    if status.activity is Activity.FAULT:
+        fault = controller.fault or "it does not say which"
+        return f"the controller has a fault ({fault}): mend it, then send RESET"
+    if request.command == _C.HOME or status.homed:
+        return ""
+    if status.homed is False:
+        return "the robot is not homed: home it first (HOME)"
+    if "homed" in controller.accept_unknown:
+        return ""
+    return (
+        "the controller does not tell whether the robot is homed: home it first (HOME); for a controller "
+        'that never tells, the site file can say accept_unknown = ["homed"]'
+    )
+
+
+def _value_obstacle(request: CommandRequest, controller: Controller, joints: Joints) -> str:
+    if request.command == _C.SPEED:
+        if not request.HasField("speed_percent"):
+            return "SPEED needs speed_percent, from 1 to 100"
+        if not 1.0 <= request.speed_percent <= 100.0:
+            return f"speed {request.speed_percent:g} % is outside 1 to 100 %"
+    if request.command not in _MOVES:
+        return ""
+    values = tuple(request.joint_positions)
+    if len(values) != len(joints):
+        names = ", ".join(joints.names)
+        return f"{len(values)} joint positions, but the robot has {len(joints)} joints ({names})"
+    if request.command == _C.MOVE_RELATIVE:
+        if controller.positions is None:
+            return "the controller has not told where the joints are, so nothing can be added to that"
+        values = tuple(start + offset for start, offset in zip(controller.positions, values, strict=True))
+    # Limits and constraints are linear: all of a straight path in joint space is within them when its end is.
+    return "; ".join(violations(joints, values))
+
+
+def controller_command(request: CommandRequest) -> ControllerCommand:
+    """A command as the driver takes it.
+
+    Raises:
+        ValueError: If it is none that a driver knows.
+    """
+    match request.command:
+        case _C.HOME:
+            return Home()
+        case _C.HOLD:
+            return Hold()
+        case _C.RESUME:
+            return Resume()
+        case _C.RESET:
+            return Reset()
+        case _C.TRACE_ON:
+            return Trace(on=True)
+        case _C.TRACE_OFF:
+            return Trace(on=False)
+        case _C.SPEED:
+            return Speed(percent=request.speed_percent)
+        case _C.MOVE_ABSOLUTE:
+            return MoveAbsolute(positions=tuple(request.joint_positions))
+        case _C.MOVE_RELATIVE:
+            return MoveRelative(offsets=tuple(request.joint_positions))
+    raise ValueError(f"{_C.Name(request.command)} is not a controller's command")

@@ -1,0 +1,248 @@
+"""One robot of a gateway: its link, topics and authority. What fails here, fails for this robot alone."""
+
+import asyncio
+import logging
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bus.publisher import Publisher
+from bus.requests import Request
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import Session
+from protocol_gateway.audit import AuditLog, Entry, read_entries
+from protocol_gateway.authority import Now
+from protocol_gateway.control import Control
+from protocol_gateway.driver import Driver
+from protocol_gateway.journal import Journal
+from protocol_gateway.ledger import Ledger
+from protocol_gateway.link import ControllerLink, LinkSettings, LinkState, LinkStatus
+from protocol_gateway.motion import is_moving, motion_may_be_held
+from protocol_gateway.obstacles import Controller
+from protocol_gateway.restart import remembered
+from protocol_gateway.states import audit_entry, controller_state, lease_state
+from protocol_gateway.telemetry import Telemetry
+from protocol_gateway.unit_driver import UnitDriver
+from robots.description import load
+from robots.joints import joints_of
+
+log = logging.getLogger(__name__)
+
+_S = schema.Event.Severity
+
+_LOOK_S = 0.05
+_HEARTBEAT_S = 1.0
+_MEND_S = 1.0
+MESH = "mesh"
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotSettings:
+    """One robot, as the site file gives it.
+
+    Attributes:
+        name: In keys.
+        description: A library robot's name, or a path.
+        host: Of the controller; `port` too.
+        codes: Type codes, where the controller sends numbers: {2: "ABSOLUTE.DEG", 101: "COMMAND:home"}.
+        accept_unknown: What the controller never tells and is done without: "mode", "homed".
+        stop_proven: The stop unit was tried on this controller; without that the robot is read-only.
+        stale_after_s: Without a unit for this long, nothing is known of the robot any more.
+        reconnect_after_s: Without a unit for this long, the connection is made anew.
+    """
+
+    name: str
+    description: str | Path
+    host: str
+    port: int
+    codes: Mapping[int, str] = field(default_factory=dict)
+    accept_unknown: frozenset[str] = frozenset()
+    stop_proven: bool = True
+    stale_after_s: float = 1.0
+    reconnect_after_s: float = 4.0
+
+
+class Robot:
+    """A robot on the mesh, from its controller's socket to its keys.
+
+    Raises:
+        DescriptionError, CodeTableError, AuditError, KeyNameError: If it cannot be run as it is set.
+    """
+
+    def __init__(self, session: Session, site: str, settings: RobotSettings, audit_folder: Path) -> None:
+        joints = joints_of(load(settings.description))
+        driver: Driver = UnitDriver(joints.types, settings.codes)
+        self._settings = settings
+        self._read_only = not (settings.stop_proven and driver.can_stop)
+
+        def publisher(topic: str) -> Publisher:
+            return session.declare_publisher(site, settings.name, topic)
+
+        self._controller_topic = publisher("controller")
+        self._lease_topic = publisher("lease")
+        self._audit_topic = publisher("audit")
+        self._journal = Journal(publisher("events"), settings.name)
+        self._telemetry = Telemetry(
+            joints,
+            fast=publisher("joints"),
+            slow=publisher("joints/slow"),
+            raw=publisher("raw"),
+            journal=self._journal,
+            on_status=self._on_told,
+        )
+        self._link = ControllerLink(
+            LinkSettings(
+                host=settings.host,
+                port=settings.port,
+                stale_after_s=settings.stale_after_s,
+                reconnect_after_s=settings.reconnect_after_s,
+            ),
+            driver,
+            on_event=self._telemetry.on_event,
+            on_status=self._on_link,
+        )
+        self._link_state = LinkState.DOWN
+        path = audit_folder / site / f"{settings.name}.jsonl"
+        self._audit = AuditLog(path, on_written=self._on_written)
+        self._control = Control(
+            joints,
+            driver,
+            Ledger(self._audit, self._journal),
+            self._journal,
+            authority=remembered(read_entries(path)),
+            send=self._link.send,
+            controller=self._controller,
+            on_change=self._publish_state,
+        )
+        session.answer(site, settings.name, "stop", self._answer_stop)
+        session.answer(site, settings.name, "lease/request/*", self._answer_lease)
+        session.answer(site, settings.name, "command/*", self._answer_command)
+        self._say_how_it_starts()
+
+    def _say_how_it_starts(self) -> None:
+        if self._audit.mended:
+            self._journal.say(
+                _S.ERROR, "audit.mended", f"audit log {self._audit.path.name}: {self._audit.mended}"
+            )
+        if self._read_only:
+            text = "no stop unit is configured and proven for this controller: the robot is read-only"
+            self._journal.say(_S.WARNING, "robot.read_only", text)
+        stop = self._control.authority.stop
+        if stop is not None:
+            text = f"stop request {stop.id} ({stop.by}: {stop.reason}) is latched since before this start"
+            self._journal.say(_S.WARNING, "stop.remembered", text, stop_id=stop.id)
+        self._publish_state()
+
+    async def run(self) -> None:
+        """Keep the link and the heartbeats until cancelled; then stop what moves under a lease."""
+        link = asyncio.create_task(self._keep_link())
+        try:
+            await self._beat()
+        finally:
+            # While there is a link to stop it over.
+            self._control.end_lease("the gateway is being ended")
+            link.cancel()
+            await asyncio.gather(link, return_exceptions=True)
+
+    async def close(self) -> None:
+        """Write what is still to be written, and close the audit log."""
+        await self._control.close()
+        await self._audit.close()
+
+    async def _keep_link(self) -> None:
+        while True:
+            try:
+                await self._link.run()
+            except Exception:
+                log.exception("%s: the link failed and begins anew", self._settings.name)
+                self._journal.say(
+                    _S.ERROR, "gateway.failed", "the gateway failed at this robot and begins anew"
+                )
+                await asyncio.sleep(_MEND_S)
+
+    async def _beat(self) -> None:
+        next_s = 0.0
+        while True:
+            await asyncio.sleep(_LOOK_S)
+            self._control.check_expiry()
+            self._observe()
+            now_s = time.monotonic()
+            if now_s >= next_s:
+                next_s = now_s + _HEARTBEAT_S
+                self._publish_state()
+                self._audit.pay()
+
+    # --------------------------------------------------------------- requests
+
+    async def _answer_stop(self, request: Request) -> schema.StopAnswer:
+        message = request.message
+        assert isinstance(message, schema.StopRequest)
+        return self._control.stop(by=message.by or "somebody", reason=message.reason, source=MESH)
+
+    async def _answer_lease(self, request: Request) -> schema.LeaseAnswer:
+        message = request.message
+        assert isinstance(message, schema.LeaseRequest)
+        return await self._control.lease(message, operator=request.chunk, source=MESH)
+
+    async def _answer_command(self, request: Request) -> schema.CommandAnswer:
+        message = request.message
+        assert isinstance(message, schema.CommandRequest)
+        return await self._control.command(message, operator=request.chunk, source=MESH)
+
+    # ------------------------------------------------------------------ state
+
+    def _on_link(self, status: LinkStatus) -> None:
+        before, self._link_state = self._link_state, status.state
+        if status.state is LinkState.DOWN:
+            self._telemetry.forget()
+        if before is not status.state:
+            severity = _S.INFO if status.state is LinkState.UP else _S.WARNING
+            self._journal.say(
+                severity, f"link.{status.state.value}", f"link to the controller: {status.text}"
+            )
+            if before is LinkState.DOWN:
+                self._control.link_is_back()
+        self._publish_state()
+
+    def _on_told(self) -> None:
+        self._observe()
+        self._publish_state()
+
+    def _on_written(self, entry: Entry) -> None:
+        self._audit_topic.put(audit_entry(entry), source_time_ns=entry.time_ns)
+
+    def _observe(self) -> None:
+        if self._link.status.state is not LinkState.UP:
+            return
+        activity = self._telemetry.status.activity
+        self._control.observe(
+            moving=is_moving(activity, self._telemetry.watch), may_be_held=motion_may_be_held(activity)
+        )
+
+    def _controller(self) -> Controller:
+        return Controller(
+            link=self._link.status,
+            status=self._telemetry.status,
+            fault=self._telemetry.fault,
+            positions=self._telemetry.positions,
+            read_only=self._read_only,
+            accept_unknown=self._settings.accept_unknown,
+        )
+
+    def _publish_state(self) -> None:
+        now = Now(time.monotonic(), time.time_ns())
+        last = self._link.last_received
+        authority = self._control.authority
+        self._controller_topic.put(
+            controller_state(
+                self._controller(),
+                authority.stop,
+                counters=self._link.counters,
+                age_s=None if last is None else now.monotonic_s - last.monotonic_s,
+                rate_hz=self._link.rate_hz,
+                controller_time_s=self._telemetry.controller_time_s,
+                now=now,
+            )
+        )
+        self._lease_topic.put(lease_state(authority, now))
