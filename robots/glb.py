@@ -49,7 +49,7 @@ def link_meshes(description: RobotDescription, *, cache: Path | None = None) -> 
 
 
 def cache_folder() -> Path:
-    """Where GLB files are kept: below XDG_CACHE_HOME or ~/.cache; a temporary folder if that is not writable."""
+    """Where GLB files are kept: below XDG_CACHE_HOME or ~/.cache; a temporary folder if that is read-only."""
     home = os.environ.get("XDG_CACHE_HOME")
     roots = [Path(home)] if home else [Path.home() / ".cache"]
     for root in [*roots, Path(tempfile.gettempdir())]:

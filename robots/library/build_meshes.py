@@ -1,0 +1,61 @@
+"""Models the library's meshes and writes them: `python -m robots.library.build_meshes`.
+
+Their files are committed; this script is where they come from, and what to change them in.
+"""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from robots.library import pt_arm, puma_arm
+from robots.library.parts import Piece, mesh_of
+from robots.meshes.write_3ds import write_3ds
+from robots.meshes.write_vrml import write_vrml
+
+LIBRARY = Path(__file__).parent
+
+
+def _pt(size: float, height: float, length: float, tool: float) -> Mapping[str, Callable[[], list[Piece]]]:
+    return {
+        "base.wrl": lambda: pt_arm.base(size, height),
+        "column.3ds": lambda: pt_arm.column(size),
+        "upper_arm.wrl": lambda: pt_arm.upper_arm(size, length),
+        "forearm.3ds": lambda: pt_arm.forearm(size, length),
+        "wrist.wrl": lambda: pt_arm.wrist(size),
+        "flange.3ds": lambda: pt_arm.flange(size, tool),
+    }
+
+
+# Sizes in mm are those of each robot's D-H rows.
+ROBOTS: Mapping[str, Mapping[str, Callable[[], list[Piece]]]] = {
+    "pt500": _pt(0.84, 300.0, 250.0, 100.0),
+    "pt600": _pt(1.0, 350.0, 300.0, 120.0),
+    "puma560": {
+        "base.3ds": puma_arm.base,
+        "column.wrl": puma_arm.column,
+        "upper_arm.3ds": puma_arm.upper_arm,
+        "forearm.wrl": puma_arm.forearm,
+        "wrist.3ds": puma_arm.wrist,
+        "wrist_cage.wrl": puma_arm.wrist_cage,
+        "flange.3ds": puma_arm.flange,
+    },
+}
+
+
+def mesh_file(robot: str, name: str) -> bytes:
+    """The content of one of the library's mesh files."""
+    mesh = mesh_of(ROBOTS[robot][name]())
+    return write_vrml(mesh).encode() if name.endswith(".wrl") else write_3ds(mesh)
+
+
+def main() -> None:
+    """Write every mesh file of the library."""
+    for robot, files in ROBOTS.items():
+        folder = LIBRARY / robot / "meshes"
+        folder.mkdir(exist_ok=True)
+        for name in files:
+            (folder / name).write_bytes(mesh_file(robot, name))
+            print(f"{robot}/meshes/{name}")
+
+
+if __name__ == "__main__":
+    main()

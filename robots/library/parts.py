@@ -1,0 +1,197 @@
+"""What arms are built of: hubs, cheeks, motor housings, bolts, covers; millimetres.
+
+A piece is a material and a solid. Round things are made along z and laid where they belong.
+"""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from robots.meshes.mesh import FloatArray, Material, Mesh, Part
+from robots.meshes.normals import creased
+from robots.meshes.solids import Profile, Solid, lofted, moved, plate, rectangle, rounded, strap, turned
+
+Piece = tuple[Material, Solid]
+
+PAINT = Material("paint", (0.85, 0.51, 0.17), (0.3, 0.3, 0.3), shininess=0.4)
+CASTING = Material("casting", (0.21, 0.225, 0.24), (0.2, 0.2, 0.2), shininess=0.25)
+STEEL = Material("steel", (0.74, 0.76, 0.78), (0.8, 0.8, 0.8), shininess=0.7)
+RUBBER = Material("rubber", (0.09, 0.09, 0.1), (0.05, 0.05, 0.05), shininess=0.05)
+
+ROUND = 40  # segments of a large circle
+SMALL = 12  # of a bolt
+# Below this, neighbouring faces are one smooth surface.
+CREASE = np.radians(36)
+
+
+def at(x: float = 0.0, y: float = 0.0, z: float = 0.0, *, axis: str = "+z") -> FloatArray:
+    """(4, 4) that lays something made along z at a point, along another axis ("-y")."""
+    columns = {
+        "+z": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+        "-z": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
+        "+x": [[0, 1, 0], [0, 0, 1], [1, 0, 0]],
+        "-x": [[0, 1, 0], [0, 0, -1], [-1, 0, 0]],
+        "+y": [[0, 0, 1], [1, 0, 0], [0, 1, 0]],
+        "-y": [[0, 0, 1], [-1, 0, 0], [0, -1, 0]],
+    }
+    # Rows: where x, y and z go.
+    placement = np.eye(4)
+    placement[:3, :3] = np.array(columns[axis], dtype=np.float64).T
+    placement[:3, 3] = (x, y, z)
+    return placement
+
+
+def laid(pieces: Iterable[Piece], placement: FloatArray) -> list[Piece]:
+    """Pieces moved by a (4, 4) transform."""
+    return [(material, moved(solid, placement)) for material, solid in pieces]
+
+
+def turned_piece(
+    material: Material, profile: Profile, *, fillet: float = 0.0, segments: int = ROUND
+) -> Piece:
+    """A turned body; its corners rounded."""
+    return material, turned(rounded(profile, fillet) if fillet else profile, segments)
+
+
+def drum(material: Material, radius: float, low: float, high: float, *, fillet: float = 3.0) -> Piece:
+    """A cylinder along z with rounded edges."""
+    return turned_piece(material, [(0, low), (radius, low), (radius, high), (0, high)], fillet=fillet)
+
+
+def bolts(
+    circle: float, count: int, radius: float, low: float, high: float, *, start: float = 0.0
+) -> list[Piece]:
+    """Socket-head bolts on a circle about z; `start` in degrees."""
+    angles = np.radians(start) + np.arange(count) * (2 * np.pi / count)
+    socket = radius * 0.5
+    head = [
+        (radius, low),
+        (radius, high - 0.15 * radius),
+        (radius * 0.85, high),
+        (socket, high),
+        (socket, high - 0.4 * radius),
+        (0, high - 0.4 * radius),
+    ]
+    return [
+        (STEEL, moved(turned(head, SMALL), at(circle * float(np.cos(angle)), circle * float(np.sin(angle)))))
+        for angle in angles
+    ]
+
+
+def motor(radius: float, low: float, high: float, *, fins: int = 5) -> list[Piece]:
+    """A motor housing along z: a flange, cooling fins, a domed cap with its bolts."""
+    length = high - low
+    cap = low + 0.72 * length
+    profile: list[tuple[float, float]] = [(0, low), (radius, low), (radius, low + 0.1 * length)]
+    groove = (cap - low - 0.14 * length) / (2 * fins)
+    for fin in range(fins):
+        z = low + 0.12 * length + 2 * groove * fin
+        profile += [(radius * 0.9, z), (radius * 0.9, z + groove), (radius * 0.98, z + groove)]
+        profile += [(radius * 0.98, z + 2 * groove)]
+    profile += [(radius, cap), (radius, high - 0.14 * length), (radius * 0.86, high)]
+    body = turned_piece(CASTING, [*profile, (0, high)])
+    return [body, *bolts(radius * 0.66, 4, radius * 0.075, high - 1, high + radius * 0.06, start=45)]
+
+
+def cover(
+    radius: float, low: float, high: float, *, material: Material = CASTING, count: int = 6
+) -> list[Piece]:
+    """A bolted cover along z: a disc with a raised middle."""
+    middle = low + 0.62 * (high - low)
+    profile = [
+        (0, low),
+        (radius, low),
+        (radius, middle),
+        (radius * 0.62, middle),
+        (radius * 0.56, high),
+        (0, high),
+    ]
+    disc = turned_piece(material, profile, fillet=0.06 * radius)
+    return [disc, *bolts(radius * 0.81, count, radius * 0.07, middle - 1, middle + radius * 0.05)]
+
+
+def cheek(
+    material: Material,
+    start: Sequence[float],
+    start_radius: float,
+    end: Sequence[float],
+    end_radius: float,
+    low: float,
+    high: float,
+    *,
+    bevel: float = 5.0,
+) -> Piece:
+    """A flat arm round two circles in x and y, from z low to z high."""
+    outline = strap(np.array(start), start_radius, np.array(end), end_radius, ROUND)
+    return material, plate(outline, low, high, bevel)
+
+
+def rounded_box(
+    material: Material,
+    size: Sequence[float],
+    center: Sequence[float],
+    *,
+    radius: float = 8.0,
+    bevel: float = 4.0,
+) -> Piece:
+    """A box with round corners about z and rounded edges."""
+    outline = rectangle(size[0], size[1], radius, steps=4)
+    solid = plate(outline, -size[2] / 2, size[2] / 2, bevel)
+    return material, moved(solid, at(*center))
+
+
+def tapered(
+    material: Material, stations: Sequence[tuple[float, float, float, float]], radius: float
+) -> Piece:
+    """A body along x through round-cornered sections.
+
+    Args:
+        stations: (x, size along y, size along z, middle in y) of each section.
+        radius: Of the sections' corners.
+    """
+    sections = []
+    for x, along_y, along_z, middle in _eased(stations):
+        flat = rectangle(along_y, along_z, radius, steps=6)
+        sections.append(np.column_stack([np.full(len(flat), x), flat[:, 0] + middle, flat[:, 1]]))
+    return material, lofted(sections)
+
+
+def _eased(stations: Sequence[tuple[float, float, float, float]]) -> list[tuple[float, ...]]:
+    """More sections between those given, with soft ends and soft changes of size."""
+    given = np.array(stations, dtype=np.float64)
+    sections: list[FloatArray] = []
+    for start, end in zip(given, given[1:], strict=False):
+        for t in np.linspace(0, 1, 5)[:-1]:
+            eased = t * t * (3 - 2 * t)
+            sections.append(
+                np.array([start[0] + t * (end[0] - start[0]), *(start + eased * (end - start))[1:]])
+            )
+    sections.append(given[-1])
+    # Both ends rounded off by a few millimetres.
+    edge = 5.0
+    ends = []
+    for inset, forward in ((1.0, 0.0), (0.45, 0.16), (0.12, 0.5)):
+        ends.append((inset * edge, forward * edge))
+    first, last = sections[0], sections[-1]
+    head = [np.array([first[0] + go, first[1] - 2 * cut, first[2] - 2 * cut, first[3]]) for cut, go in ends]
+    tail = [
+        np.array([last[0] - go, last[1] - 2 * cut, last[2] - 2 * cut, last[3]]) for cut, go in reversed(ends)
+    ]
+    sections[0] = np.array([first[0] + edge, *first[1:]])
+    sections[-1] = np.array([last[0] - edge, *last[1:]])
+    return [tuple(section.tolist()) for section in (*head, *sections, *tail)]
+
+
+def mesh_of(pieces: Iterable[Piece]) -> Mesh:
+    """Pieces as a mesh: a part a material, smooth but for its creases."""
+    by_material: dict[Material, list[Solid]] = {}
+    for material, solid in pieces:
+        by_material.setdefault(material, []).append(solid)
+    return Mesh(tuple(_part(material, solids) for material, solids in by_material.items()))
+
+
+def _part(material: Material, solids: Sequence[Solid]) -> Part:
+    offsets = np.cumsum([0, *(len(vertices) for vertices, _ in solids)])
+    vertices = np.concatenate([vertices for vertices, _ in solids])
+    triangles = np.concatenate([faces + offset for (_, faces), offset in zip(solids, offsets, strict=False)])
+    return Part(material.name, material, *creased(vertices, triangles, CREASE))
