@@ -61,7 +61,7 @@ def look_of(description: Description, *, aspect: float) -> Look:
     points[:, 2] = np.maximum(points[:, 2], 0.0)
     lowest, highest = points.min(axis=0), points.max(axis=0)
     body = _BODY * float(np.linalg.norm(highest - lowest))
-    room = np.r_[points - body * [1, 1, 0], points + body, points * [1, 1, 0]]
+    room = np.r_[points - body * np.array([1.0, 1.0, 0.0]), points + body, points * np.array([1.0, 1.0, 0.0])]
     center = (lowest + highest) / 2.0
     cameras = {view.name: _camera(view, room, aspect, base_to_site) for view in description.views}
     if FREE not in cameras:
@@ -133,7 +133,7 @@ def _camera(view: View, room: FloatArray, aspect: float, base_to_site: FloatArra
 
 def _free_camera(room: FloatArray, center: FloatArray, aspect: float, base_to_site: FloatArray) -> Camera:
     # The room's corners stay empty most of the time: the arm is worth more of the picture.
-    core = center + (room - center) * [0.62, 0.62, 0.92]
+    core = center + (room - center) * np.array([0.62, 0.62, 0.92])
     camera = Camera(center + _FREE_DIRECTION, center, np.array([0.0, 0.0, 1.0]))
     return _placed(fitted(camera, aspect, core), base_to_site)
 
@@ -159,4 +159,4 @@ def _moved(transform: FloatArray, points: Iterable[FloatArray] | FloatArray) -> 
 
 
 def _array(vector: Vector3) -> FloatArray:
-    return np.array([vector.x, vector.y, vector.z])
+    return np.array([vector.x, vector.y, vector.z], dtype=np.float64)

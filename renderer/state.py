@@ -1,0 +1,189 @@
+"""What is known of a robot now, and what a picture says of it."""
+
+import math
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+
+import numpy as np
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from numpy.typing import NDArray
+
+from bus.schemas.robomesh_pb2 import ControllerState, Description
+from bus.topics import topic
+from renderer.look import Look, home_placements
+from renderer.overlay import Overlay, Row
+
+FloatArray = NDArray[np.float64]
+
+# Metres, or the rotation's entries: less is below a pixel.
+_NOTICEABLE = 3e-5
+
+STALE_AFTER_S = topic("frames").stale_after_s or 1.0
+
+
+@dataclass
+class RobotState:
+    """The newest of each topic of one robot.
+
+    Attributes:
+        look: None until its description and meshes came.
+        link_placements: (4, 4) link to site by link; empty until frames came.
+        positions: By joint [rad] or [m]; empty until joint states came.
+        source_time_ns: Of what the placements show.
+        version: Counts what came and would change a picture.
+    """
+
+    site: str
+    name: str
+    look: Look | None = None
+    link_placements: dict[str, FloatArray] = field(default_factory=dict)
+    positions: dict[str, float] = field(default_factory=dict)
+    controller: ControllerState | None = None
+    source_time_ns: int = 0
+    version: int = 0
+    _noticed: dict[str, FloatArray] = field(default_factory=dict)
+
+    def take_frames(self, message: FrameTransforms, source_time_ns: int) -> None:
+        """Take newer placements of the links."""
+        prefix = f"{self.site}/{self.name}/"
+        placements = {
+            transform.child_frame_id.removeprefix(prefix): _placement(transform)
+            for transform in message.transforms
+            if transform.child_frame_id.startswith(prefix)
+        }
+        self.link_placements, self.source_time_ns = placements, source_time_ns
+        # Frames come all the time; a picture is only worth drawing when they differ, by creeping too.
+        if not _same(placements, self._noticed):
+            self._noticed = placements
+            self.version += 1
+
+    def take_joints(self, message: JointStates) -> None:
+        """Take newer joint positions; a picture waits for the frames that belong to them."""
+        self.positions = {joint.name: joint.position for joint in message.joints}
+
+    def take_controller(self, message: ControllerState) -> None:
+        """Take a newer state of the controller."""
+        if _state_words(message) != _state_words(self.controller):
+            self.version += 1
+        self.controller = message
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ages:
+    """Time since each topic's last new value came [s]; None: none came while we listened."""
+
+    frames: float | None
+    joints: float | None
+    controller: float | None
+
+
+def age_s(state: RobotState, ages: Ages) -> float:
+    """How old what a picture shows is [s]; infinite where nobody knows.
+
+    The gateway's own word counts too: what it received last may be older than the message that
+    tells of it.
+    """
+    if ages.frames is None or ages.joints is None:
+        told = _told_age(state, ages)
+        return math.inf if told is None else max(told, STALE_AFTER_S * 1.001)
+    return max(ages.frames, ages.joints, _told_age(state, ages) or 0.0)
+
+
+def _told_age(state: RobotState, ages: Ages) -> float | None:
+    controller = state.controller
+    if controller is None or not controller.HasField("last_unit_age_s") or ages.controller is None:
+        return None
+    if controller.link == ControllerState.UP:
+        # Its next word is up to a second away, and units come meanwhile: joints tell their age.
+        return controller.last_unit_age_s
+    return controller.last_unit_age_s + ages.controller
+
+
+def _same(some: dict[str, FloatArray], others: dict[str, FloatArray]) -> bool:
+    return some.keys() == others.keys() and all(
+        np.abs(placement - others[name]).max() < _NOTICEABLE for name, placement in some.items()
+    )
+
+
+def placements_now(state: RobotState, look: Look) -> dict[str, FloatArray]:
+    """(4, 4) link to site of every link; at home as long as nobody told."""
+    return state.link_placements or home_placements(look)
+
+
+def overlay_of(state: RobotState, look: Look, view: str, *, age: float) -> Overlay:
+    """What is written over a picture of a robot.
+
+    Args:
+        age: Of what it shows [s].
+    """
+    description = look.description
+    return Overlay(
+        title=state.name,
+        view=view,
+        time=_time(state.source_time_ns),
+        state=_state_words(state.controller),
+        rows=tuple(_row(joint, state.positions[joint.name]) for joint in _told(description, state)),
+        mark="simulated" if description.simulated else "",
+        stale=_stale_words(state, age),
+    )
+
+
+def _told(description: Description, state: RobotState) -> list[Description.Joint]:
+    return [joint for joint in description.joints if joint.name in state.positions]
+
+
+def _stale_words(state: RobotState, age: float) -> str:
+    if not state.link_placements:
+        return "NO DATA, drawn at home"
+    if age <= STALE_AFTER_S:
+        return ""
+    if math.isinf(age):
+        return "STALE"
+    return f"STALE {age:.0f} s" if age < 120 else f"STALE {age / 60:.0f} min"
+
+
+def _state_words(controller: ControllerState | None) -> str:
+    if controller is None:
+        return ""
+    if controller.link != ControllerState.UP:
+        link = ControllerState.Link.Name(controller.link)
+        return f"controller {link.lower()}"
+    words = [ControllerState.Activity.Name(controller.activity), ControllerState.Mode.Name(controller.mode)]
+    known = [word.lower() for word in words if not word.endswith(("UNKNOWN", "UNSPECIFIED"))]
+    if controller.HasField("stop"):
+        known.insert(0, "stop request latched")
+    return ", ".join(dict.fromkeys(known))
+
+
+def _time(source_time_ns: int) -> str:
+    if not source_time_ns:
+        return ""
+    local = datetime.fromtimestamp(source_time_ns * 1e-9, tz=UTC).astimezone()
+    return f"{local:%H:%M:%S}.{local.microsecond // 100_000} {local:%Z}"
+
+
+def _row(joint: Description.Joint, position: float) -> Row:
+    rotary = joint.type == Description.Joint.ROTARY
+    shown = f"{math.degrees(position):.2f}" if rotary else f"{position * 1e3:.1f}"
+    width = joint.upper - joint.lower
+    return Row(
+        name=joint.name,
+        value=shown.replace("-", "−"),
+        unit="°" if rotary else "mm",
+        share=(position - joint.lower) / width if width > 0 else 0.5,
+    )
+
+
+def _placement(transform: FrameTransform) -> FloatArray:
+    q, t = transform.rotation, transform.translation
+    x, y, z, w = q.x, q.y, q.z, q.w
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), t.x],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), t.y],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), t.z],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )

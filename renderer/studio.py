@@ -1,0 +1,104 @@
+"""Where pictures are made: one drawing and an encoder a stream, all in one thread.
+
+An OpenGL context belongs to the thread that made it, and drawing must not hold up the event loop.
+"""
+
+import logging
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from renderer import cache, opengl
+from renderer.cameras import Camera
+from renderer.encoder import Packet, VideoEncoder, jpeg, open_encoder
+from renderer.overlay import Overlay, write_over
+from renderer.scene import Scene
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """A picture to be made.
+
+    Attributes:
+        stream: The video stream that it belongs to.
+        video: Encode it for the stream.
+        key_frame: As a key frame.
+        image: Encode it as JPEG.
+    """
+
+    stream: str
+    scene: Scene
+    camera: Camera
+    overlay: Overlay
+    video: bool = False
+    key_frame: bool = False
+    image: bool = False
+
+
+@dataclass(frozen=True)
+class Painted:
+    """What came out of a job."""
+
+    packet: Packet | None
+    jpeg: bytes | None
+
+
+class Studio:
+    """Makes pictures; every method runs in the studio's own thread."""
+
+    def __init__(
+        self, size: tuple[int, int], fps: float, *, samples: int, device: int | None, folder: Path
+    ) -> None:
+        """Open OpenGL.
+
+        Raises:
+            NoOpenGLError: If there is none.
+            NoEncoderError: If no H.264 encoder works.
+        """
+        self._size, self._fps, self._folder = size, fps, folder
+        self._drawing = opengl.Drawing(opengl.open_context(device), size, samples=samples)
+        self._encoders: dict[str, VideoEncoder] = {}
+        # Tried before anybody watches: a machine without an encoder must say so at its start.
+        self.encoder_name = open_encoder(size, fps).name
+
+    @property
+    def renderer_name(self) -> str:
+        """What draws, in the driver's words."""
+        return self._drawing.renderer_name
+
+    def take_mesh(self, name: str, glb: bytes, color: str) -> None:
+        """Take a link's mesh, unless it is there.
+
+        Raises:
+            GlbError: If it is not GLB.
+        """
+        if not self._drawing.has(name):
+            self._drawing.add(name, cache.prepared_once(glb, color=color, folder=self._folder))
+
+    def has_mesh(self, name: str) -> bool:
+        """Whether a link's mesh is there."""
+        return self._drawing.has(name)
+
+    def paint(self, job: Job) -> Painted:
+        """Draw, write over, encode."""
+        picture = self._drawing.draw(job.scene, job.camera)
+        write_over(picture, job.overlay)
+        packet = None
+        if job.video:
+            encoder = self._encoders.get(job.stream)
+            if encoder is None:
+                encoder = self._encoders[job.stream] = open_encoder(self._size, self._fps)
+            packet = encoder.encode(picture, key_frame=job.key_frame)
+        return Painted(packet, jpeg(picture) if job.image else None)
+
+    def close(self) -> None:
+        """Release OpenGL and the encoders."""
+        self._encoders.clear()
+        self._drawing.close()
+
+
+def open_thread() -> ThreadPoolExecutor:
+    """The thread that a studio lives in."""
+    return ThreadPoolExecutor(max_workers=1, thread_name_prefix="renderer")
