@@ -125,6 +125,11 @@ class Subscription:
         return 0 if seen is None else seen.lost
 
     @property
+    def keys(self) -> tuple[str, ...]:
+        """The keys of which something came."""
+        return tuple(self._seen)
+
+    @property
     def skipped(self) -> int:
         """Samples that arrived and that the consumer was too slow to take."""
         return self._skipped

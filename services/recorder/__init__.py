@@ -1,1 +1,5 @@
-"""TBD."""
+"""Captures of what a robot publishes, as MCAP files that explain themselves."""
+
+from services.recorder.recorder import Settings, serve
+
+__all__ = ["Settings", "serve"]
