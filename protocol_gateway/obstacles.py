@@ -101,6 +101,8 @@ def _state_obstacle(request: CommandRequest, controller: Controller) -> str:
     if status.activity is Activity.FAULT:
         fault = controller.fault or "it does not say which"
         return f"the controller has a fault ({fault}): mend it, then send RESET"
+    if status.activity is Activity.HOLDING and request.command != _C.RESUME:
+        return "a motion is on hold: RESUME it, or give it up with RESET"
     if request.command == _C.HOME or status.homed:
         return ""
     if status.homed is False:
