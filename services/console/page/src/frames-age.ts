@@ -1,0 +1,12 @@
+// How old the 3-D view's frames are, told without decoding them.
+
+import { useEffect, useState } from "preact/hooks";
+import { watch } from "./mesh";
+import { now } from "./topics";
+
+/** Age [s] of the newest frames; null: not known, or none yet. */
+export function useFramesAge(robotKey: string): number | null {
+  const [last] = useState<{ newAt: number | null }>({ newAt: null });
+  useEffect(() => watch(`${robotKey}/frames`, (sample) => (last.newAt = sample.newAt)), [robotKey]);
+  return last.newAt === null ? null : Math.max(0, (now.value - last.newAt) / 1000);
+}

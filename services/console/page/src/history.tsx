@@ -1,0 +1,137 @@
+// The joints of the last 60 seconds as curves.
+
+import { fromBinary } from "@bufbuild/protobuf";
+import { useEffect, useRef, useState } from "preact/hooks";
+import uPlot from "uplot";
+import "uplot/dist/uPlot.min.css";
+import { JointStatesSchema } from "./gen/foxglove/JointStates_pb";
+import { jointUnit } from "./format";
+import type { Description } from "./gen/robomesh_pb";
+import { watch } from "./mesh";
+import { Panel, Toggle } from "./parts";
+import { t } from "./texts";
+import { theme } from "./theme";
+
+const SPAN_S = 60;
+const STEP_MS = 100; // finer than a pixel shows
+const CURVES = ["--curve-1", "--curve-2", "--curve-3", "--curve-4", "--curve-5", "--curve-6", "--curve-7"];
+
+export function History({ robotKey, description }: { robotKey: string; description: Description | undefined }) {
+  const place = useRef<HTMLDivElement>(null);
+  const [paused, setPaused] = useState(false);
+  const [any, setAny] = useState(false);
+  const stopped = useRef(false);
+  stopped.current = paused;
+  const [rows] = useState<{ time: number[]; values: (number | null)[][] }>({ time: [], values: [] });
+  const joints = description?.joints ?? [];
+  const names = joints.map((joint) => joint.name).join(" ");
+
+  useEffect(() => {
+    rows.time = [];
+    rows.values = joints.map(() => []);
+    const factors = joints.map((joint) => jointUnit(joint).factor);
+    return watch(`${robotKey}/joints`, (sample) => {
+      const last = rows.time.at(-1);
+      if (!sample.live || (last !== undefined && sample.arrived / 1000 - last < STEP_MS / 1000)) return;
+      // A gap is a gap: no line is drawn through what was not seen.
+      if (last !== undefined && sample.arrived / 1000 - last > 1) append(last + 0.1, () => null);
+      const states = new Map(
+        fromBinary(JointStatesSchema, sample.payload).joints.map((joint) => [joint.name, joint.position]),
+      );
+      append(sample.arrived / 1000, (i) => {
+        const position = states.get(joints[i]?.name ?? "");
+        return position === undefined ? null : position * (factors[i] ?? 1);
+      });
+      setAny(true);
+    });
+    function append(time: number, value: (index: number) => number | null): void {
+      rows.time.push(time);
+      rows.values.forEach((column, i) => column.push(value(i)));
+      while ((rows.time[0] ?? time) < time - SPAN_S - 2) {
+        rows.time.shift();
+        for (const column of rows.values) column.shift();
+      }
+    }
+  }, [robotKey, names]);
+
+  useEffect(() => {
+    const element = place.current;
+    if (!element || joints.length === 0) return;
+    const style = getComputedStyle(document.documentElement);
+    const colour = (name: string) => style.getPropertyValue(name).trim();
+    const axis = { stroke: colour("--dim"), grid: { stroke: colour("--line"), width: 1 }, ticks: { show: false } };
+    const font = "12px system-ui, sans-serif";
+    const plot = new uPlot(
+      {
+        width: element.clientWidth,
+        height: element.clientHeight,
+        legend: { show: false },
+        cursor: { y: false, drag: { x: false, y: false } },
+        scales: { x: { time: false, auto: false, range: () => window() }, y: { range: (_, min, max) => padded(min, max) } },
+        axes: [
+          { ...axis, font, size: 26, values: (_, splits) => splits.map((at) => `${Math.round(at - window()[1])} s`) },
+          { ...axis, font, size: 46, values: (_, splits) => splits.map((at) => `${at}°`.replace("-", "−")) },
+        ],
+        series: [
+          {},
+          ...joints.map((joint, i) => ({
+            label: joint.name,
+            stroke: colour(CURVES[i % CURVES.length] ?? "--text"),
+            width: 1.5,
+            points: { show: false },
+          })),
+        ],
+      },
+      [[], ...joints.map(() => [])],
+      element,
+    );
+    let end = performance.now() / 1000;
+    function window(): [number, number] {
+      return [end - SPAN_S, end];
+    }
+    const draw = () => {
+      if (stopped.current) return;
+      end = performance.now() / 1000;
+      plot.setData([rows.time, ...rows.values] as uPlot.AlignedData, true);
+    };
+    const timer = setInterval(draw, 200);
+    const observer = new ResizeObserver(() =>
+      plot.setSize({ width: element.clientWidth, height: element.clientHeight }),
+    );
+    observer.observe(element);
+    return () => {
+      clearInterval(timer);
+      observer.disconnect();
+      plot.destroy();
+    };
+  }, [names, theme.value]);
+  return (
+    <Panel
+      name="history"
+      title={t("history")}
+      end={
+        <Toggle on={paused} set={setPaused}>
+          {t("pause")}
+        </Toggle>
+      }
+    >
+      <div class="legend">
+        {joints.map((joint, i) => (
+          <span key={joint.name}>
+            <span class={`curve curve-${(i % CURVES.length) + 1}`} aria-hidden="true" />
+            {joint.name}
+          </span>
+        ))}
+      </div>
+      <div class="plot" ref={place}>
+        {!any && <p class="plot-word dim">{t("plot_empty")}</p>}
+      </div>
+    </Panel>
+  );
+}
+
+function padded(min: number | null, max: number | null): [number, number] {
+  if (min === null || max === null) return [-90, 90];
+  const room = Math.max(5, (max - min) * 0.08);
+  return [min - room, max + room];
+}

@@ -1,0 +1,183 @@
+// The page's one WebSocket to the console's server: keys watched, requests asked.
+
+import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
+import type { DescMessage, MessageInitShape, MessageShape } from "@bufbuild/protobuf";
+import { signal } from "@preact/signals";
+import { FromPageSchema, ToPageSchema } from "./gen/robomesh_pb";
+import type { ToPage_Hello } from "./gen/robomesh_pb";
+import { t } from "./texts";
+
+/** A publication as it came. Times are on this page's monotonic clock, in ms. */
+export interface Sample {
+  key: string;
+  payload: Uint8Array;
+  publisher: bigint;
+  sequence: bigint;
+  /** Publisher's source time in ms since the Unix epoch. */
+  sourceTime: number;
+  live: boolean;
+  arrived: number;
+  /** When it was new; null: its age is not known. */
+  newAt: number | null;
+}
+
+/** A request that was refused or not answered; the text is for people. */
+export class AskError extends Error {}
+
+type Listener = (sample: Sample) => void;
+
+export const hello = signal<ToPage_Hello | null>(null);
+/** Keys of the liveliness tokens that are alive. */
+export const presence = signal<ReadonlySet<string>>(new Set());
+/** When the connection was lost (ms since the Unix epoch); null while there is one; 0 before the first. */
+export const lostAt = signal<number | null>(0);
+
+const listeners = new Map<string, Set<Listener>>();
+const newest = new Map<string, Sample>();
+const asked = new Map<bigint, { resolve: (payload: Uint8Array) => void; reject: (error: AskError) => void }>();
+let socket: WebSocket | null = null;
+let lastAsk = 0n;
+let retryMs = 250;
+
+/** Connects, and keeps connecting. */
+export function connect(): void {
+  const scheme = location.protocol === "https:" ? "wss" : "ws";
+  const opened = new WebSocket(`${scheme}://${location.host}/mesh`);
+  opened.binaryType = "arraybuffer";
+  opened.onopen = () => {
+    socket = opened;
+    retryMs = 250;
+    presence.value = new Set();
+    for (const expression of listeners.keys()) send({ case: "watch", value: { key: expression } });
+  };
+  opened.onmessage = (event: MessageEvent<ArrayBuffer>) => receive(new Uint8Array(event.data));
+  opened.onclose = () => {
+    socket = null;
+    if (lostAt.value === null) lostAt.value = Date.now();
+    for (const { reject } of asked.values()) reject(new AskError(t("not_connected")));
+    asked.clear();
+    setTimeout(connect, retryMs);
+    retryMs = Math.min(retryMs * 2, 2000);
+  };
+}
+
+/** Hears every publication on a key expression until the returned function is called. */
+export function watch(expression: string, listener: Listener): () => void {
+  const present = listeners.get(expression);
+  if (present) {
+    present.add(listener);
+    for (const sample of newest.values()) if (matches(expression, sample.key)) listener(sample);
+  } else {
+    listeners.set(expression, new Set([listener]));
+    send({ case: "watch", value: { key: expression } });
+  }
+  return () => {
+    const set = listeners.get(expression);
+    set?.delete(listener);
+    if (set?.size !== 0) return;
+    listeners.delete(expression);
+    for (const key of newest.keys()) if (matches(expression, key)) newest.delete(key);
+    send({ case: "unwatch", value: { key: expression } });
+  };
+}
+
+/** Asks a request of the mesh.
+ *
+ * @throws AskError with the reason in words. */
+export async function ask<Q extends DescMessage, A extends DescMessage>(
+  key: string,
+  requestSchema: Q,
+  request: MessageInitShape<Q>,
+  answerSchema: A,
+  timeoutS = 2,
+): Promise<MessageShape<A>> {
+  const id = ++lastAsk;
+  const payload = toBinary(requestSchema, create(requestSchema, request));
+  const answer = new Promise<Uint8Array>((resolve, reject) => {
+    if (!send({ case: "ask", value: { id, key, payload, timeoutS } })) {
+      reject(new AskError(t("not_connected")));
+      return;
+    }
+    // The server tells a time-out itself; this is for a server that says nothing any more.
+    const timer = setTimeout(
+      () => settle(id)?.reject(new AskError(t("timed_out", { seconds: timeoutS }))),
+      timeoutS * 1000 + 1000,
+    );
+    const done = () => clearTimeout(timer);
+    asked.set(id, {
+      resolve: (bytes) => (done(), resolve(bytes)),
+      reject: (error) => (done(), reject(error)),
+    });
+  });
+  return fromBinary(answerSchema, await answer);
+}
+
+function settle(id: bigint) {
+  const waiting = asked.get(id);
+  asked.delete(id);
+  return waiting;
+}
+
+function send(message: NonNullable<MessageInitShape<typeof FromPageSchema>["message"]>): boolean {
+  if (socket?.readyState !== WebSocket.OPEN) return false;
+  socket.send(toBinary(FromPageSchema, create(FromPageSchema, { message })));
+  return true;
+}
+
+function receive(bytes: Uint8Array): void {
+  const { message } = fromBinary(ToPageSchema, bytes);
+  switch (message.case) {
+    case "hello":
+      hello.value = message.value;
+      lostAt.value = null;
+      break;
+    case "presence": {
+      const keys = new Set(presence.value);
+      if (message.value.alive) keys.add(message.value.key);
+      else keys.delete(message.value.key);
+      presence.value = keys;
+      break;
+    }
+    case "answer": {
+      const waiting = settle(message.value.id);
+      if (message.value.ok) waiting?.resolve(message.value.payload);
+      else waiting?.reject(new AskError(message.value.error));
+      break;
+    }
+    case "sample": {
+      const { key, attachment, payload, live, ageS } = message.value;
+      const header = readHeader(attachment);
+      const arrived = performance.now();
+      const before = newest.get(key);
+      const repeated = before?.publisher === header.publisher && before.sequence === header.sequence;
+      let newAt = live ? arrived - (ageS ?? 0) * 1000 : null;
+      // A repeat (after a new connection, say) is as old as it was.
+      if (repeated && before.newAt !== null) newAt = before.newAt;
+      const sample = { key, payload, ...header, live, arrived, newAt };
+      newest.set(key, sample);
+      for (const [expression, set] of listeners) {
+        if (matches(expression, key)) for (const listener of [...set]) listener(sample);
+      }
+      break;
+    }
+  }
+}
+
+function readHeader(attachment: Uint8Array) {
+  if (attachment.byteLength !== 24) return { publisher: 0n, sequence: 0n, sourceTime: 0 };
+  const view = new DataView(attachment.buffer, attachment.byteOffset, 24);
+  return {
+    publisher: view.getBigUint64(0, true),
+    sequence: view.getBigUint64(8, true),
+    sourceTime: Number(view.getBigInt64(16, true) / 1000n) / 1000,
+  };
+}
+
+/** Whether a key expression (`*` stands for one chunk) covers a key. */
+export function matches(expression: string, key: string): boolean {
+  if (expression === key) return true;
+  if (!expression.includes("*")) return false;
+  const pattern = expression.split("/");
+  const chunks = key.split("/");
+  return pattern.length === chunks.length && pattern.every((part, i) => part === "*" || part === chunks[i]);
+}

@@ -1,0 +1,71 @@
+// What stands around a robot in the 3-D view: light, floor, grid, in the page's colours.
+
+import * as THREE from "three";
+
+const FLOOR_RADIUS = 1.6;
+const GRID_STEP = 0.1;
+
+export interface Palette {
+  background: string;
+  floor: string;
+  grid: string;
+  gridStrong: string;
+  accent: string;
+}
+
+/** The page's colours for the scene, from the style sheet. */
+export function palette(): Palette {
+  const style = getComputedStyle(document.documentElement);
+  const read = (name: string) => style.getPropertyValue(name).trim();
+  return {
+    background: read("--scene"),
+    floor: read("--scene-floor"),
+    grid: read("--scene-grid"),
+    gridStrong: read("--scene-grid-strong"),
+    accent: read("--accent"),
+  };
+}
+
+/** Sky, key light with a shadow, and a fill from behind. */
+export function lights(): THREE.Object3D[] {
+  const sky = new THREE.HemisphereLight("#f4f7fa", "#5b5f63", 1.5);
+  sky.position.set(0, 0, 1);
+  const key = new THREE.DirectionalLight("#fff8ee", 2.6);
+  key.position.set(1.6, -2.2, 3.4);
+  key.castShadow = true;
+  key.shadow.mapSize.set(1024, 1024);
+  Object.assign(key.shadow.camera, { left: -1.5, right: 1.5, top: 1.5, bottom: -1.5, near: 0.5, far: 8 });
+  key.shadow.bias = -0.0004;
+  key.shadow.normalBias = 0.008;
+  key.shadow.radius = 3;
+  const fill = new THREE.DirectionalLight("#cfe0f2", 0.9);
+  fill.position.set(-2.5, 1.5, 1.8);
+  return [sky, key, fill];
+}
+
+/** A round floor with a grid of 100 mm, stronger each 500 mm, ending at its edge. */
+export function floor(colours: Palette): THREE.Group {
+  const group = new THREE.Group();
+  const disc = new THREE.Mesh(
+    new THREE.CircleGeometry(FLOOR_RADIUS, 96),
+    new THREE.MeshStandardMaterial({ color: colours.floor, roughness: 1, metalness: 0 }),
+  );
+  disc.position.z = -0.002;
+  disc.receiveShadow = true;
+  group.add(disc, gridLines(colours.grid, (i) => i % 5 !== 0), gridLines(colours.gridStrong, (i) => i % 5 === 0));
+  return group;
+}
+
+function gridLines(colour: string, wanted: (index: number) => boolean): THREE.LineSegments {
+  const points: number[] = [];
+  const count = Math.floor(FLOOR_RADIUS / GRID_STEP);
+  for (let i = -count; i <= count; i++) {
+    if (!wanted(i)) continue;
+    const at = i * GRID_STEP;
+    const reach = Math.sqrt(FLOOR_RADIUS ** 2 - at ** 2);
+    points.push(at, -reach, 0, at, reach, 0, -reach, at, 0, reach, at, 0);
+  }
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.Float32BufferAttribute(points, 3));
+  return new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: colour }));
+}

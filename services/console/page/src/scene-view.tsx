@@ -1,0 +1,149 @@
+// The live 3-D panel: views of the description, trail and frames, and a word when it is stale.
+
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { create } from "@bufbuild/protobuf";
+import { staleText, timeOfDay } from "./format";
+import { ViewSchema, View_Projection } from "./gen/robomesh_pb";
+import type { Description, View } from "./gen/robomesh_pb";
+import { watch } from "./mesh";
+import { Choice, Toggle } from "./parts";
+import { RobotScene } from "./scene";
+import { t, textOr } from "./texts";
+import { theme } from "./theme";
+import { useFramesAge } from "./frames-age";
+import { isStale } from "./topics";
+
+/** Where the free camera begins, for a description that names none. */
+const FREE: View = create(ViewSchema, {
+  name: "free",
+  eye: { x: 1.35, y: -1.75, z: 1.15 },
+  target: { x: 0, y: 0, z: 0.42 },
+  up: { x: 0, y: 0, z: 1 },
+  projection: View_Projection.PERSPECTIVE,
+});
+
+/** Views of a description, the free one first. */
+export function viewsOf(description: Description | undefined): readonly View[] {
+  const named = description?.views ?? [];
+  const free = named.find((view) => view.name === "free") ?? FREE;
+  return [free, ...named.filter((view) => view.name !== "free")];
+}
+
+export function viewText(name: string): string {
+  return textOr(`view_${name}`, name);
+}
+
+export function SceneView(props: {
+  robotKey: string;
+  description: Description | undefined;
+  stale: boolean;
+  age: number | null | undefined;
+  lostAt: number | null;
+}) {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const scene = useRef<RobotScene | null>(null);
+  const [problem, setProblem] = useState("");
+  const [loaded, setLoaded] = useState(false);
+  const [view, setView] = useState("free");
+  const [trail, setTrail] = useState(false);
+  const [frames, setFrames] = useState(false);
+  const { robotKey, description } = props;
+  const prefix = robotKey.split("/").slice(1).join("/");
+  const framesAge = useFramesAge(robotKey);
+  const stale = props.stale || isStale("frames", framesAge);
+  const age = props.stale ? props.age : framesAge;
+
+  // One scene for one description: a changed one begins anew.
+  const identity = useMemo(
+    () => description && JSON.stringify([description.links, description.baseToSite]),
+    [description],
+  );
+  useEffect(() => {
+    if (!canvas.current || !description) return;
+    setProblem("");
+    setLoaded(false);
+    let made: RobotScene;
+    try {
+      made = new RobotScene(canvas.current, prefix);
+    } catch {
+      setProblem(t("no_webgl"));
+      return;
+    }
+    scene.current = made;
+    const stop = watch(`${robotKey}/frames`, (sample) =>
+      made.placeFrames(sample.payload, sample.sourceTime, sample.arrived),
+    );
+    void made
+      .load(description, (link, text) => setProblem(t("model_failed", { link, text })))
+      .then(() => setLoaded(true));
+    return () => {
+      stop();
+      made.dispose();
+      scene.current = null;
+    };
+  }, [identity]);
+  useEffect(() => scene.current?.setStale(stale), [stale, identity, loaded]);
+  useEffect(() => scene.current?.setColours(), [theme.value]);
+  useEffect(() => scene.current?.showTrail(trail), [trail, identity]);
+  useEffect(() => scene.current?.showFrames(frames), [frames, identity]);
+  const views = viewsOf(description);
+  const chosen = views.find((each) => each.name === view) ?? FREE;
+  useEffect(() => scene.current?.look(chosen), [chosen.name, identity]);
+
+  const onKey = (event: KeyboardEvent) => {
+    const step = 0.1;
+    const turns: Record<string, [number, number]> = {
+      ArrowLeft: [-step, 0],
+      ArrowRight: [step, 0],
+      ArrowUp: [0, -step],
+      ArrowDown: [0, step],
+    };
+    const turn = turns[event.key];
+    if (!turn) return;
+    event.preventDefault();
+    scene.current?.turn(...turn);
+  };
+  const waiting = !description ? t("waiting_description") : !loaded && !problem ? t("loading_model") : "";
+  return (
+    <section class={`panel scene ${stale && loaded ? "is-stale" : ""}`} aria-label={t("scene")}>
+      <div class="canvas-place">
+        <canvas
+          key={identity ?? "none"}
+          ref={canvas}
+          tabIndex={0}
+          role="img"
+          aria-label={`${t("scene")}. ${t("scene_hint")}`}
+          title=""
+          onKeyDown={onKey}
+          data-loaded={loaded}
+        />
+      </div>
+      <div class="scene-tools">
+        <Choice
+          label={t("view")}
+          values={views.map((each) => each.name)}
+          chosen={chosen.name}
+          text={viewText}
+          choose={setView}
+        />
+        <div class="scene-toggles">
+          <Toggle on={trail} set={setTrail}>
+            {t("show_trail")}
+          </Toggle>
+          <Toggle on={frames} set={setFrames}>
+            {t("show_frames")}
+          </Toggle>
+        </div>
+      </div>
+      {waiting && <p class="scene-word dim">{waiting}</p>}
+      {problem && <p class="scene-word trouble">{problem}</p>}
+      {stale && loaded && (
+        <p class="scene-stale" role="status">
+          <span class="shape warning" aria-hidden="true" />
+          {age === undefined ? t("no_data") : staleText(age)}
+          {props.lostAt !== null && <span class="dim">{t("no_link_since", { time: timeOfDay(props.lostAt) })}</span>}
+        </p>
+      )}
+    </section>
+  );
+}

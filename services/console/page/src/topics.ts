@@ -1,0 +1,153 @@
+// What the page knows of the mesh: the newest message per key, and how old it is.
+
+import { fromBinary } from "@bufbuild/protobuf";
+import type { DescMessage, MessageShape } from "@bufbuild/protobuf";
+import { signal } from "@preact/signals";
+import type { Signal } from "@preact/signals";
+import { useEffect, useMemo } from "preact/hooks";
+import { AuditListSchema, AuditEntrySchema, EventListSchema, EventSchema } from "./gen/robomesh_pb";
+import type { AuditEntry, ControllerState, Event } from "./gen/robomesh_pb";
+import { hello, watch } from "./mesh";
+import type { Sample } from "./mesh";
+
+export interface Latest<M> {
+  key: string;
+  message: M;
+  sample: Sample;
+}
+
+/** The page's monotonic clock in ms, four times a second: what ages are drawn by. */
+export const now = signal(performance.now());
+setInterval(() => (now.value = performance.now()), 250);
+
+const REDRAW_MS = 50; // a person reads no faster; 3-D and plots take samples as they come
+const LIST_LENGTH = 200;
+
+interface Watched<M> {
+  entries: Signal<ReadonlyMap<string, Latest<M>>>;
+  users: number;
+  stop: () => void;
+}
+const watched = new Map<string, Watched<unknown>>();
+
+function follow<M>(expression: string): Watched<M> {
+  const present = watched.get(expression);
+  if (present) return present as Watched<M>;
+  const entries = signal<ReadonlyMap<string, Latest<M>>>(new Map());
+  const fresh: Watched<M> = { entries, users: 0, stop: () => undefined };
+  watched.set(expression, fresh as Watched<unknown>);
+  return fresh;
+}
+
+function start<S extends DescMessage>(schema: S, expression: string, topic: Watched<MessageShape<S>>): void {
+  const dirty = new Map<string, Sample>();
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  const flush = () => {
+    timer = undefined;
+    const next = new Map(topic.entries.value);
+    for (const [key, sample] of dirty) next.set(key, { key, sample, message: fromBinary(schema, sample.payload) });
+    dirty.clear();
+    topic.entries.value = next;
+  };
+  const stop = watch(expression, (sample) => {
+    dirty.set(sample.key, sample);
+    timer ??= setTimeout(flush, REDRAW_MS);
+  });
+  topic.stop = () => {
+    clearTimeout(timer);
+    stop();
+  };
+}
+
+/** The newest message of every key that a key expression covers. */
+export function useTopics<S extends DescMessage>(
+  schema: S,
+  expression: string,
+): ReadonlyMap<string, Latest<MessageShape<S>>> {
+  const topic = useMemo(() => follow<MessageShape<S>>(expression), [expression]);
+  useEffect(() => {
+    // Another component may have let it go between this one's drawing and now.
+    watched.set(expression, topic as Watched<unknown>);
+    if (topic.users++ === 0) start(schema, expression, topic);
+    return () => {
+      if (--topic.users === 0) {
+        topic.stop();
+        watched.delete(expression);
+      }
+    };
+  }, [topic]);
+  return topic.entries.value;
+}
+
+/** The newest message of one key. */
+export function useTopic<S extends DescMessage>(schema: S, key: string): Latest<MessageShape<S>> | undefined {
+  return useTopics(schema, key).get(key);
+}
+
+/** The last events or audit entries of a robot, newest first. */
+export function useEvents(key: string): readonly Event[] {
+  return useList(key, (sample) =>
+    sample.live ? [fromBinary(EventSchema, sample.payload)] : fromBinary(EventListSchema, sample.payload).events,
+  );
+}
+
+export function useAudit(key: string): readonly AuditEntry[] {
+  return useList(key, (sample) =>
+    sample.live
+      ? [fromBinary(AuditEntrySchema, sample.payload)]
+      : fromBinary(AuditListSchema, sample.payload).entries,
+  );
+}
+
+function useList<M>(key: string, decode: (sample: Sample) => readonly M[]): readonly M[] {
+  const list = useMemo(() => signal<readonly M[]>([]), [key]);
+  useEffect(() => {
+    const seen = new Set<string>();
+    return watch(key, (sample) => {
+      if (!sample.live) {
+        list.value = [...decode(sample)].reverse().slice(0, LIST_LENGTH);
+        seen.clear();
+        return;
+      }
+      const id = `${sample.publisher}:${sample.sequence}`;
+      if (seen.has(id)) return; // sent again after a new connection
+      seen.add(id);
+      list.value = [...decode(sample), ...list.value].slice(0, LIST_LENGTH);
+    });
+  }, [list]);
+  return list.value;
+}
+
+/** Age [s] of a sample now; null: not known. */
+export function ageOf(latest: Latest<unknown> | undefined, at = now.value): number | null {
+  if (!latest || latest.sample.newAt === null) return null;
+  return Math.max(0, (at - latest.sample.newAt) / 1000);
+}
+
+/** Age [s] of joint states, with what the gateway itself says of the last unit's age; null: not known. */
+export function jointsAge(
+  joints: Latest<unknown> | undefined,
+  controller: Latest<ControllerState> | undefined,
+  at = now.value,
+): number | null {
+  if (!joints) return null;
+  const own = ageOf(joints, at);
+  const reportAge = ageOf(controller, at);
+  const lastUnit = controller?.message.lastUnitAgeS;
+  if (reportAge === null || lastUnit === undefined || controller === undefined) return own;
+  const reported = reportAge + lastUnit;
+  if (own === null) return reported;
+  // A report made before the newest states came says nothing of them.
+  return controller.sample.arrived >= joints.sample.arrived ? Math.max(own, reported) : own;
+}
+
+/** Age [s] from which a topic is stale; infinite where it does not age. */
+export function staleAfter(topic: string): number {
+  const rows = hello.value?.stale ?? [];
+  const row = rows.find((r) => r.topic === topic) ?? rows.find((r) => r.topic === topic.replace(/\/.*/, "/*"));
+  return row?.afterS ?? Number.POSITIVE_INFINITY;
+}
+
+export function isStale(topic: string, age: number | null): boolean {
+  return age === null || age > staleAfter(topic);
+}

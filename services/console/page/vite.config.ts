@@ -1,0 +1,12 @@
+import { defineConfig } from "vite";
+
+export default defineConfig({
+  base: "/",
+  build: {
+    target: "es2024",
+    assetsDir: "assets",
+    assetsInlineLimit: 0, // data: addresses would need a wider security policy
+    chunkSizeWarningLimit: 900,
+    modulePreload: { polyfill: false },
+  },
+});
