@@ -12,19 +12,12 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from bus import keys
 from bus.endpoints import Tls
 from bus.errors import KeyNameError
+from robots.description import Pose
 from services.errors import ListenError, SiteFileError
 from services.listen import split_address
 
 Triple = tuple[float, float, float]
 Quiet = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Pose(BaseModel):
-    """Where something stands: millimetres, and degrees about fixed x, y, z."""
-
-    model_config = Quiet
-    xyz: Triple = (0.0, 0.0, 0.0)
-    rpy: Triple = (0.0, 0.0, 0.0)
 
 
 class TlsFiles(BaseModel):
@@ -182,9 +175,6 @@ class Site(BaseModel):
         return None if files is None else Tls(ca=files.ca, certificate=files.certificate, key=files.key)
 
 
-DEMO = Site(site="demo", robot=(Robot(name="pt600", model="pt600", demo=True),))
-
-
 def load(path: Path | None) -> Site:
     """The site of a file; without one the built-in site `demo`.
 
@@ -241,3 +231,7 @@ def _checked_name(name: str, what: str) -> str:
         return keys.check_name(name, what)
     except KeyNameError as error:
         raise ValueError(str(error)) from None
+
+
+# What runs without a file.
+DEMO = Site(site="demo", robot=(Robot(name="pt600", model="pt600", demo=True),))

@@ -115,12 +115,15 @@ def simulate(
     rate: Annotated[float, typer.Option(metavar="HZ", min=1, max=1000)] = 100.0,
     max_clients: Annotated[int, typer.Option(metavar="N", min=1)] = 8,
     demo: Annotated[bool, typer.Option(help="Move until the first command.")] = False,
-    fault: Annotated[list[str] | None, typer.Option(metavar="NAME", help="freeze, garbage")] = None,
+    fault: Annotated[
+        list[str] | None, typer.Option(metavar="NAME[@SECONDS]", help="freeze, garbage; when it begins.")
+    ] = None,
+    insecure: Annotated[bool, typer.Option(help="Listen beyond loopback, without any protection.")] = False,
 ) -> None:
     """Run a controller of the old kind that simulates its arm."""
     from services.command_line import roles
 
-    roles.simulate(robot, listen, rate, max_clients, demo, tuple(fault or ()))
+    roles.simulate(robot, listen, rate, max_clients, demo, tuple(fault or ()), insecure)
 
 
 # ------------------------------------------------------------- what is there
@@ -304,6 +307,9 @@ def run(arguments: list[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Exception as error:
+        # Services run their robots in task groups.
+        while isinstance(error, ExceptionGroup):
+            error = error.exceptions[0]
         if isinstance(error, _known_errors()):
             return _could_not(str(error))
         if os.environ.get("ROBOMESH_DEBUG"):
