@@ -4,6 +4,7 @@ A piece is a material and a solid. Round things are made along z and laid where 
 """
 
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -18,8 +19,6 @@ CASTING = Material("casting", (0.21, 0.225, 0.24), (0.2, 0.2, 0.2), shininess=0.
 STEEL = Material("steel", (0.74, 0.76, 0.78), (0.8, 0.8, 0.8), shininess=0.7)
 RUBBER = Material("rubber", (0.09, 0.09, 0.1), (0.05, 0.05, 0.05), shininess=0.05)
 
-ROUND = 40  # segments of a large circle
-SMALL = 12  # of a bolt
 # Below this, neighbouring faces are one smooth surface.
 CREASE = np.radians(36)
 
@@ -46,15 +45,20 @@ def laid(pieces: Iterable[Piece], placement: FloatArray) -> list[Piece]:
     return [(material, moved(solid, placement)) for material, solid in pieces]
 
 
-def turned_piece(
-    material: Material, profile: Profile, *, fillet: float = 0.0, segments: int = ROUND
-) -> Piece:
+def turned_piece(material: Material, profile: Profile, *, fillet: float = 0.0) -> Piece:
     """A turned body; its corners rounded."""
-    return material, turned(rounded(profile, fillet) if fillet else profile, segments)
+    largest = max(radius for radius, _ in profile)
+    return material, turned(rounded(profile, fillet) if fillet else profile, _segments(largest))
 
 
-def drum(material: Material, radius: float, low: float, high: float, *, fillet: float = 3.0) -> Piece:
-    """A cylinder along z with rounded edges."""
+def _segments(radius: float) -> int:
+    """As many as the eye needs for a circle of this size."""
+    sizes = [(45, 36), (30, 28), (8, 20), (0, 10)]
+    return next(count for least, count in sizes if radius >= least)
+
+
+def drum(material: Material, radius: float, low: float, high: float, *, fillet: float = 0.0) -> Piece:
+    """A cylinder along z; its edges rounded by the fillet."""
     return turned_piece(material, [(0, low), (radius, low), (radius, high), (0, high)], fillet=fillet)
 
 
@@ -63,19 +67,14 @@ def bolts(
 ) -> list[Piece]:
     """Socket-head bolts on a circle about z; `start` in degrees."""
     angles = np.radians(start) + np.arange(count) * (2 * np.pi / count)
-    socket = radius * 0.5
-    head = [
-        (radius, low),
-        (radius, high - 0.15 * radius),
-        (radius * 0.85, high),
-        (socket, high),
-        (socket, high - 0.4 * radius),
-        (0, high - 0.4 * radius),
-    ]
-    return [
-        (STEEL, moved(turned(head, SMALL), at(circle * float(np.cos(angle)), circle * float(np.sin(angle)))))
-        for angle in angles
-    ]
+    head: list[tuple[float, float]] = [(radius, low), (radius, high), (0, high)]
+    if radius >= 8:  # the socket of a smaller one is not seen
+        floor = high - 0.4 * radius
+        head[1:] = [(radius, high - 0.2 * radius), (radius * 0.8, high)]
+        head += [(radius * 0.5, high), (radius * 0.5, floor), (0, floor)]
+    bolt = turned(head, _segments(radius))
+    centers = circle * np.column_stack([np.cos(angles), np.sin(angles)])
+    return [(STEEL, moved(bolt, at(x, y))) for x, y in centers.tolist()]
 
 
 def motor(radius: float, low: float, high: float, *, fins: int = 5) -> list[Piece]:
@@ -122,7 +121,7 @@ def cheek(
     bevel: float = 5.0,
 ) -> Piece:
     """A flat arm round two circles in x and y, from z low to z high."""
-    outline = strap(np.array(start), start_radius, np.array(end), end_radius, ROUND)
+    outline = strap(np.array(start), start_radius, np.array(end), end_radius, count=36)
     return material, plate(outline, low, high, bevel)
 
 
@@ -135,8 +134,8 @@ def rounded_box(
     bevel: float = 4.0,
 ) -> Piece:
     """A box with round corners about z and rounded edges."""
-    outline = rectangle(size[0], size[1], radius, steps=4)
-    solid = plate(outline, -size[2] / 2, size[2] / 2, bevel)
+    outline = rectangle(size[0], size[1], radius, steps=3)
+    solid = plate(outline, -size[2] / 2, size[2] / 2, bevel, steps=2)
     return material, moved(solid, at(*center))
 
 
@@ -150,36 +149,36 @@ def tapered(
         radius: Of the sections' corners.
     """
     sections = []
-    for x, along_y, along_z, middle in _eased(stations):
-        flat = rectangle(along_y, along_z, radius, steps=6)
+    for x, along_y, along_z, middle in _eased(stations).tolist():
+        flat = rectangle(along_y, along_z, radius, steps=4)
         sections.append(np.column_stack([np.full(len(flat), x), flat[:, 0] + middle, flat[:, 1]]))
     return material, lofted(sections)
 
 
-def _eased(stations: Sequence[tuple[float, float, float, float]]) -> list[tuple[float, ...]]:
-    """More sections between those given, with soft ends and soft changes of size."""
+# How the ends of a tapered body are rounded off: taken from each side, and at which distance from the end.
+_END = np.array([[5.0, 0.0], [2.25, 0.8], [0.6, 2.5]])
+_END_LENGTH = 5.0
+
+
+def _eased(stations: Sequence[tuple[float, float, float, float]]) -> FloatArray:
+    """(n, 4): more stations between those given, so that sizes change softly, and round ends."""
     given = np.array(stations, dtype=np.float64)
-    sections: list[FloatArray] = []
-    for start, end in zip(given, given[1:], strict=False):
-        for t in np.linspace(0, 1, 5)[:-1]:
-            eased = t * t * (3 - 2 * t)
-            sections.append(
-                np.array([start[0] + t * (end[0] - start[0]), *(start + eased * (end - start))[1:]])
-            )
-    sections.append(given[-1])
-    # Both ends rounded off by a few millimetres.
-    edge = 5.0
-    ends = []
-    for inset, forward in ((1.0, 0.0), (0.45, 0.16), (0.12, 0.5)):
-        ends.append((inset * edge, forward * edge))
-    first, last = sections[0], sections[-1]
-    head = [np.array([first[0] + go, first[1] - 2 * cut, first[2] - 2 * cut, first[3]]) for cut, go in ends]
-    tail = [
-        np.array([last[0] - go, last[1] - 2 * cut, last[2] - 2 * cut, last[3]]) for cut, go in reversed(ends)
-    ]
-    sections[0] = np.array([first[0] + edge, *first[1:]])
-    sections[-1] = np.array([last[0] - edge, *last[1:]])
-    return [tuple(section.tolist()) for section in (*head, *sections, *tail)]
+    steps = np.linspace(0, 1, 4)[:-1, None]
+    soft = steps * steps * (3 - 2 * steps)
+    weights = np.hstack([steps, soft, soft, soft])
+    between = [start + weights * (end - start) for start, end in pairwise(given)]
+    sections = np.vstack([*between, given[-1:]])
+    first, last = _rounded_end(given[0], 1), _rounded_end(given[-1], -1)
+    sections[0, 0] += _END_LENGTH
+    sections[-1, 0] -= _END_LENGTH
+    return np.vstack([first, sections, last])
+
+
+def _rounded_end(station: FloatArray, direction: int) -> FloatArray:
+    sections = np.repeat(station[None], len(_END), axis=0)
+    sections[:, 0] += direction * _END[:, 1]
+    sections[:, 1:3] -= 2 * _END[:, :1]
+    return sections[::direction]
 
 
 def mesh_of(pieces: Iterable[Piece]) -> Mesh:

@@ -8,7 +8,6 @@ import numpy as np
 from robots.library.parts import (
     CASTING,
     PAINT,
-    ROUND,
     RUBBER,
     STEEL,
     Piece,
@@ -23,6 +22,7 @@ from robots.library.parts import (
     tapered,
     turned_piece,
 )
+from robots.meshes.mesh import FloatArray
 from robots.meshes.solids import lofted, plate, rectangle, tube
 
 # The column's frame has its y axis up and its x axis forward: x forward, y left, z up, seen from there.
@@ -47,12 +47,12 @@ def base(s: float, height: float) -> list[Piece]:
         ],
         fillet=9 * s,
     )
-    bearing = drum(STEEL, 104 * s, top - 9 * s, top - 1 * s, fillet=1)
+    bearing = drum(STEEL, 104 * s, top - 9 * s, top - 1 * s, fillet=0)
     pieces = [foot, pedestal, bearing]
     for x in (-1, 1):
         for y in (-1, 1):
             corner = at(x * 112 * s, y * 112 * s)
-            washer = drum(STEEL, 15 * s, 24 * s, 27 * s, fillet=0.8)
+            washer = drum(STEEL, 15 * s, 24 * s, 27 * s)
             pieces += laid([washer, *bolts(0.0, 1, 10 * s, 27 * s, 36 * s)], corner)
     for angle in np.radians([45, 135, 225, 315]):
         pieces += laid([_rib(s, top)], _about_z(float(angle)))
@@ -74,7 +74,7 @@ def _rib(s: float, top: float) -> Piece:
     return PAINT, lofted(sides)
 
 
-def _about_z(angle: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+def _about_z(angle: float) -> FloatArray:
     placement = np.eye(4)
     placement[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     return placement
@@ -92,12 +92,12 @@ def column(s: float) -> list[Piece]:
         (PAINT, _trunk(s)),
     ]
     # The waist's motor stands behind the trunk.
-    upright += laid(motor(44 * s, 0, 150 * s, fins=7), at(-96 * s, 0, -140 * s))
+    upright += laid(motor(44 * s, 0, 150 * s, fins=7), at(-84 * s, 0, -140 * s))
     pieces = laid(upright, _UPRIGHT)
     for side in (1, -1):
         low, high = (60 * s, 96 * s)
         plate_low, plate_high = (low, high) if side > 0 else (-high, -low)
-        pieces.append(cheek(PAINT, (0, -96 * s), 74 * s, (0, 0), 73 * s, plate_low, plate_high, bevel=7 * s))
+        pieces.append(cheek(PAINT, (0, -72 * s), 74 * s, (0, 0), 73 * s, plate_low, plate_high, bevel=7 * s))
     pieces += laid(motor(60 * s, 0, 74 * s, fins=4), at(0, 0, 95 * s))
     pieces += laid(cover(60 * s, 0, 20 * s, count=8), at(0, 0, -95 * s, axis="-z"))
     return pieces
@@ -123,7 +123,7 @@ def upper_arm(s: float, length: float) -> list[Piece]:
     fork = length - 84 * s
     along: list[Piece] = [
         drum(PAINT, 66 * s, -57 * s, 57 * s, fillet=6 * s),
-        drum(STEEL, 50 * s, -60 * s, 60 * s, fillet=1),
+        drum(STEEL, 50 * s, -60 * s, 60 * s, fillet=0),
         tapered(
             PAINT,
             [
@@ -146,7 +146,7 @@ def upper_arm(s: float, length: float) -> list[Piece]:
 
 def _conduit(s: float, length: float) -> list[Piece]:
     """The elbow motor's cable along the arm's side, in two clamps."""
-    t = np.linspace(0, 1, 25)
+    t = np.linspace(0, 1, 21)
     path = np.column_stack(
         [
             (62 + t * (length / s - 62)) * s,
@@ -154,12 +154,11 @@ def _conduit(s: float, length: float) -> list[Piece]:
             (47 + 24 * np.sin(np.pi * np.minimum(t * 1.35, 1.0) / 2) ** 2) * s,
         ]
     )
-    path[-4:, 1] += np.array([0, 0, 0, 0]) * s
     clamps = [
         rounded_box(CASTING, (16 * s, 26 * s, 16 * s), (x, 0.0, z), radius=3 * s, bevel=2 * s)
         for x, z in ((0.36 * length, 55 * s), (0.62 * length, 62 * s))
     ]
-    return [(RUBBER, tube(path[:-3], 6.5 * s, 12)), *clamps]
+    return [(RUBBER, tube(path[:-2], 6.5 * s, 10)), *clamps]
 
 
 def forearm(s: float, length: float) -> list[Piece]:
@@ -167,7 +166,7 @@ def forearm(s: float, length: float) -> list[Piece]:
     fork = length - 62 * s
     along: list[Piece] = [
         drum(CASTING, 47 * s, -38 * s, 38 * s, fillet=4 * s),
-        drum(STEEL, 36 * s, -41 * s, 41 * s, fillet=1),
+        drum(STEEL, 36 * s, -41 * s, 41 * s, fillet=0),
         tapered(
             PAINT,
             [
@@ -196,7 +195,7 @@ def wrist(s: float) -> list[Piece]:
     pieces = laid(
         [
             drum(CASTING, 33 * s, -26.5 * s, 26.5 * s, fillet=3 * s),
-            drum(STEEL, 24 * s, -28 * s, 28 * s, fillet=1),
+            drum(STEEL, 24 * s, -28 * s, 28 * s, fillet=0),
         ],
         at(axis="+y"),
     )
@@ -213,7 +212,7 @@ def wrist(s: float) -> list[Piece]:
         ],
         fillet=5 * s,
     )
-    lip = drum(RUBBER, 31 * s, 81 * s, 85 * s, fillet=1)
+    lip = drum(RUBBER, 31 * s, 81 * s, 85 * s, fillet=0)
     return [*pieces, body, lip]
 
 
@@ -233,13 +232,12 @@ def flange(s: float, face: float) -> list[Piece]:
             (0, face - 7 * s),
         ],
         fillet=1.6 * s,
-        segments=ROUND,
     )
     holes: list[Piece] = []
     for angle in np.radians([45, 135, 225, 315]):
         place = at(26 * s * float(np.cos(angle)), 26 * s * float(np.sin(angle)), face)
-        holes += laid([drum(RUBBER, 3.6 * s, -2.0, 0.35, fillet=0.1)], place)
-    dowel = laid([drum(CASTING, 2.6 * s, -2.0, 3.0 * s, fillet=0.6)], at(26 * s, 0, face))
+        holes += laid([drum(RUBBER, 3.6 * s, -2.0, 0.35)], place)
+    dowel = laid([drum(CASTING, 2.6 * s, -2.0, 3.0 * s)], at(26 * s, 0, face))
     # A mark on the rim, so that the roll can be seen.
     mark = rounded_box(
         PAINT, (5 * s, 10 * s, 10 * s), (37.5 * s, 0, face - 6.5 * s), radius=1.5 * s, bevel=1 * s

@@ -32,10 +32,10 @@ def base() -> list[Piece]:
         [(0, 24), (150, 24), (146, 44), (98, 96), (88, 170), (88, 520), (97, 532), (97, 566), (0, 566)],
         fillet=16,
     )
-    pieces = [foot, trunk, drum(STEEL, 90, 564, 573, fillet=1)]
+    pieces = [foot, trunk, drum(STEEL, 90, 564, 573, fillet=0)]
     for x in (-1, 1):
         for y in (-1, 1):
-            washer = drum(STEEL, 19, 26, 29, fillet=1)
+            washer = drum(STEEL, 19, 26, 29)
             pieces += laid([washer, *bolts(0.0, 1, 12, 29, 40)], at(x * 140, y * 140))
     pieces.append(rounded_box(CASTING, (110, 130, 250), (-112, 0, 190), radius=14, bevel=5))
     for z in (110, 160, 210):
@@ -57,7 +57,7 @@ def column() -> list[Piece]:
     )
     body = drum(PAINT, 86, -118, 148, fillet=8)
     rear = laid(cover(80, 0, 22, count=8), at(0, 0, -117, axis="-z"))
-    ring = drum(STEEL, 74, 147, 156, fillet=1)
+    ring = drum(STEEL, 74, 147, 156, fillet=0)
     return [*neck, body, *rear, ring]
 
 
@@ -70,12 +70,10 @@ def upper_arm() -> list[Piece]:
         (PAINT, plate(outline, low, high, 12, steps=4)),
         (PAINT, plate(rear, low, high, 12, steps=4)),
     ]
-    pieces += laid(
-        [drum(STEEL, 76, -14, 27 + 2, fillet=1), drum(PAINT, 84, 28, 52, fillet=4)], at(-_A2, 0, 0)
-    )
+    pieces += laid([drum(STEEL, 76, -14, 29, fillet=0), drum(PAINT, 84, 28, 52, fillet=4)], at(-_A2, 0, 0))
     pieces += laid(cover(72, 0, 16, count=8), at(-_A2, 0, high - 1))
     pieces += laid(cover(46, 0, 14, count=6), at(0, 0, high - 1))
-    pieces += laid([drum(STEEL, 48, 42, 50, fillet=1)], at())
+    pieces += [drum(STEEL, 48, 42, 50)]
     # The cover of the two motors in the arm's back, and the long one between the axes.
     back = strap(np.array([-_A2 - 150, 0.0]), 54, np.array([-_A2 - 112, 0.0]), 56, 40)
     middle = strap(np.array([-_A2 + 128, 0.0]), 52, np.array([-104.0, 0.0]), 38, 40)
@@ -91,7 +89,7 @@ def upper_arm() -> list[Piece]:
 def forearm() -> list[Piece]:
     """From the elbow, at x = 20.3, up along z to the wrist; y along the elbow's axis."""
     pieces = laid(
-        [drum(PAINT, 62, -42, 40, fillet=5), drum(STEEL, 46, -44, 42, fillet=1)], at(-_A3, 0, 0, axis="+y")
+        [drum(PAINT, 62, -42, 40, fillet=5), drum(STEEL, 46, -44, 42, fillet=0)], at(-_A3, 0, 0, axis="+y")
     )
     pieces += laid(cover(52, 0, 14, count=6), at(-_A3, -41, 0, axis="-y"))
     # x of the body is z of the link, its y the link's x.
@@ -102,12 +100,12 @@ def forearm() -> list[Piece]:
         20,
     )
     pieces += laid([body], upwards)
-    pieces += [drum(STEEL, 33, 345, 352, fillet=1)]
+    pieces += [drum(STEEL, 33, 345, 352, fillet=0)]
     pieces.append(rounded_box(CASTING, (70, 60, 10), (16, 0, -113), radius=8, bevel=3))
     for x in (-6, 38):
         pieces += laid(motor(19, 0, 56, fins=4), at(x, 0, -117, axis="-z"))
     outline = strap(np.array([90.0, 12.0]), 28, np.array([240.0, 3.0]), 20, 40)
-    panel = laid([(CASTING, plate(outline, 36, 42, 2))], upwards @ np.diag([1.0, 1.0, 1.0, 1.0]))
+    panel = laid([(CASTING, plate(outline, 36, 42, 2))], upwards)
     return [*pieces, *panel]
 
 
@@ -116,7 +114,7 @@ def wrist() -> list[Piece]:
     roll = laid(
         [
             turned_piece(PAINT, [(0, 34), (36, 34), (37, 66), (34, 80), (0, 80)], fillet=4),
-            drum(CASTING, 38.5, 56, 62, fillet=1),
+            drum(CASTING, 38.5, 56, 62, fillet=0),
         ],
         at(axis="+y"),
     )
@@ -130,7 +128,7 @@ def wrist() -> list[Piece]:
 
 def wrist_cage() -> list[Piece]:
     """The bending block: y along the bend, z along the flange's axis."""
-    hub = laid([drum(CASTING, 30, -25.5, 25.5, fillet=3), drum(STEEL, 22, -27, 27, fillet=1)], at(axis="+y"))
+    hub = laid([drum(CASTING, 30, -25.5, 25.5, fillet=3), drum(STEEL, 22, -27, 27, fillet=0)], at(axis="+y"))
     nose = turned_piece(CASTING, [(0, 0), (24, 0), (24, 22), (27, 25), (0, 25)], fillet=3)
     return [*hub, nose]
 
@@ -145,6 +143,6 @@ def flange() -> list[Piece]:
     holes: list[Piece] = []
     for angle in np.radians([0, 90, 180, 270]):
         place = at(21 * float(np.cos(angle)), 21 * float(np.sin(angle)))
-        holes += laid([drum(RUBBER, 3.2, -2.0, 0.3, fillet=0.1)], place)
+        holes += laid([drum(RUBBER, 3.2, -2.0, 0.3)], place)
     mark = rounded_box(PAINT, (4, 8, 8), (31.5, 0, -5.2), radius=1.2, bevel=0.8)
     return [disc, *holes, mark]

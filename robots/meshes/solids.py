@@ -61,7 +61,7 @@ def _skin(rings: Sequence[IndexArray]) -> IndexArray:
     return kept
 
 
-def rounded(profile: Profile, radius: float, steps: int = 3) -> list[tuple[float, float]]:
+def rounded(profile: Profile, radius: float, steps: int = 2) -> list[tuple[float, float]]:
     """A profile with its inner corners filleted, each by what its neighbours leave room for."""
     points = np.array(profile, dtype=np.float64)
     result = [points[0]]
