@@ -197,7 +197,8 @@ class Robot:
         if status.state is LinkState.DOWN:
             self._telemetry.forget()
         if before is not status.state:
-            severity = _S.INFO if status.state is LinkState.UP else _S.WARNING
+            lost = status.state is LinkState.DOWN or before is LinkState.UP
+            severity = _S.WARNING if lost else _S.INFO
             self._journal.say(
                 severity, f"link.{status.state.value}", f"link to the controller: {status.text}"
             )

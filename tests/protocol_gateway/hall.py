@@ -1,0 +1,143 @@
+"""A hall for the gateway's tests: simulated controllers, a gateway, a monitor, an operator; sockets and router real."""
+
+import asyncio
+import contextlib
+from dataclasses import dataclass, field
+
+import pytest
+
+from bus.errors import RefusedError
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import open_session
+from protocol_gateway.gateway import RobotSettings, Settings, serve
+from services.simulator.simulator import Settings as SimulatorSettings
+from services.simulator.simulator import serve as simulate
+
+C = schema.CommandRequest.Command
+A = schema.LeaseRequest.Action
+STATE = schema.ControllerState
+
+
+async def until(condition, timeout_s=8.0):
+    async with asyncio.timeout(timeout_s):
+        while not condition():
+            await asyncio.sleep(0.01)
+    return condition()
+
+
+@dataclass
+class Plant:
+    """What a test sees of a site, from the monitor's and the operator's side."""
+
+    session: object
+    audit: object
+    robot: str = "arm"
+    seen: dict = field(default_factory=dict)
+    secret: str = ""
+    id: int = 0
+
+    def key(self, topic):
+        return f"robomesh/hall/{self.robot}/{topic}"
+
+    @property
+    def controller(self):
+        return self.seen["controller"][-1]
+
+    @property
+    def joints(self):
+        return [joint.position for joint in self.seen["joints"][-1].joints]
+
+    def events(self, code):
+        return [event for event in self.seen["events"] if event.code == code]
+
+    async def stop(self, **fields):
+        return await self.session.ask(self.key("stop"), schema.StopRequest(**fields))
+
+    async def lease(self, action, operator="li", **fields):
+        if action in (A.RENEW, A.RELEASE, A.OFFER):
+            fields.setdefault("lease", self.secret)
+        answer = await self.session.ask(
+            self.key(f"lease/request/{operator}"), schema.LeaseRequest(action=action, **fields)
+        )
+        self.secret = answer.lease or self.secret
+        return answer
+
+    async def command(self, command, operator="li", **fields):
+        self.id += 1
+        fields = {"lease": self.secret, "id": self.id, **fields}
+        request = schema.CommandRequest(command=command, **fields)
+        return await self.session.ask(self.key(f"command/{operator}"), request)
+
+    async def home(self):
+        """Take control for long enough, and home."""
+        await self.lease(A.ACQUIRE, ttl_s=5)
+        await self.command(C.HOME)
+        await until(lambda: self.controller.homed == STATE.YES)
+        await self.lease(A.RENEW, ttl_s=5)
+
+
+@contextlib.asynccontextmanager
+async def simulator(**settings):
+    """The port of a running simulated controller."""
+    said = asyncio.get_running_loop().create_future()
+    task = asyncio.create_task(
+        simulate(SimulatorSettings(**{"robot": "pt600", **settings}), ready=said.set_result)
+    )
+    await asyncio.wait([said, task], return_when=asyncio.FIRST_COMPLETED)
+    try:
+        yield int((await said).rpartition(":")[2])
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+@contextlib.asynccontextmanager
+async def gateway(mesh, folder, *ports, up=True, **robot):
+    """A gateway of one robot a port, and a monitor that has seen the first one's link up."""
+    names = ["arm", *(f"arm-{number}" for number in range(2, len(ports) + 1))]
+    settings = Settings(
+        site="hall",
+        audit_folder=folder,
+        robots=tuple(
+            RobotSettings(**{"name": name, "description": "pt600", "host": "127.0.0.1", "port": port, **robot})
+            for name, port in zip(names, ports, strict=True)
+        ),
+    )
+    async with open_session(mesh) as own, open_session(mesh) as monitor:
+        task = asyncio.create_task(serve(own, settings))
+        plant = Plant(monitor, folder / "hall" / "arm.jsonl")
+        watching = [
+            asyncio.create_task(watch(monitor, plant, topic))
+            for topic in ("joints", "joints/slow", "controller", "lease", "events", "audit", "raw")
+        ]
+        try:
+            await until(lambda: task.done() or plant.seen.get("controller"))
+            if up:
+                await until(lambda: task.done() or plant.controller.link == STATE.UP)
+            if task.done():
+                await task
+            yield plant
+        finally:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+            for each in watching:
+                each.cancel()
+            await asyncio.gather(*watching, return_exceptions=True)
+
+
+async def watch(session, plant, topic):
+    seen = plant.seen.setdefault(topic, [])
+    async for sample in session.subscribe(plant.key(topic), newest=2000):
+        message = sample.message()
+        if isinstance(message, schema.EventList):
+            seen.extend(message.events)
+        elif isinstance(message, schema.AuditList):
+            seen.extend(message.entries)
+        else:
+            seen.append(message)
+
+
+async def refusal(awaitable):
+    with pytest.raises(RefusedError) as caught:
+        await awaitable
+    return str(caught.value)
