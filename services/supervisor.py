@@ -65,12 +65,16 @@ async def supervise(
         async with asyncio.TaskGroup() as group:
             for program in programs:
                 prefix = f"{program.name:<{width}} | "
-                group.create_task(_keep(program, running, lambda line, p=prefix: write(p + line)))
+                group.create_task(_keep(program, running, _prefixed(write, prefix)))
             group.create_task(_once(ready))
     except* ServiceError as errors:
         raise errors.exceptions[0] from None
     finally:
-        await _end(running.values())
+        await _end([*running.values()])
+
+
+def _prefixed(write: Callable[[str], None], prefix: str) -> Callable[[str], None]:
+    return lambda line: write(prefix + line)
 
 
 async def _once(ready: Callable[[], Awaitable[None]]) -> None:

@@ -59,12 +59,20 @@ async def _row(session: Session, site: str, robot: str) -> dict[str, Any]:
         session.last(robot_key(site, robot, "controller"), timeout_s=1.5),
         session.last(robot_key(site, robot, "lease"), timeout_s=1.5),
     )
-    known = isinstance(state, _State)
+    if not isinstance(state, _State):
+        return {
+            "site": site,
+            "robot": robot,
+            "link": "no gateway",
+            "mode": "unknown",
+            "age_s": None,
+            "holder": "",
+        }
     return {
         "site": site,
         "robot": robot,
-        "link": _State.Link.Name(state.link).lower() if known else "no gateway",
-        "mode": _State.Mode.Name(state.mode).lower().removeprefix("mode_") if known else "unknown",
-        "age_s": state.last_unit_age_s if known and state.HasField("last_unit_age_s") else None,
+        "link": _State.Link.Name(state.link).lower(),
+        "mode": _State.Mode.Name(state.mode).lower().removeprefix("mode_"),
+        "age_s": state.last_unit_age_s if state.HasField("last_unit_age_s") else None,
         "holder": lease.holder if isinstance(lease, schema.Lease) else "",
     }

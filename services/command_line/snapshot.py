@@ -24,6 +24,8 @@ def run(robot: str, view: str, out: Path, router: str) -> None:
         import numpy as np
 
         image = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
+        if image is None:
+            raise NoPictureError(f"what came for {view!r} is no picture")
         try:
             done, encoded = cv2.imencode(out.suffix or ".png", image)
         except cv2.error:

@@ -1,0 +1,122 @@
+"""`robomesh doctor`: what is missing on this machine, and how to mend it."""
+
+import ctypes
+import importlib.util
+import os
+import shutil
+import socket
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import typer
+
+# Role -> the packages that it imports; the extra has the role's name.
+_ROLES = {
+    "gateway": ("zenoh", "pydantic", "numpy"),
+    "kinematics": ("pinocchio", "coal", "trimesh"),
+    "simulator": ("ruckig",),
+    "recorder": ("mcap", "mcap_protobuf"),
+    "renderer": ("moderngl", "av", "cv2"),
+    "console": ("starlette", "uvicorn", "websockets"),
+}
+_FREE_BYTES = 1 << 30
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing looked at; `mend` says what to do where it is not right."""
+
+    what: str
+    right: bool
+    text: str
+    mend: str = ""
+
+
+def run() -> None:
+    """Print every finding; exit status 1 when something is missing."""
+    findings = [finding for look in (_python, _roles, _open_gl, _page, _ports, _disk) for finding in look()]
+    for finding in findings:
+        print(f"{'ok     ' if finding.right else 'MISSING'}  {finding.what}: {finding.text}")
+        if not finding.right:
+            print(f"         {finding.mend}")
+    if not all(finding.right for finding in findings):
+        raise typer.Exit(1)
+
+
+def _python() -> list[Finding]:
+    version = ".".join(map(str, sys.version_info[:3]))
+    return [Finding("Python", sys.version_info >= (3, 11), version, "install Python 3.11 or newer")]
+
+
+def _roles() -> list[Finding]:
+    findings = []
+    for role, packages in _ROLES.items():
+        absent = [package for package in packages if importlib.util.find_spec(package) is None]
+        findings.append(
+            Finding(
+                f"role {role}",
+                not absent,
+                "its packages are here" if not absent else f"no {', '.join(absent)}",
+                f"pip install 'robomesh[{role}]', or ./dev up, which installs everything",
+            )
+        )
+    return findings
+
+
+def _open_gl() -> list[Finding]:
+    mend = "apt-get install libegl1 libgl1; everything but the renderer runs without it"
+    for library in ("libEGL.so.1", "libGL.so.1"):
+        try:
+            ctypes.CDLL(library)
+        except OSError:
+            return [Finding("OpenGL", False, f"no {library}: no rendered video, no snapshots", mend)]
+    try:
+        import moderngl
+
+        context = moderngl.create_context(standalone=True, backend="egl")  # type: ignore[arg-type]
+    except Exception as error:
+        return [Finding("OpenGL", False, f"no context off screen: {error}", mend)]
+    name = context.info["GL_RENDERER"]
+    context.release()
+    return [Finding("OpenGL", True, name)]
+
+
+def _page() -> list[Finding]:
+    from services.console.console import PAGE
+
+    built = (PAGE / "index.html").exists()
+    return [Finding("page", built, "built" if built else "not built", "./dev up builds it")]
+
+
+def _ports() -> list[Finding]:
+    findings = []
+    for what, port in (("router's port", 7447), ("console's port", 8080)):
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            free = _succeeds(lambda probe=probe, port=port: probe.bind(("127.0.0.1", port)))  # type: ignore[misc]
+        text = f"127.0.0.1:{port} is free" if free else f"127.0.0.1:{port} is taken"
+        mend = "a site may be running already (robomesh list); or name another port in the site file"
+        findings.append(Finding(what, free, text, mend))
+    return findings
+
+
+def _disk() -> list[Finding]:
+    free = shutil.disk_usage(".").free
+    writable = os.access(".", os.W_OK)
+    return [
+        Finding(
+            "disk",
+            writable and free > _FREE_BYTES,
+            f"{free / 1e9:.1f} GB free here" + ("" if writable else ", and not writable"),
+            "recordings and the audit log need room: without audit no motion",
+        )
+    ]
+
+
+def _succeeds(attempt: Callable[[], None]) -> bool:
+    try:
+        attempt()
+    except OSError:
+        return False
+    return True
