@@ -13,7 +13,7 @@ from renderer import mesh as mesh_module
 from renderer.mesh import Mesh, prepared
 
 # Counted up whenever a mesh is prepared differently.
-_VERSION = 1
+_VERSION = 2
 
 
 def cache_folder() -> Path:

@@ -1,6 +1,6 @@
 """What a description makes of a robot's pictures: its links, its cameras, how much room it needs."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -150,13 +150,15 @@ def _with_tool(description: Description, points: FloatArray) -> FloatArray:
     middle = points.mean(axis=0)
     away = points - middle
     distance = np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
-    return np.r_[points, points + away / distance * longest * (distance > 0.8 * distance.max())]
+    outermost = points + away / distance * longest * (distance > 0.8 * distance.max())
+    return np.concatenate([points, outermost])
 
 
-def _moved(transform: FloatArray, points: Iterable[FloatArray] | FloatArray) -> FloatArray:
-    moved: FloatArray = np.asarray(points) @ transform[:3, :3].T + transform[:3, 3]
+def _moved(transform: FloatArray, points: FloatArray) -> FloatArray:
+    moved: FloatArray = points @ transform[:3, :3].T + transform[:3, 3]
     return moved
 
 
 def _array(vector: Vector3) -> FloatArray:
-    return np.array([vector.x, vector.y, vector.z], dtype=np.float64)
+    numbers: FloatArray = np.array([vector.x, vector.y, vector.z])
+    return numbers

@@ -17,16 +17,21 @@ _SHADOW_TRIANGLES = 300
 _PLAIN_COLOR = (0.62, 0.64, 0.66, 1.0)
 
 
+# A vertex as OpenGL takes it.
+VERTEX = np.dtype([("position", "f4", 3), ("normal", "f4", 3), ("color", "u1", 4), ("surface", "u1", 4)])
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles in the link's frame [m], three vertices each, none shared.
+    """Triangles in the link's frame [m].
 
     Attributes:
-        positions: (3t, 3) float32.
-        normals: (3t, 3) float32, unit.
-        colors: (3t, 4) uint8, sRGB and opacity.
-        surface: (3t, 4) uint8: the share of the sky that the vertex sees past its own link,
+        positions: (v, 3) float32.
+        normals: (v, 3) float32, unit.
+        colors: (v, 4) uint8, sRGB and opacity.
+        surface: (v, 4) uint8: the share of the sky that the vertex sees past its own link,
             roughness, metalness, and nothing.
+        triangles: (t, 3) uint32, vertex numbers.
         edges: (2e, 3) float32, ends of the sharp edges.
         shadow: (3s, 3) float32, a coarse copy that casts the shadow.
     """
@@ -35,6 +40,7 @@ class Mesh:
     normals: NDArray[np.float32]
     colors: NDArray[np.uint8]
     surface: NDArray[np.uint8]
+    triangles: NDArray[np.uint32]
     edges: NDArray[np.float32]
     shadow: NDArray[np.float32]
 
@@ -60,11 +66,19 @@ def prepared(glb: bytes, *, color: str = "", most_triangles: int = MOST_TRIANGLE
     plain = srgb(color) if color else _PLAIN_COLOR
     bodies = [_Body.of(surface, plain, kept) for surface in surfaces]
     corners = _joined([body.corners() for body in bodies], 3)
+    vertices = np.zeros(len(corners), dtype=VERTEX)
+    vertices["position"] = corners
+    vertices["normal"] = np.round(_joined([body.normals.reshape(-1, 3) for body in bodies], 3), 4)
+    vertices["color"] = _bytes(_joined([body.colors.reshape(-1, 4) for body in bodies], 4))
+    vertices["surface"] = _bytes(_joined([body.surface() for body in bodies], 4))
+    # Each vertex is shaded once: on software OpenGL that is a third of the drawing.
+    unique, numbers = _unique(vertices)
     return Mesh(
-        positions=corners.astype(np.float32),
-        normals=_joined([body.normals.reshape(-1, 3) for body in bodies], 3).astype(np.float32),
-        colors=_bytes(_joined([body.colors.reshape(-1, 4) for body in bodies], 4)),
-        surface=_bytes(_joined([body.surface() for body in bodies], 4)),
+        positions=unique["position"],
+        normals=unique["normal"],
+        colors=unique["color"],
+        surface=unique["surface"],
+        triangles=numbers.reshape(-1, 3),
         edges=_joined([body.edges.reshape(-1, 3) for body in bodies], 3).astype(np.float32),
         shadow=_coarse(corners).astype(np.float32),
     )
@@ -135,6 +149,16 @@ def _coarse(corners: FloatArray) -> FloatArray:
     kept = _SHADOW_TRIANGLES / max(len(triangles), 1)
     positions, triangles = _simplified(positions, triangles, kept)
     return positions[triangles].reshape(-1, 3)
+
+
+def _unique(vertices: NDArray[np.void]) -> tuple[NDArray[np.void], NDArray[np.uint32]]:
+    """Vertices without repetition, in the order of their first use, and their numbers."""
+    rows = vertices.view(f"V{VERTEX.itemsize}")
+    _, first, numbers = np.unique(rows, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return vertices[first[order]], rank[numbers].astype(np.uint32)
 
 
 def _joined(arrays: Sequence[FloatArray], width: int) -> FloatArray:

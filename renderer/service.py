@@ -192,7 +192,7 @@ class _Renderer:
                     view,
                     fps=self._settings.fps,
                     ages=partial(self._ages, state),
-                    paint=partial(_in, self._thread, self._studio.paint),
+                    paint=lambda job: _in(self._thread, self._studio.paint, job),
                 )
             except RendererError as error:
                 log.error("%s/%s: %s", state.site, state.name, error)

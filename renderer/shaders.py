@@ -34,6 +34,36 @@ void main() { color = vec4(backdrop(mix(0.35, place.y, level)), 1.0); }
 """
 )
 
+# One texture as it is, or several samples a pixel laid over what is there.
+COMPOSE_FRAGMENT = """
+uniform float opacity;
+out vec4 color;
+#if SAMPLES > 0
+uniform sampler2DMS layer;
+#else
+uniform sampler2D layer;
+#endif
+void main() {
+    ivec2 at = ivec2(gl_FragCoord.xy);
+#if SAMPLES > 0
+    vec4 sum = vec4(0.0);
+    for (int each = 0; each < SAMPLES; ++each) sum += texelFetch(layer, at, each);
+    color = sum * (opacity / float(SAMPLES));
+#else
+    color = texelFetch(layer, at, 0) * opacity;
+#endif
+}
+"""
+
+# A rectangle of the picture, in clip coordinates.
+RECTANGLE_VERTEX = """#version 330
+uniform vec4 rectangle;
+void main() {
+    vec2 corner = vec2(gl_VertexID & 1, (gl_VertexID >> 1) & 1);
+    gl_Position = vec4(mix(rectangle.xy, rectangle.zw, corner), 0.0, 1.0);
+}
+"""
+
 # A plane through `origin`, spanned by `u` and `v`, with lines each `fine` and `coarse` metres.
 PLANE_VERTEX = (
     _COMMON
@@ -54,10 +84,6 @@ PLANE_FRAGMENT = (
     _COMMON
     + """
 uniform float fine, coarse, extent, strength;
-uniform float shade;                  // 1: the plane is the floor and takes the shadow
-uniform sampler2D shadow;
-uniform vec2 shadow_center;
-uniform float shadow_extent;
 in vec2 place;
 out vec4 color;
 float line(float step_m, float width_px) {
@@ -65,26 +91,26 @@ float line(float step_m, float width_px) {
     vec2 off = abs(fract(place / step_m + 0.5) - 0.5);
     vec2 on = 1.0 - smoothstep(wide * (width_px - 0.5), wide * (width_px + 0.5), off);
     // Lines nearer to each other than a few pixels become an even tone, then nothing.
-    vec2 crowded = smoothstep(vec2(0.12), vec2(0.4), wide);
-    on *= 1.0 - crowded;
+    on *= 1.0 - smoothstep(vec2(0.12), vec2(0.4), wide);
     return max(on.x, on.y);
 }
 void main() {
     float far = 1.0 - smoothstep(0.35, 1.0, length(place) / extent);
     float lines = max(0.20 * line(fine, 0.55), 0.42 * line(coarse, 0.7)) * strength;
-    float dark = 0.0;
-    if (shade > 0.0) {
-        vec2 at = (place - shadow_center) / (2.0 * shadow_extent) + 0.5;
-        dark = texture(shadow, at).r * shade;
-    }
-    vec3 grid_color = vec3(0.42, 0.47, 0.53);
-    vec3 shadow_color = vec3(0.13, 0.15, 0.18);
-    float alpha = 1.0 - (1.0 - lines) * (1.0 - dark);
-    vec3 mixed = mix(grid_color, shadow_color, alpha > 0.0 ? dark / max(alpha, 1e-4) : 0.0);
-    color = vec4(mixed, alpha * far);
+    color = vec4(vec3(0.42, 0.47, 0.53), lines * far);
 }
 """
 )
+
+SHADE_FRAGMENT = """#version 330
+uniform sampler2D shadow;
+uniform float extent, strength;
+in vec2 place;
+out vec4 color;
+void main() {
+    color = vec4(0.13, 0.15, 0.18, texture(shadow, place / (2.0 * extent) + 0.5).r * strength);
+}
+"""
 
 BODY_VERTEX = (
     _COMMON
@@ -98,7 +124,7 @@ void main() {
     vec4 place = part_to_site * vec4(position, 1.0);
     at = place.xyz;
     facing = mat3(part_to_site) * normal;
-    body_paint = paint;
+    body_paint = vec4(to_linear(paint.rgb), paint.a);
     body_surface = surface;
     gl_Position = site_to_clip * place;
 }
@@ -128,7 +154,7 @@ vec3 studio(vec3 way, float roughness) {
 void main() {
     vec3 n = normalize(facing);
     vec3 to_eye = orthographic > 0.5 ? -forward : normalize(eye - at);
-    vec3 albedo = to_linear(body_paint.rgb);
+    vec3 albedo = body_paint.rgb;
     float open = body_surface.r, roughness = clamp(body_surface.g, 0.12, 1.0), metallic = body_surface.b;
 
     // Light from the whole ceiling, what the floor gives back, and a weaker light from the side.
@@ -140,7 +166,9 @@ void main() {
     float facing_eye = max(dot(n, to_eye), 0.0);
     diffuse += vec3(0.26, 0.27, 0.29) * facing_eye * open;
     vec3 base = mix(vec3(0.04), albedo, metallic);
-    vec3 fresnel = base + (max(vec3(1.0 - roughness), base) - base) * pow(1.0 - facing_eye, 5.0);
+    float grazing = (1.0 - facing_eye) * (1.0 - facing_eye);
+    grazing *= grazing * (1.0 - facing_eye);
+    vec3 fresnel = base + (max(vec3(1.0 - roughness), base) - base) * grazing;
     vec3 mirror = studio(reflect(-to_eye, n), roughness) * fresnel * mix(0.4, 1.0, open) * sky;
     vec3 light = albedo * diffuse * (1.0 - metallic) * (1.0 - fresnel) + mirror;
 
@@ -151,7 +179,7 @@ void main() {
     vec3 seen = to_srgb(light);
     float grey = dot(seen, vec3(0.2126, 0.7152, 0.0722));
     seen = mix(seen, vec3(mix(0.60, grey, 0.55)), stale);
-    color = vec4(seen, body_paint.a * mix(1.0, 0.62, stale));
+    color = vec4(seen, 1.0) * body_paint.a;
 }
 """
 )
@@ -170,7 +198,7 @@ void main() {
 EDGE_FRAGMENT = """#version 330
 uniform vec4 tone;
 out vec4 color;
-void main() { color = tone; }
+void main() { color = vec4(tone.rgb, 1.0) * tone.a; }
 """
 
 # Seen from below against the light: the height of the lowest thing above each place of the floor.

@@ -81,14 +81,16 @@ class Stream:
         # A tick that comes a hair early is taken: the next would be a whole one late.
         if now - self._drawn_at < 0.9 / rate and not (video and self._key_frames.asked):
             return
-        self._drawn_at, self._drawn_version = now, self.state.version
         image = image and now - self._image_at >= 0.9 / _IMAGE_HZ
+        if not (video or image):
+            return
+        self._drawn_at, self._drawn_version = now, self.state.version
         await self._draw(now, video=video, image=image)
 
     async def _draw(self, now: float, *, video: bool, image: bool) -> None:
         state, look = self.state, self.state.look
-        if look is None:
-            return
+        if look is None or self.view not in look.cameras:
+            return  # a newer description has no such view: silence, and the age tells
         age = age_s(state, self._ages())
         source_time_ns = state.source_time_ns or time.time_ns()
         key_frame = video and self._key_frames.due(now)

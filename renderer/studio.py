@@ -8,9 +8,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from renderer import cache, opengl
+from renderer import cache
 from renderer.cameras import Camera
+from renderer.drawing import Drawing
 from renderer.encoder import Packet, VideoEncoder, jpeg, open_encoder
+from renderer.opengl import open_context
 from renderer.overlay import Overlay, write_over
 from renderer.scene import Scene
 
@@ -58,7 +60,7 @@ class Studio:
             NoEncoderError: If no H.264 encoder works.
         """
         self._size, self._fps, self._folder = size, fps, folder
-        self._drawing = opengl.Drawing(opengl.open_context(device), size, samples=samples)
+        self._drawing = Drawing(open_context(device), size, samples=samples)
         self._encoders: dict[str, VideoEncoder] = {}
         # Tried before anybody watches: a machine without an encoder must say so at its start.
         self.encoder_name = open_encoder(size, fps).name
