@@ -16,6 +16,7 @@ class PresenceWatch:
 
     def __init__(self, session: zenoh.Session, key_expr: str = EVERYBODY) -> None:
         loop = asyncio.get_running_loop()
+        self._closed = False
         self._changes: asyncio.Queue[tuple[keys.PresenceKey, bool] | None] = asyncio.Queue()
 
         def on_change(sample: zenoh.Sample) -> None:
@@ -40,5 +41,7 @@ class PresenceWatch:
 
     def close(self) -> None:
         """Watch no more; the iterator ends."""
-        self._subscriber.undeclare()
-        self._changes.put_nowait(None)
+        if not self._closed:
+            self._closed = True
+            self._subscriber.undeclare()
+            self._changes.put_nowait(None)

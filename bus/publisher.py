@@ -39,6 +39,7 @@ class Publisher:
         # New at each start, so that a number that begins again is not taken for an old one.
         self._identity = secrets.randbits(64)
         self._sequence = 0
+        self._closed = False
         self._lock = threading.Lock()
         self._history: deque[tuple[Header, Message]] = deque(maxlen=_history_length(self.topic))
         self._publisher: Any = _declare(session, self.key, self.topic)
@@ -87,6 +88,9 @@ class Publisher:
 
     def close(self) -> None:
         """Publish and answer no more."""
+        if self._closed:
+            return
+        self._closed = True
         if self._queryable is not None:
             self._queryable.undeclare()
         self._publisher.undeclare()

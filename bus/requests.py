@@ -53,11 +53,15 @@ class Answerer:
         self._handler = handler
         self._loop = asyncio.get_running_loop()
         self._tasks: set[asyncio.Task[None]] = set()
+        self._closed = False
         # `*` in the row is the asker's: one chunk.
         self._queryable = session.declare_queryable(keys.robot_key(site, robot, name), self._hand_over)
 
     def close(self) -> None:
         """Answer no more."""
+        if self._closed:
+            return
+        self._closed = True
         self._queryable.undeclare()
         for task in self._tasks:
             task.cancel()
