@@ -67,7 +67,8 @@ def type_code(type_text: str) -> int | None:
     sign, digits = match.groups()
     # Ten digits hold every int32; int() itself refuses thousands of them with an exception of its own.
     code = int(sign + digits) if len(digits) <= 10 else None
-    if code not in _INT32:
+    # None in a range is looked for in each of its four thousand million numbers.
+    if code is None or code not in _INT32:
         raise UnitError(f"type {type_text[:24]} is beyond int32")
     return code
 
