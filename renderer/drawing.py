@@ -71,18 +71,30 @@ class Drawing:
     def add(self, name: str, mesh: Mesh) -> None:
         """Take a mesh; one of that name before is forgotten."""
         self.forget([name])
-        self._meshes[name] = upload(self.context, self._programs, mesh)
+        with self.context:
+            self._meshes[name] = upload(self.context, self._programs, mesh)
         self._shadow_of = None
 
     def forget(self, names: Iterable[str]) -> None:
         """Let meshes go."""
-        for name in names:
-            uploaded = self._meshes.pop(name, None)
-            if uploaded is not None:
-                uploaded.release()
+        with self.context:
+            for name in names:
+                uploaded = self._meshes.pop(name, None)
+                if uploaded is not None:
+                    uploaded.release()
 
     def draw(self, scene: Scene, camera: Camera) -> Picture:
         """A picture of the scene: (height, width, 3) uint8 RGB, valid until the next is drawn."""
+        # Another drawing's context may be the thread's current one.
+        with self.context:
+            return self._draw(scene, camera)
+
+    def close(self) -> None:
+        """Release everything; the context too."""
+        self.forget(list(self._meshes))
+        self.context.release()
+
+    def _draw(self, scene: Scene, camera: Camera) -> Picture:
         aspect = self.size[0] / self.size[1]
         matrix = site_to_clip(camera, aspect, center=scene.center, radius=4.0 * scene.radius)
         self.context.copy_framebuffer(self._final, self._backdrop_of(scene, camera, matrix))
@@ -96,11 +108,6 @@ class Drawing:
             self._lay_bodies(rectangle, opacity=1.0 - (1.0 - _STALE_OPACITY) * scene.stale)
         self._final.read_into(self._picture, components=3)
         return self._picture
-
-    def close(self) -> None:
-        """Release everything; the context too."""
-        self.forget(list(self._meshes))
-        self.context.release()
 
     def _draw_bodies(
         self,

@@ -94,12 +94,15 @@ def _surfaces(document: dict[str, Any], binary: bytes) -> Iterator[Surface]:
 
 def _meshes(document: dict[str, Any]) -> Iterator[tuple[int, NDArray[np.float64]]]:
     """(mesh number, node_to_file) of every node that has one."""
-    scenes = document.get("scenes", [])
-    roots = scenes[document.get("scene", 0)].get("nodes", []) if scenes else range(len(document["nodes"]))
+    nodes, scenes = document.get("nodes", []), document.get("scenes", [])
+    children = {child for node in nodes for child in node.get("children", [])}
+    roots = [number for number in range(len(nodes)) if number not in children]
+    if scenes:
+        roots = scenes[document.get("scene", 0)].get("nodes", [])
     waiting = [(number, np.eye(4)) for number in roots]
     while waiting:
         number, parent_to_file = waiting.pop()
-        node = document["nodes"][number]
+        node = nodes[number]
         node_to_file = parent_to_file @ _placement(node)
         if "mesh" in node:
             yield node["mesh"], node_to_file

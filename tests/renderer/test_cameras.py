@@ -1,0 +1,43 @@
+"""Cameras: where a point lands, and what is in the picture."""
+
+import numpy as np
+import pytest
+
+from renderer.cameras import Camera, fitted, pixels, site_to_camera
+
+SIZE = (640, 360)
+TOP = Camera(np.array([0, 0, 3.0]), np.zeros(3), np.array([0, 1.0, 0]), half_height=0.9)
+
+
+def test_a_top_view_shows_x_to_the_right_and_y_upwards_to_scale():
+    points = np.array([[0.0, 0.0, 0.5], [0.4, 0.0, 0.1], [0.0, 0.45, 0.9]])
+    # 180 px for 0.9 m, whatever the height.
+    assert pixels(TOP, SIZE, points) == pytest.approx(np.array([[320, 180], [400, 180], [320, 90]]))
+
+
+def test_a_perspective_target_lands_in_the_middle_and_the_nearer_looks_larger():
+    camera = Camera(np.array([2.0, -1.0, 1.5]), np.array([0.1, 0.2, 0.3]), np.array([0, 0, 1.0]))
+    assert pixels(camera, SIZE, camera.target[None]) == pytest.approx(np.array([[320.0, 180.0]]))
+    up = np.array([0.0, 0.0, 0.1])
+    near, far = camera.target - camera.forward, camera.target + camera.forward
+    rows = [pixels(camera, SIZE, np.array([at, at + up]))[:, 1] for at in (near, far)]
+    assert rows[0][0] - rows[0][1] > 1.5 * (rows[1][0] - rows[1][1]) > 0
+
+
+@pytest.mark.parametrize("half_height", [1.0, None])
+def test_a_fitted_camera_shows_every_point_and_wastes_little(half_height):
+    random = np.random.default_rng(1)
+    points = random.uniform(-1, 1, (200, 3)) * [0.8, 0.6, 0.5] + [3.0, 0.0, 0.2]
+    start = Camera(np.array([4.5, -2, 1.5]), np.array([3.0, 0, 0.2]), np.array([0, 0, 1.0]), half_height)
+    camera = fitted(start, SIZE[0] / SIZE[1], points)
+    assert camera.forward == pytest.approx(start.forward)
+    assert camera.target == pytest.approx(start.target)
+    shares = np.abs(pixels(camera, SIZE, points) / SIZE * 2 - 1)
+    assert 0.8 < shares.max() < 1.0
+
+
+def test_looking_along_up_still_gives_a_picture():
+    camera = Camera(np.array([0, 0, 3.0]), np.zeros(3), np.array([0, 0, 1.0]), half_height=1.0)
+    rotation = site_to_camera(camera)[:3, :3]
+    assert rotation @ rotation.T == pytest.approx(np.eye(3))
+    assert np.linalg.det(rotation) == pytest.approx(1.0)

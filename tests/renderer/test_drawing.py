@@ -1,0 +1,132 @@
+"""Pictures: real pixels from a real OpenGL."""
+
+import numpy as np
+import pytest
+
+from renderer.cameras import Camera, pixels
+from renderer.drawing import Drawing
+from renderer.errors import NoOpenGLError
+from renderer.mesh import prepared
+from renderer.opengl import open_context
+from renderer.scene import Part, Scene
+from tests.renderer.bodies import ball, context_or_skip, cube
+
+SIZE = (320, 180)
+CENTER = np.array([0.0, 0.0, 0.2])
+FREE = Camera(np.array([1.2, -1.5, 1.0]), CENTER, np.array([0.0, 0.0, 1.0]))
+TOP = Camera(np.array([0.0, 0.0, 3.0]), CENTER, np.array([0.0, 1.0, 0.0]), half_height=0.6)
+FRONT = Camera(np.array([3.0, 0.0, 0.2]), CENTER, np.array([0.0, 0.0, 1.0]), half_height=0.6)
+RED, GREEN = (1.0, 0.0, 0.0, 1.0), (0.0, 0.6, 0.0, 1.0)
+
+
+def at(x, y, z):
+    placement = np.eye(4)
+    placement[:3, 3] = x, y, z
+    return placement
+
+
+def scene(*parts, stale=0.0):
+    return Scene(tuple(parts), CENTER, 0.6, stale=stale)
+
+
+@pytest.fixture(scope="module")
+def drawing():
+    drawing = Drawing(context_or_skip(), SIZE)
+    drawing.add("red", prepared(cube(0.1, color=RED)))
+    drawing.add("green", prepared(cube(0.1, color=GREEN)))
+    drawing.add("ball", prepared(ball(0.15, color=RED)))
+    drawing.add("glass", prepared(cube(0.1, color=(0.0, 0.0, 1.0, 0.4))))
+    yield drawing
+    drawing.close()
+
+
+def is_red(pixel):
+    red, green, blue = (int(value) for value in pixel)
+    return red > 90 and red > 2 * green and red > 2 * blue
+
+
+def pixel_at(picture, camera, point):
+    (x, y), *_ = pixels(camera, SIZE, np.array([point]))
+    return picture[int(y), int(x)]
+
+
+@pytest.mark.parametrize("camera", [FREE, TOP, FRONT])
+def test_a_red_cube_is_red_where_the_camera_looks(drawing, camera):
+    picture = drawing.draw(scene(Part("red", at(0, 0, 0.2))), camera)
+    assert picture.shape == (180, 320, 3)
+    assert is_red(picture[90, 160])
+    assert not is_red(picture[4, 4])
+
+
+def test_a_top_view_puts_a_cube_where_the_matrix_says(drawing):
+    picture = drawing.draw(scene(Part("red", at(0.4, 0.2, 0.1))), TOP)
+    red = picture[..., 0].astype(int) - picture[..., 1].astype(int) > 80
+    rows, columns = np.nonzero(red)
+    corners = np.array([[0.3, 0.3, 0.2], [0.5, 0.1, 0.2]])
+    expected = pixels(TOP, SIZE, corners)
+    assert (columns.min(), rows.min()) == pytest.approx(expected[0], abs=1.5)
+    assert (columns.max() + 1, rows.max() + 1) == pytest.approx(expected[1], abs=1.5)
+
+
+def test_the_nearer_body_hides_the_farther(drawing):
+    parts = Part("green", at(0, 0, 0.2)), Part("red", at(0.4, 0, 0.2))
+    for order in (parts, parts[::-1]):
+        assert is_red(drawing.draw(scene(*order), FRONT)[90, 160])
+
+
+def test_glass_lets_what_is_behind_it_through(drawing):
+    behind = drawing.draw(scene(Part("red", at(0, 0, 0.2))), FRONT)[90, 160].astype(int)
+    through = drawing.draw(scene(Part("glass", at(0.4, 0, 0.2)), Part("red", at(0, 0, 0.2))), FRONT)
+    red, _, blue = through[90, 160].astype(int) - behind
+    assert red < -10
+    assert blue > 10
+
+
+def test_a_stale_picture_is_grey(drawing):
+    part = Part("red", at(0, 0, 0.2))
+    live = drawing.draw(scene(part), FREE)[90, 160].astype(int)
+    stale = drawing.draw(scene(part, stale=1.0), FREE)[90, 160].astype(int)
+    assert np.ptp(live) > 100
+    assert np.ptp(stale) < 30
+
+
+def test_a_body_casts_its_shadow_on_the_floor_below_it(drawing):
+    empty = drawing.draw(scene(), TOP).astype(int)
+    hovering = drawing.draw(scene(Part("red", at(0, 0, 0.1))), TOP).astype(int)
+    dark = (empty - hovering).min(axis=2)
+    # The cube fills 15 px to each side of the middle.
+    assert dark[85:95, 160 - 22 : 160 - 16].max() > 15
+    assert dark[90, 4] == 0
+
+
+def test_edges_are_smooth_with_samples_and_stepped_without(drawing):
+    rough = Drawing(context_or_skip(), SIZE, samples=0)
+    rough.add("ball", prepared(ball(0.15, color=RED)))
+    shades = []
+    for each in (drawing, rough):
+        column = each.draw(scene(Part("ball", at(0, 0, 0.2))), TOP)[60:120, 160:220].astype(int)
+        redness = column[..., 0] - column[..., 1]
+        shades.append(((redness > 15) & (redness < 70)).sum())
+    rough.close()
+    assert shades[0] > shades[1]
+
+
+def test_a_body_beside_the_camera_and_one_out_of_sight_do_no_harm(drawing):
+    parts = Part("red", at(0, 0, 0.2)), Part("green", at(1.2, -1.5, 1.0)), Part("green", at(9, 9, 9))
+    drawing.draw(scene(*parts), FREE)
+    picture = drawing.draw(scene(Part("green", at(9, 9, 9))), TOP)
+    assert not is_red(picture[90, 160])
+
+
+def test_a_mesh_that_was_forgotten_or_never_came_is_not_drawn(drawing):
+    drawing.add("passing", prepared(cube(0.1, color=RED)))
+    drawing.forget(["passing"])
+    picture = drawing.draw(scene(Part("passing", at(0, 0, 0.2)), Part("never", at(0, 0, 0.2))), FRONT)
+    assert not is_red(picture[90, 160])
+
+
+def test_a_device_that_there_is_none_of_is_refused_in_one_line():
+    context_or_skip().release()
+    with pytest.raises(NoOpenGLError, match="apt-get install libegl1 libgl1") as caught:
+        open_context(device=99)
+    assert "\n" not in str(caught.value)

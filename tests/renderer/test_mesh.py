@@ -1,0 +1,118 @@
+"""Meshes: read from GLB, made ready, kept."""
+
+import struct
+
+import numpy as np
+import pytest
+
+from renderer import cache
+from renderer.errors import GlbError
+from renderer.glb import read_glb
+from renderer.mesh import prepared
+from tests.renderer.bodies import ball, cube
+
+RED = (1.0, 0.0, 0.0, 1.0)
+
+
+def area(mesh):
+    a, b, c = (mesh.positions[mesh.triangles[:, corner]] for corner in range(3))
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+
+
+def test_a_cube_keeps_its_flat_faces_and_its_twelve_edges():
+    mesh = prepared(cube(0.5))
+    assert len(mesh.triangles) == 12
+    # Each of the 8 corners once a face that meets there.
+    assert len(mesh.positions) == 24
+    assert np.isclose(np.abs(mesh.normals).max(axis=1), 1.0).all()
+    assert len(mesh.edges) == 2 * 12
+    assert area(mesh) == pytest.approx(6.0)
+
+
+def test_a_ball_is_smooth_and_has_no_edges():
+    mesh = prepared(ball(0.3))
+    outwards = mesh.positions / np.linalg.norm(mesh.positions, axis=1, keepdims=True)
+    assert (outwards * mesh.normals).sum(axis=1).min() > 0.98
+    assert len(mesh.edges) == 0
+
+
+def test_a_heavy_mesh_is_simplified_and_keeps_its_size():
+    heavy = ball(0.3, rings=80, sectors=100)
+    mesh = prepared(heavy, most_triangles=1000)
+    assert 700 < len(mesh.triangles) < 1100
+    assert len(mesh.shadow) // 3 < 400
+    assert np.abs(mesh.positions).max() == pytest.approx(0.3, rel=0.02)
+    assert area(mesh) == pytest.approx(4 * np.pi * 0.09, rel=0.03)
+
+
+def test_a_node_places_its_mesh():
+    quarter_turn_about_z = [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]
+    node = {"translation": [1.0, 2.0, 3.0], "rotation": quarter_turn_about_z, "scale": [2.0, 1.0, 1.0]}
+    positions = prepared(cube(0.5, node=node)).positions
+    assert positions.min(axis=0) == pytest.approx([0.5, 1.0, 2.5], abs=1e-6)
+    assert positions.max(axis=0) == pytest.approx([1.5, 3.0, 3.5], abs=1e-6)
+
+
+def test_a_mirrored_node_still_shows_its_outside():
+    mesh = prepared(cube(0.5, node={"scale": [-1.0, 1.0, 1.0]}))
+    assert ((mesh.positions * mesh.normals).sum(axis=1) > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("color", "said", "painted"),
+    [
+        (RED, "#00ff00", (255, 0, 0, 255)),
+        (None, "#00ff00", (0, 255, 0, 255)),
+        ((1.0, 0.0, 0.0, 0.5), "", (255, 0, 0, 128)),
+    ],
+)
+def test_the_files_own_colour_counts_before_the_descriptions(color, said, painted):
+    mesh = prepared(cube(0.5, color=color), color=said)
+    assert tuple(mesh.colors[0]) == painted
+    assert mesh.transparent == (painted[3] < 255)
+
+
+def test_an_empty_mesh_is_empty():
+    mesh = prepared(b"glTF" + struct.pack("<II", 2, 22) + struct.pack("<II", 2, 0x4E4F534A) + b"{}")
+    assert len(mesh.triangles) == 0
+
+
+@pytest.mark.parametrize(
+    ("data", "says"),
+    [
+        (b"", "0 bytes that are not GLB"),
+        (b"#VRML V2.0 utf8 Shape {}", "not GLB"),
+        (b"glTF" + struct.pack("<II", 1, 24) + bytes(12), "version 1"),
+        (cube(0.5)[:-8], "whole"),
+        (cube(0.5).replace(b'"POSITION": 0', b'"POSITION": 7'), "does not fit together"),
+        (cube(0.5).replace(b'"count": 8', b'"count": 3'), "name vertex 7 of 3"),
+    ],
+)
+def test_what_is_not_a_mesh_is_refused_in_words(data, says):
+    with pytest.raises(GlbError, match=says):
+        prepared(data)
+
+
+def test_bytes_cut_anywhere_are_an_error_and_no_crash():
+    whole = cube(0.5)
+    for length in range(len(whole)):
+        with pytest.raises(GlbError):
+            read_glb(whole[:length])
+
+
+def test_a_mesh_is_made_ready_once(tmp_path, monkeypatch):
+    glb = ball(0.3)
+    first = cache.prepared_once(glb, color="#102030", folder=tmp_path)
+    monkeypatch.setattr(cache, "prepared", None)
+    again = cache.prepared_once(glb, color="#102030", folder=tmp_path)
+    assert np.array_equal(first.positions, again.positions)
+    assert np.array_equal(first.triangles, again.triangles)
+
+
+def test_a_stored_mesh_that_was_damaged_is_not_taken(tmp_path):
+    cache.store_glb(b"some mesh", tmp_path)
+    (path,) = tmp_path.iterdir()
+    assert cache.stored_glb(path.stem, tmp_path) == b"some mesh"
+    path.write_bytes(b"some mes")
+    assert cache.stored_glb(path.stem, tmp_path) is None
+    assert cache.stored_glb("0" * 64, tmp_path) is None
