@@ -17,12 +17,6 @@ from robots.description import (
     nearest,
 )
 
-_WANTED = {
-    "missing": "is missing",
-    "finite_number": "must be a finite number",
-    "too_short": "must not be empty",
-}
-
 
 def sentence(error: ErrorDetails, values: Mapping[str, Any]) -> str:
     """One of pydantic's errors as one line: key, value and what would be right."""
@@ -33,7 +27,7 @@ def sentence(error: ErrorDetails, values: Mapping[str, Any]) -> str:
     key = _key(location, values)
     if kind == "missing":
         return f"{key} is missing"
-    wanted = _WANTED.get(kind) or error["msg"][0].lower() + error["msg"][1:]
+    wanted = error["msg"][0].lower() + error["msg"][1:]
     wanted = wanted.replace("input should be", "must be").replace("string should match", "must match")
     return f"{key} = {error['input']!r}: {wanted}"
 
@@ -64,6 +58,8 @@ def problems_of(description: RobotDescription) -> tuple[str, ...]:
 
 
 def _joint_problems(description: RobotDescription) -> Iterator[str]:
+    if not description.joints:
+        yield "joint = []: an arm has at least one joint"
     for joint in description.joints:
         lower, upper = joint.limits
         unit = _unit(joint, description.units)
@@ -75,6 +71,9 @@ def _joint_problems(description: RobotDescription) -> Iterator[str]:
                 f"{lower:g} to {upper:g} {unit}"
             )
     for constraint in description.constraints:
+        if not constraint.joints:
+            yield "constraint joints = {}: name at least one joint"
+            continue
         lower, upper = constraint.limits
         if lower >= upper:
             yield f"constraint limits = [{lower:g}, {upper:g}]: the lower must be below the upper"

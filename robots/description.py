@@ -18,7 +18,6 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
-    FiniteFloat,
     PrivateAttr,
     StringConstraints,
     ValidationError,
@@ -34,9 +33,11 @@ BASE_LINK = "base"
 TOOL_FRAME = "tool"
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
-Triple = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
-Range = tuple[FiniteFloat, FiniteFloat]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+# Strict: "90" and true are no numbers.
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
+Triple = tuple[Number, Number, Number]
+Range = tuple[Number, Number]
 Color = Annotated[str, StringConstraints(pattern=r"^#[0-9a-fA-F]{6}$")]
 
 
@@ -111,15 +112,15 @@ class Joint(_Table):
 
     name: Name
     type: JointType = JointType.ROTARY
-    a: FiniteFloat
-    alpha: FiniteFloat
-    d: FiniteFloat
-    theta: FiniteFloat = 0.0
+    a: Number
+    alpha: Number
+    d: Number
+    theta: Number = 0.0
     limits: Range
     max_speed: Positive
     max_acceleration: Positive
     max_jerk: Positive
-    home: FiniteFloat = 0.0
+    home: Number = 0.0
     link: Link = Link()
 
     @property
@@ -138,7 +139,7 @@ class Frame(Pose):
 class Constraint(_Table):
     """A limit on a sum: lower <= sum of coefficient x joint position <= upper."""
 
-    joints: dict[str, FiniteFloat] = Field(min_length=1)
+    joints: dict[str, Number]
     limits: Range
 
 
@@ -165,7 +166,7 @@ class RobotDescription(_Table):
     provenance: str = ""
     units: Units = Units()
     base: Body = Body()
-    joints: tuple[Joint, ...] = Field(alias="joint", min_length=1)
+    joints: tuple[Joint, ...] = Field(alias="joint")
     tool: Pose = Pose()
     frames: tuple[Frame, ...] = Field((), alias="frame")
     constraints: tuple[Constraint, ...] = Field((), alias="constraint")

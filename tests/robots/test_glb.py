@@ -1,0 +1,156 @@
+"""Links as GLB: in the link's frame, in metres, painted, kept in a cache."""
+
+import json
+import struct
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from robots.description import load, parse
+from robots.errors import MeshError
+from robots.glb import cache_folder, link_meshes
+from robots.meshes.mesh import bounds
+from robots.meshes.read import read_mesh
+
+BOX = """#VRML V2.0 utf8
+Shape { appearance Appearance { material DEF %s Material { diffuseColor 1 0 0 transparency 0.5 } }
+  geometry Box { size 100 200 300 } }
+Shape { appearance Appearance { material DEF steel Material { diffuseColor 0 1 0 } }
+  geometry Sphere { radius 10 } }
+"""
+ROBOT = """
+name = "one"
+[base]
+mesh = "box.wrl"
+mesh_pose = { xyz = [0.0, 0.0, 150.0], rpy = [0.0, 0.0, 90.0] }
+color = "#0000ff"
+[[joint]]
+name = "waist"
+a = 0.0
+alpha = 0.0
+d = 0.0
+limits = [-1.0, 1.0]
+max_speed = 1.0
+max_acceleration = 1.0
+max_jerk = 1.0
+"""
+
+
+def document(glb: bytes) -> dict[str, Any]:
+    magic, version, length = struct.unpack_from("<4sII", glb)
+    assert (magic, version, length) == (b"glTF", 2, len(glb))
+    (size,) = struct.unpack_from("<I", glb, 12)
+    parsed: dict[str, Any] = json.loads(glb[20 : 20 + size])
+    return parsed
+
+
+def corners(glb: bytes) -> tuple[np.ndarray, np.ndarray]:
+    parsed = document(glb)
+    used = [
+        parsed["accessors"][primitive["attributes"]["POSITION"]]
+        for mesh in parsed["meshes"]
+        for primitive in mesh["primitives"]
+    ]
+    return (
+        np.min([accessor["min"] for accessor in used], axis=0),
+        np.max([accessor["max"] for accessor in used], axis=0),
+    )
+
+
+def one(folder: Path, material: str = "paint") -> dict[str, bytes]:
+    (folder / "box.wrl").write_text(BOX % material)
+    return link_meshes(parse(ROBOT, folder / "robot.toml"), cache=folder / "cache")
+
+
+def test_mesh_is_scaled_turned_and_shifted_into_the_links_frame(tmp_path: Path) -> None:
+    low, high = corners(one(tmp_path)["base"])
+    np.testing.assert_allclose([low, high], [[-0.1, -0.05, 0.0], [0.1, 0.05, 0.3]], atol=1e-7)
+
+
+def test_color_replaces_the_paint_alone(tmp_path: Path) -> None:
+    materials = {m["name"]: m["pbrMetallicRoughness"] for m in document(one(tmp_path)["base"])["materials"]}
+    assert materials["paint"]["baseColorFactor"] == pytest.approx([0, 0, 1, 0.5], abs=0.01)
+    assert materials["steel"]["baseColorFactor"] == pytest.approx([0, 1, 0, 1], abs=0.01)
+
+
+def test_color_replaces_all_where_nothing_is_called_paint(tmp_path: Path) -> None:
+    materials = document(one(tmp_path, "red")["base"])["materials"]
+    assert all(m["pbrMetallicRoughness"]["baseColorFactor"][:3] == [0, 0, 1] for m in materials)
+
+
+def test_transparent_material_is_blended(tmp_path: Path) -> None:
+    materials = {m["name"]: m for m in document(one(tmp_path)["base"])["materials"]}
+    assert materials["paint"]["alphaMode"] == "BLEND"
+    assert materials["steel"].get("alphaMode", "OPAQUE") == "OPAQUE"
+
+
+def test_normals_travel_with_the_mesh(tmp_path: Path) -> None:
+    for mesh in document(one(tmp_path)["base"])["meshes"]:
+        assert "NORMAL" in mesh["primitives"][0]["attributes"]
+
+
+def test_link_without_a_mesh_has_no_glb(tmp_path: Path) -> None:
+    assert list(one(tmp_path)) == ["base"]
+
+
+def test_changed_mesh_file_or_color_gives_another_glb(tmp_path: Path) -> None:
+    first = one(tmp_path)["base"]
+    assert one(tmp_path)["base"] == first
+    assert one(tmp_path, "red")["base"] != first
+    red = parse(ROBOT.replace("#0000ff", "#ff0000"), tmp_path / "robot.toml")
+    assert link_meshes(red, cache=tmp_path / "cache")["base"] != first
+
+
+def test_inlined_file_that_changes_is_noticed(tmp_path: Path) -> None:
+    (tmp_path / "box.wrl").write_text('#VRML V2.0 utf8\nInline { url "part.wrl" }')
+    description = parse(ROBOT, tmp_path / "robot.toml")
+    sizes = []
+    for size in ("10 10 10", "20 20 20"):
+        (tmp_path / "part.wrl").write_text(f"#VRML V2.0 utf8\nShape {{ geometry Box {{ size {size} }} }}")
+        low, high = corners(link_meshes(description, cache=tmp_path / "cache")["base"])
+        sizes.append(float((high - low)[0]))
+    assert sizes == pytest.approx([0.01, 0.02])
+
+
+def test_warm_cache_needs_no_trimesh(tmp_path: Path) -> None:
+    code = (
+        "import sys; from robots.description import load; from robots.glb import link_meshes; "
+        "meshes = link_meshes(load('pt600')); print(len(meshes), 'trimesh' in sys.modules)"
+    )
+    answers = [
+        subprocess.run(
+            [sys.executable, "-c", code],
+            capture_output=True,
+            text=True,
+            check=True,
+            env={"XDG_CACHE_HOME": str(tmp_path), "PYTHONPATH": ":".join(sys.path)},
+        ).stdout.split()
+        for _ in range(2)
+    ]
+    assert answers == [["6", "True"], ["6", "False"]]
+
+
+def test_cache_that_cannot_be_written_falls_back(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    blocker = tmp_path / "file"
+    blocker.write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(blocker))
+    assert blocker not in cache_folder().parents
+
+
+def test_wrong_mesh_file_is_told(tmp_path: Path) -> None:
+    (tmp_path / "box.wrl").write_bytes(b"MM\0\0")
+    with pytest.raises(MeshError, match=r"box\.wrl"):
+        link_meshes(parse(ROBOT, tmp_path / "robot.toml"), cache=tmp_path / "cache")
+
+
+def test_glb_holds_the_mesh_files_shape(tmp_path: Path) -> None:
+    description = load("pt600")
+    path = description.mesh_path(description.bodies["column"])
+    assert path is not None
+    low, high = bounds(read_mesh(path))
+    glb_low, glb_high = corners(link_meshes(description, cache=tmp_path)["column"])
+    np.testing.assert_allclose([glb_low, glb_high], [low / 1000, high / 1000], atol=1e-6)

@@ -1,0 +1,78 @@
+"""Joints in SI, and what their limits forbid."""
+
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from robots.description import load
+from robots.errors import JointCountError
+from robots.joints import JointType, joints_of, violations
+
+PAPER_SAMPLE_DEG = [100.00, 30.45, 92.66, -67.10, -25.85]
+
+
+def test_joints_are_in_radians() -> None:
+    joints = joints_of(load("pt600"))
+    assert joints.names == ("waist", "shoulder", "elbow", "wrist", "roll")
+    assert set(joints.types) == {JointType.ROTARY}
+    np.testing.assert_allclose(joints.lower, np.radians([-150, -30, -110, -100, -180]))
+    np.testing.assert_allclose(joints.upper, np.radians([150, 130, 110, 100, 180]))
+
+
+@pytest.mark.parametrize("robot", ["pt500", "pt600"])
+def test_papers_sample_frame_is_within_the_limits(robot: str) -> None:
+    assert violations(joints_of(load(robot)), np.radians(PAPER_SAMPLE_DEG)) == ()
+
+
+@pytest.mark.parametrize("robot", ["pt500", "pt600", "puma560"])
+def test_home_and_each_limit_are_allowed(robot: str) -> None:
+    joints = joints_of(load(robot))
+    assert violations(joints, joints.home) == ()
+    for index in range(len(joints)):
+        for limit in (joints.lower[index], joints.upper[index]):
+            positions = joints.home.copy()
+            positions[index] = limit
+            assert not [text for text in violations(joints, positions) if text.startswith("joint")]
+
+
+def test_position_beyond_a_limit_is_told_in_degrees() -> None:
+    joints = joints_of(load("pt600"))
+    positions = np.radians([0, 131, 0, 0, 0])
+    assert violations(joints, positions) == ("joint shoulder at 131.00° is beyond its limit 130.00°",)
+
+
+def test_limit_rounded_to_the_protocols_digits_is_no_violation() -> None:
+    joints = joints_of(load("pt600"))
+    assert violations(joints, np.radians([150.004, 0, 0, 0, 0])) == ()
+    assert violations(joints, np.radians([150.01, 0, 0, 0, 0])) != ()
+
+
+def test_coupled_limit_is_checked() -> None:
+    joints = joints_of(load("pt600"))
+    found = violations(joints, np.radians([0, 100, 100, 0, 0]))
+    assert found == ("shoulder + elbow at 200.00° is beyond its limit 160.00°",)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_number_that_is_not_finite_is_a_violation(value: float) -> None:
+    (found,) = violations(joints_of(load("pt600")), [0, 0, value, 0, 0])
+    assert found.startswith("joint elbow at")
+    assert found.endswith("is not a finite number")
+
+
+@pytest.mark.parametrize("positions", [[], [0.0] * 4, [0.0] * 6, [[0.0] * 5]])
+def test_wrong_count_is_an_error(positions: list[float]) -> None:
+    with pytest.raises(JointCountError, match=r"this robot takes \(5,\)"):
+        violations(joints_of(load("pt600")), positions)
+
+
+def test_joints_need_neither_pinocchio_nor_trimesh() -> None:
+    code = (
+        "import sys; from robots.description import load; from robots.joints import joints_of; "
+        "joints_of(load('pt600')); print({'pinocchio', 'trimesh'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"

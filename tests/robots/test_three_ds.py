@@ -1,0 +1,88 @@
+"""The 3DS reader and writer."""
+
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robots.errors import MeshError
+from robots.meshes.mesh import Material, Mesh, Part, bounds
+from robots.meshes.normals import creased
+from robots.meshes.solids import box
+from robots.meshes.three_ds import read_3ds
+from robots.meshes.write_3ds import write_3ds
+
+TESTDATA = Path(__file__).resolve().parents[2].parent / "shared" / "testdata" / "3ds"
+GLASS = Material("glass", (0.2, 0.4, 0.6), (1.0, 1.0, 1.0), shininess=0.5, transparency=0.25)
+
+
+def a_box() -> Mesh:
+    return Mesh(
+        (Part("box", GLASS, *creased(*box(np.zeros(3), np.array([1.0, 2.0, 3.0])), 0.0), two_sided=True),)
+    )
+
+
+def test_what_is_written_reads_the_same(tmp_path: Path) -> None:
+    path = tmp_path / "box.3ds"
+    path.write_bytes(write_3ds(a_box()))
+    mesh = read_3ds(path)
+    (part,) = mesh.parts
+    assert bounds(mesh)[1].tolist() == [1, 2, 3]
+    assert part.material == GLASS
+    assert part.two_sided
+    assert len(part.vertices) == 24  # the edges stay sharp
+    facing = np.cross(
+        *(part.vertices[part.triangles[:, k]] - part.vertices[part.triangles[:, 0]] for k in (1, 2))
+    )
+    assert (np.einsum("ij,ij->i", facing, part.normals[part.triangles[:, 0]]) > 0).all()
+
+
+@pytest.mark.skipif(not TESTDATA.is_dir(), reason="the shared test data is not beside the checkout")
+def test_transparency_and_names_of_a_real_file_are_read() -> None:
+    mesh = read_3ds(TESTDATA / "cubes_with_alpha.3DS")
+    transparent = {part.material.name: part.material.transparency for part in mesh.parts}
+    assert transparent["Transparent"] == pytest.approx(0.17)
+    assert [part.name for part in mesh.parts] == [f"Quader0{number}" for number in range(1, 6)]
+
+
+def test_file_cut_anywhere_is_told_with_its_byte(tmp_path: Path) -> None:
+    whole = write_3ds(a_box())
+    path = tmp_path / "cut.3ds"
+    for end in range(len(whole)):
+        path.write_bytes(whole[:end])
+        with pytest.raises(MeshError, match=r"cut\.3ds") as caught:
+            read_3ds(path)
+        assert "\n" not in str(caught.value)
+
+
+def test_any_byte_changed_is_a_mesh_or_an_error(tmp_path: Path) -> None:
+    whole = bytearray(write_3ds(a_box()))
+    path = tmp_path / "changed.3ds"
+    for position in range(len(whole)):
+        changed = bytearray(whole)
+        changed[position] ^= 0xFF
+        path.write_bytes(changed)
+        with suppress(MeshError):
+            read_3ds(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (b"", "is not a 3DS file: it does not begin with chunk 4D4D"),
+        (b"#VRML V2.0 utf8\n", "is not a 3DS file"),
+        (b"MM\xff\xff\x00\x00", "byte 0: chunk 4D4D of 65535 bytes; 6 are left there"),
+    ],
+)
+def test_wrong_file_is_told(tmp_path: Path, content: bytes, expected: str) -> None:
+    path = tmp_path / "wrong.3ds"
+    path.write_bytes(content)
+    with pytest.raises(MeshError, match=r"wrong\.3ds") as caught:
+        read_3ds(path)
+    assert expected in str(caught.value)
+
+
+def test_missing_file_is_told(tmp_path: Path) -> None:
+    with pytest.raises(MeshError, match="cannot be read: No such file"):
+        read_3ds(tmp_path / "none.3ds")
