@@ -1,0 +1,204 @@
+"""The simulated controller itself: what it does with a unit, and what it tells. No I/O; time is an argument.
+
+    state     move, home   hold      resume   stop      reset     at rest
+    --------  -----------  --------  -------  --------  --------  -----------------
+    idle      moving       holding   -        stopped   -         demo: moving
+    moving    moving*      holding   -        stopped   -         next motion, idle
+    homing    then moving  holding   -        stopped   -         next motion, idle
+    holding   refused      -         goes on  stopped   idle      -
+    stopped   refused      -         -        -         idle      -
+
+*A new unit's motions take the place of the running one, smoothly; only homing is first brought to
+its end. The motions of one unit are done one after the other. While the arm brakes it is told as
+moving: "stopped" and "holding" are said of an arm that stands.
+"""
+
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+
+from protocol_gateway.core.codes import code_table
+from protocol_gateway.core.records import (
+    AbsolutePositions,
+    Error,
+    Record,
+    Status,
+    Time,
+    Velocities,
+    write_unit,
+)
+from robots.joints import FloatArray, Joints
+from services.simulator.motion import Motion
+from services.simulator.orders import (
+    Move,
+    Order,
+    SetSpeed,
+    Situation,
+    Word,
+    asks_to_stop,
+    orders_of,
+    scales_of,
+)
+
+# Homing is slow, because nothing is known yet; at its end the marks are looked for.
+_HOMING_SPEED = 0.5
+_MARKS_S = 0.5
+_DEMO_SPEED = 0.6
+_DEMO_REST_S = 0.4
+# An encoder's resolution, in degrees or millimetres.
+_DECIMALS = 6
+
+
+class Controller:
+    """State of one simulated controller.
+
+    Args:
+        codes: Type codes as in the site file; empty: names are written.
+        demo: Targets [rad] or [m] of an endless motion, until the first motion command; None: at rest.
+            Controllers boot without knowing where they are, and tell `homed` only after homing. A demo
+            begins homed: it stands for an arm that has been at work since long before one looked.
+        now_s: The clock's time at boot.
+    """
+
+    def __init__(
+        self,
+        joints: Joints,
+        *,
+        codes: Mapping[int, str],
+        demo: Iterator[FloatArray] | None,
+        now_s: float,
+    ) -> None:
+        self.table = code_table(codes)
+        self._joints = joints
+        self._scales = scales_of(joints)
+        self._motion = Motion(joints, joints.home.copy())
+        self._demo = demo
+        self._boot_s = now_s
+        self._homed = demo is not None
+        self._trace = self._stopped = self._held = False
+        self._speed = 1.0
+        self._task: Move | None = None
+        self._queue: deque[Move] = deque()
+
+    def obey(self, records: Sequence[Record], now_s: float) -> Error | None:
+        """Do what a client's unit says, all or nothing; the record that answers it when it is refused."""
+        orders = orders_of(records, self._joints, self._situation(now_s))
+        if isinstance(orders, Error):
+            # Whatever else is wrong with a unit, a stop in it is a stop.
+            if asks_to_stop(records):
+                self._do([Word("stop")], now_s)
+            return orders
+        self._do(orders, now_s)
+        return None
+
+    def tick(self, now_s: float) -> None:
+        """Go from a motion that has ended to the next one."""
+        if self._held or self._stopped or self._motion.moving(now_s):
+            return
+        if self._task is not None and now_s >= self._motion.end_s + self._pause_s():
+            self._homed = self._homed or self._task.homing
+            self._task = None
+        if self._task is None and self._queue:
+            self._begin(self._queue.popleft(), now_s)
+        elif self._task is None and self._demo is not None:
+            self._begin(Move(next(self._demo)), now_s)
+
+    def told(self, now_s: float) -> bytes:
+        """The unit that tells the controller's state."""
+        state = self._motion.state(now_s)
+        positions = (state.positions / self._scales).round(_DECIMALS) + 0.0  # no "-0.00"
+        velocities = (state.velocities / self._scales).round(_DECIMALS) + 0.0
+        return write_unit(
+            (
+                AbsolutePositions(tuple(positions.tolist())),
+                Velocities(tuple(velocities.tolist())),
+                Status(self._words(now_s)),
+                Time(round(now_s - self._boot_s, _DECIMALS)),
+            ),
+            self.table,
+        )
+
+    # ------------------------------------------------------------------------ orders
+
+    def _situation(self, now_s: float) -> Situation:
+        where = self._motion.state(now_s).positions
+        if self._homing():
+            where = self._queue[-1].target if self._queue else self._joints.home
+        return Situation(stopped=self._stopped, held=self._held, where=where)
+
+    def _do(self, orders: Sequence[Order], now_s: float) -> None:
+        motions = [order for order in orders if isinstance(order, Move)]
+        if motions and not self._homing():
+            self._forget()
+        for order in orders:
+            match order:
+                case Move():
+                    self._queue.append(order)
+                case SetSpeed(fraction):
+                    self._speed = fraction
+                    if self._task is not None and not self._held and self._motion.moving(now_s):
+                        self._begin(self._task, now_s)
+                case Word(word):
+                    self._word(word, now_s)
+        if any(isinstance(order, Move) or _moves(order) for order in orders):
+            self._demo = None
+        if self._queue and self._task is None and not (self._held or self._stopped):
+            self._begin(self._queue.popleft(), now_s)
+
+    def _word(self, word: str, now_s: float) -> None:
+        match word:
+            case "trace" | "untrace":
+                self._trace = word == "trace"
+            case "stop":
+                self._stopped, self._held = True, False
+                self._forget()
+                self._motion.brake(now_s)
+            case "hold" if not self._stopped:
+                self._held = True
+                self._motion.brake(now_s)
+            case "resume" if self._held:
+                self._held = False
+                if self._task is not None:
+                    self._begin(self._task, now_s)
+            case "reset":
+                if self._held:
+                    self._forget()
+                self._stopped = self._held = False
+
+    def _begin(self, task: Move, now_s: float) -> None:
+        self._task = task
+        slower = _HOMING_SPEED if task.homing else _DEMO_SPEED if self._demo is not None else 1.0
+        self._motion.move(task.target, now_s, speed=self._speed * slower)
+
+    def _forget(self) -> None:
+        self._queue.clear()
+        self._task = None
+
+    # ------------------------------------------------------------------------- state
+
+    def _homing(self) -> bool:
+        return self._task is not None and self._task.homing
+
+    def _pause_s(self) -> float:
+        """How long the arm rests at the end of the running task."""
+        if self._homing():
+            return _MARKS_S
+        return _DEMO_REST_S if self._demo is not None else 0.0
+
+    def _words(self, now_s: float) -> tuple[str, ...]:
+        flags = (("homed",) if self._homed else ()) + (("trace",) if self._trace else ())
+        return (self._activity(now_s), "remote", *flags)
+
+    def _activity(self, now_s: float) -> str:
+        braking = (self._stopped or self._held) and self._motion.moving(now_s)
+        if braking:
+            return "moving"
+        if self._stopped or self._held:
+            return "stopped" if self._stopped else "holding"
+        if self._homing():
+            return "homing"
+        return "moving" if self._task is not None or self._motion.moving(now_s) else "idle"
+
+
+def _moves(order: Order) -> bool:
+    """Whether a word has to do with motion: tracing a demo, or slowing it, does not end it."""
+    return isinstance(order, Word) and order.word not in ("trace", "untrace")
