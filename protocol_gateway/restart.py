@@ -15,7 +15,8 @@ def remembered(entries: Iterable[Entry]) -> Authority:
     """
     authority, cleared = Authority(), None
     for entry in entries:
-        number = int(entry.values.get("stop_id", "0") or "0")
+        told = entry.values.get("stop_id", "")
+        number = int(told) if told.isdecimal() else 0
         if entry.request == "STOP" and number:
             latched = Stop(
                 id=number, by=entry.operator, reason=entry.values.get("reason", ""), since_ns=entry.time_ns

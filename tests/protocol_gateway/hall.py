@@ -1,4 +1,4 @@
-"""A hall for the gateway's tests: simulated controllers, a gateway, a monitor, an operator; sockets and router real."""
+"""A hall for the gateway's tests: simulated controllers, a gateway, a monitor, an operator; nothing is a mock."""
 
 import asyncio
 import contextlib
@@ -99,7 +99,9 @@ async def gateway(mesh, folder, *ports, up=True, **robot):
         site="hall",
         audit_folder=folder,
         robots=tuple(
-            RobotSettings(**{"name": name, "description": "pt600", "host": "127.0.0.1", "port": port, **robot})
+            RobotSettings(
+                **{"name": name, "description": "pt600", "host": "127.0.0.1", "port": port, **robot}
+            )
             for name, port in zip(names, ports, strict=True)
         ),
     )

@@ -91,23 +91,26 @@ async def repeated(say, text):
 @contextlib.contextmanager
 def full_disk(path):
     """The open audit log's file is a full device for a while: its writes really fail."""
-    (number,) = [fd for fd in os.listdir("/proc/self/fd") if _target(fd) == str(path)]
-    kept, full = os.dup(int(number)), os.open("/dev/full", os.O_RDWR)
-    os.dup2(full, int(number))
+    (number,) = [int(fd.name) for fd in Path("/proc/self/fd").iterdir() if _target(fd) == path]
+    kept, full = os.dup(number), os.open("/dev/full", os.O_RDWR)
+    os.dup2(full, number)
     os.close(full)
     try:
         yield
     finally:
-        os.dup2(kept, int(number))
+        os.dup2(kept, number)
         os.close(kept)
 
 
 def _target(fd):
     with contextlib.suppress(OSError):
-        return os.readlink(f"/proc/self/fd/{fd}")
+        return fd.readlink()
+    return None
 
 
-def test_a_frozen_controller_is_silent_within_its_stale_time_and_old_states_are_not_dated_anew(mesh, tmp_path):
+def test_a_frozen_controller_is_silent_within_its_stale_time_and_old_states_are_not_dated_anew(
+    mesh, tmp_path
+):
     async def main():
         async with simulator_process() as (process, port), gateway(mesh, tmp_path, port) as plant:
             process.send_signal(signal.SIGSTOP)
@@ -166,51 +169,54 @@ def test_without_its_router_the_gateway_still_stops_a_motion_whose_operator_is_g
 
 def test_one_robots_dead_controller_does_not_hurt_another(mesh, tmp_path):
     async def main():
-        async with simulator(demo=True) as alive:
-            async with gateway(mesh, tmp_path, alive, free_port()) as plant:
-                other = await plant.session.last("robomesh/hall/arm-2/controller")
-                assert other.link == STATE.DOWN
-                await until(lambda: len(plant.seen["joints"]) > 100)
-                assert plant.controller.counters.connections == 1
+        async with simulator(demo=True) as alive, gateway(mesh, tmp_path, alive, free_port()) as plant:
+            other = await plant.session.last("robomesh/hall/arm-2/controller")
+            assert other.link == STATE.DOWN
+            await until(lambda: len(plant.seen["joints"]) > 100)
+            assert plant.controller.counters.connections == 1
 
     run(main())
 
 
 def test_garbage_between_units_is_said_a_few_times_and_counted_always(mesh, tmp_path):
     async def main():
-        async with simulator(demo=True, faults=("garbage",)) as port:
-            async with gateway(mesh, tmp_path, port) as plant:
-                await until(lambda: plant.controller.counters.units_malformed > 25)
-                told = plant.events("unit.malformed")
-                assert 5 <= len(told) < plant.controller.counters.units_malformed
-                assert told[0].values["offset"]
-                assert len(plant.seen["joints"]) > 20
+        noisy = simulator(demo=True, faults=("garbage",))
+        async with noisy as port, gateway(mesh, tmp_path, port) as plant:
+            await until(lambda: plant.controller.counters.units_malformed > 25)
+            told = plant.events("unit.malformed")
+            assert 5 <= len(told) < plant.controller.counters.units_malformed
+            assert told[0].values["offset"]
+            assert len(plant.seen["joints"]) > 20
 
     run(main())
 
 
-def test_a_controller_that_tells_only_positions_is_commanded_only_if_the_site_file_accepts_that(mesh, tmp_path):
+def test_a_controller_that_tells_only_positions_is_commanded_only_if_the_site_file_accepts_that(
+    mesh, tmp_path
+):
     async def main():
-        async with bare_controller() as (port, say, heard):
-            async with repeated(say, lambda: "1#ABSOLUTE.DEG*1;90;-90;0;0@"):
-                async with gateway(mesh, tmp_path, port) as plant:
-                    await plant.lease(A.ACQUIRE, ttl_s=5)
-                    assert 'accept_unknown = ["mode"]' in await refusal(plant.command(C.HOME))
-                    await plant.command(C.HOLD)
-                    assert plant.controller.homed == STATE.UNKNOWN
-                async with gateway(mesh, tmp_path, port, accept_unknown=frozenset({"mode"})) as plant:
-                    await plant.lease(A.ACQUIRE, ttl_s=5)
-                    where = [0, 1.5, -1.5, 0, 0]
-                    text = await refusal(plant.command(C.MOVE_ABSOLUTE, joint_positions=where))
-                    assert 'accept_unknown = ["homed"]' in text
-                    await plant.command(C.HOME)
-                both = frozenset({"mode", "homed"})
-                async with gateway(mesh, tmp_path, port, accept_unknown=both) as plant:
-                    await plant.lease(A.ACQUIRE, ttl_s=5)
-                    assert "stop 1 is latched" in await refusal(plant.command(C.HOME))
-                    await plant.command(C.RESET, stop_id=1)
-                    await plant.command(C.MOVE_ABSOLUTE, joint_positions=where)
-                    await until(lambda: b"ABSOLUTE.DEG*0.00;85.94" in heard)
+        async with (
+            bare_controller() as (port, say, heard),
+            repeated(say, lambda: "1#ABSOLUTE.DEG*1;90;-90;0;0@"),
+        ):
+            async with gateway(mesh, tmp_path, port) as plant:
+                await plant.lease(A.ACQUIRE, ttl_s=5)
+                assert 'accept_unknown = ["mode"]' in await refusal(plant.command(C.HOME))
+                await plant.command(C.HOLD)
+                assert plant.controller.homed == STATE.UNKNOWN
+            async with gateway(mesh, tmp_path, port, accept_unknown=frozenset({"mode"})) as plant:
+                await plant.lease(A.ACQUIRE, ttl_s=5)
+                where = [0, 1.5, -1.5, 0, 0]
+                text = await refusal(plant.command(C.MOVE_ABSOLUTE, joint_positions=where))
+                assert 'accept_unknown = ["homed"]' in text
+                await plant.command(C.HOME)
+            both = frozenset({"mode", "homed"})
+            async with gateway(mesh, tmp_path, port, accept_unknown=both) as plant:
+                await plant.lease(A.ACQUIRE, ttl_s=5)
+                assert "stop 1 is latched" in await refusal(plant.command(C.HOME))
+                await plant.command(C.RESET, stop_id=1)
+                await plant.command(C.MOVE_ABSOLUTE, joint_positions=where)
+                await until(lambda: b"ABSOLUTE.DEG*0.00;85.94" in heard)
 
     run(main())
 
@@ -218,16 +224,16 @@ def test_a_controller_that_tells_only_positions_is_commanded_only_if_the_site_fi
 def test_motion_that_nobody_commanded_is_said_and_ends_the_lease(mesh, tmp_path):
     async def main():
         waist = 0.0
-        async with bare_controller() as (port, say, _):
-            async with repeated(say, lambda: f"1#ABSOLUTE.DEG*{waist};90;-90;0;0@"):
-                async with gateway(mesh, tmp_path, port) as plant:
-                    await plant.lease(A.ACQUIRE, ttl_s=5)
-                    await asyncio.sleep(0.3)
-                    assert plant.seen["lease"][-1].holder == "li"
-                    waist = 5.0
-                    await until(lambda: plant.events("motion.foreign"))
-                    await until(lambda: not plant.seen["lease"][-1].holder)
-                    assert not plant.events("stop.latched")
+        bare = bare_controller()
+        async with bare as (port, say, _), repeated(say, lambda: f"1#ABSOLUTE.DEG*{waist};90;-90;0;0@"):
+            async with gateway(mesh, tmp_path, port) as plant:
+                await plant.lease(A.ACQUIRE, ttl_s=5)
+                await asyncio.sleep(0.3)
+                assert plant.seen["lease"][-1].holder == "li"
+                waist = 5.0
+                await until(lambda: plant.events("motion.foreign"))
+                await until(lambda: not plant.seen["lease"][-1].holder)
+                assert not plant.events("stop.latched")
 
     run(main())
 
@@ -274,7 +280,13 @@ def test_on_a_full_disk_a_stop_works_and_a_motion_is_refused_and_the_stop_is_wri
             await plant.lease(A.RENEW)
             await plant.command(C.RESET, stop_id=stop.stop_id)
         assert verify(plant.audit).ok
-        assert [e.request for e in read_entries(plant.audit)] == ["ACQUIRE", "HOME", "STOP", "RESET", "REVOKE"]
+        assert [e.request for e in read_entries(plant.audit)] == [
+            "ACQUIRE",
+            "HOME",
+            "STOP",
+            "RESET",
+            "REVOKE",
+        ]
 
     run(main())
 

@@ -1,0 +1,267 @@
+"""The authority's rules, by hand-set clocks."""
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
+from protocol_gateway.admission import admit, remember
+from protocol_gateway.authority import (
+    Answer,
+    Authority,
+    Now,
+    command_sent,
+    end_lease,
+    expire,
+    holds,
+    observe,
+    request_lease,
+    stop,
+    stop_sent,
+)
+
+A = LeaseRequest.Action
+C = CommandRequest.Command
+
+
+def at(seconds):
+    return Now(1000.0 + seconds, round((5000.0 + seconds) * 1e9))
+
+
+def ask(authority, action, operator="li", *, time_s=0.0, secret="fresh", **fields):
+    request = LeaseRequest(action=action, **fields)
+    return request_lease(authority, request, operator=operator, now=at(time_s), secret=secret)
+
+
+def held(**fields):
+    return ask(Authority(), A.ACQUIRE, secret="s", **fields).authority
+
+
+def command(kind, number=1, **fields):
+    return CommandRequest(**{"lease": "s", "id": number, "command": kind, **fields})
+
+
+def moving(time_s=0.0):
+    return command_sent(held(), command(C.MOVE_ABSOLUTE), at(time_s))
+
+
+def see(authority, moves, time_s, *, pending=False):
+    return observe(authority, moving=moves, pending=pending, now=at(time_s))
+
+
+@pytest.mark.parametrize(("asked", "kept"), [(0, 2.0), (0.1, 0.5), (3, 3.0), (60, 5.0), (-1, 0.5)])
+def test_a_leases_time_is_kept_between_half_a_second_and_five(asked, kept):
+    assert held(ttl_s=asked).lease.ttl_s == kept
+
+
+def test_a_lease_lives_until_its_time_is_over_and_not_longer():
+    authority = ask(held(), A.RENEW, time_s=1.5, lease="s").authority
+    assert expire(authority, at(3.4)) == (authority, None)
+    free, ended = expire(authority, at(3.5))
+    assert free.lease is None
+    assert (ended.holder, ended.renewals, ended.stop) == ("li", 1, False)
+
+
+def test_the_holders_own_acquire_renews_and_keeps_the_secret():
+    outcome = ask(held(), A.ACQUIRE, time_s=1.0, lease="s", secret="other")
+    assert outcome.granted.secret == "s"
+    assert outcome.granted.until_s == at(3.0).monotonic_s
+
+
+@pytest.mark.parametrize(
+    ("action", "operator", "fields", "words"),
+    [
+        (A.ACQUIRE, "wang", {}, "li is in control"),
+        (A.ACQUIRE, "li", {}, "another window or program"),
+        (A.RENEW, "li", {"lease": "t"}, "another window or program"),
+        (A.RENEW, "wang", {"lease": "s"}, "li is in control"),
+        (A.RELEASE, "wang", {"lease": "s"}, "li is in control"),
+        (A.OFFER, "wang", {"lease": "s", "to": "zhao"}, "li is in control"),
+        (A.ACCEPT, "wang", {}, "not offered to wang"),
+        (A.TAKE, "wang", {"reason": "  "}, "needs a reason"),
+    ],
+)
+def test_who_does_not_hold_the_lease_is_refused_with_the_reason(action, operator, fields, words):
+    outcome = ask(held(), action, operator, **fields)
+    assert not outcome.answer.accepted
+    assert words in outcome.answer.text
+    assert outcome.authority == held()
+    assert outcome.granted is None
+
+
+@pytest.mark.parametrize("action", [A.RENEW, A.RELEASE, A.OFFER])
+def test_a_lease_that_has_ended_is_not_anybodys(action):
+    free, _ = end_lease(held(), "over")
+    outcome = ask(free, action, lease="s")
+    assert "take control first" in outcome.answer.text
+
+
+def test_an_offer_passes_the_lease_on_but_not_while_its_holders_motion_runs():
+    offered = ask(moving(), A.OFFER, lease="s", to="wang").authority
+    assert "motion still runs" in ask(offered, A.ACCEPT, "wang").answer.text
+    offered = ask(held(), A.OFFER, lease="s", to="wang").authority
+    passed = ask(offered, A.ACCEPT, "wang", secret="w")
+    assert (passed.granted.holder, passed.ended.stop) == ("wang", False)
+    assert not holds(passed.authority, "li", "s")
+
+
+@pytest.mark.parametrize(
+    "end",
+    [
+        lambda state: expire(state, at(2.0))[1],
+        lambda state: ask(state, A.RELEASE, lease="s").ended,
+        lambda state: ask(state, A.TAKE, "wang", reason="he left").ended,
+        lambda state: end_lease(state, "session lost")[1],
+    ],
+)
+def test_however_a_lease_ends_its_holders_motion_is_stopped(end):
+    assert end(moving()).stop
+    assert end(command_sent(moving(), command(C.HOLD), at(0.1))).stop
+    assert not end(held()).stop
+
+
+def test_motion_is_over_when_the_robot_has_been_still_for_half_a_second():
+    state, foreign = see(moving(), True, 0.1)
+    assert not foreign
+    state, _ = see(state, False, 0.5)
+    assert state.lease.motion is not None
+    state, _ = see(state, False, 0.6)
+    assert state.lease.motion is None
+
+
+def test_a_slow_start_is_waited_for():
+    state, _ = see(moving(), False, 1.9)
+    assert state.lease.motion is not None
+    state, _ = see(state, False, 2.0)
+    assert state.lease.motion is None
+
+
+def test_a_held_motion_stays_the_holders_until_the_controller_says_that_there_is_none():
+    state = command_sent(moving(), command(C.HOLD), at(0.1))
+    state, _ = see(state, False, 100.0, pending=True)
+    assert state.lease.motion is not None
+    state, _ = see(state, False, 100.0, pending=False)
+    assert state.lease.motion is None
+
+
+def test_motion_that_nobody_commanded_is_seen_when_it_begins():
+    state, foreign = see(held(), False, 0.0)
+    assert not foreign
+    state, foreign = see(state, True, 1.0)
+    assert foreign
+    state, foreign = see(state, True, 1.05)
+    assert not foreign
+    assert not state.lease.tolerates_motion
+
+
+def test_a_robot_that_was_moving_by_itself_may_go_on_until_the_first_command():
+    state, _ = see(Authority(), True, 0.0)
+    state, _ = see(state, False, 0.1)
+    state = ask(state, A.ACQUIRE, secret="s", time_s=5.0).authority
+    assert state.lease.tolerates_motion
+    assert not command_sent(state, command(C.TRACE_ON), at(6.0)).lease.tolerates_motion
+    late = ask(replace(state, lease=None), A.ACQUIRE, time_s=50.0).authority
+    assert not late.lease.tolerates_motion
+
+
+def test_a_robot_slowing_down_from_a_stop_is_not_moved_by_somebody_else():
+    state, _ = see(moving(), True, 0.1)
+    state, _ = stop(state, by="wang", reason="", now=at(0.2))
+    state, foreign = see(state, True, 0.25)
+    assert not foreign
+    assert state.foreign_s is None
+
+
+def test_every_stop_has_a_number_and_only_its_own_reset_clears_it():
+    state, first = stop(held(), by="wang", reason="", now=at(0))
+    state, second = stop(state, by="zhao", reason="smoke", now=at(1))
+    assert (first.id, second.id) == (1, 2)
+    for stop_id, words in [
+        (1, "RESET names stop 1, but stop 2 is latched (zhao: smoke)"),
+        (0, "names stop 0"),
+    ]:
+        verdict = admit(state, command(C.RESET, stop_id=stop_id), operator="li", now=at(2))
+        assert words in verdict.answer.text
+    reset = command(C.RESET, stop_id=2)
+    assert admit(state, reset, operator="li", now=at(2)).answer.accepted
+    assert command_sent(state, reset, at(2)).stop is None
+    assert stop_sent(state, 1, at(3)) == state
+    assert "nothing is" in admit(held(), reset, operator="li", now=at(2)).answer.text
+
+
+@pytest.mark.parametrize("kind", [C.HOME, C.RESUME, C.MOVE_ABSOLUTE, C.MOVE_RELATIVE, C.RUN_PROGRAM])
+def test_a_latched_stop_forbids_motion(kind):
+    state, _ = stop(held(), by="wang", reason="", now=at(0))
+    assert "stop 1 is latched" in admit(state, command(kind), operator="li", now=at(0)).answer.text
+
+
+@pytest.mark.parametrize("kind", [C.HOLD, C.TRACE_ON, C.TRACE_OFF, C.SPEED])
+def test_a_latched_stop_does_not_forbid_what_moves_nothing(kind):
+    state, _ = stop(held(), by="wang", reason="", now=at(0))
+    assert admit(state, command(kind), operator="li", now=at(0)).answer.accepted
+
+
+def test_an_id_is_used_once():
+    state = remember(held(), command(C.HOME, 5), Answer(True, "done"))
+    again = admit(state, command(C.HOME, 5), operator="li", now=at(0))
+    assert (again.answer, again.repeat) == (Answer(True, "done"), True)
+    lower = admit(state, command(C.HOME, 4), operator="li", now=at(0))
+    assert "id 4 is not higher than 5" in lower.answer.text
+    assert not lower.counted
+    assert "id 0" in admit(held(), command(C.HOME, 0), operator="li", now=at(0)).answer.text
+    assert admit(state, command(C.HOME, 6), operator="li", now=at(0)).answer.accepted
+
+
+def test_an_answer_is_not_kept_under_somebody_elses_lease():
+    state = ask(held(), A.TAKE, "wang", reason="he left", secret="w").authority
+    assert remember(state, command(C.HOME, 9), Answer(True, "")) == state
+
+
+def test_what_was_delayed_on_the_way_is_refused():
+    late = command(C.HOME)
+    late.not_after.FromNanoseconds(at(1).wall_ns)
+    assert admit(held(), late, operator="li", now=at(1)).answer.accepted
+    refused = admit(held(), late, operator="li", now=at(1.5))
+    assert "0.50 s after its not_after" in refused.answer.text
+    assert refused.counted
+
+
+def test_the_secret_is_not_in_the_leases_own_text():
+    assert "s3cret" not in repr(ask(Authority(), A.ACQUIRE, secret="s3cret").authority)
+
+
+requests = st.tuples(
+    st.sampled_from([A.ACQUIRE, A.RENEW, A.RELEASE, A.OFFER, A.ACCEPT, A.TAKE]),
+    st.sampled_from(["li", "wang", "zhao"]),
+    st.sampled_from(["li", "wang", ""]),
+    st.sampled_from(["", "because"]),
+    st.booleans(),
+    st.floats(0.0, 3.0),
+)
+
+
+@given(st.lists(requests, max_size=30))
+def test_whatever_is_asked_only_the_newest_granted_secret_ever_holds(asked):
+    authority, granted, time_s = Authority(), {}, 0.0
+    for number, (action, operator, to, reason, knows, wait_s) in enumerate(asked):
+        time_s += wait_s
+        authority, _ = expire(authority, at(time_s))
+        secret = granted.get(operator, "") if knows else ""
+        outcome = ask(
+            authority,
+            action,
+            operator,
+            time_s=time_s,
+            to=to,
+            reason=reason,
+            lease=secret,
+            secret=f"#{number}",
+        )
+        authority = outcome.authority
+        if outcome.granted is not None:
+            granted[operator] = outcome.granted.secret
+            assert outcome.granted.holder == operator
+        holders = [name for name, known in granted.items() if holds(authority, name, known)]
+        assert holders == ([authority.lease.holder] if authority.lease else [])

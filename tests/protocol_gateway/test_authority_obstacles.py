@@ -1,0 +1,163 @@
+"""What a controller's state and the joints' limits forbid, and what a robot's positions tell of motion."""
+
+from dataclasses import replace
+from math import radians
+
+import pytest
+
+from bus.schemas.robomesh_pb2 import CommandRequest
+from protocol_gateway.driver import Activity, Mode, MoveAbsolute, Speed, StatusReceived, Trace
+from protocol_gateway.link import LinkState, LinkStatus
+from protocol_gateway.motion import PositionWatch, is_moving, motion_may_be_held
+from protocol_gateway.obstacles import Controller, controller_command, obstacle
+from robots.description import load
+from robots.joints import joints_of
+
+C = CommandRequest.Command
+JOINTS = joints_of(load("pt600"))
+HOME = tuple(JOINTS.home.tolist())
+READY = Controller(
+    link=LinkStatus(LinkState.UP, ""),
+    status=StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=True, trace=False),
+    positions=HOME,
+)
+
+
+def in_state(**status):
+    return replace(READY, status=replace(READY.status, **status))
+
+
+def linked(state):
+    return replace(READY, link=LinkStatus(state, "the cable"))
+
+
+def command(kind, **fields):
+    if kind in (C.MOVE_ABSOLUTE, C.MOVE_RELATIVE):
+        fields.setdefault("joint_positions", HOME if kind == C.MOVE_ABSOLUTE else [0] * 5)
+    if kind == C.SPEED:
+        fields.setdefault("speed_percent", 50)
+    return CommandRequest(command=kind, **fields)
+
+
+SITUATIONS = {
+    "ready": READY,
+    "link down": linked(LinkState.DOWN),
+    "silent": linked(LinkState.SILENT),
+    "read only": replace(READY, read_only=True),
+    "local": in_state(mode=Mode.LOCAL),
+    "mode unknown": in_state(mode=None),
+    "mode unknown, accepted": replace(in_state(mode=None), accept_unknown=frozenset({"mode"})),
+    "stopped": in_state(activity=Activity.STOPPED),
+    "fault": in_state(activity=Activity.FAULT),
+    "holding": in_state(activity=Activity.HOLDING),
+    "moving": in_state(activity=Activity.MOVING),
+    "not homed": in_state(homed=False),
+    "homed unknown": in_state(homed=None),
+    "homed unknown, accepted": replace(in_state(homed=None), accept_unknown=frozenset({"homed"})),
+    "not homed, unknown accepted": replace(in_state(homed=False), accept_unknown=frozenset({"homed"})),
+}
+
+ALL = [
+    "HOME",
+    "HOLD",
+    "RESUME",
+    "RESET",
+    "TRACE_ON",
+    "TRACE_OFF",
+    "SPEED",
+    "MOVE_ABSOLUTE",
+    "MOVE_RELATIVE",
+]
+
+
+@pytest.mark.parametrize(
+    ("situation", "allowed"),
+    [
+        ("ready", ALL),
+        ("link down", []),
+        ("silent", []),
+        ("read only", []),
+        ("local", []),
+        ("mode unknown", ["HOLD"]),
+        ("mode unknown, accepted", ALL),
+        ("stopped", ["HOLD", "RESET", "TRACE_ON", "TRACE_OFF", "SPEED"]),
+        ("fault", ["HOLD", "RESET", "TRACE_ON", "TRACE_OFF", "SPEED"]),
+        ("holding", ["HOLD", "RESUME", "RESET", "TRACE_ON", "TRACE_OFF", "SPEED"]),
+        ("moving", ALL),
+        ("not homed", ["HOME", "HOLD", "RESET", "TRACE_ON", "TRACE_OFF", "SPEED"]),
+        ("homed unknown", ["HOME", "HOLD", "RESET", "TRACE_ON", "TRACE_OFF", "SPEED"]),
+        ("homed unknown, accepted", ALL),
+        ("not homed, unknown accepted", ["HOME", "HOLD", "RESET", "TRACE_ON", "TRACE_OFF", "SPEED"]),
+    ],
+)
+def test_what_may_be_sent_in_each_state_of_the_controller(situation, allowed):
+    found = [name for name in ALL if not obstacle(command(C.Value(name)), SITUATIONS[situation], JOINTS)]
+    assert found == allowed
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        (command(C.SPEED, speed_percent=0), "speed 0 % is outside 1 to 100 %"),
+        (command(C.SPEED, speed_percent=100.5), "speed 100.5 % is outside 1 to 100 %"),
+        (CommandRequest(command=C.SPEED), "SPEED needs speed_percent, from 1 to 100"),
+        (command(C.MOVE_ABSOLUTE, joint_positions=[0] * 6), "6 joint positions, but the robot has 5 joints"),
+        (command(C.MOVE_ABSOLUTE, joint_positions=[float("nan")] * 5), "not a finite number"),
+        (
+            command(C.MOVE_ABSOLUTE, joint_positions=[radians(151), 0, 0, 0, 0]),
+            "Not sent: joint waist at 151.00° is beyond its limit 150.00°.",
+        ),
+        (
+            command(C.MOVE_ABSOLUTE, joint_positions=[0, radians(120), radians(60), 0, 0]),
+            "shoulder + elbow at 180.00° is beyond its limit 160.00°",
+        ),
+        (command(C.MOVE_RELATIVE, joint_positions=[0, radians(41), 0, 0, 0]), "joint shoulder at 131.00°"),
+        (command(C.RUN_PROGRAM), "programs cannot be run yet"),
+    ],
+)
+def test_a_refused_value_is_named_with_what_would_be_allowed(asked, words):
+    assert words in obstacle(asked, READY, JOINTS)
+
+
+def test_nothing_is_added_to_positions_that_are_not_known():
+    asked = command(C.MOVE_RELATIVE)
+    assert "has not told where the joints are" in obstacle(asked, replace(READY, positions=None), JOINTS)
+
+
+def test_commands_become_the_drivers_own():
+    assert controller_command(command(C.TRACE_OFF)) == Trace(on=False)
+    assert controller_command(command(C.SPEED)) == Speed(percent=50.0)
+    assert controller_command(command(C.MOVE_ABSOLUTE)) == MoveAbsolute(positions=HOME)
+
+
+def watched(positions_at):
+    watch = PositionWatch((False, True))
+    for number in range(200):
+        watch.see(positions_at(number * 0.01), number * 0.01)
+    return watch
+
+
+@pytest.mark.parametrize(
+    ("positions_at", "moving"),
+    [
+        (lambda t: (0.5, 0.1), False),
+        (lambda t: (0.5 + radians(0.01) * (int(t * 100) % 2), 0.1), False),
+        (lambda t: (0.5 + radians(0.5) * t, 0.1), True),
+        (lambda t: (0.5, 0.1 + 0.001 * t), True),
+        (lambda t: (0.5 + t if t < 1.0 else 1.5, 0.1), False),
+    ],
+)
+def test_positions_tell_whether_a_robot_moves_when_its_controller_does_not(positions_at, moving):
+    assert is_moving(None, watched(positions_at)) is moving
+
+
+def test_the_controllers_word_counts_where_it_gives_one():
+    still, moving = watched(lambda t: (0.0, 0.0)), watched(lambda t: (t, 0.0))
+    assert is_moving(Activity.HOMING, still) is True
+    assert is_moving(Activity.IDLE, moving) is False
+    assert is_moving(None, PositionWatch((False,))) is None
+    assert [motion_may_be_held(each) for each in (None, Activity.HOLDING, Activity.IDLE)] == [
+        True,
+        True,
+        False,
+    ]
