@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic_core import ErrorDetails
 
-from robots.description import (
+from robots.schema import (
     BASE_LINK,
     TOOL_FRAME,
     Joint,

@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from robots.description import Body, RobotDescription
 from robots.joints import FloatArray
 from robots.meshes.mesh import PAINT, Color, Material, Mesh, Part, transformed
 from robots.meshes.read import read_mesh
 from robots.poses import pose_matrix
+from robots.schema import Body, RobotDescription
 
 logger = logging.getLogger(__name__)
 
@@ -58,7 +58,8 @@ def cache_folder() -> Path:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError:
             continue
-        if os.access(folder, os.W_OK):
+        # In the temporary folder it may be another user's, who could put anything there.
+        if os.access(folder, os.W_OK) and folder.stat().st_uid == os.getuid():
             return folder
     return Path(tempfile.mkdtemp(prefix="robomesh-meshes-"))
 

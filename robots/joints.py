@@ -6,8 +6,8 @@ from math import degrees, isfinite, radians
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from robots.description import Joint, JointType, RobotDescription, Units
 from robots.errors import JointCountError
+from robots.schema import Joint, JointType, RobotDescription, Units
 
 __all__ = [
     "Constraint",

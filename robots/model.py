@@ -17,9 +17,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from robots.description import TOOL_FRAME, JointType, RobotDescription
 from robots.joints import FloatArray, Joints, angle_factor, as_positions, joints_of, length_factor
 from robots.poses import dh_fixed_part, pose_matrix, rpy_rotation
+from robots.schema import TOOL_FRAME, JointType, RobotDescription
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from robots.description import Pose, Units
 from robots.joints import FloatArray, angle_factor, length_factor
+from robots.schema import Pose, Units
 
 
 def pose_matrix(pose: Pose, units: Units) -> FloatArray:

@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from robots.description import RobotDescription
 from robots.joints import joints_of
 from robots.meshes.mesh import Mesh, bounds
+from robots.schema import RobotDescription
 from robots.views import reach, views_of
 
 

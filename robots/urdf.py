@@ -10,9 +10,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from robots.description import BASE_LINK, TOOL_FRAME, JointType, RobotDescription
 from robots.joints import FloatArray, angle_factor, joints_of, length_factor
 from robots.poses import dh_fixed_part, pose_matrix, rotation_rpy, rpy_rotation
+from robots.schema import BASE_LINK, TOOL_FRAME, JointType, RobotDescription
 
 
 def glb_beside(link: str) -> str:

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robots.description import RobotDescription
 from robots.joints import FloatArray, joints_of, length_factor
+from robots.schema import RobotDescription
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,8 @@ from robots.meshes.vrml_geometry import GEOMETRY, Geometry
 from robots.meshes.vrml_parser import MAX_DEPTH, Is, Node, Proto, Value, parse_vrml
 from robots.meshes.vrml_values import color, line_error, node_of, nodes_of, numbers, strings
 
+# A few USEs of USEs can make billions of nodes.
+MAX_NODES = 200_000
 _GROUPS = {"Group", "Anchor", "Billboard", "Collision", "Transform"}
 # Geometry without triangles, or not drawn yet.
 _NOT_DRAWN = {"IndexedLineSet", "PointSet", "Text", "ElevationGrid", "Extrusion"}
@@ -53,10 +55,14 @@ class _Walk:
     including: tuple[Path, ...]
     warnings: list[str] = field(default_factory=list)
     inlined: bool = False
+    drawn: int = 0
 
     def parts(self, node: Node, placement: FloatArray, depth: int) -> Iterator[Part]:
         if depth > MAX_DEPTH:
             raise line_error(self.path, node, f"nested deeper than {MAX_DEPTH}")
+        self.drawn += 1
+        if self.drawn > MAX_NODES:
+            raise line_error(self.path, node, f"draws more than {MAX_NODES} nodes")
         if node.proto is not None:
             body = _instance(node, node.proto)
             if body is not None:

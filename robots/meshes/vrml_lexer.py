@@ -11,6 +11,7 @@ Number lists are most of a file: they are taken whole, by NumPy, not token by to
 Source: ISO/IEC 14772-1:1997, annex A.
 """
 
+import bisect
 import re
 from dataclasses import dataclass, field
 from enum import Enum
@@ -65,6 +66,7 @@ class Lexer:
     warnings: list[str] = field(default_factory=list)
     _position: int = 0
     _peeked: Token | None = None
+    _newlines: list[int] | None = None
 
     def peek(self) -> Token:
         """The next token, which stays."""
@@ -84,7 +86,10 @@ class Lexer:
 
     def number_list(self) -> FloatArray | None:
         """The numbers up to the `]` when only numbers stand before it; None, and nothing read, otherwise."""
-        start = self._position if self._peeked is None else self._peeked.position
+        first = self.peek()
+        if first.kind is not Kind.NUMBER and first.text != "]":
+            return None
+        start = first.position
         end = self.text.find("]", start)
         if end < 0:
             return None
@@ -100,7 +105,8 @@ class Lexer:
                 numbers = np.array(joined.replace(",", " ").split(), dtype=np.float64)
             except ValueError:
                 return None
-            self._warn_of_split_sign(start)
+            sign = _SPLIT_SIGN.search(self.text, start)
+            self._warn_of_split_sign(sign.start() if sign else start)
         # NumPy would take "nan" and "inf"; VRML has no such numbers.
         if not np.isfinite(numbers).all():
             return None
@@ -128,7 +134,9 @@ class Lexer:
 
     def line(self, position: int) -> int:
         """The number of the line that a position is on."""
-        return self.text.count("\n", 0, position) + 1
+        if self._newlines is None:
+            self._newlines = [match.start() for match in re.finditer("\n", self.text)]
+        return bisect.bisect_left(self._newlines, position) + 1
 
     def _read(self) -> Token:
         match = _TOKEN.match(self.text, self._position)

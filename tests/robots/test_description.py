@@ -176,6 +176,14 @@ def test_unknown_robot_is_told_the_nearest_one() -> None:
         load("pt60")
 
 
+def test_folder_of_the_same_name_does_not_hide_a_library_robot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "pt600").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert load("pt600").title == "Pt600"
+
+
 def test_missing_file_is_told(tmp_path: Path) -> None:
     with pytest.raises(DescriptionError, match=r"arm\.toml: cannot be read: No such file"):
         load(tmp_path / "arm.toml")

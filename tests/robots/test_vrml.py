@@ -46,7 +46,7 @@ def test_papers_sample_is_read_with_warnings(tmp_path: Path) -> None:
     assert low.tolist() == [-25.08, -6.161, -13.86]
     assert high.tolist() == [25.08, 30.8, 13.86]
     assert mesh.parts[0].material.diffuse == (0.7, 0.7, 0.7)
-    assert [warning.split(":")[0] for warning in mesh.warnings] == ["line 1", "line 4", "line 7"]
+    assert [warning.split(":")[0] for warning in mesh.warnings] == ["line 1", "line 4", "line 8"]
 
 
 def expected_files(folder: str) -> list[dict[str, object]]:
@@ -223,6 +223,12 @@ def test_inline_that_leads_back_to_itself_is_refused(tmp_path: Path) -> None:
     write(tmp_path, 'Inline { url "a.wrl" }', "b.wrl")
     with pytest.raises(MeshError, match="leads back to itself"):
         read_vrml(write(tmp_path, 'Inline { url "b.wrl" }'))
+
+
+def test_uses_of_uses_cannot_exhaust_the_reader(tmp_path: Path) -> None:
+    groups = [f"DEF G{n + 1} Group {{ children [ USE G{n} USE G{n} ] }}" for n in range(60)]
+    with pytest.raises(MeshError, match="draws more than 200000 nodes"):
+        read_vrml(write(tmp_path, "\n".join(["DEF G0 Shape { }", *groups])))
 
 
 def test_unknown_nodes_scripts_and_routes_do_no_harm(tmp_path: Path) -> None:

@@ -1,0 +1,208 @@
+"""What a robot.toml holds: its tables and keys, in the file's own units.
+
+Degrees and millimetres unless the file says otherwise: what people read off a data sheet.
+`robots.joints`, `robots.model` and `robots.views` turn it into SI.
+
+Source: Chen, Zhang, Xue 2001, section 3.3 (the description file of the model definition program).
+"""
+
+import difflib
+from collections.abc import Iterable
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    StringConstraints,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
+
+BASE_LINK = "base"
+TOOL_FRAME = "tool"
+
+Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+# Strict: "90" and true are no numbers.
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
+Triple = tuple[Number, Number, Number]
+Range = tuple[Number, Number]
+Color = Annotated[str, StringConstraints(pattern=r"^#[0-9a-fA-F]{6}$")]
+
+
+class JointType(StrEnum):
+    """Which D-H parameter varies: theta (rotary) or d (prismatic)."""
+
+    ROTARY = "rotary"
+    PRISMATIC = "prismatic"
+
+
+class _Table(BaseModel):
+    """A table of the file: frozen, and without a key that nobody reads."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_unknown_keys(cls, values: Any) -> Any:
+        keys = [field.alias or name for name, field in cls.model_fields.items()]
+        unknown = [key for key in values if key not in keys] if isinstance(values, dict) else []
+        if unknown:
+            raise PydanticCustomError(
+                "unknown_key",
+                "{text}",
+                {"key": unknown[0], "text": f"unknown key{nearest(unknown[0], keys)}"},
+            )
+        return values
+
+
+class Units(_Table):
+    """The file's units of length and angle; speeds are per second of them."""
+
+    length: Literal["mm", "m"] = "mm"
+    angle: Literal["deg", "rad"] = "deg"
+
+
+class Pose(_Table):
+    """A placement: translation, then roll, pitch and yaw about the fixed x, y and z axes."""
+
+    xyz: Triple = (0.0, 0.0, 0.0)
+    rpy: Triple = (0.0, 0.0, 0.0)
+
+
+class Body(_Table):
+    """How a link looks: a mesh file beside the description, and its colour.
+
+    Attributes:
+        mesh: File, relative to the description's folder; none: the link is not drawn.
+        mesh_scale: The mesh file's unit in metres.
+        mesh_pose: Of the mesh in the link's frame.
+        color: Of the mesh's materials named "paint", or of all where none is; none: the mesh's own.
+    """
+
+    mesh: str | None = None
+    mesh_scale: Positive = 0.001
+    mesh_pose: Pose = Pose()
+    color: Color | None = None
+
+
+class Link(Body):
+    """The link that a joint moves; named as the joint unless it says otherwise."""
+
+    name: Name | None = None
+
+
+class Joint(_Table):
+    """A joint, its standard D-H row, and the link that it moves.
+
+    `link to previous link = Rot(z, theta) Trans(0, 0, d) Trans(a, 0, 0) Rot(x, alpha)`; the
+    variable adds to theta of a rotary joint and to d of a prismatic one.
+    """
+
+    name: Name
+    type: JointType = JointType.ROTARY
+    a: Number
+    alpha: Number
+    d: Number
+    theta: Number = 0.0
+    limits: Range
+    max_speed: Positive
+    max_acceleration: Positive
+    max_jerk: Positive
+    home: Number = 0.0
+    link: Link = Link()
+
+    @property
+    def link_name(self) -> str:
+        """Name of the link that the joint moves."""
+        return self.link.name or self.name
+
+
+class Frame(Pose):
+    """A named frame on a link: a sensor, a mounting face."""
+
+    name: Name
+    link: Name
+
+
+class Constraint(_Table):
+    """A limit on a sum: lower <= sum of coefficient x joint position <= upper."""
+
+    joints: dict[str, Number]
+    limits: Range
+
+
+class View(_Table):
+    """A camera, in the base frame; parallel or perspective."""
+
+    eye: Triple
+    target: Triple
+    up: Triple = (0.0, 0.0, 1.0)
+    projection: Literal["orthographic", "perspective"] = "perspective"
+
+
+class Collision(_Table):
+    """Pairs of links that are never checked against each other."""
+
+    ignore: tuple[tuple[str, str], ...] = ()
+
+
+class RobotDescription(_Table):
+    """A robot's description file, in the file's own units."""
+
+    name: Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9_-]*$")]
+    title: str = ""
+    provenance: str = ""
+    units: Units = Units()
+    base: Body = Body()
+    joints: tuple[Joint, ...] = Field(alias="joint")
+    tool: Pose = Pose()
+    frames: tuple[Frame, ...] = Field((), alias="frame")
+    constraints: tuple[Constraint, ...] = Field((), alias="constraint")
+    views: dict[Name, View] = Field(default_factory=dict, alias="view")
+    collision: Collision = Collision()
+
+    _source: Path = PrivateAttr(Path())
+    _text: str = PrivateAttr("")
+
+    @property
+    def source(self) -> Path:
+        """The file that it was read from."""
+        return self._source
+
+    @property
+    def text(self) -> str:
+        """The file's text as it stands there."""
+        return self._text
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """Names of the links, base first."""
+        return (BASE_LINK, *(joint.link_name for joint in self.joints))
+
+    @property
+    def bodies(self) -> dict[str, Body]:
+        """How each link looks, by link name, base first."""
+        return {BASE_LINK: self.base} | {joint.link_name: joint.link for joint in self.joints}
+
+    def read_from(self, source: Path, text: str) -> Self:
+        """The same description, knowing its file."""
+        known = self.model_copy()
+        known._source = source
+        known._text = text
+        return known
+
+    def mesh_path(self, body: Body) -> Path | None:
+        """Where a body's mesh file is; None without one."""
+        return None if body.mesh is None else self._source.parent / body.mesh
+
+
+def nearest(name: str, names: Iterable[str]) -> str:
+    """A hint to end a sentence with: the nearest right name, or all of them."""
+    names = tuple(names)
+    close = difflib.get_close_matches(name, names, n=1)
+    return f"; did you mean {close[0]!r}?" if close else f"; there are {', '.join(names)}"
