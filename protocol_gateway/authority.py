@@ -260,7 +260,9 @@ def command_sent(authority: Authority, request: CommandRequest, now: Now) -> Aut
         motion = Motion(last_s=now.monotonic_s)
     elif request.command == _C.HOLD and motion is not None:
         motion = replace(motion, held=True)
-    return replace(authority, lease=replace(lease, motion=motion, tolerates_motion=False))
+    # From its first motion on, whatever else moves the robot is a surprise.
+    tolerates = lease.tolerates_motion and request.command not in MOTION_COMMANDS
+    return replace(authority, lease=replace(lease, motion=motion, tolerates_motion=tolerates))
 
 
 def stop(authority: Authority, *, by: str, reason: str, now: Now) -> tuple[Authority, Stop]:

@@ -331,7 +331,7 @@ class Control:
         lease = self.authority.lease
         if foreign and not rules.moved_recently(before, now):
             self._journal.say(
-                _S.WARNING,
+                _S.INFO if lease is None else _S.WARNING,
                 "motion.foreign",
                 "the robot began to move, and nobody commanded it through the gateway",
             )

@@ -1,4 +1,4 @@
-"""A hall for the gateway's tests: simulated controllers, a gateway, a monitor, an operator; nothing is a mock."""
+"""A hall for the gateway's tests: controllers, a gateway, a monitor, an operator; nothing is a mock."""
 
 import asyncio
 import contextlib

@@ -156,12 +156,13 @@ def test_motion_that_nobody_commanded_is_seen_when_it_begins():
     assert not state.lease.tolerates_motion
 
 
-def test_a_robot_that_was_moving_by_itself_may_go_on_until_the_first_command():
+def test_a_robot_that_was_moving_by_itself_may_go_on_until_it_is_commanded_to_move():
     state, _ = see(Authority(), True, 0.0)
     state, _ = see(state, False, 0.1)
     state = ask(state, A.ACQUIRE, secret="s", time_s=5.0).authority
     assert state.lease.tolerates_motion
-    assert not command_sent(state, command(C.TRACE_ON), at(6.0)).lease.tolerates_motion
+    assert command_sent(state, command(C.TRACE_ON), at(6.0)).lease.tolerates_motion
+    assert not command_sent(state, command(C.HOME), at(6.0)).lease.tolerates_motion
     late = ask(replace(state, lease=None), A.ACQUIRE, time_s=50.0).authority
     assert not late.lease.tolerates_motion
 

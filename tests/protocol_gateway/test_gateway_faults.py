@@ -224,16 +224,17 @@ def test_a_controller_that_tells_only_positions_is_commanded_only_if_the_site_fi
 def test_motion_that_nobody_commanded_is_said_and_ends_the_lease(mesh, tmp_path):
     async def main():
         waist = 0.0
-        bare = bare_controller()
-        async with bare as (port, say, _), repeated(say, lambda: f"1#ABSOLUTE.DEG*{waist};90;-90;0;0@"):
-            async with gateway(mesh, tmp_path, port) as plant:
-                await plant.lease(A.ACQUIRE, ttl_s=5)
-                await asyncio.sleep(0.3)
-                assert plant.seen["lease"][-1].holder == "li"
-                waist = 5.0
-                await until(lambda: plant.events("motion.foreign"))
-                await until(lambda: not plant.seen["lease"][-1].holder)
-                assert not plant.events("stop.latched")
+        async with contextlib.AsyncExitStack() as stack:
+            port, say, _ = await stack.enter_async_context(bare_controller())
+            await stack.enter_async_context(repeated(say, lambda: f"1#ABSOLUTE.DEG*{waist};90;-90;0;0@"))
+            plant = await stack.enter_async_context(gateway(mesh, tmp_path, port))
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            await asyncio.sleep(0.3)
+            assert plant.seen["lease"][-1].holder == "li"
+            waist = 5.0
+            await until(lambda: plant.events("motion.foreign"))
+            await until(lambda: not plant.seen["lease"][-1].holder)
+            assert not plant.events("stop.latched")
 
     run(main())
 
