@@ -89,6 +89,7 @@ async def serve(
             ws_max_size=1 << 20,
             lifespan="off",
             log_config=None,
+            log_level="warning",
             access_log=False,
             server_header=False,
             timeout_graceful_shutdown=1,

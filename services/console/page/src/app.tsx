@@ -74,6 +74,14 @@ function StopButton({ robots }: { robots: readonly string[] }) {
   const robot = route.value?.robot ?? "";
   return (
     <div class="stop-place">
+      {stopNotice.value && (
+        <div class={`stop-notice ${stopNotice.value.kind}`}>
+          <NoticeLine notice={stopNotice.value} />
+          <button class="quiet" onClick={() => (stopNotice.value = null)}>
+            {t("dismiss")}
+          </button>
+        </div>
+      )}
       <button
         class="stop"
         disabled={robots.length === 0}
@@ -130,14 +138,6 @@ function Banners() {
         <div class="banner warning">
           <span class="shape warning" aria-hidden="true" />
           {t("insecure")}
-        </div>
-      )}
-      {stopNotice.value && (
-        <div class={`banner ${stopNotice.value.kind === "refused" ? "alarm" : ""}`}>
-          <NoticeLine notice={stopNotice.value} />
-          <button class="quiet" onClick={() => (stopNotice.value = null)}>
-            {t("dismiss")}
-          </button>
         </div>
       )}
     </div>

@@ -40,7 +40,8 @@ export function ControlPanel(props: {
             autocomplete="username"
             spellcheck={false}
             maxLength={40}
-            placeholder={t("operator_hint")}
+            placeholder={t("operator")}
+            title={t("operator_hint")}
             value={operator.value}
             disabled={mine}
             onInput={(event) => setOperator(event.currentTarget.value)}
@@ -105,10 +106,12 @@ export function ControlPanel(props: {
           {t(tracing ? "trace_off" : "trace_on")}
         </button>
       </div>
-      <Speed
-        enabled={can}
-        send={(value) => send(Command.SPEED, t("what_speed", { value }), { speedPercent: value })}
-      />
+      {!stopped && (
+        <Speed
+          enabled={can}
+          send={(value) => send(Command.SPEED, t("what_speed", { value }), { speedPercent: value })}
+        />
+      )}
       <NoticeLine notice={controlNotice.value} idle={state?.readOnly ? t("read_only_text") : mine ? "" : t("take_first")} />
     </Panel>
   );

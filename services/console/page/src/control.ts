@@ -17,7 +17,7 @@ import {
   StopRequestSchema,
 } from "./gen/robomesh_pb";
 import type { LeaseAnswer } from "./gen/robomesh_pb";
-import { ask, AskError } from "./mesh";
+import { ask } from "./mesh";
 import { t } from "./texts";
 
 /** What became of an action, in words, shown where the action was. */
@@ -45,6 +45,7 @@ export interface CommandValues {
 }
 
 const TTL_S = 2;
+const TOLD_MS = 15_000; // how long a stop that went well is told of
 const COMMAND_VALID_MS = 1000;
 const OPERATOR = "robomesh.operator";
 const OPERATOR_NAME = /^[A-Za-z0-9][A-Za-z0-9_.-]*$/;
@@ -72,8 +73,7 @@ export function holds(robotKey: string): boolean {
 }
 
 function reasonOf(error: unknown): string {
-  if (error instanceof AskError) return error.message;
-  throw error;
+  return error instanceof Error ? error.message : String(error);
 }
 
 function askLease(robotKey: string, who: string, action: Action, lease: string): Promise<LeaseAnswer> {
@@ -181,14 +181,14 @@ export async function command(
   const request = {
     lease: mine.lease,
     id: ++lastCommand,
-    notAfter: timestampFromMs(performance.now() + mine.clockMs + COMMAND_VALID_MS),
+    notAfter: timestampFromMs(Math.floor(performance.now() + mine.clockMs + COMMAND_VALID_MS)),
     command: name,
     ...values,
   };
   try {
     const key = `${robotKey}/command/${mine.operator}`;
     const answer = await ask(key, CommandRequestSchema, request, CommandAnswerSchema);
-    if (answer.accepted) tell({ kind: "done", text: answer.text || t("sent", { what }) });
+    if (answer.accepted) tell({ kind: "done", text: t("sent", { what }) });
     else tell({ kind: "refused", text: t("not_sent", { text: answer.text }) });
     return answer.accepted;
   } catch (error) {
@@ -216,10 +216,12 @@ export async function stop(robotKeys: readonly string[]): Promise<void> {
     }),
   );
   const failed = outcomes.filter((outcome) => outcome.kind === "refused");
-  stopNotice.value = {
+  const told: Notice = {
     kind: failed.length ? "refused" : "done",
     text: (failed.length ? failed : outcomes).map((outcome) => outcome.text).join(" "),
   };
+  stopNotice.value = told;
+  if (told.kind === "done") setTimeout(() => stopNotice.value === told && (stopNotice.value = null), TOLD_MS);
 }
 
 /** Gives control back when this tab is hidden or left. */

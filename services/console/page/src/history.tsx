@@ -57,6 +57,8 @@ export function History({ robotKey, description }: { robotKey: string; descripti
   useEffect(() => {
     const element = place.current;
     if (!element || joints.length === 0) return;
+    let end = performance.now() / 1000;
+    const shown = (): [number, number] => [end - SPAN_S, end];
     const style = getComputedStyle(document.documentElement);
     const colour = (name: string) => style.getPropertyValue(name).trim();
     const axis = { stroke: colour("--dim"), grid: { stroke: colour("--line"), width: 1 }, ticks: { show: false } };
@@ -67,9 +69,15 @@ export function History({ robotKey, description }: { robotKey: string; descripti
         height: element.clientHeight,
         legend: { show: false },
         cursor: { y: false, drag: { x: false, y: false } },
-        scales: { x: { time: false, auto: false, range: () => window() }, y: { range: (_, min, max) => padded(min, max) } },
+        scales: { x: { time: false, auto: false, range: shown }, y: { range: (_, min, max) => padded(min, max) } },
         axes: [
-          { ...axis, font, size: 26, values: (_, splits) => splits.map((at) => `${Math.round(at - window()[1])} s`) },
+          {
+            ...axis,
+            font,
+            size: 26,
+            splits: () => [-60, -45, -30, -15, 0].map((back) => end + back),
+            values: (_, splits) => splits.map((at) => `${Math.round(at - end)} s`.replace("-", "−")),
+          },
           { ...axis, font, size: 46, values: (_, splits) => splits.map((at) => `${at}°`.replace("-", "−")) },
         ],
         series: [
@@ -85,10 +93,6 @@ export function History({ robotKey, description }: { robotKey: string; descripti
       [[], ...joints.map(() => [])],
       element,
     );
-    let end = performance.now() / 1000;
-    function window(): [number, number] {
-      return [end - SPAN_S, end];
-    }
     const draw = () => {
       if (stopped.current) return;
       end = performance.now() / 1000;

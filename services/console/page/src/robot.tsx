@@ -6,7 +6,12 @@ import { held, holds, seeHolder } from "./control";
 import { ControlPanel } from "./control-panel";
 import { EventsPanel } from "./events-panel";
 import { stampTime } from "./format";
-import { ControllerStateSchema, ControllerState_Known as Known, ControllerState_Mode as Mode } from "./gen/robomesh_pb";
+import {
+  ControllerStateSchema,
+  ControllerState_Known as Known,
+  ControllerState_Link as Link,
+  ControllerState_Mode as Mode,
+} from "./gen/robomesh_pb";
 import { DescriptionSchema, KinematicStateSchema, LeaseSchema } from "./gen/robomesh_pb";
 import type { ControllerState, Description } from "./gen/robomesh_pb";
 import { JointStatesSchema } from "./gen/foxglove/JointStates_pb";
@@ -46,19 +51,21 @@ export function Robot({ site, robot }: RobotName) {
         age={joints ? age : undefined}
         lostAt={lost}
       />
-      <ControlPanel robotKey={key} controller={controller} holder={holder} lease={lease?.message} />
-      <JointsPanel
-        robotKey={key}
-        description={description?.message}
-        joints={joints?.message}
-        controller={controller?.message}
-        stale={stale}
-        age={joints ? age : undefined}
-      />
+      <div class="side">
+        <ControlPanel robotKey={key} controller={controller} holder={holder} lease={lease?.message} />
+        <JointsPanel
+          robotKey={key}
+          description={description?.message}
+          joints={joints?.message}
+          controller={controller?.message}
+          stale={stale}
+          age={joints ? age : undefined}
+        />
+        <ToolPanel kinematics={kinematics} description={description?.message} />
+        <EventsPanel robotKey={key} />
+      </div>
       <Camera robotKey={key} description={description?.message} />
       <History robotKey={key} description={description?.message} />
-      <ToolPanel kinematics={kinematics} description={description?.message} />
-      <EventsPanel robotKey={key} />
     </div>
   );
 }
@@ -85,7 +92,7 @@ function Headline(props: {
     facts.push(t(message.homed === Known.YES ? "homed" : message.homed === Known.NO ? "not_homed" : "homed_unknown"));
     if (message.readOnly) facts.push(t("read_only"));
   }
-  const trouble = message?.fault || message?.linkText;
+  const trouble = message?.fault || (message?.link !== Link.UP && message?.linkText);
   return (
     <div class="headline">
       <h1>{props.name}</h1>

@@ -13,20 +13,31 @@ import { theme } from "./theme";
 import { useFramesAge } from "./frames-age";
 import { isStale } from "./topics";
 
-/** Where the free camera begins, for a description that names none. */
-const FREE: View = create(ViewSchema, {
-  name: "free",
-  eye: { x: 1.35, y: -1.75, z: 1.15 },
-  target: { x: 0, y: 0, z: 0.42 },
-  up: { x: 0, y: 0, z: 1 },
-  projection: View_Projection.PERSPECTIVE,
-});
+// Where the free camera stands, from the target, in lengths of the arm's reach.
+const FREE_EYE = { x: 1.32, y: -1.86, z: 0.84 };
+const NOMINAL_REACH = 1.1; // m, until the description is there
 
 /** Views of a description, the free one first. */
 export function viewsOf(description: Description | undefined): readonly View[] {
   const named = description?.views ?? [];
-  const free = named.find((view) => view.name === "free") ?? FREE;
+  const free = named.find((view) => view.name === "free") ?? freeView(named);
   return [free, ...named.filter((view) => view.name !== "free")];
+}
+
+/** A free view as far away as the others, which stand three reaches from their target. */
+function freeView(others: readonly View[]): View {
+  const front = others.find((view) => view.name === "front");
+  const { eye, target } = front ?? {};
+  const away = eye && target ? Math.hypot(eye.x - target.x, eye.y - target.y, eye.z - target.z) : 0;
+  const reach = away / 3 || NOMINAL_REACH;
+  const at = target ?? { x: 0, y: 0, z: 0.45 * reach };
+  return create(ViewSchema, {
+    name: "free",
+    eye: { x: at.x + FREE_EYE.x * reach, y: at.y + FREE_EYE.y * reach, z: at.z + FREE_EYE.z * reach },
+    target: { x: at.x, y: at.y, z: at.z },
+    up: { x: 0, y: 0, z: 1 },
+    projection: View_Projection.PERSPECTIVE,
+  });
 }
 
 export function viewText(name: string): string {
@@ -87,7 +98,7 @@ export function SceneView(props: {
   useEffect(() => scene.current?.showTrail(trail), [trail, identity]);
   useEffect(() => scene.current?.showFrames(frames), [frames, identity]);
   const views = viewsOf(description);
-  const chosen = views.find((each) => each.name === view) ?? FREE;
+  const chosen = views.find((each) => each.name === view) ?? freeView([]);
   useEffect(() => scene.current?.look(chosen), [chosen.name, identity]);
 
   const onKey = (event: KeyboardEvent) => {

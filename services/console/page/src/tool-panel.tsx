@@ -29,7 +29,7 @@ export function ToolPanel(props: {
     >
       <dl class={`numbers ${stale && state ? "stale" : ""}`}>
         {["x", "y", "z"].map((axis, i) => (
-          <div key={axis}>
+          <div key={axis} class="short">
             <dt>{axis}</dt>
             <dd>
               {fixed(at[i] === undefined ? undefined : at[i]! * 1000, 1)}
@@ -38,7 +38,7 @@ export function ToolPanel(props: {
           </div>
         ))}
         {["roll", "pitch", "yaw"].map((axis, i) => (
-          <div key={axis}>
+          <div key={axis} class="short">
             <dt>{axis}</dt>
             <dd>
               {fixed(angles[i], 2)}
