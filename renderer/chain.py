@@ -66,36 +66,39 @@ def read_chain(urdf: str) -> Chain:
     return Chain(roots[0], tuple(ordered))
 
 
-def placements(chain: Chain, positions: Mapping[str, float]) -> dict[str, FloatArray]:
-    """(4, 4) link to base of every link; joints that are not named stand at 0.
+def placements(chain: Chain, positions: Mapping[str, float | FloatArray]) -> dict[str, FloatArray]:
+    """(..., 4, 4) link to base of every link; joints that are not named stand at 0.
 
     Args:
-        positions: By joint [rad] or [m].
+        positions: By joint [rad] or [m], one or, all alike, many.
     """
-    placed = {chain.root: np.eye(4)}
+    placed: dict[str, FloatArray] = {chain.root: np.eye(4)}
     for joint in chain.joints:
-        placed[joint.child] = (
-            placed[joint.parent] @ joint.origin @ _motion(joint, positions.get(joint.name, 0.0))
-        )
+        motion = _motion(joint, np.asarray(positions.get(joint.name, 0.0)))
+        placed[joint.child] = placed[joint.parent] @ joint.origin @ motion
     return placed
 
 
-def reach(chain: Chain) -> FloatArray:
-    """(n, 3) where the links' origins come within the joints' limits, in the base frame [m].
+def reach(chain: Chain, points: Mapping[str, FloatArray]) -> FloatArray:
+    """(n, 3) where links' origins and points on them come within the limits, in the base frame [m].
 
-    A sample of it, the same each time; and how the arm stands with every joint at 0.
+    A sample of it, the same each time, with every joint at 0 in it.
+
+    Args:
+        points: (k, 3) by link, in its frame [m].
     """
-    random = np.random.default_rng(0)
-    points = [[placement[:3, 3] for placement in placements(chain, {}).values()]]
-    for _ in range(_SAMPLES):
-        # Towards the limits more often than not: that is where an arm is longest.
-        share = random.beta(0.7, 0.7, len(chain.joints))
-        positions = {
-            joint.name: joint.lower + share[index] * (joint.upper - joint.lower)
-            for index, joint in enumerate(chain.joints)
-        }
-        points.append([placement[:3, 3] for placement in placements(chain, positions).values()])
-    return np.concatenate([np.array(each) for each in points])
+    # Towards the limits more often than not: that is where an arm is longest.
+    shares = np.random.default_rng(0).beta(0.7, 0.7, (len(chain.joints), _SAMPLES))
+    positions = {
+        joint.name: np.append(joint.lower + share * (joint.upper - joint.lower), 0.0)
+        for joint, share in zip(chain.joints, shares, strict=True)
+    }
+    seen = []
+    for link, link_to_base in placements(chain, positions).items():
+        here = np.concatenate([np.zeros((1, 3)), points.get(link, np.empty((0, 3)))])
+        seen.append(np.einsum("...ij,kj->...ki", link_to_base[..., :3, :3], here))
+        seen[-1] += link_to_base[..., None, :3, 3]
+    return np.concatenate([each.reshape(-1, 3) for each in seen])
 
 
 def _joint(element: ElementTree.Element) -> ChainJoint:
@@ -140,18 +143,20 @@ def _numbers(text: str) -> FloatArray:
     return values
 
 
-def _motion(joint: ChainJoint, position: float) -> FloatArray:
-    motion = np.eye(4)
+def _motion(joint: ChainJoint, position: FloatArray) -> FloatArray:
+    """(..., 4, 4) what a joint's positions add to its origin."""
+    motion = np.tile(np.eye(4), (*position.shape, 1, 1))
     if joint.kind in ("revolute", "continuous"):
-        motion[:3, :3] = rotation(joint.axis, position)
+        motion[..., :3, :3] = rotation(joint.axis, position)
     elif joint.kind == "prismatic":
-        motion[:3, 3] = joint.axis * position
+        motion[..., :3, 3] = joint.axis * position[..., None]
     return motion
 
 
-def rotation(axis: FloatArray, angle: float) -> FloatArray:
-    """(3, 3) rotation about a unit axis by an angle [rad] (Rodrigues)."""
+def rotation(axis: FloatArray, angle: FloatArray) -> FloatArray:
+    """(..., 3, 3) rotation about a unit axis by angles [rad] (Rodrigues)."""
     x, y, z = axis
     across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    matrix: FloatArray = np.eye(3) + np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across
+    sine, cosine = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
+    matrix: FloatArray = np.eye(3) + sine * across + (1.0 - cosine) * (across @ across)
     return matrix

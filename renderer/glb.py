@@ -100,7 +100,11 @@ def _meshes(document: dict[str, Any]) -> Iterator[tuple[int, NDArray[np.float64]
     if scenes:
         roots = scenes[document.get("scene", 0)].get("nodes", [])
     waiting = [(number, np.eye(4)) for number in roots]
+    visits = 0
     while waiting:
+        visits += 1
+        if visits > len(nodes):
+            raise GlbError("a GLB whose nodes go round in a circle")
         number, parent_to_file = waiting.pop()
         node = nodes[number]
         node_to_file = parent_to_file @ _placement(node)

@@ -17,8 +17,8 @@ FloatArray = NDArray[np.float64]
 FREE = "free"
 # From the front right and a little above: waist, shoulder and elbow all show.
 _FREE_DIRECTION = np.array([1.5, -1.5, 0.85])
-# How far a link's body comes beyond its frame's origin, over the arm's reach.
-_BODY = 0.09
+# How far a link's body comes beyond its frame's origin, over the size of the arm's room.
+_BODY = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,12 +56,13 @@ def look_of(description: Description, *, aspect: float) -> Look:
     base_to_site = np.eye(4)
     if len(description.base_to_site) == 16:
         base_to_site = np.array(description.base_to_site).reshape(4, 4)
-    points = _with_tool(description, reach(chain))
+    points = reach(chain, _frames_by_link(description))
     # A robot's floor is where it stands: what would be below is not drawn for.
     points[:, 2] = np.maximum(points[:, 2], 0.0)
     lowest, highest = points.min(axis=0), points.max(axis=0)
     body = _BODY * float(np.linalg.norm(highest - lowest))
-    room = np.r_[points - body * np.array([1.0, 1.0, 0.0]), points + body, points * np.array([1.0, 1.0, 0.0])]
+    flat = np.array([1.0, 1.0, 0.0])
+    room = np.concatenate([points - body * flat, points + body, points * flat])
     center = (lowest + highest) / 2.0
     cameras = {view.name: _camera(view, room, aspect, base_to_site) for view in description.views}
     if FREE not in cameras:
@@ -143,15 +144,13 @@ def _placed(camera: Camera, base_to_site: FloatArray) -> Camera:
     return Camera(eye, target, base_to_site[:3, :3] @ camera.up, half_height=camera.half_height)
 
 
-def _with_tool(description: Description, points: FloatArray) -> FloatArray:
-    """The points, and as much around the outermost as the tool is long."""
-    lengths = [np.array(frame.frame_to_link).reshape(4, 4)[:3, 3] for frame in description.frames]
-    longest = max((float(np.linalg.norm(length)) for length in lengths), default=0.0)
-    middle = points.mean(axis=0)
-    away = points - middle
-    distance = np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
-    outermost = points + away / distance * longest * (distance > 0.8 * distance.max())
-    return np.concatenate([points, outermost])
+def _frames_by_link(description: Description) -> dict[str, FloatArray]:
+    """(k, 3) origins of the tool and the named frames, by the link that carries them."""
+    origins: dict[str, FloatArray] = {}
+    for frame in description.frames:
+        origin = np.array(frame.frame_to_link).reshape(4, 4)[:3, 3]
+        origins[frame.link] = np.concatenate([origins.get(frame.link, np.empty((0, 3))), [origin]])
+    return origins
 
 
 def _moved(transform: FloatArray, points: FloatArray) -> FloatArray:

@@ -111,7 +111,7 @@ def _write_badge(picture: Picture, text: str, *, size: int, y: int) -> None:
     width = picture.shape[1]
     pad = round(0.55 * size)
     inner = text_width(text, size, _BOLD)
-    x = (width - inner) // 2 - pad
+    x = max((width - inner) // 2 - pad, 0)
     picture[y : y + size + 2 * pad - size // 4, x : x + inner + 2 * pad] = AMBER
     _text(picture, text, (x + pad, y + pad + round(0.78 * size)), size=size, weight=_BOLD, color=(28, 22, 8))
 
@@ -143,7 +143,7 @@ def _text(
 def _lay(picture: Picture, mask: Mask, x: int, y: int, color: Color) -> None:
     """Lay a colour over a picture through a mask, cut at the picture's edges."""
     top, left = max(y, 0), max(x, 0)
-    area = picture[top : y + mask.shape[0], left : x + mask.shape[1]]
+    area = picture[top : max(y + mask.shape[0], 0), left : max(x + mask.shape[1], 0)]
     if area.size:
         part = mask[top - y : top - y + area.shape[0], left - x : left - x + area.shape[1], None]
         area[:] = area + (np.array(color, dtype=np.float32) - area) * part

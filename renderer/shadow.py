@@ -6,23 +6,24 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float32]
 
-# What the shadow map holds where nothing is above the floor.
+# What the shadow map holds where nothing is above the floor [m], and what is surely less.
 NOTHING = 1e6
+_ANY_HEIGHT = 1e3
 
 # (up to this height, blurred by this much, this dark), heights and widths over the scene's radius.
 _LAYERS = (
-    (0.05, 0.025, 0.62),
-    (0.25, 0.05, 0.36),
-    (0.60, 0.09, 0.34),
-    (1e9, 0.15, 0.26),
+    (0.04, 0.030, 0.75),
+    (0.20, 0.045, 0.50),
+    (0.55, 0.075, 0.42),
+    (_ANY_HEIGHT, 0.11, 0.34),
 )
 
 
 def soft_shadow(heights: FloatArray, *, texel: float) -> FloatArray:
     """How much light each place of the floor lacks, 0 to 1.
 
-    A large lamp's shadow is as wide as its caster is high, so each slice of height is blurred
-    by its own width and the slices are laid over each other.
+    A large lamp's shadow is the wider and the fainter the higher its caster is, so each slice of
+    height is blurred by its own width, and the slices are laid over each other.
 
     Args:
         heights: (n, n) height of the lowest body above the place, over the scene's radius;
@@ -30,12 +31,10 @@ def soft_shadow(heights: FloatArray, *, texel: float) -> FloatArray:
         texel: Width of a place, over the scene's radius.
     """
     light = np.ones_like(heights)
-    below = np.zeros(heights.shape, dtype=bool)
+    bottom = 0.0
     for top, width, dark in _LAYERS:
-        # What is lower belongs to the slice too: a post's foot is part of its top's shadow.
-        inside = heights < min(top, NOTHING)
-        if inside.any() and (inside & ~below).any():
-            blurred = cv2.GaussianBlur(inside.astype(np.float32), (0, 0), max(width / texel, 0.6))
-            light *= 1.0 - dark * blurred
-        below |= inside
+        inside = (heights >= bottom) & (heights < top)
+        if inside.any():
+            light *= 1.0 - dark * cv2.GaussianBlur(inside.astype(np.float32), (0, 0), width / texel)
+        bottom = top
     return 1.0 - light

@@ -93,6 +93,11 @@ def test_what_is_not_a_mesh_is_refused_in_words(data, says):
         prepared(data)
 
 
+def test_nodes_that_go_round_in_a_circle_are_refused():
+    with pytest.raises(GlbError, match="circle"):
+        prepared(cube(0.5, node={"children": [0]}))
+
+
 def test_bytes_cut_anywhere_are_an_error_and_no_crash():
     whole = cube(0.5)
     for length in range(len(whole)):

@@ -1,0 +1,105 @@
+"""Encoders: what comes out is decoded again by FFmpeg, as a browser would."""
+
+import av
+import cv2
+import numpy as np
+import pytest
+
+from renderer.encoder import H264Encoder, jpeg, open_encoder
+from renderer.errors import NoEncoderError
+from renderer.key_frames import KeyFrameClock
+
+SIZE = (320, 180)
+IDR, SPS, PPS = 5, 7, 8
+
+
+def pictures(count):
+    """A red square that wanders over grey."""
+    for number in range(count):
+        picture = np.full((SIZE[1], SIZE[0], 3), 128, dtype=np.uint8)
+        picture[60:120, 10 + 4 * number : 70 + 4 * number] = (200, 30, 30)
+        yield picture
+
+
+def units(data):
+    """The types of the NAL units of an Annex B packet."""
+    assert data.startswith((b"\0\0\0\1", b"\0\0\1"))
+    starts = [at + 3 for at in range(len(data) - 3) if data[at : at + 3] == b"\0\0\1"]
+    return [data[at] & 31 for at in starts]
+
+
+def decoded(packets):
+    decoder = av.CodecContext.create("h264", "r")
+    # One thread: frame threads hold pictures back.
+    decoder.thread_count = 1
+    frames = [frame for data in packets for frame in decoder.decode(av.Packet(data))]
+    return frames + decoder.decode(None)
+
+
+def test_each_picture_is_one_packet_and_all_are_decoded():
+    encoder = open_encoder(SIZE, 30)
+    packets = [
+        encoder.encode(picture, key_frame=number % 10 == 0) for number, picture in enumerate(pictures(40))
+    ]
+    frames = decoded([packet.data for packet in packets])
+    assert len(frames) == 40
+    assert [packet.key_frame for packet in packets] == [number % 10 == 0 for number in range(40)]
+    for frame, picture in zip(frames, pictures(40), strict=True):
+        seen = cv2.cvtColor(frame.to_ndarray(format="yuv420p"), cv2.COLOR_YUV2RGB_I420)
+        assert np.abs(seen.astype(int) - picture).mean() < 4
+
+
+def test_only_key_frames_are_intra_and_each_brings_its_parameter_sets():
+    encoder = open_encoder(SIZE, 30)
+    for number, picture in enumerate(pictures(30)):
+        kinds = units(encoder.encode(picture, key_frame=number in (0, 7)).data)
+        if number in (0, 7):
+            assert [kind for kind in kinds if kind in (SPS, PPS, IDR)] == [SPS, PPS, IDR]
+        else:
+            assert not {SPS, PPS, IDR} & set(kinds)
+
+
+def test_a_stream_can_be_joined_at_any_key_frame():
+    encoder = open_encoder(SIZE, 30)
+    packets = [encoder.encode(picture, key_frame=n in (0, 12)).data for n, picture in enumerate(pictures(20))]
+    assert len(decoded(packets[12:])) == 8
+
+
+def test_the_stream_tells_its_colours():
+    encoder = H264Encoder(SIZE, 30, codec="libx264")
+    frame = decoded([encoder.encode(picture, key_frame=True).data for picture in pictures(1)])[0]
+    assert (frame.colorspace, frame.color_range) == (6, 1)
+
+
+def test_an_encoder_that_cannot_be_opened_says_so():
+    with pytest.raises(NoEncoderError, match="libx264 cannot be opened"):
+        H264Encoder((0, 0), 30, codec="libx264")
+
+
+def test_a_jpeg_shows_the_picture():
+    (picture,) = pictures(1)
+    seen = cv2.cvtColor(cv2.imdecode(np.frombuffer(jpeg(picture), np.uint8), 1), cv2.COLOR_BGR2RGB)
+    assert np.abs(seen.astype(int) - picture).mean() < 4
+
+
+def test_a_key_frame_comes_first_then_each_two_seconds():
+    clock = KeyFrameClock()
+    made = []
+    for tick in range(150):
+        now = 100.0 + tick / 30
+        if clock.due(now):
+            clock.made(now)
+            made.append(tick)
+    assert made == [0, 60, 120]
+
+
+def test_however_many_join_one_key_frame_a_second_is_forced():
+    clock = KeyFrameClock()
+    made = []
+    for tick in range(90):
+        now = 100.0 + tick / 30
+        clock.ask(now)
+        if clock.due(now):
+            clock.made(now)
+            made.append(tick)
+    assert made == [0, 30, 60]

@@ -1,0 +1,107 @@
+"""What a description makes of pictures: the chain, the room, the cameras."""
+
+import numpy as np
+import pytest
+
+from bus.schemas.robomesh_pb2 import Description, Vector3, View
+from renderer.cameras import pixels
+from renderer.chain import placements, reach, read_chain
+from renderer.errors import ChainError, UnknownViewError
+from renderer.look import camera_of, home_placements, look_of
+from robots.description import load
+from robots.model import build_model, frame_placements, link_placements
+from robots.urdf import to_urdf
+from services.kinematics.describe import describe
+
+SIZE = (640, 360)
+ROBOTS = ("pt500", "pt600", "puma560")
+
+
+def described(name, base_to_site=None):
+    description = load(name)
+    model = build_model(description)
+    message = describe(
+        description,
+        model,
+        urdf=to_urdf(description),
+        meshes={},
+        base_to_site=np.eye(4) if base_to_site is None else base_to_site,
+        cell="",
+        simulated=True,
+    )
+    return message, model
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_the_chain_places_links_as_the_robot_model_does(robot):
+    message, model = described(robot)
+    chain = read_chain(message.urdf)
+    random = np.random.default_rng(3)
+    for _ in range(20):
+        positions = random.uniform(model.joints.lower, model.joints.upper)
+        placed = placements(chain, dict(zip(model.joints.names, positions, strict=True)))
+        for name, expected in zip(model.link_names, link_placements(model, positions), strict=True):
+            assert placed[name] == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("view", ["front", "top", "left"])
+def test_an_orthographic_view_shows_the_arm_wherever_it_may_go(robot, view):
+    message, model = described(robot)
+    camera = camera_of(look_of(message, aspect=16 / 9), view)
+    assert camera.orthographic
+    random = np.random.default_rng(4)
+    tools = [
+        frame_placements(model, random.uniform(model.joints.lower, model.joints.upper))["tool"][:3, 3]
+        for _ in range(500)
+    ]
+    above = np.array([tool for tool in tools if tool[2] > 0])
+    shares = np.abs(pixels(camera, SIZE, above) / SIZE * 2 - 1)
+    assert shares.max() < 1.0
+    assert shares.max() > 0.6
+
+
+def test_a_robot_that_stands_elsewhere_takes_its_cameras_along():
+    base_to_site = np.array([[0.0, -1, 0, 5], [1, 0, 0, -2], [0, 0, 1, 0.4], [0, 0, 0, 1]])
+    here, there = (look_of(described("pt600", at)[0], aspect=16 / 9) for at in (None, base_to_site))
+    home_here, home_there = home_placements(here), home_placements(there)
+    for view in ("front", "top", "left", "free"):
+        points = [
+            pixels(camera_of(look, view), SIZE, np.array([home["wrist"][:3, 3]]))
+            for look, home in ((here, home_here), (there, home_there))
+        ]
+        assert points[0] == pytest.approx(points[1], abs=1e-6)
+    assert there.center == pytest.approx(base_to_site[:3, :3] @ here.center + base_to_site[:3, 3])
+
+
+def test_a_view_of_the_description_keeps_its_eye_and_a_free_one_of_its_own_counts():
+    message, _ = described("pt600")
+    eye, target = Vector3(x=1.0, y=2.0, z=1.5), Vector3(z=0.4)
+    message.views.add(name="free", eye=eye, target=target, up=Vector3(z=1.0), projection=View.PERSPECTIVE)
+    camera = camera_of(look_of(message, aspect=16 / 9), "free")
+    assert camera.eye == pytest.approx([1.0, 2.0, 1.5])
+    with pytest.raises(UnknownViewError, match="no view 'behind'; there are free, front, left, top"):
+        camera_of(look_of(message, aspect=16 / 9), "behind")
+
+
+def test_a_moving_axis_reaches_to_its_limits():
+    urdf = """<robot name="gantry"><link name="rail"/><link name="hand"/>
+      <joint name="x" type="prismatic"><parent link="rail"/><child link="hand"/>
+      <origin xyz="0 0 1" rpy="0 0 1.5707963267948966"/><axis xyz="1 0 0"/>
+      <limit lower="-0.5" upper="2" effort="0" velocity="1"/></joint></robot>"""
+    points = reach(read_chain(urdf), {"hand": np.array([[0.0, 0.0, -0.1]])})
+    assert points.min(axis=0) == pytest.approx([0.0, -0.5, 0.0], abs=0.05)
+    assert points.max(axis=0) == pytest.approx([0.0, 2.0, 1.0], abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("urdf", "says"),
+    [
+        ("", "cannot be read"),
+        ("<robot><link name='a'/><link name='b'/></robot>", "2 root links"),
+        ("<robot><link name='a'/><joint name='j' type='fixed'/></robot>", "has no parent"),
+    ],
+)
+def test_a_urdf_that_is_no_chain_is_refused_in_words(urdf, says):
+    with pytest.raises(ChainError, match=says):
+        look_of(Description(urdf=urdf), aspect=1.0)

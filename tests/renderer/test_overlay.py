@@ -1,0 +1,48 @@
+"""The overlay: what is written, where, and that figures stand still."""
+
+import numpy as np
+import pytest
+
+from renderer.overlay import AMBER, Overlay, Row, text_width, write_over
+
+ROWS = (Row("waist", "−12.34", "°", 0.4), Row("lift", "1204.5", "mm", 1.0))
+LIVE = Overlay(title="pt600", view="free", time="14:02:11.3 UTC", state="moving", rows=ROWS)
+
+
+def written(overlay, size=(1280, 720)):
+    picture = np.full((size[1], size[0], 3), 150, dtype=np.uint8)
+    write_over(picture, overlay)
+    return picture
+
+
+def is_amber(picture):
+    return (np.abs(picture.astype(int) - AMBER).max(axis=2) < 4).sum()
+
+
+def test_figures_are_all_as_wide():
+    assert len({text_width(figure * 4, 18) for figure in "0123456789"}) == 1
+    assert text_width("111.11", 18) == text_width("888.88", 18)
+
+
+def test_a_live_picture_has_no_badge_and_a_stale_one_has():
+    stale = Overlay(**{**LIVE.__dict__, "stale": "STALE 3 s"})
+    assert is_amber(written(LIVE)) == 0
+    assert is_amber(written(stale)) > 1000
+
+
+@pytest.mark.parametrize("size", [(64, 64), (320, 180), (854, 480), (1920, 1080)])
+def test_any_size_is_written_without_harm(size):
+    picture = written(Overlay(**{**LIVE.__dict__, "stale": "STALE 3 s", "mark": "simulated"}), size)
+    assert (picture != 150).any()
+
+
+def test_the_middle_of_the_picture_stays_the_robots():
+    assert (written(LIVE)[200:500, 400:900] == 150).all()
+
+
+def test_other_values_leave_everything_else_where_it_was():
+    other = Overlay(**{**LIVE.__dict__, "rows": (Row("waist", "−98.76", "°", 0.4), ROWS[1])})
+    changed = (written(LIVE) != written(other)).any(axis=2)
+    rows, columns = np.nonzero(changed)
+    assert rows.max() - rows.min() < 20
+    assert columns.max() - columns.min() < text_width("−98.76", 19)
