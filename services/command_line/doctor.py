@@ -1,6 +1,5 @@
 """`robomesh doctor`: what is missing on this machine, and how to mend it."""
 
-import ctypes
 import importlib.util
 import os
 import shutil
@@ -66,20 +65,18 @@ def _roles() -> list[Finding]:
 
 def _open_gl() -> list[Finding]:
     mend = "apt-get install libegl1 libgl1; everything but the renderer runs without it"
-    for library in ("libEGL.so.1", "libGL.so.1"):
-        try:
-            ctypes.CDLL(library)
-        except OSError:
-            return [Finding("OpenGL", False, f"no {library}: no rendered video, no snapshots", mend)]
     try:
-        import moderngl
-
-        context = moderngl.create_context(standalone=True, backend="egl")  # type: ignore[arg-type]
-    except Exception as error:
-        return [Finding("OpenGL", False, f"no context off screen: {error}", mend)]
+        from renderer.errors import RendererError
+        from renderer.opengl import open_context
+    except ImportError as error:
+        return [Finding("OpenGL", False, f"its packages are not here: {error}", mend)]
+    try:
+        context = open_context()
+    except RendererError as error:
+        return [Finding("OpenGL", False, str(error), mend)]
     name = context.info["GL_RENDERER"]
     context.release()
-    return [Finding("OpenGL", True, name)]
+    return [Finding("OpenGL", True, f"off screen, by {name or 'a device without a name'}")]
 
 
 def _page() -> list[Finding]:

@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Iterator
+from math import degrees
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,6 @@ import typer
 
 from robots.description import load
 from robots.errors import DescriptionError, RobotError
-from robots.joints import Joints, JointType, joints_of
 from services.command_line.find import print_json
 from services.errors import ServiceError
 
@@ -37,37 +36,28 @@ def check(robot: str, as_json: bool) -> None:
 def show(robot: str, as_json: bool) -> None:
     """Print a robot's joints and derived values."""
     from robots.model import build_model, tool_placement
-    from robots.views import reach
+    from robots.summary import description_summary
 
     description = load(robot)
-    joints = joints_of(description)
-    tool = tool_placement(build_model(description), joints.home)
+    model = build_model(description)
+    tool = tool_placement(model, model.joints.home)
+    summary = {**description_summary(description), "tool_at_home": tool.tolist()}
     if as_json:
-        print_json(
-            {
-                "name": description.name,
-                "title": description.title,
-                "provenance": description.provenance,
-                "links": list(description.link_names),
-                "joints": [*_joint_records(joints)],
-                "reach": reach(description),
-                "tool_at_home": tool.tolist(),
-            }
-        )
+        print_json(summary)
         return
+    joints = summary["joints"]
     print(
-        f"{description.title or description.name}: {len(joints)} joints, "
-        f"reach {reach(description) * 1000:.0f} mm"
+        f"{summary['title'] or summary['name']}: {len(joints)} joints, "
+        f"reach {summary['reach_m'] * 1000:.0f} mm"
     )
     if description.provenance:
         print(description.provenance)
-    for record in _joint_records(joints):
-        rotary = record["type"] == "rotary"
-        factor, unit = (57.29577951308232, "°") if rotary else (1000.0, " mm")
+    for joint in joints:
+        factor, unit = (degrees(1.0), "°") if joint["type"] == "rotary" else (1000.0, " mm")
         print(
-            f"  {record['name']:<12} {record['type']:<10} "
-            f"{record['lower'] * factor:8.1f} .. {record['upper'] * factor:.1f}{unit}, "
-            f"up to {record['max_speed'] * factor:.0f}{unit}/s, home {record['home'] * factor:.1f}{unit}"
+            f"  {joint['name']:<12} {joint['type']:<10} "
+            f"{joint['lower'] * factor:8.1f} .. {joint['upper'] * factor:.1f}{unit}, "
+            f"up to {joint['max_speed'] * factor:.0f}{unit}/s, home {joint['home'] * factor:.1f}{unit}"
         )
     x, y, z = tool[:3, 3] * 1000
     print(f"  tool at home: {x:.1f} {y:.1f} {z:.1f} mm")
@@ -93,27 +83,17 @@ def export(robot: str, folder: Path) -> None:
 
 def mesh_info(file: Path, as_json: bool) -> None:
     """Print what a mesh file holds."""
-    from robots.meshes.mesh import bounds
     from robots.meshes.read import read_mesh
+    from robots.summary import mesh_summary
 
-    mesh = read_mesh(file)
-    lower, upper = bounds(mesh)
-    materials = sorted({part.material.name for part in mesh.parts if part.material.name})
+    summary = mesh_summary(read_mesh(file))
     if as_json:
-        print_json(
-            {
-                "triangles": mesh.triangle_count,
-                "min": lower.tolist(),
-                "max": upper.tolist(),
-                "materials": materials,
-                "warnings": list(mesh.warnings),
-            }
-        )
+        print_json(summary)
         return
-    print(f"{file.name}: {mesh.triangle_count} triangles")
-    print(f"  from {_triple(lower)} to {_triple(upper)}, in the file's own units")
-    print(f"  materials: {', '.join(materials) or 'none named'}")
-    for warning in mesh.warnings:
+    print(f"{file.name}: {summary['triangles']} triangles")
+    print(f"  from {_triple(summary['min'])} to {_triple(summary['max'])}, in the file's own units")
+    print(f"  materials: {', '.join(filter(None, summary['materials'])) or 'none named'}")
+    for warning in summary["warnings"]:
         print(f"  warning: {warning}")
 
 
@@ -152,18 +132,6 @@ def _joint_positions(line: str) -> list[float]:
 
 def _refuse(constant: str) -> float:
     raise ValueError(constant)
-
-
-def _joint_records(joints: Joints) -> Iterator[dict[str, Any]]:
-    for index, name in enumerate(joints.names):
-        yield {
-            "name": name,
-            "type": "rotary" if joints.types[index] is JointType.ROTARY else "prismatic",
-            **{
-                column: float(getattr(joints, column)[index])
-                for column in ("lower", "upper", "max_speed", "max_acceleration", "max_jerk", "home")
-            },
-        }
 
 
 def _triple(values: Any) -> str:

@@ -62,8 +62,8 @@ def gateway(path: Path | None, connect: str, controllers: list[str]) -> None:
 
 def kinematics(path: Path | None, connect: str) -> None:
     """Run the kinematics of the site's robots."""
-    from robots.description import Units
     from robots.poses import pose_matrix
+    from robots.schema import Units
     from services import kinematics as role
 
     site = _begin(path)

@@ -1,0 +1,344 @@
+"""A site as real processes: commanded, recorded, killed part by part."""
+
+import asyncio
+import json
+import signal
+import subprocess
+import sys
+import time
+from math import degrees, radians
+
+import pytest
+from mcap.reader import make_reader
+
+from bus.errors import RefusedError
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import open_session
+from tests.conftest import free_port, run
+from tests.site import ONE_ARM, alive, kill, robomesh, running_site, site_file, wait_until
+
+pytestmark = pytest.mark.processes
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    with running_site(tmp_path_factory.mktemp("site")) as running:
+        yield running
+
+
+async def last_positions(session) -> list[float]:
+    """Joint positions in degrees, the next live ones."""
+    async for sample in session.subscribe("robomesh/test/arm/joints", history=False):
+        return [degrees(joint.position) for joint in sample.message().joints]
+    raise AssertionError
+
+
+def test_list_names_the_robot_and_every_service(site):
+    result = site.command("list", "--json")
+    found = json.loads(result.stdout)
+    (robot,) = found["robots"]
+    assert (robot["site"], robot["robot"], robot["link"], robot["mode"]) == ("test", "arm", "up", "remote")
+    assert robot["age_s"] < 1.0
+    assert {service["service"] for service in found["services"]} == {
+        "gateway",
+        "kinematics",
+        "recorder",
+        "renderer",
+        "console",
+    }
+
+
+def test_joints_arrive_where_they_were_sent_and_the_recording_holds_all_that_a_monitor_saw(site):
+    target = [12.0, 34.5, -20.0, 15.0, -40.0]
+
+    async def watch():
+        """Everything on `joints` between trace on and trace off."""
+        async with open_session(site.mesh) as session:
+            seen = []
+
+            async def collect(states):
+                async for sample in states:
+                    seen.append((sample.header.publisher, sample.header.sequence, sample.payload))
+
+            async def send(*words):
+                result = await asyncio.to_thread(site.command, "send", "arm", *words, "--json")
+                answer = json.loads(result.stdout)
+                assert answer["accepted"], answer
+                assert result.returncode == 0
+
+            await send("trace", "on")
+            while (await recordings(session))[0].topics == []:
+                await asyncio.sleep(0.05)
+            states = session.subscribe("robomesh/test/arm/joints", newest=20_000, history=False)
+            collector = asyncio.create_task(collect(states))
+            await send("move", *map(str, target))
+            assert await last_positions(session) == pytest.approx(target, abs=0.02)
+            collector.cancel()
+            await send("trace", "off")
+            while (await recordings(session))[0].open:
+                await asyncio.sleep(0.05)
+            return seen, (await recordings(session))[0], states.lost("robomesh/test/arm/joints")
+
+    async def recordings(session):
+        answer = await session.ask("robomesh/test/-/recordings/list", timeout_s=5.0)
+        return answer.recordings
+
+    seen, recording, lost = run(watch(), timeout_s=60.0)
+    assert len(seen) > 100
+    assert lost == 0
+    file = site.folder / "recordings" / "arm" / recording.file
+    with file.open("rb") as stream:
+        recorded = {
+            message.data
+            for _, channel, message in make_reader(stream).iter_messages()
+            if channel.topic == "robomesh/test/arm/joints"
+        }
+    assert {payload for _, _, payload in seen} <= recorded
+    info = json.loads(robomesh("recordings", "info", str(file), "--json").stdout)
+    counts = {topic["topic"].rsplit("/", 1)[-1]: topic for topic in info["topics"]}
+    assert counts["joints"]["lost"] == 0
+    assert {"joints", "controller", "frames", "description", "top"} <= set(counts)
+
+
+def test_home_brings_the_joints_home(site):
+    result = site.command("send", "arm", "home")
+    assert result.returncode == 0, result.stderr + result.stdout
+
+    async def main():
+        async with open_session(site.mesh) as session:
+            description = await session.last("robomesh/test/arm/description")
+            homes = [degrees(joint.home) for joint in description.joints]
+            assert await last_positions(session) == pytest.approx(homes, abs=0.02)
+
+    run(main())
+
+
+def test_a_stop_needs_no_control_ends_the_motion_and_latches_until_reset(site):
+    mover = subprocess.Popen(
+        [
+            *(sys.executable, "-m", "services.command_line.main", "send", "arm"),
+            *("move", "-140", "0", "0", "0", "0", "--connect", site.router, "--json"),
+        ],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+    async def main():
+        async with open_session(site.mesh) as session:
+            async for sample in session.subscribe("robomesh/test/arm/lease", newest=50):
+                if sample.message().motion:
+                    break
+            stopped = await asyncio.to_thread(site.command, "send", "arm", "stop", "--json")
+            assert json.loads(stopped.stdout)["accepted"]
+            positions = await last_positions(session)
+            while (again := await last_positions(session)) != positions:
+                positions = again
+            assert positions[0] > -139.0
+
+    run(main())
+    out, _ = mover.communicate(timeout=20)
+    answer = json.loads(out)
+    assert not answer["accepted"]
+    assert "stop" in answer["text"]
+    assert mover.returncode == 1
+    refused = site.command("send", "arm", "home")
+    assert refused.returncode == 1
+    assert "stop 1 is latched" in refused.stdout
+    assert site.command("send", "arm", "reset").returncode == 0
+    assert site.command("send", "arm", "home").returncode == 0
+
+
+def test_ctrl_c_on_send_stops_the_robot(site):
+    mover = subprocess.Popen(
+        [
+            *(sys.executable, "-m", "services.command_line.main", "send", "arm"),
+            *("move", "140", "0", "0", "0", "0", "--connect", site.router),
+        ],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+    async def until_moving():
+        async with open_session(site.mesh) as session:
+            async for sample in session.subscribe("robomesh/test/arm/lease", newest=50):
+                if sample.message().motion:
+                    return
+
+    run(until_moving())
+    mover.send_signal(signal.SIGINT)
+    out, _ = mover.communicate(timeout=20)
+    assert "interrupted" in out
+    assert mover.returncode == 1
+    assert site.command("send", "arm", "reset").returncode == 0
+
+
+def test_a_move_beyond_a_limit_is_refused_in_words_and_audited(site):
+    result = site.command("send", "arm", "move", "0", "0", "131", "0", "0")
+    assert result.returncode == 1
+    assert "elbow" in result.stdout
+    assert "131.00°" in result.stdout
+    assert "110.00°" in result.stdout
+
+    async def main():
+        async with open_session(site.mesh) as session:
+            audit = await session.last("robomesh/test/arm/audit")
+            entry = next(entry for entry in reversed(audit.entries) if entry.request == "MOVE_ABSOLUTE")
+            assert entry.outcome == schema.AuditEntry.REFUSED
+            assert "110.00°" in entry.text
+            with pytest.raises(RefusedError, match="lease"):
+                await session.ask(
+                    "robomesh/test/arm/command/intruder",
+                    schema.CommandRequest(command=schema.CommandRequest.HOME, lease="guessed", id=1),
+                )
+
+    run(main())
+    log = site.folder / "audit" / "test" / "arm.jsonl"
+    assert robomesh("audit", "verify", str(log)).returncode == 0
+    lines = log.read_bytes().splitlines(keepends=True)
+    forged = site.folder / "forged.jsonl"
+    forged.write_bytes(
+        b"".join(lines).replace(b'"REFUSED"', b'"ACCEPTED"').replace(b'"refused"', b'"accepted"')
+    )
+    assert robomesh("audit", "verify", str(forged)).returncode == 1
+
+
+def test_forward_kinematics_is_answered_and_wrong_counts_are_refused(site):
+    async def main():
+        async with open_session(site.mesh) as session:
+            key = "robomesh/test/arm/kinematics/forward"
+            sample = [radians(q) for q in (100.0, 30.45, 92.66, -67.10, -25.85)]
+            answer = await session.ask(key, schema.ForwardRequest(joint_positions=sample))
+            x, y, z = (answer.tool_to_base[index] for index in (3, 7, 11))
+            assert (x, y, z) == pytest.approx((-0.0281, 0.1594, 0.8528), abs=1e-4)
+            with pytest.raises(RefusedError, match="5 joints"):
+                await session.ask(key, schema.ForwardRequest(joint_positions=[0.0]))
+
+    run(main())
+
+
+def test_snapshot_saves_a_picture(site, tmp_path):
+    out = tmp_path / "top.png"
+    result = site.command("snapshot", "arm", "top", str(out))
+    assert result.returncode == 0, result.stderr
+    assert out.read_bytes().startswith(b"\x89PNG")
+
+
+def test_monitor_prints_a_line_a_state(site):
+    result = site.command("monitor", "arm", "--json", "--count", "5")
+    rows = [json.loads(line) for line in result.stdout.splitlines()]
+    assert len(rows) == 5
+    assert [row["sequence"] for row in rows[1:]] == list(range(rows[1]["sequence"], rows[1]["sequence"] + 4))
+    assert list(rows[0]["joints"]) == ["waist", "shoulder", "elbow", "wrist", "roll"]
+
+
+@pytest.mark.parametrize(
+    "victim", ["simulate", "gateway", "kinematics", "recorder", "renderer", "console", "router"]
+)
+def test_a_killed_service_comes_back_and_the_others_did_not_notice(site, victim):
+    before = site.children()
+    kill(before[victim])
+    wait_until(
+        lambda: site.children().get(victim, before[victim]) != before[victim], what=f"{victim} did not return"
+    )
+    after = site.children()
+    assert {name: pid for name, pid in after.items() if name != victim} == {
+        name: pid for name, pid in before.items() if name != victim
+    }
+
+    async def main():
+        async with open_session(site.mesh) as session:
+            for topic in ("joints", "frames", "controller"):
+                async for sample in session.subscribe(f"robomesh/test/arm/{topic}", history=False):
+                    assert sample.live
+                    break
+
+    run(main())
+
+
+def test_ctrl_c_ends_everything_within_two_seconds(tmp_path):
+    with running_site(tmp_path) as running:
+        children = running.children()
+        assert len(children) == 7
+        asked = time.monotonic()
+        running.process.send_signal(signal.SIGINT)
+        running.process.wait(10.0)
+        took_s = time.monotonic() - asked
+        assert not [name for name, pid in children.items() if alive(pid)]
+        # The promise is 2 s; a loaded machine is given half a second for its scheduling.
+        assert took_s < 2.5
+
+
+def test_no_orphan_outlives_a_killed_supervisor(tmp_path):
+    with running_site(tmp_path) as running:
+        children = running.children()
+        kill(running.process.pid)
+        running.process.wait()
+        wait_until(lambda: not any(alive(pid) for pid in children.values()), 5.0, "orphans")
+
+
+def test_a_monitor_at_a_second_site_sees_the_firsts_robot(tmp_path):
+    first, second = tmp_path / "first", tmp_path / "second"
+    first.mkdir()
+    second.mkdir()
+    with (
+        running_site(first, name="first") as one,
+        running_site(
+            second,
+            name="second",
+            robots=ONE_ARM.replace('"arm"', '"other"'),
+            more=f'connect = ["{one.router}"]',
+        ) as two,
+    ):
+
+        def both_seen() -> bool:
+            found = json.loads(two.command("list", "--json").stdout)["robots"]
+            return {(row["site"], row["robot"], row["link"]) for row in found} == {
+                ("first", "arm", "up"),
+                ("second", "other", "up"),
+            }
+
+        wait_until(both_seen, 30.0)
+        rows = two.command("monitor", "first/arm", "--json", "--count", "3").stdout.splitlines()
+        assert all(json.loads(row)["key"] == "robomesh/first/arm/joints" for row in rows)
+        assert two.command("send", "first/arm", "home").returncode == 0
+
+
+def test_bad_input_is_one_line_that_names_it_and_exit_status_2(tmp_path):
+    router = f"tcp/127.0.0.1:{free_port()}"
+    unreadable = tmp_path / "broken.toml"
+    unreadable.write_text("site = [")
+    unknown = site_file(
+        tmp_path,
+        robots=ONE_ARM.replace("pt600", "pt6000"),
+        router=router,
+        console=f"127.0.0.1:{free_port()}",
+    )
+    mesh = tmp_path / "base.wrl"
+    mesh.write_text("not a mesh")
+    for arguments, words in (
+        (("up", str(tmp_path / "none.toml")), "none.toml"),
+        (("up", str(unreadable)), "broken.toml"),
+        (("kinematics", "--site", str(unknown)), "pt6000"),
+        (("gateway", "--site", str(unknown)), "--controller arm="),
+        (("list", "--connect", router), "no router"),
+        (("list", "--connect", "nonsense"), "nonsense"),
+        (("monitor", "arm", "--connect", router), "no router"),
+        (("send", "arm", "jump"), "jump"),
+        (("mesh", "info", str(mesh)), "base.wrl"),
+        (("simulate", "--listen", "nowhere"), "nowhere"),
+        (("simulate", "--robot", "pt6000"), "pt6000"),
+        (("robot", "show", "pt6000"), "pt6000"),
+    ):
+        result = robomesh(*arguments)
+        assert result.returncode == 2, (arguments, result)
+        assert words in result.stderr, (arguments, result.stderr)
+        assert "Traceback" not in result.stderr
+        assert len(result.stderr.strip().splitlines()) == 1, result.stderr
+
+
+def test_a_taken_port_ends_up_with_one_line_and_exit_status_2(site, tmp_path):
+    path = site_file(tmp_path, robots=ONE_ARM, router=site.router, console=f"127.0.0.1:{free_port()}")
+    result = robomesh("up", str(path))
+    assert result.returncode == 2
+    assert "another one running" in result.stderr
+    assert "Traceback" not in result.stderr

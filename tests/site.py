@@ -1,0 +1,162 @@
+"""A whole site as real processes, on ports of its own."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bus.session import SessionSettings
+from tests.conftest import free_port
+
+READY_S = 60.0
+
+
+@dataclass
+class RunningSite:
+    """A site that was started by `robomesh up`."""
+
+    folder: Path
+    router: str
+    console: str
+    process: subprocess.Popen[str]
+    log: list[str] = field(default_factory=list)
+
+    @property
+    def mesh(self) -> SessionSettings:
+        """Session settings towards its router."""
+        return SessionSettings(connect=(self.router,), wait_s=5.0)
+
+    def children(self) -> dict[str, int]:
+        """Process ids of its services, by name."""
+        found = {}
+        for line in _output("ps", "-o", "pid=,args=", "--ppid", str(self.process.pid)).splitlines():
+            pid, _, arguments = line.strip().partition(" ")
+            if "services.command_line.main " in arguments:
+                name = arguments.split("services.command_line.main ", 1)[1].split()[0]
+                found[name] = int(pid)
+        return found
+
+    def command(self, *arguments: str, timeout_s: float = 40.0) -> subprocess.CompletedProcess[str]:
+        """Run `robomesh` towards its router."""
+        return robomesh(*arguments, "--connect", self.router, timeout_s=timeout_s)
+
+
+def robomesh(*arguments: str, timeout_s: float = 40.0, text: str = "") -> subprocess.CompletedProcess[str]:
+    """Run `robomesh` to its end."""
+    return subprocess.run(
+        [sys.executable, "-m", "services.command_line.main", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=timeout_s,
+        input=text,
+    )
+
+
+def site_file(
+    folder: Path, *, name: str = "test", robots: str, router: str, console: str, more: str = ""
+) -> Path:
+    """Write a site file with ports of its own."""
+    path = folder / "site.toml"
+    path.write_text(
+        f"""
+site = "{name}"
+[router]
+listen = ["{router}"]
+{more}
+[console]
+listen = "{console}"
+[renderer]
+size = [320, 180]
+{robots}
+""",
+        encoding="utf-8",
+    )
+    return path
+
+
+ONE_ARM = """
+[[robot]]
+name = "arm"
+model = "pt600"
+demo = true
+"""
+
+
+@contextmanager
+def running_site(
+    folder: Path, *, name: str = "test", robots: str = ONE_ARM, more: str = ""
+) -> Iterator[RunningSite]:
+    """A running site; ended, with all its processes, when the block ends."""
+    router, console = f"tcp/127.0.0.1:{free_port()}", f"127.0.0.1:{free_port()}"
+    path = site_file(folder, name=name, robots=robots, router=router, console=console, more=more)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "services.command_line.main", "up", str(path)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+    site = RunningSite(folder, router, f"http://{console}/", process)
+    ready = threading.Event()
+
+    def read() -> None:
+        assert process.stdout is not None
+        for line in process.stdout:
+            site.log.append(line.rstrip())
+            if line.startswith("console http"):
+                ready.set()
+        ready.set()
+
+    reader = threading.Thread(target=read, daemon=True)
+    reader.start()
+    try:
+        came = ready.wait(READY_S)
+        assert came, "\n".join(site.log)
+        assert process.poll() is None, "\n".join(site.log)
+        yield site
+    finally:
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+            try:
+                process.wait(5.0)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        reader.join(5.0)
+        assert process.stdout is not None
+        process.stdout.close()
+
+
+def alive(pid: int) -> bool:
+    """Whether a process runs (a zombie does not)."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+def wait_until(condition, timeout_s: float = 20.0, what: str = "") -> None:
+    """Wait for a condition.
+
+    Raises:
+        AssertionError: If it does not come about in time.
+    """
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline, what or "it did not come about in time"
+        time.sleep(0.05)
+
+
+def kill(pid: int, number: int = signal.SIGKILL) -> None:
+    """Send a signal."""
+    os.kill(pid, number)
+
+
+def _output(*command: str) -> str:
+    return subprocess.run(command, capture_output=True, text=True, check=False).stdout
