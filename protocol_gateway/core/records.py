@@ -143,11 +143,11 @@ def write_number(value: float) -> str:
     Raises:
         UnitFormatError: If it is not finite.
     """
+    if not math.isfinite(value):
+        raise UnitFormatError(f"{value} is not a finite number")
     short = f"{value:.2f}"
     if float(short) == value:
         return short
-    if not math.isfinite(value):
-        raise UnitFormatError(f"{value} is not a finite number")
     exact = repr(float(value))
     # The written form has no exponents: the paper's controllers print plain decimals.
     return format(Decimal(exact), "f") if "e" in exact else exact

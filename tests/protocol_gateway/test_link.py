@@ -1,0 +1,311 @@
+"""The link over real sockets; a bare TCP server stands for controllers that misbehave."""
+
+import asyncio
+import contextlib
+import time
+
+import pytest
+
+from protocol_gateway.driver import JointsReceived, MalformedReceived, Refused, UnknownReceived
+from protocol_gateway.errors import LinkCloggedError, LinkDownError
+from protocol_gateway.link import ControllerLink, LinkSettings, LinkState
+from protocol_gateway.unit_driver import UnitDriver
+from robots.joints import JointType
+from tests.conftest import free_port, run
+
+STATE = b"1#ABSOLUTE.DEG*10.00;20.00@"
+STOP = b"1#COMMAND*stop@"
+
+
+class Controller:
+    """A TCP server whose every byte the test decides."""
+
+    def __init__(self):
+        self.connections = asyncio.Queue()
+
+    async def joined(self, reader, writer):
+        await self.connections.put((reader, writer))
+
+    async def next(self):
+        return await self.connections.get()
+
+
+@contextlib.asynccontextmanager
+async def controller(port=0):
+    it = Controller()
+    server = await asyncio.start_server(it.joined, "127.0.0.1", port)
+    it.port = server.sockets[0].getsockname()[1]
+    writers = []
+    try:
+        yield it
+    finally:
+        while not it.connections.empty():
+            writers.append(it.connections.get_nowait()[1])
+        for writer in writers:
+            writer.transport.abort()
+        server.close()
+        await server.wait_closed()
+
+
+class Seen:
+    def __init__(self):
+        self.events = []
+        self.received = []
+        self.statuses = []
+
+    def event(self, event, received):
+        self.events.append(event)
+        self.received.append(received)
+
+    @property
+    def states(self):
+        return [status.state for status in self.statuses]
+
+
+@contextlib.asynccontextmanager
+async def link(port, **settings):
+    seen = Seen()
+    it = ControllerLink(
+        LinkSettings(host="127.0.0.1", port=port, **settings),
+        UnitDriver((JointType.ROTARY, JointType.ROTARY)),
+        on_event=seen.event,
+        on_status=seen.statuses.append,
+    )
+    task = asyncio.create_task(it.run())
+    try:
+        yield it, seen
+    finally:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+
+
+async def until(condition, timeout_s=5.0):
+    async with asyncio.timeout(timeout_s):
+        while not condition():
+            await asyncio.sleep(0.005)
+
+
+def send_often(it, unit):
+    for _ in range(10_000):
+        it.send(unit)
+
+
+async def send_on(it):
+    for _ in range(10_000):
+        it.send(STOP)
+        await asyncio.sleep(0)
+
+
+async def end(writer):
+    writer.transport.abort()
+    with contextlib.suppress(OSError):
+        await writer.wait_closed()
+
+
+def test_the_link_is_up_when_units_come_and_events_are_dated_when_they_came():
+    async def main():
+        async with controller() as arm, link(arm.port) as (it, seen):
+            _, writer = await arm.next()
+            await until(lambda: seen.states == [LinkState.SILENT])
+            before = time.time_ns()
+            writer.write(STATE + STATE)
+            await until(lambda: len(seen.events) == 2)
+            assert it.status.state is LinkState.UP
+            assert all(isinstance(event, JointsReceived) for event in seen.events)
+            assert before <= seen.received[0].wall_ns <= time.time_ns()
+            assert it.last_received == seen.received[-1]
+            await end(writer)
+
+    run(main())
+
+
+def test_a_unit_in_pieces_is_dated_when_its_last_byte_came():
+    async def main():
+        async with controller() as arm, link(arm.port) as (_, seen):
+            _, writer = await arm.next()
+            writer.write(STATE[:10])
+            await asyncio.sleep(0.1)
+            late = time.time_ns()
+            writer.write(STATE[10:])
+            await until(lambda: seen.events)
+            assert seen.received[0].wall_ns >= late
+            await end(writer)
+
+    run(main())
+
+
+def test_what_goes_wrong_is_counted():
+    async def main():
+        async with controller() as arm, link(arm.port) as (it, seen):
+            reader, writer = await arm.next()
+            writer.write(STATE + b"nonsense@" + b"1#FORCE*1@" + b"1#ERROR*5;joint 1@")
+            await until(lambda: len(seen.events) == 4)
+            assert [type(event) for event in seen.events] == [
+                JointsReceived,
+                MalformedReceived,
+                UnknownReceived,
+                Refused,
+            ]
+            it.send(STOP)
+            assert await reader.readexactly(len(STOP)) == STOP
+            counters = it.counters
+            assert (counters.units_received, counters.units_malformed) == (3, 1)
+            assert (counters.records_unknown, counters.refusals, counters.connections) == (1, 1, 1)
+            assert (counters.units_sent, counters.bytes_sent) == (1, len(STOP))
+            assert counters.bytes_received == len(STATE) + 9 + 10 + 18
+            await end(writer)
+
+    run(main())
+
+
+def test_a_controller_that_falls_silent_is_told_and_then_connected_to_anew():
+    async def main():
+        patience = {"stale_after_s": 0.2, "reconnect_after_s": 0.5}
+        async with controller() as arm, link(arm.port, **patience) as (it, seen):
+            _, writer = await arm.next()
+            writer.write(STATE)
+            await until(lambda: it.status.state is LinkState.SILENT and LinkState.UP in seen.states)
+            assert "sent nothing for 0.2 s" in it.status.text
+            # The socket is still open: a stop is worth trying.
+            it.send(STOP)
+            _, again = await arm.next()
+            again.write(STATE)
+            await until(lambda: it.status.state is LinkState.UP)
+            assert it.counters.connections == 2
+            assert LinkState.DOWN in seen.states
+            await end(writer)
+            await end(again)
+
+    run(main())
+
+
+def test_garbage_alone_does_not_make_a_link_look_alive():
+    async def main():
+        async with controller() as arm, link(arm.port) as (it, seen):
+            _, writer = await arm.next()
+            writer.write(b"nonsense@" * 10)
+            await until(lambda: len(seen.events) == 10)
+            assert it.status.state is LinkState.SILENT
+            assert it.last_received is None
+            await end(writer)
+
+    run(main())
+
+
+def test_a_lost_connection_is_made_again_and_half_a_unit_of_it_is_forgotten():
+    async def main():
+        async with controller() as arm, link(arm.port) as (it, seen):
+            _, writer = await arm.next()
+            writer.write(STATE + STATE[:12])
+            await until(lambda: len(seen.events) == 1)
+            await end(writer)
+            await until(lambda: it.status.state is LinkState.DOWN)
+            _, again = await arm.next()
+            again.write(STATE)
+            await until(lambda: len(seen.events) == 2)
+            assert isinstance(seen.events[1], JointsReceived)
+            await end(again)
+
+    run(main())
+
+
+def test_a_controller_that_is_not_there_is_told_in_words_and_found_when_it_comes():
+    async def main():
+        port = free_port()
+        async with link(port) as (it, seen):
+            await until(lambda: seen.statuses)
+            assert it.status.state is LinkState.DOWN
+            assert it.status.text == f"cannot connect to 127.0.0.1:{port}: connection refused"
+            with pytest.raises(LinkDownError, match="connection refused"):
+                it.send(STOP)
+            async with controller(port) as arm:
+                _, writer = await arm.next()
+                writer.write(STATE)
+                await until(lambda: it.status.state is LinkState.UP)
+                await end(writer)
+
+    run(main())
+
+
+def test_a_refused_connection_is_told_with_the_controllers_own_words():
+    async def main():
+        async with controller() as arm, link(arm.port) as (it, seen):
+            _, writer = await arm.next()
+            writer.write(b"1#ERROR*1;too many clients@")
+            writer.close()
+            await until(lambda: LinkState.DOWN in seen.states)
+            assert "too many clients" in it.status.text
+            assert LinkState.UP not in seen.states
+            await end(writer)
+
+    run(main())
+
+
+def test_a_unit_that_does_not_fit_is_an_error_and_is_never_completed_later():
+    async def main():
+        async with controller() as arm, link(arm.port) as (it, _):
+            reader, writer = await arm.next()
+            writer.transport.pause_reading()
+            writer.write(STATE)
+            await until(lambda: it.status.state is LinkState.UP)
+            unit = STOP.rjust(4000)
+            with pytest.raises(LinkCloggedError):
+                send_often(it, unit)
+            sent = it.counters.units_sent
+            with pytest.raises(LinkDownError):
+                it.send(STOP)
+            await until(lambda: it.status.state is LinkState.DOWN)
+            writer.transport.resume_reading()
+            with contextlib.suppress(ConnectionError):
+                assert (await reader.read()).count(b"@") <= sent
+            await end(writer)
+
+    run(main())
+
+
+def test_nothing_is_sent_over_a_connection_that_has_just_broken():
+    async def main():
+        async with controller() as arm, link(arm.port) as (it, _):
+            _, writer = await arm.next()
+            writer.write(STATE)
+            await until(lambda: it.status.state is LinkState.UP)
+            await end(writer)
+            # A first unit may still go to a socket whose end is not known yet; the link finds out.
+            with pytest.raises(LinkDownError):
+                await send_on(it)
+
+    run(main())
+
+
+def test_bad_code_behind_the_link_ends_it_with_its_own_exception():
+    async def main():
+        def broken(event, received):
+            raise ZeroDivisionError
+
+        async with controller() as arm:
+            driver = UnitDriver((JointType.ROTARY, JointType.ROTARY))
+            it = ControllerLink(LinkSettings(host="127.0.0.1", port=arm.port), driver, on_event=broken)
+            task = asyncio.create_task(it.run())
+            _, writer = await arm.next()
+            writer.write(STATE)
+            with pytest.raises(ZeroDivisionError):
+                await task
+            await end(writer)
+
+    run(main())
+
+
+def test_the_rate_is_told_after_a_second_and_is_none_when_nothing_comes():
+    async def main():
+        async with controller() as arm, link(arm.port) as (it, _):
+            _, writer = await arm.next()
+            begin = time.monotonic()
+            while time.monotonic() - begin < 1.5:
+                writer.write(STATE)
+                await asyncio.sleep(0.02)
+            assert 20.0 < it.rate_hz <= 50.0
+            await end(writer)
+            await until(lambda: it.rate_hz == 0.0)
+
+    run(main())

@@ -1,0 +1,133 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from protocol_gateway.driver import (
+    Activity,
+    Driver,
+    Hold,
+    Home,
+    JointsReceived,
+    MalformedReceived,
+    Mode,
+    MoveAbsolute,
+    MoveRelative,
+    Refused,
+    Reset,
+    Resume,
+    Speed,
+    StatusReceived,
+    Stop,
+    Trace,
+    UnknownReceived,
+)
+from protocol_gateway.errors import CommandError
+from protocol_gateway.unit_driver import UnitDriver
+from robots.joints import JointType
+
+R, P = JointType.ROTARY, JointType.PRISMATIC
+
+COMMANDS = [
+    (Home(), b"1#COMMAND*home@"),
+    (Hold(), b"1#COMMAND*hold@"),
+    (Resume(), b"1#COMMAND*resume@"),
+    (Reset(), b"1#COMMAND*reset@"),
+    (Stop(), b"1#COMMAND*stop@"),
+    (Trace(True), b"1#COMMAND*trace@"),
+    (Trace(False), b"1#COMMAND*untrace@"),
+    (Speed(50.0), b"1#COMMAND*speed=50.00@"),
+    (MoveAbsolute((math.pi / 2, 0.25)), b"1#ABSOLUTE.DEG*90.00;250.00@"),
+    (MoveRelative((-math.pi, 0.0)), b"1#RELATIVE.DEG*-180.00;0.00@"),
+]
+
+
+def driver(**settings) -> Driver:
+    return UnitDriver((R, P), **settings)
+
+
+@pytest.mark.parametrize(("command", "data"), COMMANDS)
+def test_commands_are_told_in_the_papers_words_and_units(command, data):
+    assert driver().encode(command) == data
+
+
+def test_commands_are_told_in_codes_where_the_site_file_has_them():
+    coded = driver(codes={2: "ABSOLUTE.DEG", 102: "COMMAND:stop"})
+    assert coded.encode(Stop()) == b"1#102@"
+    assert coded.encode(MoveAbsolute((0.0, 0.0))) == b"1#2*0.00;0.00@"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [MoveAbsolute((1.0,)), MoveRelative((1.0, 2.0, 3.0)), MoveAbsolute((math.nan, 0.0)), Speed(math.inf)],
+)
+def test_what_the_protocol_cannot_say_is_refused(command):
+    with pytest.raises(CommandError):
+        driver().encode(command)
+
+
+def test_positions_come_in_radians_and_metres_with_their_velocities_and_time():
+    (joints, status) = driver().receive(
+        b"4#ABSOLUTE.DEG*180.00;1000.00&VELOCITY.DEG*90.00;10.00&STATUS*moving;remote;homed&TIME*1.50@"
+    )
+    assert joints == JointsReceived((math.pi, 1.0), (math.pi / 2, 0.01), 1.5)
+    assert status == StatusReceived(Activity.MOVING, Mode.REMOTE, True, False, 1.5)
+
+
+def test_a_bare_controller_of_the_papers_kind_tells_positions_only():
+    assert driver().receive(b"1#ABSOLUTE.DEG*180;0@") == [JointsReceived((math.pi, 0.0), None, None)]
+
+
+def test_a_status_without_a_word_of_activity_or_mode_leaves_them_unknown():
+    assert driver().receive(b"1#STATUS*trace@") == [StatusReceived(None, None, False, True, None)]
+
+
+def test_unknown_words_types_and_a_clients_records_are_handed_over_raw_and_not_acted_on():
+    unit = b"4#STATUS*idle;sleepy&FORCE*1;2&COMMAND*home&RELATIVE.DEG*1.00;2.00"
+    events = driver().receive(unit + b"@")
+    assert [event.type for event in events if isinstance(event, UnknownReceived)] == [
+        "STATUS",
+        "FORCE",
+        "COMMAND",
+        "RELATIVE.DEG",
+    ]
+    assert all(event.raw == unit for event in events if isinstance(event, UnknownReceived))
+    assert not any(isinstance(event, JointsReceived) for event in events)
+
+
+def test_a_refusal_comes_with_its_number_and_text():
+    assert driver().receive(b"1#ERROR*5;joint waist@") == [Refused(5, "joint waist")]
+
+
+@pytest.mark.parametrize(
+    "unit",
+    [b"1#ABSOLUTE.DEG*1;2;3@", b"2#ABSOLUTE.DEG*1;2&VELOCITY.DEG*1@", b"2#STATUS*idle&ABSOLUTE.DEG*1@"],
+)
+def test_a_unit_of_another_joint_count_is_refused_whole(unit):
+    fresh = driver()
+    (event,) = fresh.receive(b"1#TIME*1.00@" + unit)[1:]
+    assert isinstance(event, MalformedReceived)
+    assert event.offset == 12
+    assert "for 2 joints" in event.reason
+    assert fresh.units_received == 1
+
+
+def test_a_new_connection_forgets_the_unfinished_unit_of_the_one_before():
+    fresh = driver()
+    fresh.receive(b"1#ABSOLUTE.DEG*1;")
+    fresh.connected()
+    assert fresh.receive(b"2@1#ABSOLUTE.DEG*0;0@")[1:] == [JointsReceived((0.0, 0.0))]
+
+
+@given(st.binary(max_size=300))
+def test_any_bytes_give_events_and_never_joints_that_nobody_sent(data):
+    for event in driver().receive(data):
+        assert not isinstance(event, JointsReceived) or b"ABSOLUTE.DEG" in data or b"2" in data
+
+
+@given(st.lists(st.floats(-360, 360), min_size=2, max_size=2).map(tuple))
+def test_positions_sent_come_back_as_themselves(positions):
+    fresh = driver()
+    (joints,) = fresh.receive(fresh.encode(MoveAbsolute(positions)))
+    assert joints.positions == pytest.approx(positions, abs=1e-10)
