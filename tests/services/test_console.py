@@ -1,0 +1,367 @@
+"""The console's server over a real router: what goes down to a browser, and what comes up."""
+
+import asyncio
+import hashlib
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+
+import pytest
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from bus.errors import RefusedError
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import open_session
+from services.console.console import Settings, serve
+from services.console.errors import PageNotBuiltError
+from services.errors import ListenError
+from tests.conftest import run
+
+KEY_FRAME = b"\0\0\0\1\x67\x42\xc0\x1f\0\0\0\1\x65\x88"
+DELTA = b"\0\0\0\1\x41\x9a\x01"
+
+
+@pytest.fixture
+def page(tmp_path):
+    (tmp_path / "assets").mkdir()
+    (tmp_path / "index.html").write_text("<!doctype html><title>page</title>")
+    (tmp_path / "assets" / "index-1234.js").write_text("export {}")
+    return tmp_path
+
+
+@asynccontextmanager
+async def console(mesh, page, **settings):
+    """A running console's HOST:PORT, and a second session on the same mesh."""
+    async with open_session(mesh) as own, open_session(mesh) as other:
+        address = asyncio.get_running_loop().create_future()
+        settings = {"site": "s", "listen": "127.0.0.1:0", "page": page, **settings}
+        task = asyncio.create_task(serve(own, Settings(**settings), on_ready=address.set_result))
+        await asyncio.wait([task, address], return_when=asyncio.FIRST_COMPLETED)
+        if task.done():
+            task.result()
+        try:
+            yield address.result().removeprefix("http://"), other
+        finally:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+
+
+@dataclass
+class Page:
+    """A page's end of the WebSocket."""
+
+    socket: object
+    samples: list = field(default_factory=list)
+    other: list = field(default_factory=list)
+
+    async def send(self, **message):
+        await self.socket.send(schema.FromPage(**message).SerializeToString())
+
+    async def watch(self, key):
+        await self.send(watch={"key": key})
+
+    async def until(self, condition, timeout_s=5.0):
+        """Reads until the condition holds."""
+        async with asyncio.timeout(timeout_s):
+            while not condition():
+                message = schema.ToPage.FromString(await self.socket.recv())
+                if message.WhichOneof("message") == "sample":
+                    self.samples.append(message.sample)
+                else:
+                    self.other.append(message)
+
+    async def ask(self, number, key, request=b"", timeout_s=2.0):
+        await self.send(ask={"id": number, "key": key, "payload": request, "timeout_s": timeout_s})
+        await self.until(lambda: any(m.answer.id == number for m in self.other))
+        return next(m.answer for m in self.other if m.answer.id == number)
+
+
+@asynccontextmanager
+async def browse(address):
+    async with connect(f"ws://{address}/mesh", origin=f"http://{address}", compression=None) as socket:
+        yield Page(socket)
+
+
+async def get(address, path, **headers):
+    """Status, headers and body of a GET."""
+    host, port = address.split(":")
+    reader, writer = await asyncio.open_connection(host, int(port))
+    lines = {"Host": address, "Connection": "close", **headers}
+    text = f"GET {path} HTTP/1.1\r\n" + "".join(f"{k}: {v}\r\n" for k, v in lines.items()) + "\r\n"
+    writer.write(text.encode())
+    head, _, body = (await reader.read()).partition(b"\r\n\r\n")
+    writer.close()
+    status, *rest = head.decode().split("\r\n")
+    return int(status.split()[1]), dict(line.lower().split(": ", 1) for line in rest), body
+
+
+def joints(value):
+    message = JointStates()
+    message.joints.add(name="waist", position=value)
+    return message
+
+
+def test_a_page_is_greeted_with_the_stale_times_of_the_topic_table(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, _), browse(address) as browser:
+            await browser.until(lambda: browser.other)
+            hello = browser.other[0].hello
+            assert (hello.site, hello.insecure, hello.connected) == ("s", False, True)
+            assert {each.topic: each.after_s for each in hello.stale}["controller"] == 3.0
+
+    run(main())
+
+
+def test_payload_and_attachment_reach_the_page_as_they_were(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, other), browse(address) as browser:
+            publisher = other.declare_publisher("s", "r", "joints")
+            publisher.put(joints(1.0), source_time_ns=5)
+            await browser.watch("robomesh/*/*/joints")
+            await browser.until(lambda: browser.samples)
+            first = browser.samples[0]
+            assert first.key == "robomesh/s/r/joints"
+            assert not first.live
+            assert not first.HasField("age_s")  # nobody knows how old the last value is
+            header = publisher.put(joints(2.0), source_time_ns=77)
+            await browser.until(lambda: browser.samples[-1].live)
+            last = browser.samples[-1]
+            assert last.payload == joints(2.0).SerializeToString()
+            assert int.from_bytes(last.attachment[8:16], "little") == header.sequence
+            assert int.from_bytes(last.attachment[16:], "little") == 77
+            assert 0 <= last.age_s < 1
+
+    run(main())
+
+
+def test_a_later_page_gets_the_held_value_with_its_age(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, other), browse(address) as first:
+            publisher = other.declare_publisher("s", "r", "joints")
+            await first.watch("robomesh/s/r/joints")
+            while not publisher.watched:
+                await asyncio.sleep(0.01)
+            publisher.put(joints(1.0))
+            await first.until(lambda: first.samples)
+            await asyncio.sleep(0.2)
+            async with browse(address) as second:
+                await second.watch("robomesh/s/r/joints")
+                await second.until(lambda: second.samples)
+                assert second.samples[0].live
+                assert 0.15 < second.samples[0].age_s < 2
+
+    run(main())
+
+
+def test_a_page_that_reads_nothing_gets_the_newest_then_and_delays_no_other(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, other), browse(address) as slow, browse(address) as quick:
+            publisher = other.declare_publisher("s", "r", "joints")
+            for each in (slow, quick):
+                await each.watch("robomesh/s/r/joints")
+            while not publisher.watched:
+                await asyncio.sleep(0.01)
+            big = joints(0.0)
+            big.joints[0].name = "x" * 100_000
+            for number in range(1, 201):
+                big.joints[0].position = number
+                publisher.put(big)
+                await quick.until(
+                    lambda n=number: (
+                        quick.samples
+                        and JointStates.FromString(quick.samples[-1].payload).joints[0].position == n
+                    )
+                )
+                quick.samples.clear()
+            await slow.until(
+                lambda: (
+                    slow.samples
+                    and JointStates.FromString(slow.samples[-1].payload).joints[0].position == 200
+                )
+            )
+            assert len(slow.samples) < 150  # 20 MB were published: it was spared most of it
+
+    run(main())
+
+
+def test_video_is_subscribed_to_only_while_a_page_watches_it(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, other), browse(address) as first:
+            publisher = other.declare_publisher("s", "r", "video/top")
+            publisher.put(CompressedVideo(data=KEY_FRAME), key_frame=True)
+            publisher.put(CompressedVideo(data=DELTA))
+            assert not publisher.watched
+            await first.watch("robomesh/s/r/video/top")
+            await first.until(lambda: first.samples)
+            history = schema.VideoFrames.FromString(first.samples[0].payload)
+            assert [f.sequence for f in history.frames] == [1, 2]
+            publisher.put(CompressedVideo(data=DELTA))
+            await first.until(lambda: len(first.samples) == 2)
+            async with browse(address) as second:
+                await second.watch("robomesh/s/r/video/top")
+                await second.until(lambda: len(second.samples) == 2)
+                assert [each.live for each in second.samples] == [False, True]
+            await first.send(unwatch={"key": "robomesh/s/r/video/top"})
+            async with asyncio.timeout(5):
+                while publisher.watched:
+                    await asyncio.sleep(0.01)
+
+    run(main())
+
+
+def test_events_come_as_a_list_and_then_one_by_one(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, other), browse(address) as browser:
+            publisher = other.declare_publisher("s", "r", "events")
+            for number in range(3):
+                publisher.put(schema.Event(text=f"event {number}"))
+            await browser.watch("robomesh/s/r/events")
+            await browser.until(lambda: browser.samples)
+            listed = schema.EventList.FromString(browser.samples[0].payload)
+            assert [event.text for event in listed.events] == ["event 0", "event 1", "event 2"]
+            publisher.put(schema.Event(text="event 3"))
+            await browser.until(lambda: len(browser.samples) == 2)
+            assert schema.Event.FromString(browser.samples[1].payload).text == "event 3"
+
+    run(main())
+
+
+def test_requests_are_passed_on_and_answered_and_refusals_come_in_words(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, other), browse(address) as browser:
+
+            async def command(request):
+                if request.chunk != "li":
+                    raise RefusedError(f"{request.chunk} has no lease")
+                return schema.CommandAnswer(accepted=True, text="done")
+
+            other.answer("s", "r", "command/*", command)
+            home = schema.CommandRequest(
+                command=schema.CommandRequest.HOME, id=1, lease="x"
+            ).SerializeToString()
+            answer = await browser.ask(1, "robomesh/s/r/command/li", home)
+            assert answer.ok
+            assert schema.CommandAnswer.FromString(answer.payload).text == "done"
+            refused = await browser.ask(2, "robomesh/s/r/command/wang", home)
+            assert (refused.ok, refused.error) == (False, "wang has no lease")
+            unanswered = await browser.ask(3, "robomesh/s/other/stop", timeout_s=0.3)
+            assert not unanswered.ok
+            assert unanswered.error
+            unknown = await browser.ask(4, "robomesh/s/r/joints")
+            assert "no request 'joints'" in unknown.error
+
+    run(main())
+
+
+def test_presence_is_told_at_once_and_when_it_changes(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, _), browse(address) as first:
+
+            def told(browser):
+                return {(m.presence.key.rsplit("/", 1)[0], m.presence.alive) for m in browser.other}
+
+            async with open_session(mesh) as gateway:
+                gateway.declare_presence("s", "r", "gateway")
+                await first.until(lambda: ("robomesh/s/r/alive/gateway", True) in told(first))
+                async with browse(address) as second:
+                    await second.until(lambda: ("robomesh/s/r/alive/gateway", True) in told(second))
+            await first.until(lambda: ("robomesh/s/r/alive/gateway", False) in told(first))
+
+    run(main())
+
+
+def test_a_page_that_watches_nonsense_or_sends_it_is_told_and_cut_off(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, _):
+            for message, words in (
+                (schema.FromPage(watch={"key": "robomesh/**"}).SerializeToString(), "robomesh/**"),
+                (b"\xff\xff\xff", ""),
+            ):
+                async with browse(address) as browser:
+                    await browser.socket.send(message)
+                    with pytest.raises(ConnectionClosed) as closed:
+                        await browser.until(lambda: False)
+                    assert closed.value.rcvd.code == 1008
+                    assert words in closed.value.rcvd.reason
+
+    run(main())
+
+
+def test_other_origins_and_hosts_are_refused(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, _):
+            with pytest.raises(InvalidStatus):
+                async with connect(f"ws://{address}/mesh", origin="http://evil.example", compression=None):
+                    pass
+            status, _, body = await get(address, "/", Host="evil.example")
+            assert status == 421
+            assert b"evil.example" in body
+
+    run(main())
+
+
+def test_the_page_may_run_only_its_own_code_and_only_hashed_files_are_kept(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, _):
+            status, headers, body = await get(address, "/")
+            assert (status, headers["cache-control"]) == (200, "no-store")
+            assert b"<title>page" in body
+            policy = headers["content-security-policy"]
+            assert "script-src 'self'" in policy
+            assert "unsafe" not in policy
+            _, headers, _ = await get(address, "/assets/index-1234.js")
+            assert "immutable" in headers["cache-control"]
+            assert (await get(address, "/assets/../../console.py"))[0] == 404
+
+    run(main())
+
+
+def test_a_mesh_is_asked_of_the_robot_and_checked_by_its_hash(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, other):
+            asked = []
+
+            async def answer(request):
+                asked.append(request.chunk)
+                return b"glTF bytes"
+
+            other.answer("s", "r", "mesh/*", answer)
+            sha256 = hashlib.sha256(b"glTF bytes").hexdigest()
+            for _ in range(2):
+                status, headers, body = await get(address, f"/mesh/s/r/base?sha={sha256}")
+                assert (status, body) == (200, b"glTF bytes")
+                assert "immutable" in headers["cache-control"]
+            assert asked == ["base"]  # the second came from the console's own store
+            assert (await get(address, f"/mesh/s/r/base?sha={'0' * 64}"))[0] == 409
+            assert (await get(address, "/mesh/s/R/base"))[0] == 400
+
+    run(main())
+
+
+def test_beyond_loopback_it_refuses_to_start_and_a_taken_port_is_named(mesh, page):
+    async def main():
+        with pytest.raises(ListenError, match="insecure = true"):
+            async with console(mesh, page, listen="0.0.0.0:0"):
+                pass
+        async with console(mesh, page) as (address, _):
+            with pytest.raises(ListenError, match=address):
+                async with console(mesh, page, listen=address):
+                    pass
+        with pytest.raises(PageNotBuiltError, match=r"build_page\.py"):
+            async with console(mesh, page / "nothing"):
+                pass
+
+    run(main())
+
+
+def test_beyond_loopback_every_page_is_told(mesh, page):
+    async def main():
+        async with console(mesh, page, listen="0.0.0.0:0", insecure=True) as (address, _):
+            own = address.replace("0.0.0.0", "127.0.0.1")
+            async with browse(own) as browser:
+                await browser.until(lambda: browser.other)
+                assert browser.other[0].hello.insecure
+
+    run(main())

@@ -1,0 +1,84 @@
+"""Which hosts and origins the console answers."""
+
+import pytest
+
+from bus.errors import RefusedError
+from services.console.browser import check_ask
+from services.console.errors import WatchError
+from services.console.feeds import check_expression
+from services.console.guard import refused_host, refused_origin
+
+
+@pytest.mark.parametrize(
+    "host", ["localhost:8080", "127.0.0.1:8080", "[::1]:8080", "10.0.0.7:8080", "console.plant"]
+)
+def test_hosts_of_ours_are_answered(host):
+    assert refused_host(host, ("console.plant",)) is None
+
+
+@pytest.mark.parametrize("host", ["", "evil.example", "evil.example:8080", "localhost.evil.example", "a@b:c"])
+def test_a_name_that_could_be_pointed_at_us_is_refused(host):
+    assert "not this console's" in (refused_host(host, ("console.plant",)) or "")
+
+
+def test_only_the_pages_own_origin_may_open_the_websocket():
+    assert refused_origin("http://127.0.0.1:8080", "127.0.0.1:8080") is None
+    assert refused_origin("https://console.plant", "console.plant") is None
+    for origin in (
+        "",
+        "null",
+        "http://evil.example",
+        "http://127.0.0.1:8081",
+        "http://127.0.0.1.evil.example:8080",
+    ):
+        assert refused_origin(origin, "127.0.0.1:8080")
+
+
+@pytest.mark.parametrize("key", ["robomesh/*/*/controller", "robomesh/s/r/video/top", "robomesh/s/*/events"])
+def test_topics_of_the_table_can_be_watched(key):
+    check_expression(key)
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "robomesh/**",
+        "**",
+        "robomesh/s/r/video/*",
+        "robomesh/s/r/nonsense",
+        "robomesh/s/R$/joints",
+        "other/s/r/joints",
+        "",
+    ],
+)
+def test_anything_else_is_refused_by_name(key):
+    with pytest.raises(WatchError, match="cannot be watched"):
+        check_expression(key)
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "robomesh/s/r/stop",
+        "robomesh/s/r/command/li",
+        "robomesh/s/r/lease/request/li",
+        "robomesh/s/r/mesh/base",
+    ],
+)
+def test_requests_of_the_table_can_be_asked(key):
+    check_ask(key)
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "robomesh/*/*/stop",
+        "robomesh/s/r/command/*",
+        "robomesh/s/r/joints",
+        "robomesh/s/**",
+        "robomesh/s/r/command/a/b",
+    ],
+)
+def test_a_page_asks_one_robot_one_request_of_the_table(key):
+    with pytest.raises(RefusedError):
+        check_ask(key)

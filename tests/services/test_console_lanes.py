@@ -1,0 +1,99 @@
+"""What a slow browser is sent, and what one that joins late is given."""
+
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+
+from bus import topics
+from bus.header import Header
+from bus.subscription import Sample
+from services.console.lanes import is_key_frame, lane_for
+
+KEY = b"\0\0\0\1\x67\x42\xc0\x1f\0\0\0\1\x68\xce\0\0\0\1\x65\x88"
+DELTA = b"\0\0\0\1\x41\x9a\x01"
+
+
+def sample(number, data=b"", *, topic="joints", live=True):
+    payload = CompressedVideo(data=data).SerializeToString() if topic.startswith("video") else data
+    return Sample(f"robomesh/s/r/{topic}", payload, Header(1, number, 0), live, 0.0)
+
+
+def frame(number, data, *, live=True):
+    return sample(number, data, topic="video/top", live=live)
+
+
+def numbers(lane):
+    out = []
+    while (each := lane.pop()) is not None:
+        out.append(each.header.sequence)
+    return out
+
+
+def test_of_state_only_the_newest_waits():
+    lane = lane_for(topics.topic("joints"))
+    for number in range(1, 100):
+        lane.push(sample(number))
+    assert numbers(lane) == [99]
+
+
+def test_events_keep_their_order_and_are_bounded():
+    lane = lane_for(topics.topic("events"))
+    lane.push(sample(7, topic="events", live=False))
+    for number in range(8, 12):
+        lane.push(sample(number, topic="events"))
+    assert numbers(lane) == [7, 8, 9, 10, 11]
+    for number in range(1000):
+        lane.push(sample(number, topic="events"))
+    assert numbers(lane) == list(range(800, 1000))
+
+
+def test_a_list_that_comes_again_stands_for_all_before_it():
+    lane = lane_for(topics.topic("events"), hold=True)
+    for number in range(5):
+        lane.push(sample(number, topic="events"))
+    lane.push(sample(5, topic="events", live=False))
+    assert [each.header.sequence for each in lane.held()] == [5]
+
+
+def test_video_begins_with_a_key_frame():
+    lane = lane_for(topics.topic("video/top"))
+    lane.push(frame(1, DELTA))
+    assert lane.starved
+    assert numbers(lane) == []
+    lane.push(frame(2, KEY))
+    lane.push(frame(3, DELTA))
+    assert not lane.starved
+    assert numbers(lane) == [2, 3]
+
+
+def test_slow_video_goes_on_at_the_next_key_frame():
+    lane = lane_for(topics.topic("video/top"))
+    lane.push(frame(1, KEY))
+    for number in range(2, 20):
+        lane.push(frame(number, DELTA))
+    lane.push(frame(20, KEY))
+    lane.push(frame(21, DELTA))
+    assert numbers(lane) == [20, 21]
+
+
+def test_video_without_key_frames_does_not_grow_but_asks_for_one():
+    lane = lane_for(topics.topic("video/top"))
+    lane.push(frame(1, KEY))
+    for number in range(2, 1000):
+        lane.push(frame(number, DELTA))
+    assert numbers(lane) == []
+    assert lane.starved
+
+
+def test_who_joins_gets_the_frames_since_the_last_key_frame():
+    held = lane_for(topics.topic("video/top"), hold=True)
+    for number, data in enumerate([KEY, DELTA, DELTA, KEY, DELTA], start=1):
+        held.push(frame(number, data))
+    assert [each.header.sequence for each in held.held()] == [4, 5]
+
+
+def test_a_key_frame_is_told_by_its_parameter_sets_or_its_slice():
+    assert is_key_frame(KEY)
+    assert is_key_frame(b"\0\0\1\x65\x88")
+    assert not is_key_frame(DELTA)
+    assert not is_key_frame(b"\0\0\1\x06\x05" + DELTA)
+    assert not is_key_frame(b"")
+    assert not is_key_frame(b"\0\0\1")
