@@ -30,11 +30,16 @@ _MOST_BACKDROPS = 16
 
 
 class Drawing:
-    """Draws scenes of the meshes that it was given, at one size, in the context's thread."""
+    """Draws scenes of the meshes that it was given, at one size, in the context's thread.
+
+    Attributes:
+        renderer_name: What draws, in the driver's words.
+    """
 
     def __init__(self, context: moderngl.Context, size: tuple[int, int], *, samples: int = 4) -> None:
         self.context = context
         self.size = size
+        self.renderer_name = str(context.info["GL_RENDERER"])
         samples = min(samples, context.max_samples)
         self._programs = compile_programs(context, samples=samples)
         self._bodies_layer = context.texture(size, 4, samples=samples)
@@ -58,11 +63,6 @@ class Drawing:
         self._backdrops: dict[tuple[object, ...], moderngl.Framebuffer] = {}
         self._meshes: dict[str, Uploaded] = {}
         self._picture = np.empty((size[1], size[0], 3), dtype=np.uint8)
-
-    @property
-    def renderer_name(self) -> str:
-        """What draws, in the driver's words."""
-        return str(self.context.info["GL_RENDERER"])
 
     def has(self, name: str) -> bool:
         """Whether it was given that mesh."""

@@ -96,14 +96,21 @@ class H264Encoder:
         self._context = context
 
     def encode(self, picture: Picture, *, key_frame: bool) -> Packet:
-        """The packet of an RGB picture (height, width, 3); as a key frame if asked."""
+        """The packet of an RGB picture (height, width, 3); as a key frame if asked.
+
+        Raises:
+            NoEncoderError: If the encoder failed; it is of no more use.
+        """
         # OpenCV's conversion: FFmpeg's takes 1 to 2.5 ms more.
         planes = np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGB2YUV_I420), dtype=np.uint8)
         frame = av.VideoFrame.from_ndarray(planes, format="yuv420p")
         frame.pts = self._number
         self._number += 1
         frame.pict_type = PictureType.I if key_frame else PictureType.NONE
-        packets = self._context.encode(frame)
+        try:
+            packets = self._context.encode(frame)
+        except FFmpegError as error:
+            raise NoEncoderError(f"{self.name} failed: {error}") from None
         if len(packets) != 1:
             raise NoEncoderError(f"{self.name} gave {len(packets)} packets for a picture: one is right")
         return Packet(bytes(packets[0]), bool(packets[0].is_keyframe))
@@ -121,7 +128,7 @@ def open_encoder(size: tuple[int, int], fps: float) -> VideoEncoder:
             trial = H264Encoder(size, fps, codec=codec)
             trial.encode(np.zeros((size[1], size[0], 3), dtype=np.uint8), key_frame=True)
             encoder = H264Encoder(size, fps, codec=codec)
-        except (NoEncoderError, FFmpegError) as error:
+        except NoEncoderError as error:
             reasons.append(str(error))
             continue
         for reason in reasons:

@@ -2,7 +2,7 @@
 
 RendererError
 ├── NoOpenGLError           no OpenGL here: the text names what to install
-├── NoEncoderError          no H.264 encoder could be opened
+├── NoEncoderError          no H.264 encoder could be opened, or one failed
 ├── GlbError                bytes that are not the GLB that a mesh should be
 ├── ChainError              a URDF that is not a serial chain
 └── UnknownViewError        a view that neither the description nor the renderer has
@@ -26,7 +26,7 @@ class NoOpenGLError(RendererError):
 
 
 class NoEncoderError(RendererError):
-    """No H.264 encoder could be opened."""
+    """No H.264 encoder could be opened, or one failed."""
 
 
 class GlbError(RendererError):

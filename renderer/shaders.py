@@ -161,10 +161,10 @@ void main() {
     float up = n.z * 0.5 + 0.5;
     float near_floor = clamp((at.z - floor_height) * 6.0, 0.0, 1.0);
     float sky = open * mix(1.0, 0.55 + 0.45 * near_floor, 1.0 - up);
-    vec3 diffuse = mix(vec3(0.26, 0.255, 0.25), vec3(0.66, 0.69, 0.73), up * up) * sky;
-    diffuse += vec3(0.74, 0.71, 0.66) * max(dot(n, KEY), 0.0) * mix(0.55, 1.0, open);
+    vec3 diffuse = mix(vec3(0.21, 0.205, 0.20), vec3(0.50, 0.525, 0.56), up * up) * sky;
+    diffuse += vec3(0.60, 0.575, 0.535) * max(dot(n, KEY), 0.0) * mix(0.55, 1.0, open);
     float facing_eye = max(dot(n, to_eye), 0.0);
-    diffuse += vec3(0.26, 0.27, 0.29) * facing_eye * open;
+    diffuse += vec3(0.27, 0.275, 0.285) * facing_eye * open;
     vec3 base = mix(vec3(0.04), albedo, metallic);
     float grazing = (1.0 - facing_eye) * (1.0 - facing_eye);
     grazing *= grazing * (1.0 - facing_eye);
@@ -174,7 +174,7 @@ void main() {
 
     // The rim darkens a little, so that a body stands out against one of its own colour.
     light *= mix(0.62, 1.0, smoothstep(0.0, 0.38, facing_eye));
-    light = light * 1.12 / (1.0 + 0.16 * light);
+    light = light * 1.16 / (1.0 + 0.22 * light);
 
     vec3 seen = to_srgb(light);
     float grey = dot(seen, vec3(0.2126, 0.7152, 0.0722));

@@ -9,6 +9,7 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
 from bus.session import Session
+from renderer.errors import RendererError
 from renderer.key_frames import KeyFrameClock
 from renderer.look import Look, camera_of, scene_of
 from renderer.state import STALE_AFTER_S, Ages, RobotState, age_s, overlay_of, placements_now
@@ -21,6 +22,7 @@ Paint = Callable[[Job], Awaitable[Painted]]
 # A picture in which nothing moves still tells that it is alive, and its age.
 _IDLE_HZ = 2.0
 _IMAGE_HZ = 5.0
+_TRY_AGAIN_S = 5.0
 
 
 class Stream:
@@ -53,6 +55,7 @@ class Stream:
         self._image = session.declare_publisher(
             state.site, state.name, f"image/{view}", on_get=self._answer_get
         )
+        self._name = state.site, state.name, view
         self._frame_id = f"{state.site}/{state.name}/camera/{view}"
         self._key_frames = KeyFrameClock()
         self._watched = False
@@ -71,6 +74,8 @@ class Stream:
             self._watched = False
             return
         now = time.monotonic()
+        if now < self._drawn_at:
+            return
         if video and not self._watched:
             # Who comes to a stream that stood still would see where the robot was long ago.
             self._key_frames.ask(now)
@@ -85,7 +90,13 @@ class Stream:
         if not (video or image):
             return
         self._drawn_at, self._drawn_version = now, self.state.version
-        await self._draw(now, video=video, image=image)
+        try:
+            await self._draw(now, video=video, image=image)
+        except RendererError as error:
+            log.error("%s/%s %s: %s; tried again in %g s", *self._name, error, _TRY_AGAIN_S)
+            # A new encoder begins with a key frame.
+            self._key_frames = KeyFrameClock()
+            self._drawn_at = now + _TRY_AGAIN_S
 
     async def _draw(self, now: float, *, video: bool, image: bool) -> None:
         state, look = self.state, self.state.look

@@ -12,6 +12,7 @@ from renderer import cache
 from renderer.cameras import Camera
 from renderer.drawing import Drawing
 from renderer.encoder import Packet, VideoEncoder, jpeg, open_encoder
+from renderer.errors import NoEncoderError
 from renderer.opengl import open_context
 from renderer.overlay import Overlay, write_over
 from renderer.scene import Scene
@@ -84,7 +85,11 @@ class Studio:
         return self._drawing.has(name)
 
     def paint(self, job: Job) -> Painted:
-        """Draw, write over, encode."""
+        """Draw, write over, encode.
+
+        Raises:
+            NoEncoderError: If the stream's encoder failed; the next picture gets a new one.
+        """
         picture = self._drawing.draw(job.scene, job.camera)
         write_over(picture, job.overlay)
         packet = None
@@ -92,7 +97,11 @@ class Studio:
             encoder = self._encoders.get(job.stream)
             if encoder is None:
                 encoder = self._encoders[job.stream] = open_encoder(self._size, self._fps)
-            packet = encoder.encode(picture, key_frame=job.key_frame)
+            try:
+                packet = encoder.encode(picture, key_frame=job.key_frame)
+            except NoEncoderError:
+                del self._encoders[job.stream]
+                raise
         return Painted(packet, jpeg(picture) if job.image else None)
 
     def close(self) -> None:
