@@ -4,7 +4,8 @@
     UP --no unit for stale_after_s--> SILENT --none for reconnect_after_s--> DOWN
     any --connection lost--> DOWN --after a pause, 0.2 s growing to 5 s--> connect again
 
-Data is dated once, when its last byte was read from the socket, and never again.
+Data is dated once, when its last byte was read from the socket (or earlier, when it was held back on
+the way: see `dating`), and never again.
 """
 
 import asyncio
@@ -18,14 +19,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
+from protocol_gateway.dating import Dating, Received
 from protocol_gateway.driver import (
     ControllerEvent,
     Driver,
+    JointsReceived,
     MalformedReceived,
     Refused,
+    StatusReceived,
     UnknownReceived,
 )
 from protocol_gateway.errors import LinkCloggedError, LinkDownError
+
+__all__ = ["ControllerLink", "LinkCounters", "LinkSettings", "LinkState", "LinkStatus", "Received"]
 
 logger = logging.getLogger(__name__)
 
@@ -72,19 +78,6 @@ class LinkStatus:
 
 
 @dataclass(frozen=True, slots=True)
-class Received:
-    """When an event's last byte was read from the socket.
-
-    Attributes:
-        monotonic_s: On the gateway's monotonic clock: for ages.
-        wall_ns: On the gateway's wall clock, ns since the Unix epoch: the stamp of what is published.
-    """
-
-    monotonic_s: float
-    wall_ns: int
-
-
-@dataclass(frozen=True, slots=True)
 class LinkCounters:
     """Counts since the gateway's start, as in `robomesh.LinkCounters`."""
 
@@ -127,6 +120,7 @@ class ControllerLink:
         self._counts: Counter[str] = Counter()
         self._last_received: Received | None = None
         self._refusal = ""
+        self._dating = Dating()
         self._rate = _Rate()
 
     @property
@@ -221,6 +215,7 @@ class ControllerLink:
 
     def _made(self, connection: "_Connection") -> None:
         self._driver.connected()
+        self._dating = Dating()
         self._connection = connection
         self._refusal = ""
         self._counts["connections"] += 1
@@ -228,21 +223,33 @@ class ControllerLink:
 
     def _receive(self, data: bytes) -> None:
         # Dated before it is parsed: what we do with it is not part of its age.
-        received = Received(self._monotonic_s(), self._wall_ns())
+        now = Received(self._monotonic_s(), self._wall_ns())
         units_before = self._driver.units_received
         events = self._driver.receive(data)
-        units = self._driver.units_received - units_before
         self._counts["bytes_received"] += len(data)
-        if units:
-            self._last_received = received
-            self._rate.count(units, received.monotonic_s)
+        if units := self._driver.units_received - units_before:
+            self._rate.count(units, now.monotonic_s)
+        dates = [self._date(event, now) for event in events]
         for event in events:
             self._count(event)
         # A refusal is an answer, not a sign that the arm's state comes.
-        if units and self._status.state is not LinkState.UP and not self._refusal:
+        if units and not self._refusal:
+            self._alive(max(dates, key=lambda date: date.monotonic_s, default=now), now)
+        for event, date in zip(events, dates, strict=True):
+            self._on_event(event, date)
+
+    def _date(self, event: ControllerEvent, now: Received) -> Received:
+        match event:
+            case JointsReceived() | StatusReceived():
+                return self._dating.date(event.controller_time_s, now)
+            case _:
+                return self._dating.date(None, now)
+
+    def _alive(self, newest: Received, now: Received) -> None:
+        self._last_received = newest
+        old = now.monotonic_s - newest.monotonic_s >= self._settings.stale_after_s
+        if not old and self._status.state is not LinkState.UP:
             self._tell(LinkState.UP, f"connected to {self._where}")
-        for event in events:
-            self._on_event(event, received)
 
     def _count(self, event: ControllerEvent) -> None:
         match event:

@@ -102,26 +102,25 @@ class UnitDriver:
     # -------------------------------------------------------------- from the controller
 
     def _take(self, unit: Unit, events: list[ControllerEvent]) -> None:
-        # A unit is all or nothing: one record of the wrong length refuses it whole.
-        for record in unit.records:
-            if isinstance(record, AbsolutePositions | Velocities) and len(record.values) != len(self._scales):
-                events.append(self._wrong_count(record, unit))
-                return
-        self.units_received += 1
         positions: list[tuple[float, ...]] = []
         velocities: list[tuple[float, ...]] = []
         time_s: float | None = None
         others: list[Record] = []
         for record in unit.records:
             match record:
-                case AbsolutePositions(values):
-                    positions.append(self._si(values))
-                case Velocities(values):
-                    velocities.append(self._si(values))
+                case AbsolutePositions(values) | Velocities(values):
+                    # A unit is all or nothing: one record of the wrong length refuses it whole.
+                    if len(values) != len(self._scales):
+                        events.append(self._wrong_count(values, unit))
+                        return
+                    (positions if isinstance(record, AbsolutePositions) else velocities).append(
+                        self._si(values)
+                    )
                 case Time(seconds):
                     time_s = seconds
                 case _:
                     others.append(record)
+        self.units_received += 1
         for index, values in enumerate(positions):
             events.append(
                 JointsReceived(values, velocities[index] if index < len(velocities) else None, time_s)
@@ -131,9 +130,9 @@ class UnitDriver:
         if time_s is not None and not positions and not others:
             events.append(StatusReceived(controller_time_s=time_s))
 
-    def _wrong_count(self, record: AbsolutePositions | Velocities, unit: Unit) -> MalformedReceived:
+    def _wrong_count(self, values: Sequence[float], unit: Unit) -> MalformedReceived:
         text = unit.data[:256].decode("ascii")
-        reason = f"{len(record.values)} values for {len(self._scales)} joints"
+        reason = f"{len(values)} values for {len(self._scales)} joints"
         return MalformedReceived(unit.offset, text, reason)
 
     def _si(self, values: Sequence[float]) -> tuple[float, ...]:

@@ -309,3 +309,27 @@ def test_the_rate_is_told_after_a_second_and_is_none_when_nothing_comes():
             await until(lambda: it.rate_hz == 0.0)
 
     run(main())
+
+
+def test_what_the_network_held_back_is_not_dated_as_new_and_does_not_look_live():
+    def told(clock_s):
+        return b"2#ABSOLUTE.DEG*10.00;20.00&TIME*%.2f@" % clock_s
+
+    async def main():
+        async with controller() as arm, link(arm.port, stale_after_s=0.4) as (it, seen):
+            _, writer = await arm.next()
+            writer.write(told(50.0))
+            await until(lambda: it.status.state is LinkState.UP)
+            begin = seen.received[0]
+            await until(lambda: it.status.state is LinkState.SILENT)
+            await asyncio.sleep(0.6)
+            writer.write(told(50.1) + told(50.2))
+            await until(lambda: len(seen.events) == 3)
+            assert it.status.state is LinkState.SILENT
+            assert seen.received[2].monotonic_s == pytest.approx(begin.monotonic_s + 0.2)
+            assert seen.received[2].wall_ns == pytest.approx(begin.wall_ns + 2e8, abs=5e6)
+            writer.write(told(50.0 + time.monotonic() - begin.monotonic_s))
+            await until(lambda: it.status.state is LinkState.UP)
+            await end(writer)
+
+    run(main())
