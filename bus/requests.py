@@ -86,9 +86,7 @@ class Answerer:
                     raise RefusedError(f"{asked} has a wildcard: ask one {self._row.name} by its whole key")
                 encoding = str(query.encoding) if query.encoding is not None else ""
                 payload = query.payload.to_bytes() if query.payload is not None else b""
-                message = None
-                if self._row.request is not None:
-                    message = decode_request(self._row.request, payload, encoding)
+                message = self._read(payload, encoding)
                 chunk = _chunk(self._row.name, key.topic)
                 answer = await self._handler(Request(key, message, chunk))
             except (RefusedError, MessageError) as error:
@@ -105,6 +103,17 @@ class Answerer:
                 query.reply(str(key), answer, encoding=_OCTETS)
             else:
                 query.reply(str(key), encode(answer, as_json=as_json), encoding=JSON if as_json else PROTOBUF)
+
+    def _read(self, payload: bytes, encoding: str) -> Message | None:
+        schema = self._row.request
+        if schema is None:
+            return None
+        try:
+            return decode_request(schema, payload, encoding)
+        except MessageError:
+            if self._row.unread:
+                return schema()
+            raise
 
     def _own_key(self, asked: str) -> keys.Key | None:
         """The own key that was asked; None: a wildcard that does not name the request `stop`.

@@ -90,6 +90,7 @@ class Request:
     Attributes:
         answer: Schema of the answer; None: plain bytes.
         wildcard: May be asked on a key with a wildcard.
+        unread: A payload that cannot be read counts as an empty one: a stop is a stop.
     """
 
     name: str
@@ -99,6 +100,7 @@ class Request:
     owners: frozenset[Role]
     askers: frozenset[Role]
     wildcard: bool = False
+    unread: bool = False
 
 
 _TOPICS = (
@@ -205,6 +207,7 @@ _REQUESTS = (
         owners=_GATEWAY,
         askers=EVERYONE,
         wildcard=True,
+        unread=True,
     ),
     Request(
         name="lease/request/*",

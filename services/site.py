@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from bus import keys
 from bus.endpoints import Tls
 from bus.errors import KeyNameError
+from robots import description
 from robots.description import Pose
 from services.errors import ListenError, SiteFileError
 from services.listen import split_address
@@ -182,6 +183,7 @@ def load(path: Path | None) -> Site:
 
     Raises:
         SiteFileError: A line a problem: file, key, value, and what would be right.
+        DescriptionError: If a robot's model is not right.
     """
     if path is None:
         return DEMO
@@ -196,7 +198,11 @@ def load(path: Path | None) -> Site:
         raise SiteFileError(f"{path}: not TOML: {error}") from None
     except ValidationError as error:
         raise SiteFileError("\n".join(_sentence(path, problem) for problem in error.errors())) from None
-    return _beside(site, path.parent)
+    site = _beside(site, path.parent)
+    for robot in site.robot:
+        # What no service could run with is told before any starts.
+        description.load(robot.model)
+    return site
 
 
 def _beside(site: Site, folder: Path) -> Site:

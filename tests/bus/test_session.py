@@ -248,7 +248,10 @@ def test_asking_for_everything_stops_nobody_but_asking_all_to_stop_stops_all(mes
                 gateway.answer("site", robot, "stop", stop)
             with zenoh.open(client_config(mesh.connect)) as plain:
                 assert await asyncio.to_thread(lambda: list(plain.get("robomesh/**"))) == []
-            assert stopped == []
+                assert stopped == []
+                plain_stop = lambda: list(plain.get("robomesh/site/arm-1/stop", payload="{not json"))  # noqa: E731
+                assert (await asyncio.to_thread(plain_stop))[0].ok is not None
+            assert stopped.pop() == "arm-1"
             answers = await operator.ask_all("robomesh/*/*/stop", schema.StopRequest())
             assert sorted(stopped) == ["arm-1", "arm-2"]
             assert sorted(answer.key for answer in answers) == [
