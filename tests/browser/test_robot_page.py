@@ -1,0 +1,250 @@
+"""The robot's page in a real Chromium before a real site: seeing, controlling, stopping."""
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from bus.schemas import robomesh_pb2 as schema
+
+pytestmark = pytest.mark.browser
+
+ARM = "#/hall/arm"
+STATE = schema.ControllerState
+
+
+def button(page, name):
+    return page.get_by_role("button", name=name, exact=True)
+
+
+def take(page, name="li"):
+    page.get_by_label("Your name").fill(name)
+    button(page, "Take control").click()
+    expect(page.locator(".holder")).to_have_text("You are in control")
+
+
+def ready(page):
+    """Control taken, no stop latched, homed."""
+    take(page)
+    reset = page.get_by_role("button", name="Reset stop")
+    if reset.count():
+        reset.click()
+        expect(reset).to_have_count(0)
+    button(page, "Home").click()
+    expect(page.locator(".facts")).to_contain_text("· homed", timeout=30_000)
+    expect(page.locator(".headline .state")).to_have_text("Idle", timeout=30_000)
+
+
+def degrees(page, joint):
+    text = page.locator(f'[data-joint="{joint}"]').inner_text()
+    return float(text.replace("°", "").replace("−", "-"))
+
+
+def audited(plant, request):
+    """How many such requests the gateway wrote down."""
+    text = (plant.audit / "hall" / "arm.jsonl").read_text() if (plant.audit / "hall").exists() else ""
+    return text.count(f'"{request}"')
+
+
+def drag(page, joint, pixels, *, release=True):
+    box = page.get_by_role("slider", name=f"Target of {joint}").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + pixels, y, steps=4)
+    if release:
+        page.mouse.up()
+
+
+def test_a_moving_arm_is_drawn_as_it_moves(open_page):
+    page = open_page("#/hall/second")
+    page.wait_for_selector('canvas[data-loaded="true"]')
+    before = degrees(page, "waist"), int(page.locator(".canvas-place canvas").get_attribute("data-drawn"))
+    page.wait_for_function(
+        "drawn => Number(document.querySelector('.canvas-place canvas').dataset.drawn) > drawn + 3",
+        arg=before[1],
+    )
+    expect(page.locator('[data-joint="waist"]')).not_to_have_text(f"{before[0]:.2f}°".replace("-", "−"))
+    expect(page.locator(".scene-stale")).to_have_count(0)
+    expect(page.locator(".tool dd").first).to_have_text(re.compile(r"\d+\.\d\s*mm"))
+
+
+def test_control_needs_a_name_and_says_what_a_name_is(open_page):
+    page = open_page(ARM)
+    button(page, "Take control").click()
+    expect(page.locator(".control .notice")).to_contain_text("Enter your name first")
+    page.get_by_label("Your name").fill("li wei/")
+    button(page, "Take control").click()
+    expect(page.locator(".control .notice")).to_contain_text("“li wei/” cannot be used")
+
+
+def test_without_control_nothing_on_the_page_can_move_the_arm(open_page, plant):
+    page = open_page(ARM)
+    page.wait_for_selector(".track")
+    assert page.get_by_role("slider", name="Target of").count() == 0
+    for name in ("Home", "Hold"):
+        expect(button(page, name)).to_be_disabled()
+    box = page.locator(".track").first.bounding_box()
+    page.mouse.click(box["x"] + 10, box["y"] + box["height"] / 2)
+    assert audited(plant, "MOVE_ABSOLUTE") == 0
+
+
+def test_a_slider_moves_the_joint_when_it_is_let_go_and_not_before(open_page, plant):
+    page = open_page(ARM)
+    ready(page)
+    moves, start = audited(plant, "MOVE_ABSOLUTE"), degrees(page, "waist")
+    drag(page, "waist", 30, release=False)
+    expect(page.locator(".joints .notice")).to_contain_text("Target waist:")
+    assert audited(plant, "MOVE_ABSOLUTE") == moves
+    wanted = float(
+        re.search(r"waist: (\S+)°", page.locator(".joints .notice").inner_text())[1].replace("−", "-")
+    )
+    assert wanted > start + 5
+    page.mouse.up()
+    expect(page.locator('[data-joint="waist"]')).to_have_text(
+        f"{wanted:.2f}°".replace("-", "−"), timeout=30_000
+    )
+    assert audited(plant, "MOVE_ABSOLUTE") > moves
+    # A tap beside the handle sets nothing.
+    moves = audited(plant, "MOVE_ABSOLUTE")
+    box = page.locator(".track").first.bounding_box()
+    page.mouse.click(box["x"] + 4, box["y"] + box["height"] / 2)
+    expect(page.locator(".track-handle.unsent")).to_have_count(0)
+    assert audited(plant, "MOVE_ABSOLUTE") == moves
+
+
+def test_by_keys_a_target_is_set_and_enter_sends_it_and_escape_takes_it_back(open_page, plant):
+    page = open_page(ARM)
+    ready(page)
+    moves = audited(plant, "MOVE_ABSOLUTE")
+    handle = page.get_by_role("slider", name="Target of elbow")
+    handle.focus()
+    handle.press("ArrowRight")
+    expect(page.locator(".joints .notice")).to_contain_text("Target elbow:")
+    handle.press("Escape")
+    assert audited(plant, "MOVE_ABSOLUTE") == moves
+    start = degrees(page, "elbow")
+    handle.press("PageUp")
+    handle.press("Enter")
+    wanted = f"{start + 10:.2f}°".replace("-", "−")
+    expect(page.locator('[data-joint="elbow"]')).to_have_text(wanted, timeout=30_000)
+
+
+def test_space_asks_for_a_stop_and_only_its_reset_lets_motion_go_on(open_page):
+    page = open_page(ARM)
+    ready(page)
+    drag(page, "waist", -60)
+    page.keyboard.press("Space")
+    expect(page.locator(".stop-notice")).to_contain_text("Stop sent to hall/arm")
+    expect(page.locator(".headline .state")).to_have_text("Stopped")
+    expect(button(page, "Home")).to_be_disabled()
+    page.get_by_role("button", name="Reset stop").click()
+    expect(page.locator(".stopped")).to_have_count(0)
+    expect(button(page, "Home")).to_be_enabled()
+
+
+def test_stop_works_without_control_and_names_who_asked(open_page):
+    page = open_page(ARM)
+    page.get_by_label("Your name").fill("wang")
+    page.locator("button.stop").click()
+    expect(page.locator(".stopped")).to_contain_text("Stopped by wang")
+    expect(page.get_by_role("button", name="Reset stop")).to_be_disabled()
+
+
+def test_everybody_sees_who_is_in_control_and_is_refused_in_words(open_page):
+    mine, other = open_page(ARM), open_page(ARM)
+    take(mine, "li")
+    expect(other.locator(".holder")).to_have_text("li is in control")
+    other.get_by_label("Your name").fill("wang")
+    button(other, "Take control").click()
+    expect(other.locator(".control .notice")).to_contain_text("Control not given:")
+    expect(other.locator(".control .notice")).to_contain_text("li")
+    button(mine, "Release").click()
+    expect(other.locator(".holder")).to_have_text("Nobody is in control")
+
+
+def test_a_hidden_page_gives_control_back(open_page):
+    page = open_page(ARM)
+    take(page)
+    page.evaluate(
+        "Object.defineProperty(document, 'hidden', {value: true, configurable: true});"
+        "document.dispatchEvent(new Event('visibilitychange'))"
+    )
+    expect(page.locator(".control .notice")).to_contain_text("this page was hidden")
+    expect(page.locator(".holder")).to_have_text("Nobody is in control")
+
+
+def test_going_to_another_page_gives_control_back(open_page):
+    page, other = open_page(ARM), open_page(ARM)
+    take(page)
+    expect(other.locator(".holder")).to_have_text("li is in control")
+    page.get_by_role("link", name="Fleet", exact=True).click()
+    expect(other.locator(".holder")).to_have_text("Nobody is in control", timeout=1900)
+
+
+def test_when_the_controller_falls_silent_nothing_looks_live(open_page, plant):
+    page = open_page("#/hall/second")
+    page.wait_for_selector('canvas[data-loaded="true"]')
+    expect(page.locator(".scene-stale")).to_have_count(0)
+    port = plant.call(plant.stop_controller("second"))
+    try:
+        expect(page.locator(".scene-stale")).to_contain_text(re.compile(r"stale \d"))
+        expect(page.locator('[data-joint="waist"]')).to_have_class(re.compile("stale"))
+        expect(page.locator(".headline .state")).to_have_text("No link")
+        late = open_page("#/hall/second")  # who comes now sees old values as old too
+        expect(late.locator('[data-joint="waist"]')).to_have_class(re.compile("stale"))
+        expect(late.locator(".scene-stale")).to_be_visible()
+    finally:
+        plant.call(plant.start_controller("second", port, demo=True))
+    expect(page.locator(".scene-stale")).to_have_count(0, timeout=30_000)
+
+
+def test_the_fleet_shows_every_robot_with_its_state_and_leads_to_it(open_page):
+    page = open_page()
+    tiles = page.locator(".tile")
+    expect(tiles).to_have_count(2)
+    expect(tiles.nth(1)).to_contain_text("second")
+    expect(tiles.nth(1)).to_contain_text("Nobody is in control")
+    expect(tiles.nth(1)).to_contain_text("gateway")
+    page.get_by_placeholder("Filter robots").fill("sec")
+    expect(tiles).to_have_count(1)
+    tiles.click()
+    expect(page.locator("h1")).to_have_text("second")
+
+
+@pytest.mark.parametrize("path", ["", "#/hall/second"])
+def test_a_phone_shows_one_column_with_stop_under_the_thumb(open_page, path):
+    page = open_page(path, width=360, height=740, has_touch=True)
+    page.wait_for_selector(".tile" if not path else '[data-joint="waist"]')
+    assert page.evaluate("document.documentElement.scrollWidth") == 360
+    stop = page.locator("button.stop").bounding_box()
+    assert stop["height"] >= 44
+    assert stop["y"] + stop["height"] <= 740
+    small = page.evaluate(
+        "[...document.querySelectorAll('button, input, a.tile')]"
+        ".filter(e => e.getBoundingClientRect().height < 44).map(e => e.outerHTML.slice(0, 80))"
+    )
+    assert small == []
+
+
+def test_a_control_room_sees_everything_of_a_robot_without_scrolling(open_page):
+    page = open_page("#/hall/second")
+    page.wait_for_selector('canvas[data-loaded="true"]')
+    assert page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]") == [
+        1440,
+        900,
+    ]
+    for name in ("scene", "control", "joints", "tool", "events", "camera", "history"):
+        box = page.locator(f".panel.{name}").bounding_box()
+        assert box["y"] + box["height"] <= 900, name
+        assert box["height"] >= 80, name
+
+
+def test_the_language_and_the_colours_can_be_switched_and_are_kept(open_page):
+    page = open_page(ARM)
+    button(page, "中文").click()
+    expect(page.locator("button.stop")).to_contain_text("停止请求")
+    button(page, "浅色").click()
+    page.reload()
+    expect(page.locator("button.stop")).to_contain_text("停止请求")
+    assert page.evaluate("document.documentElement.dataset.theme") == "light"
