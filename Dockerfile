@@ -1,0 +1,38 @@
+# One image a role, each with what that role needs and no more: a gateway holds no OpenGL.
+#
+#   docker build --build-arg ROLE=gateway -t robomesh-gateway .
+
+FROM debian:12 AS base
+ENV DEBIAN_FRONTEND=noninteractive PYTHONUNBUFFERED=1
+RUN apt-get update -qq \
+ && apt-get install -y -qq --no-install-recommends python3 python3-pip ca-certificates libgomp1 \
+ && rm -rf /var/lib/apt/lists/*
+RUN python3 -m pip install --quiet --root-user-action=ignore --target /opt/uv uv==0.13.8
+
+# The wheel, with the page in it.
+FROM base AS wheel
+WORKDIR /source
+COPY pyproject.toml requirements.lock README.md LICENSE ./
+COPY bus bus
+COPY robots robots
+COPY protocol_gateway protocol_gateway
+COPY renderer renderer
+COPY services services
+RUN /opt/uv/bin/uv build --quiet --wheel --build-constraint requirements.lock --out-dir /dist
+
+FROM base AS role
+ARG ROLE=all
+RUN if [ "$ROLE" = renderer ] || [ "$ROLE" = all ]; then \
+      apt-get update -qq \
+      && apt-get install -y -qq --no-install-recommends libegl1 libgl1 libgl1-mesa-dri \
+      && rm -rf /var/lib/apt/lists/*; \
+    fi
+COPY --from=wheel /dist /dist
+COPY requirements.lock /dist/
+RUN /opt/uv/bin/uv venv --quiet /opt/robomesh \
+ && /opt/uv/bin/uv pip install --quiet --python /opt/robomesh/bin/python --constraint /dist/requirements.lock \
+      "$(echo /dist/robomesh-*.whl)[$ROLE]"
+RUN useradd --create-home robomesh && mkdir /data && chown robomesh /data
+USER robomesh
+WORKDIR /data
+ENTRYPOINT ["/opt/robomesh/bin/robomesh"]
