@@ -10,15 +10,14 @@ the way: see `dating`), and never again.
 
 import asyncio
 import logging
-import os
 import random
-import socket
 import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
+from protocol_gateway.connection import Connection, reason_of
 from protocol_gateway.dating import Dating, Received
 from protocol_gateway.driver import (
     ControllerEvent,
@@ -29,19 +28,14 @@ from protocol_gateway.driver import (
     StatusReceived,
     UnknownReceived,
 )
-from protocol_gateway.errors import LinkCloggedError, LinkDownError
+from protocol_gateway.errors import LinkDownError
 
 __all__ = ["ControllerLink", "LinkCounters", "LinkSettings", "LinkState", "LinkStatus", "Received"]
 
 logger = logging.getLogger(__name__)
 
-# A unit is some hundred bytes. A small send buffer makes a controller that does not read an
-# error at once instead of kilobytes of commands that it would obey late.
-_SEND_BUFFER_BYTES = 4096
 _FIRST_PAUSE_S = 0.2
 _LONGEST_PAUSE_S = 5.0
-# What we wrote and the controller's host has not acknowledged for this long breaks the connection.
-_UNACKNOWLEDGED_MS = 3000
 
 
 class LinkState(Enum):
@@ -115,7 +109,7 @@ class ControllerLink:
         self._monotonic_s = monotonic_s
         self._wall_ns = wall_ns
         self._where = f"{settings.host}:{settings.port}"
-        self._connection: _Connection | None = None
+        self._connection: Connection | None = None
         self._status = LinkStatus(LinkState.DOWN, f"connecting to {self._where}")
         self._counts: Counter[str] = Counter()
         self._last_received: Received | None = None
@@ -175,13 +169,13 @@ class ControllerLink:
         try:
             async with asyncio.timeout(self._settings.connect_timeout_s):
                 _, connection = await loop.create_connection(
-                    lambda: _Connection(self._made, self._receive), self._settings.host, self._settings.port
+                    lambda: Connection(self._made, self._receive), self._settings.host, self._settings.port
                 )
         except TimeoutError:
             self._tell(LinkState.DOWN, f"{self._where} does not answer")
             return False
         except OSError as error:
-            self._tell(LinkState.DOWN, f"cannot connect to {self._where}: {_reason(error)}")
+            self._tell(LinkState.DOWN, f"cannot connect to {self._where}: {reason_of(error)}")
             return False
         units_before = self._driver.units_received
         text = "the link was closed"
@@ -193,7 +187,7 @@ class ControllerLink:
             self._tell(LinkState.DOWN, text)
         return self._driver.units_received > units_before and not self._refusal
 
-    async def _watch(self, connection: "_Connection") -> str:
+    async def _watch(self, connection: Connection) -> str:
         """Wait for the connection's end, telling silence; the reason of the end in words."""
         connected_s = self._monotonic_s()
         patience_s, limit_s = self._settings.stale_after_s, self._settings.reconnect_after_s
@@ -213,7 +207,7 @@ class ControllerLink:
             else f"{self._where}: {end}"
         )
 
-    def _made(self, connection: "_Connection") -> None:
+    def _made(self, connection: Connection) -> None:
         self._driver.connected()
         self._dating = Dating()
         self._connection = connection
@@ -233,7 +227,8 @@ class ControllerLink:
         for event in events:
             self._count(event)
         # A refusal is an answer, not a sign that the arm's state comes.
-        if units and not self._refusal:
+        if units > sum(isinstance(event, Refused) for event in events):
+            self._refusal = ""
             self._alive(max(dates, key=lambda date: date.monotonic_s, default=now), now)
         for event, date in zip(events, dates, strict=True):
             self._on_event(event, date)
@@ -271,59 +266,6 @@ class ControllerLink:
         self._on_status(status)
 
 
-class _Connection(asyncio.Protocol):
-    """One TCP connection; `lost` is done, with the reason in words, when it has ended."""
-
-    _transport: asyncio.Transport
-
-    def __init__(self, made: Callable[["_Connection"], None], receive: Callable[[bytes], None]) -> None:
-        self._made = made
-        self._receive = receive
-        loop = asyncio.get_running_loop()
-        self.lost: asyncio.Future[str] = loop.create_future()
-        self._closed: asyncio.Future[None] = loop.create_future()
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        assert isinstance(transport, asyncio.Transport)
-        self._transport = transport
-        _configure(transport.get_extra_info("socket"))
-        self._guarded(lambda: self._made(self))
-
-    def data_received(self, data: bytes) -> None:
-        self._guarded(lambda: self._receive(data))
-
-    def connection_lost(self, error: Exception | None) -> None:
-        reason = _reason(error) if isinstance(error, OSError) else "the controller closed the connection"
-        if not self.lost.done():
-            self.lost.set_result(reason)
-        self._closed.set_result(None)
-
-    def write(self, data: bytes) -> None:
-        if self._transport.is_closing():
-            raise LinkDownError("not sent: the connection has just ended")
-        # asyncio writes at once when its buffer is empty, and here it always is: what does not
-        # fit ends the connection, so that half a unit can never be completed later.
-        self._transport.write(data)
-        if self._transport.is_closing():
-            raise LinkDownError("not sent: the connection broke while it was written")
-        if self._transport.get_write_buffer_size():
-            self._transport.abort()
-            raise LinkCloggedError("not sent: the controller does not read; connecting again")
-
-    async def end(self) -> None:
-        self._transport.abort()
-        await self._closed
-
-    def _guarded(self, call: Callable[[], None]) -> None:
-        """Bad code ends `run` with its own exception; asyncio would only log it."""
-        try:
-            call()
-        except Exception as error:
-            if not self.lost.done():
-                self.lost.set_exception(error)
-            self._transport.abort()
-
-
 class _Rate:
     """Units a second, counted over bins of a second."""
 
@@ -344,21 +286,3 @@ class _Rate:
 
     def at(self, now_s: float) -> float:
         return self._hz if now_s - self._last_s < 2.0 else 0.0
-
-
-def _configure(connected: socket.socket) -> None:
-    """Units go out at once; a host that vanished is noticed in seconds."""
-    connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    connected.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
-    connected.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, 2)
-    connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, 1)
-    connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT, 3)
-    connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _UNACKNOWLEDGED_MS)
-
-
-def _reason(error: OSError) -> str:
-    # asyncio's own text repeats the address; the system's says what is wrong.
-    if error.errno is not None and error.errno > 0:
-        return os.strerror(error.errno).lower()
-    return (error.strerror or str(error)).lower()

@@ -21,7 +21,7 @@ from protocol_gateway.core.records import (
     write_number,
     write_unit,
 )
-from protocol_gateway.core.stream import Malformed, Unit, UnitStream
+from protocol_gateway.core.stream import Malformed, Unit, UnitStream, printable
 from protocol_gateway.driver import (
     Activity,
     ControllerCommand,
@@ -131,9 +131,8 @@ class UnitDriver:
             events.append(StatusReceived(controller_time_s=time_s))
 
     def _wrong_count(self, values: Sequence[float], unit: Unit) -> MalformedReceived:
-        text = unit.data[:256].decode("ascii")
         reason = f"{len(values)} values for {len(self._scales)} joints"
-        return MalformedReceived(unit.offset, text, reason)
+        return MalformedReceived(unit.offset, printable(unit.data), reason)
 
     def _si(self, values: Sequence[float]) -> tuple[float, ...]:
         return tuple([value * scale for value, scale in zip(values, self._scales, strict=True)])

@@ -92,13 +92,14 @@ class UnitStream:
         try:
             return Unit(read_records(data, self._table), data, offset)
         except UnitError as error:
-            return Malformed(offset, _printable(data), str(error))
+            return Malformed(offset, printable(data), str(error))
 
     def _too_long(self, data: bytes, offset: int) -> Malformed:
-        return Malformed(offset, _printable(data), f"no '@' within {LONGEST_UNIT_BYTES} bytes")
+        return Malformed(offset, printable(data), f"no '@' within {LONGEST_UNIT_BYTES} bytes")
 
 
-def _printable(data: bytes) -> str:
+def printable(data: bytes) -> str:
+    """Bytes of a peer as text that harms no terminal; the first 256 of them."""
     text = data[:_LONGEST_TEXT].decode("ascii", "backslashreplace")
     shown = "".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in text)
     return shown + "…" if len(data) > _LONGEST_TEXT else shown

@@ -242,6 +242,20 @@ def test_a_refused_connection_is_told_with_the_controllers_own_words():
     run(main())
 
 
+def test_an_answer_alone_does_not_bring_a_silent_link_up_but_the_state_after_it_does():
+    async def main():
+        async with controller() as arm, link(arm.port, stale_after_s=0.1) as (it, seen):
+            _, writer = await arm.next()
+            writer.write(b"1#ERROR*8;stopped@")
+            await until(lambda: seen.events)
+            assert it.status.state is LinkState.SILENT
+            writer.write(STATE)
+            await until(lambda: it.status.state is LinkState.UP)
+            await end(writer)
+
+    run(main())
+
+
 def test_a_unit_that_does_not_fit_is_an_error_and_is_never_completed_later():
     async def main():
         async with controller() as arm, link(arm.port) as (it, _):
