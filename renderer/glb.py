@@ -135,6 +135,8 @@ def _surface(
 ) -> Surface:
     attributes = primitive["attributes"]
     positions = _accessor(document, binary, attributes["POSITION"])
+    if not np.isfinite(positions).all():
+        raise GlbError("a GLB with positions that are not finite")
     if "indices" in primitive:
         triangles = _accessor(document, binary, primitive["indices"]).astype(np.int64).reshape(-1, 3)
     else:

@@ -3,7 +3,9 @@
 An OpenGL context belongs to the thread that made it, and drawing must not hold up the event loop.
 """
 
-import logging
+import contextlib
+import os
+import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +19,7 @@ from renderer.opengl import open_context
 from renderer.overlay import Overlay, write_over
 from renderer.scene import Scene
 
-log = logging.getLogger(__name__)
+_NICE = 5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,4 +114,13 @@ class Studio:
 
 def open_thread() -> ThreadPoolExecutor:
     """The thread that a studio lives in."""
-    return ThreadPoolExecutor(max_workers=1, thread_name_prefix="renderer")
+    return ThreadPoolExecutor(max_workers=1, thread_name_prefix="renderer", initializer=_step_back)
+
+
+def _step_back() -> None:
+    """Let everything else on the machine go first: a late picture harms nobody, a late state may.
+
+    The threads that software OpenGL starts from here take it over.
+    """
+    with contextlib.suppress(AttributeError, OSError):
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)

@@ -1,5 +1,6 @@
 """Meshes: read from GLB, made ready, kept."""
 
+import math
 import struct
 
 import numpy as np
@@ -91,6 +92,11 @@ def test_an_empty_mesh_is_empty():
 def test_what_is_not_a_mesh_is_refused_in_words(data, says):
     with pytest.raises(GlbError, match=says):
         prepared(data)
+
+
+def test_positions_that_are_no_numbers_are_refused():
+    with pytest.raises(GlbError, match="not finite"):
+        prepared(cube(math.nan))
 
 
 def test_nodes_that_go_round_in_a_circle_are_refused():

@@ -15,8 +15,9 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from bus.errors import RefusedError
 from bus.schemas.robomesh_pb2 import ControllerState, KeyFrameAnswer, KeyFrameRequest, VideoFrames
 from bus.session import open_session
-from renderer import service
-from renderer.errors import RendererError
+from renderer import service, stream, studio
+from renderer.encoder import H264Encoder
+from renderer.errors import NoEncoderError, RendererError
 from renderer.overlay import AMBER
 from renderer.service import Settings
 from services import kinematics
@@ -158,6 +159,36 @@ def test_key_frames_are_forced_at_most_once_a_second(mesh, tmp_path):
             assert answers == [KeyFrameAnswer(forced=False)] * 5
             with pytest.raises(RefusedError, match="no view 'behind'; there are free, front, left, top"):
                 await monitor.ask(key.replace("front", "behind"), KeyFrameRequest())
+
+    run(main())
+
+
+def test_a_stream_whose_encoder_fails_comes_back(mesh, tmp_path, monkeypatch):
+    """The encoder is closed under it, as when a GPU is lost."""
+
+    class Failing(H264Encoder):
+        def encode(self, picture, *, key_frame):
+            if opened[0] is self and self._number == 5:
+                raise NoEncoderError("libx264 failed: the test pulled it out")
+            return super().encode(picture, key_frame=key_frame)
+
+    def open_failing(size, fps):
+        opened.append(Failing(size, fps, codec="libx264"))
+        return opened[-1]
+
+    opened = []
+    monkeypatch.setattr(stream, "_TRY_AGAIN_S", 0.2)
+
+    async def main():
+        async with hall(mesh, tmp_path) as (robot, monitor), moving(robot):
+            await picture(monitor)
+            monkeypatch.setattr(studio, "open_encoder", open_failing)
+            video = monitor.subscribe("robomesh/hall/arm/video/front", newest=100, history=False)
+            messages = await frames(video, 12)
+            assert len(opened) == 2
+            decoder = av.CodecContext.create("h264", "r")
+            decoder.thread_count = 1
+            assert sum(len(decoder.decode(av.Packet(m.data))) for _, m in messages[5:]) >= 6
 
     run(main())
 
