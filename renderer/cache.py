@@ -4,8 +4,11 @@ import contextlib
 import hashlib
 import os
 import tempfile
+import zipfile
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 
@@ -34,7 +37,7 @@ def stored_glb(sha256: str, folder: Path) -> bytes | None:
 def store_glb(data: bytes, folder: Path) -> None:
     """Keep a mesh by its hash; a folder that cannot be written costs time later, no more."""
     with contextlib.suppress(OSError):
-        _write_whole(folder / f"{hashlib.sha256(data).hexdigest()}.glb", data)
+        _write_whole(folder / f"{hashlib.sha256(data).hexdigest()}.glb", lambda file: file.write(data))
 
 
 def prepared_once(glb: bytes, *, color: str, folder: Path) -> Mesh:
@@ -46,20 +49,25 @@ def prepared_once(glb: bytes, *, color: str, folder: Path) -> Mesh:
     version = f"{_VERSION} {mesh_module.MOST_TRIANGLES} {color} "
     path = folder / f"{hashlib.sha256(version.encode() + glb).hexdigest()}.npz"
     names = [field.name for field in fields(Mesh)]
-    with contextlib.suppress(OSError, ValueError, KeyError, EOFError), np.load(path) as stored:
+    unreadable = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
+    with contextlib.suppress(*unreadable), path.open("rb") as file, np.load(file) as stored:
         return Mesh(**{name: stored[name] for name in names})
     mesh = prepared(glb, color=color)
+    arrays = {name: getattr(mesh, name) for name in names}
     with contextlib.suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".npz", delete=False) as file:
-            np.savez(file, **{name: getattr(mesh, name) for name in names})
-        Path(file.name).replace(path)
+        _write_whole(path, lambda file: np.savez(file, **arrays))
     return mesh
 
 
-def _write_whole(path: Path, data: bytes) -> None:
-    """All of it or nothing: several renderers share the folder."""
+def _write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
+    """All of it or nothing: several renderers share the folder, and a disk may be full."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
-        file.write(data)
-    Path(file.name).replace(path)
+        partial = Path(file.name)
+        try:
+            write(file.file)
+            file.flush()
+            partial.replace(path)
+        except BaseException:
+            partial.unlink()
+            raise

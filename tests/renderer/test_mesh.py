@@ -120,6 +120,20 @@ def test_a_mesh_is_made_ready_once(tmp_path, monkeypatch):
     assert np.array_equal(first.triangles, again.triangles)
 
 
+def test_a_cache_that_was_damaged_or_cannot_be_written_costs_time_only(tmp_path):
+    glb = cube(0.5)
+    whole = cache.prepared_once(glb, color="", folder=tmp_path)
+    (path,) = tmp_path.iterdir()
+    for length in (0, 10, path.stat().st_size // 2, path.stat().st_size - 1):
+        path.write_bytes(path.read_bytes()[:length])
+        again = cache.prepared_once(glb, color="", folder=tmp_path)
+        assert np.array_equal(again.positions, whole.positions)
+        assert [each.name for each in tmp_path.iterdir()] == [path.name]
+    no_folder = path / "below a file"
+    assert len(cache.prepared_once(glb, color="", folder=no_folder).triangles) == 12
+    cache.store_glb(glb, no_folder)
+
+
 def test_a_stored_mesh_that_was_damaged_is_not_taken(tmp_path):
     cache.store_glb(b"some mesh", tmp_path)
     (path,) = tmp_path.iterdir()
