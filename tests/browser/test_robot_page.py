@@ -5,12 +5,11 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from bus.schemas import robomesh_pb2 as schema
+from services.console import build_page
 
 pytestmark = pytest.mark.browser
 
 ARM = "#/hall/arm"
-STATE = schema.ControllerState
 
 
 def button(page, name):
@@ -248,3 +247,21 @@ def test_the_language_and_the_colours_can_be_switched_and_are_kept(open_page):
     page.reload()
     expect(page.locator("button.stop")).to_contain_text("停止请求")
     assert page.evaluate("document.documentElement.dataset.theme") == "light"
+
+
+@pytest.mark.parametrize("path", ["", ARM])
+@pytest.mark.parametrize("scheme", ["dark", "light"])
+def test_axe_finds_nothing_serious(open_page, path, scheme):
+    page = open_page(path)
+    if scheme == "light":
+        button(page, "Light").click()
+    page.wait_for_selector(".tile" if not path else '[data-joint="waist"]')
+    page.evaluate((build_page.MODULES / "axe-core" / "axe.min.js").read_text())
+    found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")
+    serious = [
+        (each["id"], node["html"][:120], node["failureSummary"])
+        for each in found["violations"]
+        if each["impact"] in ("serious", "critical")
+        for node in each["nodes"]
+    ]
+    assert serious == []

@@ -48,7 +48,8 @@ export function Camera({ robotKey, description }: { robotKey: string; descriptio
     });
   }, [robotKey, shown, video]);
 
-  const age = drawn.newAt == null ? null : Math.max(0, (now.value - drawn.newAt) / 1000);
+  const at = now.value; // read in any case: it is what draws this panel again
+  const age = drawn.newAt == null ? null : Math.max(0, (at - drawn.newAt) / 1000);
   const stale = any && isStale("video/*", age);
   return (
     <Panel

@@ -97,7 +97,7 @@ function Tile({ site, robot, controller, lease, description }: TileData) {
   const holder = lease?.message.holder;
   const problem = controller?.message.fault || controller?.message.stop?.reason || controller?.message.linkText;
   return (
-    <a class={`tile ${state.level}`} href={robotLink(site, robot)} aria-label={t("open_robot", { robot })}>
+    <a class={`tile ${state.level}`} href={robotLink(site, robot)}>
       <Picture robotKey={`robomesh/${site}/${robot}`} description={description?.message} stale={stale} />
       <div class="tile-body">
         <div class="tile-line">

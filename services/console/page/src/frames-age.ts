@@ -8,5 +8,6 @@ import { now } from "./topics";
 export function useFramesAge(robotKey: string): number | null {
   const [last] = useState<{ newAt: number | null }>({ newAt: null });
   useEffect(() => watch(`${robotKey}/frames`, (sample) => (last.newAt = sample.newAt)), [robotKey]);
-  return last.newAt === null ? null : Math.max(0, (now.value - last.newAt) / 1000);
+  const at = now.value; // read in any case: it is what draws the view again
+  return last.newAt === null ? null : Math.max(0, (at - last.newAt) / 1000);
 }

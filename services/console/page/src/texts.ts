@@ -13,7 +13,6 @@ const TEXTS = {
   services: ["Services", "服务"],
   no_services: ["no service seen", "未发现服务"],
   site: ["Site", "站点"],
-  open_robot: ["Open {robot}", "打开 {robot}"],
   no_picture: ["No picture", "无图像"],
 
   connecting: ["Connecting to the console…", "正在连接控制台…"],

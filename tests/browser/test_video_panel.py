@@ -1,0 +1,102 @@
+"""The camera panel decodes real H.264 in a real Chromium, from the joiner's frames on."""
+
+import threading
+from contextlib import contextmanager
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+from playwright.sync_api import expect
+
+pytestmark = pytest.mark.browser
+
+WIDTH, HEIGHT = 320, 180
+
+
+class Encoder:
+    """Plain pictures as H.264, one frame a message, a key frame first."""
+
+    def __init__(self):
+        self._codec = av.CodecContext.create("libx264", "w")
+        self._codec.width, self._codec.height, self._codec.pix_fmt = WIDTH, HEIGHT, "yuv420p"
+        self._codec.options = {"preset": "superfast", "tune": "zerolatency", "x264-params": "keyint=250"}
+
+    def frame(self, red, green, blue):
+        picture = np.full((HEIGHT, WIDTH, 3), (red, green, blue), dtype=np.uint8)
+        (packet,) = self._codec.encode(av.VideoFrame.from_ndarray(picture, format="rgb24"))
+        return CompressedVideo(data=bytes(packet), format="h264"), packet.is_keyframe
+
+
+def pixel(page):
+    return page.evaluate(
+        "() => { const c = document.querySelector('.camera canvas');"
+        "return [...c.getContext('2d').getImageData(c.width / 2, c.height / 2, 1, 1).data].slice(0, 3) }"
+    )
+
+
+@contextmanager
+def repeated(act):
+    """Acts ten times a second meanwhile."""
+    end = threading.Event()
+
+    def go():
+        while not end.wait(0.1):
+            act()
+
+    thread = threading.Thread(target=go)
+    thread.start()
+    try:
+        yield
+    finally:
+        end.set()
+        thread.join()
+
+
+def publisher_of(plant, topic):
+    async def declare():
+        return plant.session.declare_publisher("hall", "arm", topic)
+
+    return plant.call(declare())
+
+
+def test_a_joiner_sees_the_frames_since_the_key_frame_then_live_ones(open_page, plant):
+    publisher, encoder = publisher_of(plant, "video/front"), Encoder()
+    for colour in ((200, 30, 30), (30, 200, 30)):
+        message, key = encoder.frame(*colour)
+        publisher.put(message, key_frame=key)
+    page = open_page("#/hall/arm")
+    page.wait_for_selector('.camera canvas[data-drawn="true"]')
+    page.wait_for_function("document.querySelector('.camera canvas').width === 320")
+    # What was there before is shown, but as old: nobody knows its age.
+    expect(page.locator(".camera .age")).to_have_text("stale, age unknown")
+    red, green, _ = pixel(page)
+    assert green > 150 > red
+    with repeated(lambda: publisher.put(encoder.frame(30, 30, 200)[0])):
+        expect(page.locator(".camera .age")).to_have_count(0)
+        page.wait_for_function(
+            "() => { const c = document.querySelector('.camera canvas');"
+            "return c.getContext('2d').getImageData(9, 9, 1, 1).data[2] > 150 }"
+        )
+    expect(page.locator(".camera .age")).to_contain_text("stale 1")
+    publisher.close()
+
+
+def test_a_browser_without_a_decoder_shows_still_pictures_and_says_so(open_page, plant):
+    publisher = publisher_of(plant, "image/front")
+    page = open_page("#/hall/arm")
+    page.add_init_script("delete window.VideoDecoder")
+    page.reload()
+    picture = av.VideoFrame.from_ndarray(np.full((90, 160, 3), 90, dtype=np.uint8), format="rgb24")
+    codec = av.CodecContext.create("mjpeg", "w")
+    codec.width, codec.height, codec.pix_fmt = 160, 90, "yuvj420p"
+    codec.time_base = Fraction(1, 5)
+    (packet,) = codec.encode(picture.reformat(format="yuvj420p"))
+    with repeated(lambda: publisher.put(CompressedImage(data=bytes(packet), format="jpeg"))):
+        expect(page.locator(".camera img")).to_be_visible()
+        page.wait_for_function("document.querySelector('.camera img').naturalWidth === 160")
+        expect(page.locator(".camera .age")).to_have_count(0)
+    expect(page.locator(".camera .footnote")).to_contain_text("Still pictures")
+    publisher.close()
