@@ -1,6 +1,7 @@
 """Presence: who is alive, told by Zenoh's liveliness."""
 
 import asyncio
+import contextlib
 from collections.abc import AsyncIterator
 
 import zenoh
@@ -8,7 +9,28 @@ import zenoh
 from bus import keys
 from bus.errors import KeyNameError
 
+_TIMEOUT_S = 2.0
 EVERYBODY = f"{keys.ROOT}/*/*/alive/*/*"
+
+
+async def present(session: zenoh.Session, key_expr: str = EVERYBODY) -> list[keys.PresenceKey]:
+    """Who is alive now, sorted."""
+    loop = asyncio.get_running_loop()
+    done = asyncio.Event()
+    found: set[keys.PresenceKey] = set()
+
+    def on_reply(reply: zenoh.Reply) -> None:
+        if reply.ok is not None:
+            with contextlib.suppress(KeyNameError):
+                found.add(keys.parse_presence_key(str(reply.ok.key_expr)))
+
+    def on_end() -> None:
+        if not loop.is_closed():
+            loop.call_soon_threadsafe(done.set)
+
+    session.liveliness().get(key_expr, zenoh.handlers.Callback(on_reply, on_end), timeout=_TIMEOUT_S)
+    await done.wait()
+    return sorted(found)
 
 
 class PresenceWatch:

@@ -130,6 +130,10 @@ class Session:
         self._declared.append(watch)
         return watch
 
+    async def present(self) -> list[keys.PresenceKey]:
+        """Who is alive now, everywhere, sorted."""
+        return await presence.present(self.zenoh_session)
+
     async def _refresh(self) -> None:
         async for who, alive in self.watch_presence():
             self._subscriptions = [each for each in self._subscriptions if not each.closed]

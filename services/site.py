@@ -17,6 +17,7 @@ from robots.description import Pose
 from services.errors import ListenError, SiteFileError
 from services.listen import split_address
 
+Pixels = Annotated[int, Field(ge=64, le=4096, multiple_of=2)]
 Triple = tuple[float, float, float]
 Quiet = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -123,7 +124,8 @@ class Renderer(BaseModel):
 
     model_config = Quiet
     views: tuple[str, ...] = ("front", "top", "left", "free")
-    size: tuple[Annotated[int, Field(ge=64, le=4096)], Annotated[int, Field(ge=64, le=4096)]] = (1280, 720)
+    # H.264 halves the resolution of colour.
+    size: tuple[Pixels, Pixels] = (1280, 720)
     fps: Annotated[float, Field(ge=1, le=120)] = 30
 
 

@@ -8,14 +8,11 @@ from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
 from typing import Any, NamedTuple, TypeVar
 
-from bus.keys import WHOLE_SITE, PresenceKey
+from bus.keys import WHOLE_SITE
 from bus.session import Session, SessionSettings, open_session
 from services.errors import ServiceError
 
 T = TypeVar("T")
-
-# Liveliness answers at once; this is for a far site.
-_LOOK_S = 0.4
 
 
 class Robot(NamedTuple):
@@ -44,28 +41,13 @@ async def attached(router: str) -> AsyncIterator[Session]:
         yield session
 
 
-async def services(session: Session) -> list[PresenceKey]:
-    """Who is alive, everywhere, sorted."""
-    found: set[PresenceKey] = set()
-    watch = session.watch_presence()
-    try:
-        async with asyncio.timeout(_LOOK_S):
-            async for key, alive in watch:
-                (found.add if alive else found.discard)(key)
-    except TimeoutError:
-        pass
-    finally:
-        watch.close()
-    return sorted(found)
-
-
 async def find(session: Session, text: str) -> Robot:
     """The robot that `robot` or `site/robot` means.
 
     Raises:
         NoSuchRobotError: If there is none, or `robot` stands at several sites.
     """
-    alive = await services(session)
+    alive = await session.present()
     robots = sorted({Robot(key.site, key.robot) for key in alive if key.robot != WHOLE_SITE})
     found = [robot for robot in robots if text in (robot.name, str(robot))]
     if len(found) == 1:

@@ -43,7 +43,7 @@ def run(router: str, as_json: bool) -> None:
 
 async def _collect(router: str) -> dict[str, Any]:
     async with find.attached(router) as session:
-        alive = await find.services(session)
+        alive = await session.present()
         robots = sorted({(key.site, key.robot) for key in alive if key.robot != WHOLE_SITE})
         rows = await asyncio.gather(*(_row(session, site, robot) for site, robot in robots))
         return {

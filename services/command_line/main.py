@@ -118,12 +118,16 @@ def simulate(
     fault: Annotated[
         list[str] | None, typer.Option(metavar="NAME[@SECONDS]", help="freeze, garbage; when it begins.")
     ] = None,
+    code: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NUMBER=TYPE", help="A type code of the site file: 2=ABSOLUTE.DEG"),
+    ] = None,
     insecure: Annotated[bool, typer.Option(help="Listen beyond loopback, without any protection.")] = False,
 ) -> None:
     """Run a controller of the old kind that simulates its arm."""
     from services.command_line import roles
 
-    roles.simulate(robot, listen, rate, max_clients, demo, tuple(fault or ()), insecure)
+    roles.simulate(robot, listen, rate, max_clients, demo, tuple(fault or ()), code or [], insecure)
 
 
 # ------------------------------------------------------------- what is there

@@ -50,7 +50,7 @@ def list_all(router: str, as_json: bool) -> None:
 
 async def _list(router: str) -> list[schema.Recording]:
     async with find.attached(router) as session:
-        sites = {key.site for key in await find.services(session) if key.service == "recorder"}
+        sites = {key.site for key in await session.present() if key.service == "recorder"}
         found: list[schema.Recording] = []
         for site in sorted(sites):
             answer = await session.ask(robot_key(site, WHOLE_SITE, "recordings/list"), timeout_s=10.0)

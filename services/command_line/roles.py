@@ -144,6 +144,7 @@ def simulate(
     max_clients: int,
     demo: bool,
     faults: tuple[str, ...],
+    codes: list[str],
     insecure: bool,
 ) -> None:
     """Run a simulated controller."""
@@ -157,9 +158,18 @@ def simulate(
         max_clients=max_clients,
         demo=demo,
         faults=faults,
+        codes=dict(_code(text) for text in codes),
         insecure=insecure,
     )
     service.run_until_signalled(role.serve(settings, ready=lambda line: print(line, flush=True)))
+
+
+def _code(text: str) -> tuple[int, str]:
+    number, _, meaning = text.partition("=")
+    try:
+        return int(number), meaning
+    except ValueError:
+        raise ControllerError(f"--code {text}: NUMBER=TYPE is right, as in 2=ABSOLUTE.DEG") from None
 
 
 def _begin(path: Path | None) -> Site:

@@ -1,6 +1,7 @@
 """`robomesh up`: the whole site under the supervisor, and a ready line when the arm is on the page."""
 
 import asyncio
+import logging
 import socket
 import sys
 import urllib.error
@@ -20,6 +21,8 @@ _CONSOLE_POLL_S = 0.1
 
 def run(path: Path | None) -> None:
     """Run the site until Ctrl-C."""
+    # The services say themselves that they wait for their router.
+    logging.getLogger("bus").setLevel(logging.ERROR)
     site = site_file.load(path)
     endpoint = reachable(site.router.listen[0])
 
@@ -40,7 +43,10 @@ def programs(site: Site, path: Path | None, endpoint: str) -> tuple[Program, ...
             port = _free_port()
             arguments = ("simulate", "--robot", robot.model, "--listen", f"127.0.0.1:{port}")
             demo = ("--demo",) if robot.demo else ()
-            simulators.append(Program(name=f"simulate {robot.name}", arguments=(*arguments, *demo)))
+            codes = (
+                option for code, type_ in robot.codes.items() for option in ("--code", f"{code}={type_}")
+            )
+            simulators.append(Program(name=f"simulate {robot.name}", arguments=(*arguments, *demo, *codes)))
             controllers += ["--controller", f"{robot.name}=tcp://127.0.0.1:{port}"]
     return (
         Program(name="router", arguments=("router", *of_site)),

@@ -270,6 +270,7 @@ def test_presence_comes_and_goes(mesh):
                 service.declare_presence("site", "arm", "gateway")
                 key, alive = await anext(watch)
                 assert (key.site, key.robot, key.service, alive) == ("site", "arm", "gateway", True)
+                assert await monitor.present() == [key]
             key, alive = await anext(watch)
             assert (key.service, alive) == ("gateway", False)
 
