@@ -95,7 +95,7 @@ function Tile({ site, robot, controller, lease, description }: TileData) {
   const stale = isStale("controller", unitAge);
   const leaseKnown = lease !== undefined && !isStale("lease", ageOf(lease));
   const holder = lease?.message.holder;
-  const problem = controller?.message.fault || controller?.message.stop?.reason || controller?.message.linkText;
+  const problem = problemOf(controller?.message);
   return (
     <a class={`tile ${state.level}`} href={robotLink(site, robot)}>
       <Picture robotKey={`robomesh/${site}/${robot}`} description={description?.message} stale={stale} />
@@ -123,6 +123,14 @@ function Tile({ site, robot, controller, lease, description }: TileData) {
       </div>
     </a>
   );
+}
+
+/** What is wrong, in words. */
+function problemOf(controller: ControllerState | undefined): string {
+  if (controller?.fault) return controller.fault;
+  const stop = controller?.stop;
+  if (stop) return t("stopped_by", { by: stop.by || "–", time: stampTime(stop.since) });
+  return controller?.linkText ?? "";
 }
 
 /** Services alive for a robot or a site, by presence. */

@@ -7,6 +7,7 @@ import { DASH, fixed, jointText, jointUnit } from "./format";
 import type { JointStates } from "./gen/foxglove/JointStates_pb";
 import { ControllerState_Activity as Activity } from "./gen/robomesh_pb";
 import type { ControllerState, Description, Description_Joint } from "./gen/robomesh_pb";
+import { showGhost } from "./ghost";
 import { JointTrack } from "./joint-track";
 import { Age, NoticeLine, Panel } from "./parts";
 import { t } from "./texts";
@@ -42,10 +43,19 @@ export function JointsPanel(props: {
     if (!mine) setNotice(null);
   }, [mine]);
 
+  const wantedAt = (index: number, value: number) =>
+    rows.map((_, i) => (i === index ? value : (targets[i] ?? current[i])));
+  const show = (index: number, value: number | undefined) => {
+    setPreview(value === undefined ? null : { index, value });
+    const wanted = value === undefined ? null : wantedAt(index, value);
+    showGhost(robotKey, wanted?.every((each) => each !== undefined) ? (wanted as number[]) : null);
+  };
+  useEffect(() => () => showGhost(robotKey, null), [robotKey, enabled]);
+
   const send = async (index: number, value: number) => {
-    setPreview(null);
+    show(index, undefined);
     const joint = rows[index];
-    const wanted = rows.map((_, i) => (i === index ? value : (targets[i] ?? current[i])));
+    const wanted = wantedAt(index, value);
     if (!joint || wanted.some((each) => each === undefined)) return;
     setTargets(wanted.map((each, i) => (i === index || targets[i] !== undefined ? each : undefined)));
     const what = `${joint.name} ${jointText(joint, value)}`;
@@ -58,8 +68,9 @@ export function JointsPanel(props: {
     );
     if (!accepted) setTargets([]);
   };
-  const idle = preview
-    ? `${t("target")} ${rows[preview.index]?.name}: ${rows[preview.index] ? jointText(rows[preview.index]!, preview.value) : ""}`
+  const set = preview && rows[preview.index];
+  const idle = set
+    ? `${t("target")} ${set.name}: ${jointText(set, preview.value)}`
     : t(mine ? "joint_hint" : "joint_hint_take");
   return (
     <Panel
@@ -87,7 +98,7 @@ export function JointsPanel(props: {
                 enabled={enabled}
                 step={unit === "°" ? DEGREE : 0.001}
                 text={(value) => jointText(joint, value)}
-                preview={(value) => setPreview(value === undefined ? null : { index, value })}
+                preview={(value) => show(index, value)}
                 send={(value) => void send(index, value)}
               />
               <span class="limit dim">{fixed(joint.upper * factor, 0)}</span>

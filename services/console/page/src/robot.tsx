@@ -87,7 +87,8 @@ function Headline(props: {
   const { controller, description } = props;
   const message = controller?.message;
   const facts: string[] = [];
-  if (message) {
+  // What was so is not said as if it were so.
+  if (message && !isStale("controller", ageOf(controller))) {
     facts.push(t(message.mode === Mode.LOCAL ? "mode_local" : message.mode === Mode.REMOTE ? "mode_remote" : "mode_unknown"));
     facts.push(t(message.homed === Known.YES ? "homed" : message.homed === Known.NO ? "not_homed" : "homed_unknown"));
     if (message.readOnly) facts.push(t("read_only"));

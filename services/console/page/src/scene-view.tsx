@@ -5,6 +5,7 @@ import { create } from "@bufbuild/protobuf";
 import { staleText, timeOfDay } from "./format";
 import { ViewSchema, View_Projection } from "./gen/robomesh_pb";
 import type { Description, View } from "./gen/robomesh_pb";
+import { ghost } from "./ghost";
 import { watch } from "./mesh";
 import { Choice, Toggle } from "./parts";
 import { RobotScene } from "./scene";
@@ -97,6 +98,7 @@ export function SceneView(props: {
   useEffect(() => scene.current?.setColours(), [theme.value]);
   useEffect(() => scene.current?.showTrail(trail), [trail, identity]);
   useEffect(() => scene.current?.showFrames(frames), [frames, identity]);
+  useEffect(() => scene.current?.showGhost(ghost.value), [ghost.value, loaded]);
   const views = viewsOf(description);
   const chosen = views.find((each) => each.name === view) ?? freeView([]);
   useEffect(() => scene.current?.look(chosen), [chosen.name, identity]);

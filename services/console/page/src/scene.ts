@@ -13,6 +13,7 @@ import { floor, lights, palette } from "./scene-surroundings";
 
 const FIELD_OF_VIEW = 32; // degrees, upright
 const TRAIL_POINTS = 900;
+const SAME_PLACE = 2e-3; // m, or of a rotation's matrix
 const LATE_MS = 45;
 const LATE_FRAMES = 15;
 const SOFTWARE_FRAME_MS = 60;
@@ -29,6 +30,7 @@ export class RobotScene {
   private controls: OrbitControls;
   private readonly player = new FramePlayer();
   private readonly links = new Map<string, THREE.Group>();
+  private readonly ghosts = new Map<string, THREE.Group>();
   private readonly axes = new Map<string, THREE.AxesHelper>();
   private readonly trail: THREE.Line<THREE.BufferGeometry, THREE.LineBasicMaterial>;
   private trailLength = 0;
@@ -170,6 +172,41 @@ export class RobotScene {
       });
     }
     this.dirty = true;
+  }
+
+  /** Shows where the links would be, as placements in the base frame by rows; null: not at all. */
+  showGhost(placements: ReadonlyMap<string, readonly number[]> | null): void {
+    for (const [frame, group] of this.links) {
+      const placement = placements?.get(frame.slice(this.prefix.length + 1));
+      let copy = this.ghosts.get(frame);
+      if (!copy && placement) {
+        copy = this.ghostOf(group);
+        this.ghosts.set(frame, copy);
+        this.scene.add(copy);
+      }
+      if (!copy) continue;
+      if (placement) copy.matrix.fromArray(placement).transpose().premultiply(this.base);
+      // A link that stays where it is needs no ghost over it.
+      copy.visible = placement !== undefined && !alike(copy.matrix, group.matrix);
+    }
+    this.dirty = true;
+  }
+
+  private ghostOf(group: THREE.Group): THREE.Group {
+    const copy = group.clone();
+    copy.matrixAutoUpdate = false;
+    const material = new THREE.MeshStandardMaterial({
+      color: palette().accent,
+      transparent: true,
+      opacity: 0.4,
+      depthWrite: false,
+    });
+    copy.traverse((part) => {
+      if (!(part instanceof THREE.Mesh)) return;
+      part.material = material;
+      part.castShadow = false;
+    });
+    return copy;
   }
 
   showTrail(shown: boolean): void {
@@ -325,4 +362,8 @@ function drawsInSoftware(): boolean {
   const name = context && names ? String(context.getParameter(names.UNMASKED_RENDERER_WEBGL)) : "";
   context?.getExtension("WEBGL_lose_context")?.loseContext();
   return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
+
+function alike(first: THREE.Matrix4, second: THREE.Matrix4): boolean {
+  return first.elements.every((value, i) => Math.abs(value - (second.elements[i] ?? 0)) < SAME_PLACE);
 }
