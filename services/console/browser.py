@@ -7,7 +7,8 @@ import asyncio
 import logging
 import time
 from collections import deque
-from typing import cast
+from collections.abc import Coroutine
+from typing import Any
 
 from google.protobuf.message import DecodeError
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -160,10 +161,10 @@ class Browser:
         else:
             self.tell(ToPage(answer=ToPage.Answer(id=ask.id, ok=True, payload=payload)))
 
-    def _keep(self, work: object) -> None:
-        task = asyncio.ensure_future(cast("asyncio.Future[None]", work))
-        self._asks.add(cast("asyncio.Task[None]", task))
-        task.add_done_callback(lambda done: self._asks.discard(cast("asyncio.Task[None]", done)))
+    def _keep(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.create_task(work)
+        self._asks.add(task)
+        task.add_done_callback(self._asks.discard)
 
 
 def check_ask(key: str) -> None:

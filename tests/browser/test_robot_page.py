@@ -95,6 +95,8 @@ def test_a_slider_moves_the_joint_when_it_is_let_go_and_not_before(open_page, pl
     drag(page, "waist", 30, release=False)
     expect(page.locator(".joints .notice")).to_contain_text("Target waist:")
     assert audited(plant, "MOVE_ABSOLUTE") == moves
+    # Every link beyond the waist is shown where it would be.
+    page.wait_for_selector('.canvas-place canvas[data-ghost="5"]')
     wanted = float(
         re.search(r"waist: (\S+)°", page.locator(".joints .notice").inner_text())[1].replace("−", "-")
     )

@@ -109,7 +109,7 @@ export function ControlPanel(props: {
       {!stopped && (
         <Speed
           enabled={can}
-          send={(value) => send(Command.SPEED, t("what_speed", { value }), { speedPercent: value })}
+          send={(value) => command(robotKey, Command.SPEED, t("what_speed", { value }), { speedPercent: value })}
         />
       )}
       <NoticeLine notice={controlNotice.value} idle={state?.readOnly ? t("read_only_text") : mine ? "" : t("take_first")} />
@@ -135,12 +135,13 @@ function Holder({ mine, holder, lease }: { mine: boolean; holder: string | null;
 }
 
 /** The speed to ask for; a range sends on release, by pointer or by Enter. The controller does not tell its own. */
-function Speed({ enabled, send }: { enabled: boolean; send: (percent: number) => void }) {
-  const [percent, setPercent] = useState<number | null>(null);
-  const [unsent, setUnsent] = useState(false);
+function Speed({ enabled, send }: { enabled: boolean; send: (percent: number) => Promise<boolean> }) {
+  const [sent, setSent] = useState<number | null>(null);
+  const [unsent, setUnsent] = useState<number | null>(null);
+  const percent = unsent ?? sent;
   const release = () => {
-    if (unsent && percent !== null && enabled) send(percent);
-    setUnsent(false);
+    setUnsent(null);
+    if (unsent !== null && enabled) void send(unsent).then((accepted) => accepted && setSent(unsent));
   };
   return (
     <label class="speed">
@@ -154,11 +155,10 @@ function Speed({ enabled, send }: { enabled: boolean; send: (percent: number) =>
         disabled={!enabled}
         title={t("speed_hint")}
         aria-valuetext={percent === null ? "–" : `${percent} %`}
-        onInput={(event) => {
-          setPercent(Number(event.currentTarget.value));
-          setUnsent(true);
-        }}
+        onInput={(event) => setUnsent(Number(event.currentTarget.value))}
         onPointerUp={release}
+        onPointerCancel={() => setUnsent(null)}
+        onBlur={() => setUnsent(null)}
         onKeyDown={(event) => event.key === "Enter" && release()}
       />
       <span class="value">

@@ -27,7 +27,7 @@ export function JointTrack(props: TrackProps) {
   const track = useRef<HTMLDivElement>(null);
   const [dragged, setDragged] = useState<number | undefined>(undefined);
   const [typed, setTyped] = useState<number | undefined>(undefined);
-  const drag = useRef<{ pointer: number; offset: number; moved: boolean } | null>(null);
+  const drag = useRef<{ pointer: number; offset: number; value?: number } | null>(null);
 
   const clamp = (value: number) => Math.min(upper, Math.max(lower, value));
   const share = (value: number) => `${(100 * (clamp(value) - lower)) / (upper - lower)}%`;
@@ -48,19 +48,19 @@ export function JointTrack(props: TrackProps) {
   const onDown = (event: PointerEvent & { currentTarget: HTMLElement }) => {
     if (!enabled || shown === undefined || event.button !== 0) return;
     event.currentTarget.setPointerCapture(event.pointerId);
-    drag.current = { pointer: event.pointerId, offset: valueAt(event.clientX) - shown, moved: false };
+    drag.current = { pointer: event.pointerId, offset: valueAt(event.clientX) - shown };
     setTyped(undefined);
   };
   const onMove = (event: PointerEvent) => {
     if (drag.current?.pointer !== event.pointerId) return;
     const value = clamp(valueAt(event.clientX) - drag.current.offset);
-    drag.current.moved = true;
+    drag.current.value = value;
     setDragged(value);
     props.preview(value);
   };
   const onUp = (event: PointerEvent) => {
     if (drag.current?.pointer !== event.pointerId) return;
-    take(drag.current.moved && enabled ? dragged : undefined);
+    take(enabled ? drag.current.value : undefined);
   };
   const onKey = (event: KeyboardEvent) => {
     if (!enabled || shown === undefined) return;
@@ -88,9 +88,7 @@ export function JointTrack(props: TrackProps) {
       <div class="track-bar" />
       {lower < 0 && upper > 0 && <div class="track-zero" style={{ left: share(0) }} />}
       {position !== undefined && (
-        <>
-          <div class="track-position" style={{ left: share(position) }} />
-        </>
+        <div class="track-position" style={{ left: share(position) }} />
       )}
       {shown !== undefined && enabled && (
         <div

@@ -126,7 +126,6 @@ export function SceneView(props: {
           tabIndex={0}
           role="img"
           aria-label={`${t("scene")}. ${t("scene_hint")}`}
-          title=""
           onKeyDown={onKey}
           data-loaded={loaded}
         />

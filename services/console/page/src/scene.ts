@@ -189,6 +189,7 @@ export class RobotScene {
       // A link that stays where it is needs no ghost over it.
       copy.visible = placement !== undefined && !alike(copy.matrix, group.matrix);
     }
+    this.canvas.dataset["ghost"] = String([...this.ghosts.values()].filter((copy) => copy.visible).length);
     this.dirty = true;
   }
 
