@@ -134,6 +134,8 @@ class Console(BaseModel):
 
     model_config = Quiet
     listen: str = "127.0.0.1:8080"
+    # Names that people reach it by, beside addresses and localhost.
+    hosts: tuple[str, ...] = ()
     insecure: bool = False
 
 

@@ -127,7 +127,12 @@ def console(path: Path | None, connect: str) -> None:
     from services.console import console as role
 
     site = _begin(path)
-    settings = role.Settings(site=site.site, listen=site.console.listen, insecure=site.console.insecure)
+    settings = role.Settings(
+        site=site.site,
+        listen=site.console.listen,
+        insecure=site.console.insecure,
+        hosts=site.console.hosts,
+    )
     service.run(
         role.serve,
         settings,
