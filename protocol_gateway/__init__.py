@@ -1,1 +1,1 @@
-"""The gateway between a controller's legacy protocol and the mesh: protocol core, drivers, link, authority, audit."""
+"""Between a controller and the mesh: protocol core, drivers, link, authority, audit, gateway."""

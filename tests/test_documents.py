@@ -31,9 +31,8 @@ def request_rows() -> list[str]:
     for row in REQUESTS.values():
         asked, answer = (s.DESCRIPTOR.name if s else "-" for s in (row.request, row.answer))
         owners = ", ".join(sorted(role.value for role in row.owners))
-        rows.append(
-            f"| `{row.name}` | {asked} | {answer if row.answer else 'bytes'} | {row.priority.value} | {owners} |"
-        )
+        answered = answer if row.answer else "bytes"
+        rows.append(f"| `{row.name}` | {asked} | {answered} | {row.priority.value} | {owners} |")
     return rows
 
 
