@@ -11,7 +11,7 @@ import zenoh
 from google.protobuf.message import Message
 
 from bus import keys, presence, requests
-from bus.endpoints import DEFAULT_ROUTER, Tls, client_config, first_line
+from bus.endpoints import DEFAULT_ROUTER, Tls, client_config
 from bus.errors import SessionError
 from bus.publisher import OnGet, Publisher
 from bus.subscription import Subscription
@@ -171,11 +171,11 @@ async def open_session(settings: SessionSettings) -> AsyncIterator[Session]:
         try:
             session = Session(await asyncio.to_thread(zenoh.open, config))
             break
-        except zenoh.ZError as error:
+        except zenoh.ZError:
             if deadline is not None and loop.time() >= deadline:
                 raise SessionError(
                     f"no router at {routers}: start one (robomesh up, robomesh router) or name another "
-                    f"with --connect ({first_line(error)})"
+                    "with --connect"
                 ) from None
             if not told:
                 log.warning("no router at %s yet: waiting for one", routers)

@@ -62,6 +62,7 @@ def site_file(
     folder: Path, *, name: str = "test", robots: str, router: str, console: str, more: str = ""
 ) -> Path:
     """Write a site file with ports of its own."""
+    folder.mkdir(exist_ok=True)
     path = folder / "site.toml"
     path.write_text(
         f"""

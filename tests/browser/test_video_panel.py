@@ -69,7 +69,7 @@ def test_a_joiner_sees_the_frames_since_the_key_frame_then_live_ones(open_page, 
         publisher.put(message, key_frame=key)
     page = open_page("#/hall/arm")
     page.wait_for_selector('.camera canvas[data-drawn="true"]')
-    page.wait_for_function("document.querySelector('.camera canvas').width === 320")
+    page.wait_for_function("() => document.querySelector('.camera canvas').width === 320")
     # What was there before is shown, but as old: nobody knows its age.
     expect(page.locator(".camera .age")).to_have_text("stale, age unknown")
     red, green, _ = pixel(page)
@@ -96,7 +96,7 @@ def test_a_browser_without_a_decoder_shows_still_pictures_and_says_so(open_page,
     (packet,) = codec.encode(picture.reformat(format="yuvj420p"))
     with repeated(lambda: publisher.put(CompressedImage(data=bytes(packet), format="jpeg"))):
         expect(page.locator(".camera img")).to_be_visible()
-        page.wait_for_function("document.querySelector('.camera img').naturalWidth === 160")
+        page.wait_for_function("() => document.querySelector('.camera img').naturalWidth === 160")
         expect(page.locator(".camera .age")).to_have_count(0)
     expect(page.locator(".camera .footnote")).to_contain_text("Still pictures")
     publisher.close()

@@ -313,13 +313,16 @@ def test_bad_input_is_one_line_that_names_it_and_exit_status_2(tmp_path):
         router=router,
         console=f"127.0.0.1:{free_port()}",
     )
+    no_address = site_file(
+        tmp_path / "known", robots=ONE_ARM, router=router, console=f"127.0.0.1:{free_port()}"
+    )
     mesh = tmp_path / "base.wrl"
     mesh.write_text("not a mesh")
     for arguments, words in (
         (("up", str(tmp_path / "none.toml")), "none.toml"),
         (("up", str(unreadable)), "broken.toml"),
         (("kinematics", "--site", str(unknown)), "pt6000"),
-        (("gateway", "--site", str(unknown)), "--controller arm="),
+        (("gateway", "--site", str(no_address)), "--controller arm="),
         (("list", "--connect", router), "no router"),
         (("list", "--connect", "nonsense"), "nonsense"),
         (("monitor", "arm", "--connect", router), "no router"),
