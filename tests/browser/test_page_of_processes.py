@@ -1,0 +1,63 @@
+"""From unit to pixel through real processes: `robomesh up`, and its page in a real Chromium."""
+
+import json
+
+import pytest
+from playwright.sync_api import expect, sync_playwright
+
+from tests.browser.conftest import ARGUMENTS, CHROMIUM
+from tests.browser.test_robot_page import button, degrees, drag, take
+from tests.site import robomesh, running_site, wait_until
+
+pytestmark = [pytest.mark.browser, pytest.mark.processes]
+
+
+@pytest.fixture
+def site(tmp_path):
+    if not CHROMIUM.exists():
+        pytest.skip(f"no {CHROMIUM}: the page is not driven here")
+    with running_site(tmp_path) as running:
+        yield running
+
+
+def test_home_trace_move_and_stop_from_the_page_reach_the_controller_and_the_recording(site):
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS)
+        page = browser.new_page(viewport={"width": 1440, "height": 900})
+        page.set_default_timeout(30_000)
+        page.goto(f"{site.console}#/test/arm")
+        take(page)
+        button(page, "Home").click()
+        expect(page.locator(".headline .state")).to_have_text("Idle", timeout=30_000)
+        assert degrees(page, "shoulder") == pytest.approx(90.0, abs=0.02)
+
+        button(page, "Trace on").click()
+        expect(button(page, "Trace off")).to_be_visible()
+        wait_until(lambda: recordings(site) and recordings(site)[0]["topics"], what="no recording began")
+        before = degrees(page, "waist")
+        drag(page, "waist", 60)
+        expect(page.locator(".headline .state")).to_have_text("Moving")
+        expect(page.locator(".headline .state")).to_have_text("Idle", timeout=30_000)
+        assert degrees(page, "waist") > before + 5
+
+        drag(page, "waist", -120)
+        expect(page.locator(".headline .state")).to_have_text("Moving")
+        page.locator("button.stop").click()
+        expect(page.locator(".headline .state")).to_have_text("Stopped")
+        page.get_by_role("button", name="Reset stop").click()
+        expect(page.locator(".stopped")).to_have_count(0)
+        button(page, "Trace off").click()
+        wait_until(lambda: not recordings(site)[0]["open"], what="the recording did not close")
+        button(page, "Release").click()
+        browser.close()
+    (recording,) = recordings(site)
+    counts = {topic["topic"].removeprefix("robomesh/test/arm/"): topic for topic in recording["topics"]}
+    assert counts["joints"]["messages"] > 100
+    assert counts["joints"]["lost"] == 0
+    assert counts["audit"]["messages"] >= 3
+    assert counts["video/top"]["messages"] > 0
+
+
+def recordings(site):
+    lines = robomesh("recordings", "list", "--json", "--connect", site.router).stdout.splitlines()
+    return [json.loads(line) for line in lines]
