@@ -1,0 +1,118 @@
+"""How long a picture takes: drawing, overlay, H.264, JPEG; for each size and anti-aliasing.
+
+    ./dev run python benchmarks/drawing.py [--robot pt600] [--device N] [--pictures 60] [--json]
+
+Runs on software OpenGL and on a GPU alike, and says which it was, and which encoder.
+"""
+
+import argparse
+import json
+import time
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from renderer.cameras import Camera, fitted
+from renderer.drawing import Drawing
+from renderer.encoder import jpeg, open_encoder
+from renderer.errors import RendererError
+from renderer.mesh import prepared
+from renderer.opengl import open_context
+from renderer.overlay import Overlay, Row, write_over
+from renderer.scene import Part, Scene
+from robots.description import load
+from robots.glb import link_meshes
+from robots.model import build_model, link_placements
+
+SIZES = ((640, 360), (854, 480), (1280, 720), (1920, 1080))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--robot", default="pt600")
+    parser.add_argument("--device", type=int, default=None, help="number of the EGL device")
+    parser.add_argument("--pictures", type=int, default=60)
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    try:
+        result = measure(arguments.robot, arguments.device, arguments.pictures)
+    except RendererError as error:
+        parser.exit(2, f"{error}\n")
+    if arguments.json:
+        print(json.dumps(result))
+        return
+    print(f"{result['robot']}, {result['triangles']} triangles; {result['device']}; {result['encoder']}")
+    print("size        samples   draw  overlay   h264   jpeg   all: ms (median; p90 of all)   kB/frame")
+    for row in result["rows"]:
+        width, height = row["size"]
+        print(
+            f"{width:4} x {height:<4} {row['samples']:7} {row['draw']:7.1f} {row['overlay']:7.2f} "
+            f"{row['h264']:7.1f} {row['jpeg']:6.1f} {row['all']:6.1f} {row['all_p90']:8.1f} "
+            f"{row['kilobytes']:20.1f}"
+        )
+
+
+def measure(robot: str, device: int | None, pictures: int) -> dict[str, Any]:
+    """Medians [ms] of each step for each size and anti-aliasing."""
+    description = load(robot)
+    model = build_model(description)
+    meshes = {name: prepared(glb) for name, glb in link_meshes(description).items()}
+    rows = []
+    for size, samples in product(SIZES, (0, 4)):
+        drawing = Drawing(open_context(device), size, samples=samples)
+        for name, mesh in meshes.items():
+            drawing.add(name, mesh)
+        encoder = open_encoder(size, 30)
+        times, sizes = [], []
+        for number in range(pictures):
+            positions = model.joints.home + 0.3 * np.sin(number / 15)
+            placements = dict(zip(model.link_names, link_placements(model, positions), strict=True))
+            scene, camera = view(meshes, placements, size)
+            marks = [time.perf_counter()]
+            picture = drawing.draw(scene, camera)
+            marks.append(time.perf_counter())
+            write_over(picture, overlay(positions))
+            marks.append(time.perf_counter())
+            sizes.append(len(encoder.encode(picture, key_frame=number == 0).data))
+            marks.append(time.perf_counter())
+            jpeg(picture)
+            marks.append(time.perf_counter())
+            times.append(np.diff(marks) * 1e3)
+        table = np.array(times)
+        draw, write, h264, still = np.median(table, axis=0).tolist()
+        total = table[:, :3].sum(axis=1)
+        rows.append(
+            {
+                **{"size": size, "samples": samples, "draw": draw, "overlay": write, "h264": h264},
+                **{"jpeg": still, "all": float(np.median(total)), "all_p90": float(np.percentile(total, 90))},
+                "kilobytes": float(np.mean(sizes)) / 1e3,
+            }
+        )
+        name = drawing.renderer_name
+        drawing.close()
+    triangles = sum(len(mesh.triangles) for mesh in meshes.values())
+    return {
+        "robot": robot,
+        "triangles": triangles,
+        "device": name,
+        "encoder": encoder.name,
+        "rows": rows,
+    }
+
+
+def view(meshes, placements, size):
+    points = np.array([[x, y, z] for x in (-0.4, 0.4) for y in (-0.4, 0.4) for z in (0.0, 1.0)])
+    center = np.array([0.0, 0.0, 0.45])
+    camera = Camera(center + np.array([1.5, -1.5, 0.85]), center, np.array([0.0, 0.0, 1.0]))
+    parts = tuple(Part(name, placements[name]) for name in meshes)
+    return Scene(parts, center, 0.9), fitted(camera, size[0] / size[1], points)
+
+
+def overlay(positions):
+    rows = tuple(Row(f"joint {n}", f"{np.degrees(q):.2f}", "°", 0.5) for n, q in enumerate(positions))
+    return Overlay(title="robot", view="free", time=f"{positions[0]:.3f}", state="moving", rows=rows)
+
+
+if __name__ == "__main__":
+    main()
