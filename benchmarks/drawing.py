@@ -84,8 +84,14 @@ def measure(robot: str, device: int | None, pictures: int) -> dict[str, Any]:
         total = table[:, :3].sum(axis=1)
         rows.append(
             {
-                **{"size": size, "samples": samples, "draw": draw, "overlay": write, "h264": h264},
-                **{"jpeg": still, "all": float(np.median(total)), "all_p90": float(np.percentile(total, 90))},
+                "size": size,
+                "samples": samples,
+                "draw": draw,
+                "overlay": write,
+                "h264": h264,
+                "jpeg": still,
+                "all": float(np.median(total)),
+                "all_p90": float(np.percentile(total, 90)),
                 "kilobytes": float(np.mean(sizes)) / 1e3,
             }
         )

@@ -103,21 +103,32 @@ def pixels(camera: Camera, size: tuple[int, int], points: FloatArray) -> FloatAr
     return landed
 
 
-def fitted(camera: Camera, aspect: float, points: FloatArray, *, margin: float = 1.08) -> Camera:
-    """The camera with everything in the picture, its direction and its target kept.
+def fitted(camera: Camera, aspect: float, points: FloatArray, *, margin: float = 1.06) -> Camera:
+    """The camera with everything in the picture's middle and as large as it goes, its direction kept.
 
-    An orthographic one is given its scale, a perspective one stands back as far as it must.
+    It moves sideways, and an orthographic one is given its scale, a perspective one its distance.
 
     Args:
         points: (n, 3) in the site's frame [m].
     """
-    seen = np.c_[points - camera.target, np.zeros(len(points))] @ site_to_camera(camera).T
-    x, y, z = np.abs(seen[:, 0]), np.abs(seen[:, 1]), seen[:, 2]
+    to_camera = site_to_camera(camera)[:3, :3]
+    right, up, backward = ((points - camera.target) @ to_camera.T).T
     if camera.orthographic:
-        return replace(camera, half_height=float(max(y.max(), x.max() / aspect, 1e-3) * margin))
+        half_width, half_height = np.ptp(right) / 2.0, np.ptp(up) / 2.0
+        across = np.array([right.min() + half_width, up.min() + half_height, 0.0])
+        moved = camera.eye + across @ to_camera, camera.target + across @ to_camera
+        scale = float(max(half_height, half_width / aspect, 1e-3) * margin)
+        return Camera(*moved, camera.up, half_height=scale)
+    # A point is within the picture's upper edge where up + slope * backward is at most what the
+    # eye's distance and height allow: the outermost point at each edge decides.
     slope = np.tan(camera.field_of_view / 2.0) / margin
-    distance = float(max((z + y / slope).max(), (z + x / (slope * aspect)).max(), 1e-3))
-    return replace(camera, eye=camera.target - camera.forward * distance)
+    distances, middle = [1e-3], []
+    for along, edge in ((right, slope * aspect), (up, slope)):
+        high, low = (along + edge * backward).max(), (-along + edge * backward).max()
+        distances.append((high + low) / (2.0 * edge))
+        middle.append((high - low) / 2.0)
+    target = camera.target + np.array([*middle, 0.0]) @ to_camera
+    return replace(camera, eye=target - camera.forward * max(distances), target=target)
 
 
 def _unit(vector: FloatArray) -> FloatArray:

@@ -19,6 +19,7 @@ FREE = "free"
 _FREE_DIRECTION = np.array([1.5, -1.5, 0.85])
 # How far a link's body comes beyond its frame's origin, over the size of the arm's room.
 _BODY = 0.03
+_SIDES = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (0.0, 1.0)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,11 +59,11 @@ def look_of(description: Description, *, aspect: float) -> Look:
         base_to_site = np.array(description.base_to_site).reshape(4, 4)
     points = reach(chain, _frames_by_link(description))
     # A robot's floor is where it stands: what would be below is not drawn for.
-    points[:, 2] = np.maximum(points[:, 2], 0.0)
+    points = points[points[:, 2] >= 0.0]
     lowest, highest = points.min(axis=0), points.max(axis=0)
     body = _BODY * float(np.linalg.norm(highest - lowest))
-    flat = np.array([1.0, 1.0, 0.0])
-    room = np.concatenate([points - body * flat, points + body, points * flat])
+    # Bodies come beyond their origins to every side but the floor's.
+    room = np.concatenate([points + body * side for side in _SIDES])
     center = (lowest + highest) / 2.0
     cameras = {view.name: _camera(view, room, aspect, base_to_site) for view in description.views}
     if FREE not in cameras:
@@ -133,10 +134,8 @@ def _camera(view: View, room: FloatArray, aspect: float, base_to_site: FloatArra
 
 
 def _free_camera(room: FloatArray, center: FloatArray, aspect: float, base_to_site: FloatArray) -> Camera:
-    # The room's corners stay empty most of the time: the arm is worth more of the picture.
-    core = center + (room - center) * np.array([0.62, 0.62, 0.92])
     camera = Camera(center + _FREE_DIRECTION, center, np.array([0.0, 0.0, 1.0]))
-    return _placed(fitted(camera, aspect, core), base_to_site)
+    return _placed(fitted(camera, aspect, room), base_to_site)
 
 
 def _placed(camera: Camera, base_to_site: FloatArray) -> Camera:

@@ -108,7 +108,9 @@ uniform float extent, strength;
 in vec2 place;
 out vec4 color;
 void main() {
-    color = vec4(0.13, 0.15, 0.18, texture(shadow, place / (2.0 * extent) + 0.5).r * strength);
+    // Nothing at the map's edge, whatever lies there: a shadow has no corners.
+    float inside = 1.0 - smoothstep(0.8, 1.0, length(place) / extent);
+    color = vec4(0.13, 0.15, 0.18, texture(shadow, place / (2.0 * extent) + 0.5).r * strength * inside);
 }
 """
 

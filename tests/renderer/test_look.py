@@ -45,11 +45,11 @@ def test_the_chain_places_links_as_the_robot_model_does(robot):
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
-@pytest.mark.parametrize("view", ["front", "top", "left"])
-def test_an_orthographic_view_shows_the_arm_wherever_it_may_go(robot, view):
+@pytest.mark.parametrize("view", ["front", "top", "left", "free"])
+def test_a_view_shows_the_arm_wherever_it_may_go_and_not_much_more(robot, view):
     message, model = described(robot)
     camera = camera_of(look_of(message, aspect=16 / 9), view)
-    assert camera.orthographic
+    assert camera.orthographic == (view != "free")
     random = np.random.default_rng(4)
     tools = [
         frame_placements(model, random.uniform(model.joints.lower, model.joints.upper))["tool"][:3, 3]
@@ -58,7 +58,7 @@ def test_an_orthographic_view_shows_the_arm_wherever_it_may_go(robot, view):
     above = np.array([tool for tool in tools if tool[2] > 0])
     shares = np.abs(pixels(camera, SIZE, above) / SIZE * 2 - 1)
     assert shares.max() < 1.0
-    assert shares.max() > 0.6
+    assert shares.max() > 0.75
 
 
 def test_a_robot_that_stands_elsewhere_takes_its_cameras_along():
