@@ -115,9 +115,11 @@ class _Newest:
             head.append("live", style="green")
         state, lease = self._values.get("controller"), self._values.get("lease")
         if state is not None:
+            head.append(f"   link {_word(_State.Link, state.link)}")
             head.append(
-                f"   link {_word(_State.Link, state.link)}   {_word(_State.Activity, state.activity)}"
-                f"   mode {_word(_State.Mode, state.mode)}   homed {_word(_State.Known, state.homed)}"
+                f"   {_word(_State.Activity, state.activity)}   mode {_word(_State.Mode, state.mode)}"
+                f"   homed {_word(_State.Known, state.homed)}",
+                style="" if state.link == _State.UP else "dim strike",
             )
             if state.HasField("stop"):
                 head.append(f"   STOP REQUESTED by {state.stop.by}", style="bold red")
