@@ -12,6 +12,8 @@ FloatArray = NDArray[np.float64]
 
 FIELD_OF_VIEW = float(np.deg2rad(30.0))
 _NEAREST_M = 0.01
+# A close-up stays as it is while its object fills so much of it, and keeps off its edges.
+_CLOSE_LEAST, _CLOSE_EDGE, _CLOSE_MARGIN = 0.62, 0.03, 1.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,15 +91,18 @@ def site_to_clip(camera: Camera, aspect: float, *, center: FloatArray, radius: f
     return projection(camera, aspect, near=near, far=far) @ site_to_camera(camera)
 
 
-def pixels(camera: Camera, size: tuple[int, int], points: FloatArray) -> FloatArray:
+def pixels(
+    camera: Camera, size: tuple[int, int], points: FloatArray, *, aspect: float | None = None
+) -> FloatArray:
     """(n, 2) where points land, x to the right and y downwards from the upper left corner [px].
 
     Args:
         size: Width and height [px].
         points: (n, 3) in the site's frame [m], in front of a perspective camera.
+        aspect: Where pixels are not square: the picture's width over its height.
     """
     width, height = size
-    matrix = projection(camera, width / height, near=0.1, far=100.0) @ site_to_camera(camera)
+    matrix = projection(camera, aspect or width / height, near=0.1, far=100.0) @ site_to_camera(camera)
     clip = np.c_[points, np.ones(len(points))] @ matrix.T
     landed: FloatArray = (clip[:, :2] / clip[:, 3:] + 1.0) / 2.0 * np.array(size)
     return landed
@@ -129,6 +134,21 @@ def fitted(camera: Camera, aspect: float, points: FloatArray, *, margin: float =
         middle.append((high - low) / 2.0)
     target = camera.target + np.array([*middle, 0.0]) @ to_camera
     return replace(camera, eye=target - camera.forward * max(distances), target=target)
+
+
+def close_up(camera: Camera, aspect: float, points: FloatArray) -> Camera:
+    """A camera that points fill, in the same direction: the given one as long as they do.
+
+    A camera that moved with every picture would make what stands still seem to move.
+
+    Args:
+        points: (n, 3) in the site's frame [m].
+    """
+    shares = pixels(camera, (1, 1), points, aspect=aspect)
+    inside = shares.min() >= _CLOSE_EDGE and shares.max() <= 1.0 - _CLOSE_EDGE
+    if inside and np.ptp(shares, axis=0).max() >= _CLOSE_LEAST:
+        return camera
+    return fitted(camera, aspect, points, margin=_CLOSE_MARGIN)
 
 
 def _unit(vector: FloatArray) -> FloatArray:

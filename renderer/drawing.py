@@ -89,6 +89,12 @@ class Drawing:
         with self.context:
             return self._draw(scene, camera)
 
+    def corners(self, scene: Scene) -> FloatArray | None:
+        """(n, 3) corners of boxes around the bodies, in the site's frame [m]; None: there are none."""
+        return _corners(
+            [(part, self._meshes[part.mesh]) for part in scene.parts if part.mesh in self._meshes]
+        )
+
     def close(self) -> None:
         """Release everything; the context too."""
         self.forget(list(self._meshes))
@@ -101,13 +107,16 @@ class Drawing:
         if abs(camera.forward[2]) > _EDGE_ON or not camera.orthographic:
             self._cast_shadow(scene)
             self._lay_shadow(scene, matrix)
-        parts = [(part, self._meshes[part.mesh]) for part in scene.parts if part.mesh in self._meshes]
+        parts = self._known(scene)
         rectangle = _rectangle(parts, matrix, self.size)
         if rectangle is not None:
             self._draw_bodies(parts, scene, camera, matrix, rectangle)
             self._lay_bodies(rectangle, opacity=1.0 - (1.0 - _STALE_OPACITY) * scene.stale)
         self._final.read_into(self._picture, components=3)
         return self._picture
+
+    def _known(self, scene: Scene) -> list[tuple[Part, Uploaded]]:
+        return [(part, self._meshes[part.mesh]) for part in scene.parts if part.mesh in self._meshes]
 
     def _draw_bodies(
         self,
@@ -263,18 +272,24 @@ def _shadow_extent(scene: Scene) -> float:
     return 1.5 * scene.radius
 
 
-def _rectangle(
-    parts: list[tuple[Part, Uploaded]], matrix: FloatArray, size: tuple[int, int]
-) -> tuple[int, int, int, int] | None:
-    """(x, y, width, height) of the picture that the parts can fill [px]; None: nothing of it."""
+def _corners(parts: list[tuple[Part, Uploaded]]) -> FloatArray | None:
     if not parts:
         return None
-    corners = np.concatenate(
+    return np.concatenate(
         [
             uploaded.corners @ part.part_to_site[:3, :3].T + part.part_to_site[:3, 3]
             for part, uploaded in parts
         ]
     )
+
+
+def _rectangle(
+    parts: list[tuple[Part, Uploaded]], matrix: FloatArray, size: tuple[int, int]
+) -> tuple[int, int, int, int] | None:
+    """(x, y, width, height) of the picture that the parts can fill [px]; None: nothing of it."""
+    corners = _corners(parts)
+    if corners is None:
+        return None
     clip = np.c_[corners, np.ones(len(corners))] @ matrix.T
     if (clip[:, 3] <= 1e-6).any():
         return 0, 0, *size  # something stands beside or behind the eye

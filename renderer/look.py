@@ -1,7 +1,7 @@
 """What a description makes of a robot's pictures: its links, its cameras, how much room it needs."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,12 @@ from renderer.scene import Part, Scene
 FloatArray = NDArray[np.float64]
 
 FREE = "free"
+# Follows the arm and has nothing written on it: for the small pictures of a list.
+CLOSE = "close"
 # From the front right and a little above: waist, shoulder and elbow all show.
-_FREE_DIRECTION = np.array([1.5, -1.5, 0.85])
+_FREE_DIRECTION = np.array([1.5, -1.5, 0.7])
+# A long lens: what comes nearer does not take the picture's room from the rest.
+_FREE_FIELD_OF_VIEW = float(np.deg2rad(24.0))
 # How far a link's body comes beyond its frame's origin, over the size of the arm's room.
 _BODY = 0.03
 _SIDES = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (0.0, 1.0)])
@@ -68,6 +72,7 @@ def look_of(description: Description, *, aspect: float) -> Look:
     cameras = {view.name: _camera(view, room, aspect, base_to_site) for view in description.views}
     if FREE not in cameras:
         cameras[FREE] = _free_camera(room, center, aspect, base_to_site)
+    cameras.setdefault(CLOSE, cameras[FREE])
     return Look(
         description=description,
         chain=chain,
@@ -134,13 +139,14 @@ def _camera(view: View, room: FloatArray, aspect: float, base_to_site: FloatArra
 
 
 def _free_camera(room: FloatArray, center: FloatArray, aspect: float, base_to_site: FloatArray) -> Camera:
-    camera = Camera(center + _FREE_DIRECTION, center, np.array([0.0, 0.0, 1.0]))
+    up = np.array([0.0, 0.0, 1.0])
+    camera = Camera(center + _FREE_DIRECTION, center, up, field_of_view=_FREE_FIELD_OF_VIEW)
     return _placed(fitted(camera, aspect, room), base_to_site)
 
 
 def _placed(camera: Camera, base_to_site: FloatArray) -> Camera:
     eye, target = _moved(base_to_site, np.array([camera.eye, camera.target]))
-    return Camera(eye, target, base_to_site[:3, :3] @ camera.up, half_height=camera.half_height)
+    return replace(camera, eye=eye, target=target, up=base_to_site[:3, :3] @ camera.up)
 
 
 def _frames_by_link(description: Description) -> dict[str, FloatArray]:

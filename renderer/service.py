@@ -21,7 +21,7 @@ from bus.session import Session
 from bus.subscription import Subscription
 from renderer.cache import cache_folder, store_glb, stored_glb
 from renderer.errors import RendererError, UnknownViewError
-from renderer.look import Look, look_of, mesh_name
+from renderer.look import CLOSE, Look, look_of, mesh_name
 from renderer.state import Ages, RobotState
 from renderer.stream import Stream
 from renderer.studio import Studio, open_thread
@@ -43,6 +43,7 @@ class Settings:
 
     Attributes:
         robots: Their names; none: every robot of the site.
+        views: Of each robot, beside a close-up that follows the arm.
         size: Width and height of the pictures, both even [px].
         fps: Highest rate of a view's video [1/s].
         samples: Of anti-aliasing; 0: none.
@@ -183,7 +184,7 @@ class _Renderer:
 
     def _open_streams(self, state: RobotState, look: Look) -> None:
         streams: dict[str, Stream] = {}
-        for view in self._settings.views:
+        for view in dict.fromkeys((*self._settings.views, CLOSE)):
             try:
                 streams[view] = Stream(
                     self._session,

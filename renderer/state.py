@@ -130,6 +130,11 @@ def overlay_of(state: RobotState, look: Look, view: str, *, age: float) -> Overl
     )
 
 
+def warning_of(state: RobotState, *, age: float) -> Overlay:
+    """What even a small picture must say: that it is old."""
+    return Overlay(title="", view="", time="", state="", rows=(), stale=_stale_words(state, age))
+
+
 def _told(description: Description, state: RobotState) -> list[Description.Joint]:
     return [joint for joint in description.joints if joint.name in state.positions]
 

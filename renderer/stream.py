@@ -11,8 +11,16 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from bus.session import Session
 from renderer.errors import RendererError
 from renderer.key_frames import KeyFrameClock
-from renderer.look import Look, camera_of, scene_of
-from renderer.state import STALE_AFTER_S, Ages, RobotState, age_s, overlay_of, placements_now
+from renderer.look import CLOSE, Look, camera_of, scene_of
+from renderer.state import (
+    STALE_AFTER_S,
+    Ages,
+    RobotState,
+    age_s,
+    overlay_of,
+    placements_now,
+    warning_of,
+)
 from renderer.studio import Job, Painted
 
 log = logging.getLogger(__name__)
@@ -105,12 +113,14 @@ class Stream:
         age = age_s(state, self._ages())
         source_time_ns = state.source_time_ns or time.time_ns()
         key_frame = video and self._key_frames.due(now)
+        close = self.view == CLOSE
         painted = await self._paint(
             Job(
                 stream=f"{state.name}/{self.view}",
                 scene=scene_of(look, placements_now(state, look), stale=age > STALE_AFTER_S),
                 camera=camera_of(look, self.view),
-                overlay=overlay_of(state, look, self.view, age=age),
+                follow=close,
+                overlay=warning_of(state, age=age) if close else overlay_of(state, look, self.view, age=age),
                 video=video,
                 key_frame=key_frame,
                 image=image,

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from renderer import cache
-from renderer.cameras import Camera
+from renderer.cameras import Camera, close_up
 from renderer.drawing import Drawing
 from renderer.encoder import Packet, VideoEncoder, jpeg, open_encoder
 from renderer.errors import NoEncoderError
@@ -28,6 +28,7 @@ class Job:
 
     Attributes:
         stream: The video stream that it belongs to.
+        follow: Whether the camera moves so that the bodies fill the picture.
         video: Encode it for the stream.
         key_frame: As a key frame.
         image: Encode it as JPEG.
@@ -37,6 +38,7 @@ class Job:
     scene: Scene
     camera: Camera
     overlay: Overlay
+    follow: bool = False
     video: bool = False
     key_frame: bool = False
     image: bool = False
@@ -64,6 +66,7 @@ class Studio:
         """
         self._size, self._fps, self._folder = size, fps, folder
         self._drawing = Drawing(open_context(device), size, samples=samples)
+        self._close_ups: dict[str, Camera] = {}
         self._encoders: dict[str, VideoEncoder] = {}
         # Tried before anybody watches: a machine without an encoder must say so at its start.
         self.encoder_name = open_encoder(size, fps).name
@@ -92,7 +95,7 @@ class Studio:
         Raises:
             NoEncoderError: If the stream's encoder failed; the next picture gets a new one.
         """
-        picture = self._drawing.draw(job.scene, job.camera)
+        picture = self._drawing.draw(job.scene, self._close_up(job) if job.follow else job.camera)
         write_over(picture, job.overlay)
         packet = None
         if job.video:
@@ -105,6 +108,14 @@ class Studio:
                 del self._encoders[job.stream]
                 raise
         return Painted(packet, jpeg(picture) if job.image else None)
+
+    def _close_up(self, job: Job) -> Camera:
+        camera = self._close_ups.get(job.stream, job.camera)
+        corners = self._drawing.corners(job.scene)
+        if corners is not None:
+            camera = close_up(camera, self._size[0] / self._size[1], corners)
+        self._close_ups[job.stream] = camera
+        return camera
 
     def close(self) -> None:
         """Release OpenGL and the encoders."""

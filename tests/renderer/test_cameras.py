@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from renderer.cameras import Camera, fitted, pixels, site_to_camera
+from renderer.cameras import Camera, close_up, fitted, pixels, site_to_camera
 
 SIZE = (640, 360)
 TOP = Camera(np.array([0, 0, 3.0]), np.zeros(3), np.array([0, 1.0, 0]), half_height=0.9)
@@ -36,6 +36,23 @@ def test_a_fitted_camera_shows_every_point_and_wastes_little(half_height):
     # As much room above as below, in the direction that decides.
     tight = np.abs(shares).max(axis=0).argmax()
     assert shares[:, tight].min() == pytest.approx(-shares[:, tight].max(), abs=1e-6)
+
+
+def test_a_close_up_stays_while_its_object_fills_it_and_moves_when_it_does_not():
+    random = np.random.default_rng(1)
+    points = random.uniform(-0.5, 0.5, (200, 3)) + np.array([3.0, 0.0, 0.5])
+    far = Camera(np.array([9.0, -6, 3.5]), np.array([3.0, 0, 0.2]), np.array([0, 0, 1.0]))
+    aspect = SIZE[0] / SIZE[1]
+    near = close_up(far, aspect, points)
+    shares = pixels(near, SIZE, points) / SIZE
+    assert 0.7 < np.ptp(shares[:, 1]) < 0.9
+    assert close_up(near, aspect, points + 0.02) is near
+    for elsewhere in (points + np.array([0.0, 0.0, 0.6]), points * 0.5):
+        moved = close_up(near, aspect, elsewhere)
+        assert moved is not near
+        shares = pixels(moved, SIZE, elsewhere) / SIZE
+        assert (shares > 0).all()
+        assert (shares < 1).all()
 
 
 def test_looking_along_up_still_gives_a_picture():

@@ -80,7 +80,7 @@ def test_a_view_of_the_description_keeps_its_eye_and_a_free_one_of_its_own_count
     message.views.add(name="free", eye=eye, target=target, up=Vector3(z=1.0), projection=View.PERSPECTIVE)
     camera = camera_of(look_of(message, aspect=16 / 9), "free")
     assert camera.eye == pytest.approx([1.0, 2.0, 1.5])
-    with pytest.raises(UnknownViewError, match="no view 'behind'; there are free, front, left, top"):
+    with pytest.raises(UnknownViewError, match="no view 'behind'; there are close, free, front, left, top"):
         camera_of(look_of(message, aspect=16 / 9), "behind")
 
 

@@ -157,7 +157,7 @@ def test_key_frames_are_forced_at_most_once_a_second(mesh, tmp_path):
             key = "robomesh/hall/arm/video/front/keyframe"
             answers = [await monitor.ask(key, KeyFrameRequest()) for _ in range(5)]
             assert answers == [KeyFrameAnswer(forced=False)] * 5
-            with pytest.raises(RefusedError, match="no view 'behind'; there are free, front, left, top"):
+            with pytest.raises(RefusedError, match="no view 'behind'; there are close, free, front, left, top"):
                 await monitor.ask(key.replace("front", "behind"), KeyFrameRequest())
 
     run(main())
@@ -254,6 +254,17 @@ def test_old_states_under_a_living_gateway_are_stale(mesh, tmp_path):
             async with asyncio.timeout(10):
                 while not amber(await picture(monitor)):
                     pass
+
+    run(main())
+
+
+def test_a_close_up_follows_the_arm_and_only_says_when_it_is_old(mesh, tmp_path):
+    async def main():
+        async with hall(mesh, tmp_path) as (robot, monitor), moving(robot):
+            while orange(far := await picture(monitor, "free")) < 40:
+                pass
+            close = await picture(monitor, "close")
+            assert orange(close) > 1.3 * orange(far)
 
     run(main())
 
