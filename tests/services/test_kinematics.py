@@ -1,0 +1,203 @@
+"""The kinematics service: frames against the D-H product, twist against differences, nothing old made new."""
+
+import asyncio
+from contextlib import asynccontextmanager
+
+import numpy as np
+import pytest
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from google.protobuf.timestamp_pb2 import Timestamp
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bus.errors import NoAnswerError, RefusedError
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import open_session
+from robots.description import library_names, load
+from robots.model import build_model, tool_placement
+from robots.poses import rpy_rotation
+from services import kinematics
+from services.kinematics.states import frames_message, kinematic_state, quaternions
+from tests.conftest import run
+
+angles = st.floats(-np.pi, np.pi)
+
+
+def dh_product(description, positions):
+    """Every link's placement by the plain product of the paper's matrices (section 3.2)."""
+    placement = np.eye(4)
+    placements = [placement]
+    for row, position in zip(description.joints, positions, strict=True):
+        rotary = row.type == "rotary"
+        theta = np.radians(row.theta) + (position if rotary else 0.0)
+        d = row.d / 1000 + (0.0 if rotary else position)
+        a, alpha = row.a / 1000, np.radians(row.alpha)
+        ct, st_, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
+        step = np.array(
+            [
+                [ct, -st_ * ca, st_ * sa, a * ct],
+                [st_, ct * ca, -ct * sa, a * st_],
+                [0.0, sa, ca, d],
+                [0.0, 0.0, 0.0, 1.0],
+            ]
+        )
+        placement = placement @ step
+        placements.append(placement)
+    return placements
+
+
+def rotation_of(quaternion):
+    x, y, z, w = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+@given(angles, angles, angles)
+def test_a_quaternion_turns_as_its_matrix_does(roll, pitch, yaw):
+    rotation = rpy_rotation(roll, pitch, yaw)
+    (quaternion,) = quaternions(rotation[None])
+    assert quaternion[3] >= 0
+    assert rotation_of(quaternion) == pytest.approx(rotation, abs=1e-12)
+
+
+@pytest.mark.parametrize("axis", [*np.eye(3).tolist(), [0.6, 0.8, 0.0], [0.6, 0.0, -0.8]])
+def test_half_turns_are_exact_too(axis):
+    rotation = 2 * np.outer(axis, axis) - np.eye(3)
+    (quaternion,) = quaternions(rotation[None])
+    assert rotation_of(quaternion) == pytest.approx(rotation, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", library_names())
+def test_frames_are_the_dh_product_in_the_sites_frame(name):
+    description = load(name)
+    model = build_model(description)
+    base_to_site = np.eye(4)
+    base_to_site[:3, :3], base_to_site[:3, 3] = rpy_rotation(0.1, -0.2, 2.0), (1.0, -2.0, 0.5)
+    random = np.random.default_rng(7)
+    for positions in random.uniform(model.joints.lower, model.joints.upper, (100, len(model.joints))):
+        message = frames_message(
+            model, positions, prefix="hall/arm", base_to_site=base_to_site, timestamp=Timestamp()
+        )
+        frames = {frame.child_frame_id: frame for frame in message.transforms}
+        for link, placement in zip(model.link_names, dh_product(description, positions), strict=True):
+            frame = frames[f"hall/arm/{link}"]
+            assert frame.parent_frame_id == "hall"
+            expected = base_to_site @ placement
+            translation, q = frame.translation, frame.rotation
+            assert (translation.x, translation.y, translation.z) == pytest.approx(expected[:3, 3], abs=1e-9)
+            assert rotation_of((q.x, q.y, q.z, q.w)) == pytest.approx(expected[:3, :3], abs=1e-9)
+        assert "hall/arm/tool" in frames
+
+
+@pytest.mark.parametrize("name", library_names())
+def test_the_twist_is_how_the_tool_moves(name):
+    model = build_model(load(name))
+    random = np.random.default_rng(3)
+    positions = random.uniform(model.joints.lower, model.joints.upper)
+    velocities = random.uniform(-1, 1, len(model.joints))
+    state = kinematic_state(model, positions, velocities, timestamp=Timestamp())
+    dt = 1e-6
+    after, before = (tool_placement(model, positions + sign * dt * velocities) for sign in (0.5, -0.5))
+    linear = (after[:3, 3] - before[:3, 3]) / dt
+    turn = (after[:3, :3] - before[:3, :3]) / dt @ tool_placement(model, positions)[:3, :3].T
+    v, w = state.linear_velocity, state.angular_velocity
+    assert (v.x, v.y, v.z) == pytest.approx(linear, abs=1e-6)
+    assert (w.x, w.y, w.z) == pytest.approx((turn[2, 1], turn[0, 2], turn[1, 0]), abs=1e-6)
+    assert {margin.name for margin in state.limit_margins} >= set(model.joints.names)
+
+
+@asynccontextmanager
+async def served(mesh):
+    """The service, and a session beside it."""
+    async with open_session(mesh) as own, open_session(mesh) as other:
+        settings = kinematics.Settings(
+            site="hall", robots=(kinematics.RobotSettings(name="arm", model="pt600"),)
+        )
+        own.declare_presence("hall", "arm", "kinematics")
+        task = asyncio.create_task(kinematics.serve(own, settings))
+        while await other.last("robomesh/hall/arm/description", timeout_s=0.2) is None:
+            await asyncio.sleep(0.01)
+        try:
+            yield other
+        finally:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+
+
+def states_of(positions) -> JointStates:
+    message = JointStates()
+    for name, position in zip(("waist", "shoulder", "elbow", "wrist", "roll"), positions, strict=True):
+        message.joints.add(name=name, position=position)
+    return message
+
+
+def test_the_description_names_meshes_that_are_answered_as_glb(mesh):
+    async def main():
+        async with served(mesh) as session:
+            description = await session.last("robomesh/hall/arm/description")
+            assert description.joints[0].name == "waist"
+            assert description.provenance.startswith("nominal")
+            assert "<robot" in description.urdf
+            assert 'name = "pt600"' in description.robot_toml
+            for link in description.links:
+                glb = await session.ask_bytes(f"robomesh/hall/arm/mesh/{link.mesh}")
+                assert glb.startswith(b"glTF")
+            with pytest.raises(RefusedError, match="no mesh 'nose'"):
+                await session.ask_bytes("robomesh/hall/arm/mesh/nose")
+
+    run(main())
+
+
+def test_frames_follow_the_joints_within_their_rate_and_old_joints_make_nothing_new(mesh):
+    async def main():
+        async with open_session(mesh) as gateway:
+            joints = gateway.declare_publisher("hall", "arm", "joints")
+            joints.put(states_of([0.5, 0.0, 0.0, 0.0, 0.0]))
+            async with served(mesh) as session:
+                # Joined late, beside a controller that has said its last word.
+                frames = session.subscribe("robomesh/hall/arm/frames", newest=1000)
+                old = await anext(frames)
+                assert not old.live
+                for number in range(100):
+                    joints.put(states_of([number / 100, 0.0, 0.0, 0.0, 0.0]))
+                    await asyncio.sleep(0.01)
+                live = [await anext(frames)]
+                while live[-1].header.sequence < 40:
+                    live.append(await anext(frames))
+                assert all(sample.live for sample in live)
+                spread_s = (live[-1].header.source_time_ns - live[0].header.source_time_ns) * 1e-9
+                assert len(live) / spread_s < 66
+
+    run(main())
+
+
+def test_joints_that_do_not_fit_make_no_frames(mesh):
+    async def main():
+        async with open_session(mesh) as gateway, served(mesh) as session:
+            joints = gateway.declare_publisher("hall", "arm", "joints")
+            frames = session.subscribe("robomesh/hall/arm/frames", newest=10)
+            while not joints.watched:
+                await asyncio.sleep(0.01)
+            wrong = states_of([1.0] * 5)
+            wrong.joints[2].name = "nose"
+            joints.put(wrong)
+            joints.put(states_of([float("nan"), 0.0, 0.0, 0.0, 0.0]))
+            await asyncio.sleep(0.02)
+            joints.put(states_of([0.25, 0.0, 0.0, 0.0, 0.0]))
+            sample = await anext(frames)
+            assert sample.header.sequence == 1
+            with pytest.raises(RefusedError, match="5 joints"):
+                await session.ask(
+                    "robomesh/hall/arm/kinematics/forward", schema.ForwardRequest(joint_positions=[1.0])
+                )
+            with pytest.raises(NoAnswerError):
+                await session.ask(
+                    "robomesh/hall/other/kinematics/forward", schema.ForwardRequest(), timeout_s=0.2
+                )
+
+    run(main())
