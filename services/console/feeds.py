@@ -17,6 +17,7 @@ log = logging.getLogger(__name__)
 # Samples that may wait for the event loop: one a key of a fleet, or two seconds of video.
 _NEWEST = {History.KEY_FRAME: 75, History.LAST_100: 400}
 _NEWEST_STATE = 1024
+_ASK_AGAIN_S = 3.0
 
 Sink = Callable[[Sample], None]
 
@@ -30,7 +31,9 @@ class Feed:
         self._subscription = session.subscribe(expression, newest=newest)
         self._held: dict[str, Lane] = {}
         self._sinks: set[Sink] = set()
-        self._task = asyncio.create_task(self._run())
+        self._tasks = [asyncio.create_task(self._run())]
+        if self.topic.history is History.LAST:
+            self._tasks.append(asyncio.create_task(self._ask_again()))
 
     def join(self, sink: Sink) -> None:
         """Gives what is held, then everything new, to a sink that must return at once."""
@@ -47,7 +50,21 @@ class Feed:
     def close(self) -> None:
         """Ends the subscription."""
         self._subscription.close()
-        self._task.cancel()
+        for task in self._tasks:
+            task.cancel()
+
+    async def _ask_again(self) -> None:
+        """Asks until there is a value: on a busy machine an answer can be lost, and what
+        changes seldom, as a description does, would not be seen until it did."""
+        key = keys.parse_key(self._subscription.key_expr)
+        while True:
+            await asyncio.sleep(_ASK_AGAIN_S)
+            one_is_enough = "*" not in (key.site, key.robot)
+            if self._held and one_is_enough:
+                return
+            self._subscription.refresh(key.site, key.robot)
+            if self._held:
+                return
 
     async def _run(self) -> None:
         async for sample in self._subscription:

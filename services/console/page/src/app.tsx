@@ -121,7 +121,7 @@ function Banners() {
   const lost = lostAt.value;
   return (
     <div class="banners">
-      {lost === 0 && <div class="banner">{t("connecting")}</div>}
+      {lost === 0 && <div class="banner connecting">{t("connecting")}</div>}
       {lost !== null && lost > 0 && (
         <div class="banner warning" role="alert">
           <span class="shape warning" aria-hidden="true" />

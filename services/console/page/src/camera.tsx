@@ -5,13 +5,20 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { CompressedImageSchema } from "./gen/foxglove/CompressedImage_pb";
 import type { Description } from "./gen/robomesh_pb";
 import { watch } from "./mesh";
-import { Age, Choice, Panel } from "./parts";
+import { Age, Choice, Panel, Toggle } from "./parts";
 import { viewsOf, viewText } from "./scene-view";
 import { t } from "./texts";
 import { isStale, now } from "./topics";
 import { decodesVideo, playVideo } from "./video";
 
-export function Camera({ robotKey, description }: { robotKey: string; description: Description | undefined }) {
+export function Camera(props: {
+  robotKey: string;
+  description: Description | undefined;
+  /** Whether it has the large place, and the 3-D view the small one. */
+  large: boolean;
+  setLarge: (large: boolean) => void;
+}) {
+  const { robotKey, description } = props;
   const [view, setView] = useState("front");
   const names = viewsOf(description).map((each) => each.name);
   const shown = names.includes(view) ? view : (names[0] ?? "free");
@@ -59,6 +66,9 @@ export function Camera({ robotKey, description }: { robotKey: string; descriptio
         <>
           <Age stale={stale} age={age} />
           <Choice label={t("view")} values={names} chosen={shown} text={viewText} choose={setView} />
+          <Toggle on={props.large} set={props.setLarge}>
+            {t("enlarge")}
+          </Toggle>
         </>
       }
     >

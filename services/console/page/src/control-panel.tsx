@@ -144,7 +144,7 @@ function Speed({ enabled, send }: { enabled: boolean; send: (percent: number) =>
     if (unsent !== null && enabled) void send(unsent).then((accepted) => accepted && setSent(unsent));
   };
   return (
-    <label class="speed">
+    <label class={`speed ${percent === null ? "unset" : ""}`}>
       <span class="dim">{t("speed")}</span>
       <input
         type="range"
@@ -154,17 +154,14 @@ function Speed({ enabled, send }: { enabled: boolean; send: (percent: number) =>
         value={percent ?? 100}
         disabled={!enabled}
         title={t("speed_hint")}
-        aria-valuetext={percent === null ? "–" : `${percent} %`}
+        aria-valuetext={percent === null ? t("speed_unset") : `${percent} %`}
         onInput={(event) => setUnsent(Number(event.currentTarget.value))}
         onPointerUp={release}
         onPointerCancel={() => setUnsent(null)}
         onBlur={() => setUnsent(null)}
         onKeyDown={(event) => event.key === "Enter" && release()}
       />
-      <span class="value">
-        {fixed(percent ?? undefined, 0)}
-        <span class="unit">%</span>
-      </span>
+      <span class="value">{percent === null ? t("speed_unset") : `${fixed(percent, 0)}\u202f%`}</span>
     </label>
   );
 }

@@ -49,16 +49,25 @@ export function EventsPanel({ robotKey }: { robotKey: string }) {
   );
 }
 
+/** A word that asks to be looked at; what is as it should be has no shape. */
+function Mark({ word, level }: { word: TextName; level: string }) {
+  return (
+    <span class={`mark state ${level}`}>
+      {level !== "normal" && <span class={`shape ${level}`} aria-hidden="true" />}
+      {t(word)}
+    </span>
+  );
+}
+
 function EventLine(event: Event) {
   const [word, level] = SEVERITIES[event.severity] ?? ["severity_info", "normal"];
   return (
     <li title={`${stampFull(event.timestamp)} · ${event.source} · ${event.code}`}>
       <time>{stampTime(event.timestamp)}</time>
-      <span class={`state ${level}`}>
-        <span class={`shape ${level}`} aria-hidden="true" />
-        {t(word)}
+      <span class="event-text">
+        {level !== "normal" && <Mark word={word} level={level} />}
+        {event.text}
       </span>
-      <span class="event-text">{event.text}</span>
     </li>
   );
 }
@@ -68,11 +77,8 @@ function AuditLine(entry: AuditEntry) {
   return (
     <li title={`${stampFull(entry.timestamp)} · ${entry.source}`}>
       <time>{stampTime(entry.timestamp)}</time>
-      <span class={`state ${level}`}>
-        <span class={`shape ${level}`} aria-hidden="true" />
-        {t(word)}
-      </span>
       <span class="event-text">
+        <Mark word={word} level={level} />
         <strong>{entry.operator || entry.source}</strong> {entry.request}
         {entry.text && `: ${entry.text}`}
         {entry.repeatedCount > 0n && ` (${t("repeated", { count: String(entry.repeatedCount) })})`}

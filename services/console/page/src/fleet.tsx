@@ -10,6 +10,7 @@ import { staleText, stampFull, stampTime } from "./format";
 import { presence, watch } from "./mesh";
 import { State, Tag } from "./parts";
 import { stateWord } from "./robot-state";
+import type { Level, StateWord } from "./robot-state";
 import { robotLink } from "./route";
 import { t } from "./texts";
 import { ageOf, isStale, useTopics } from "./topics";
@@ -48,11 +49,13 @@ export function Fleet() {
   const robots = fleetRobots.value.filter((key) => key.toLowerCase().includes(wanted));
   const sites = Map.groupBy(robots, (key) => key.split("/")[1] ?? "");
   const count = fleetRobots.value.length;
+  const size = robots.length <= 3 ? "few" : robots.length <= 12 ? "some" : "many";
   return (
     <div class="fleet">
       <div class="fleet-head">
         <h1>{t("all_robots")}</h1>
         <span class="dim">{count === 1 ? t("robot_count") : t("robots_count", { count })}</span>
+        <Summary states={fleetRobots.value.map((key) => stateWord(controllers.get(`${key}/controller`)))} />
         <input
           type="search"
           placeholder={t("filter")}
@@ -70,7 +73,7 @@ export function Fleet() {
             <h2>{site}</h2>
             <Services of={`robomesh/${site}/-/`} />
           </div>
-          <div class="tiles">
+          <div class={`tiles ${size}`}>
             {keys.map((key) => (
               <Tile
                 key={key}
@@ -98,7 +101,7 @@ function Tile({ site, robot, controller, lease, description }: TileData) {
   const problem = problemOf(controller?.message);
   return (
     <a class={`tile ${state.level}`} href={robotLink(site, robot)}>
-      <Picture robotKey={`robomesh/${site}/${robot}`} description={description?.message} stale={stale} />
+      <Picture robotKey={`robomesh/${site}/${robot}`} stale={stale} />
       <div class="tile-body">
         <div class="tile-line">
           <strong>{robot}</strong>
@@ -118,10 +121,41 @@ function Tile({ site, robot, controller, lease, description }: TileData) {
           </span>
           {description?.message.simulated && <Tag kind="simulated">{t("simulated")}</Tag>}
         </div>
-        <p class={`tile-problem ${state.level}`}>{state.level === "normal" ? "" : problem}</p>
-        <Services of={`robomesh/${site}/${robot}/`} />
+        {/* One line for either, so that a tile never changes its height. */}
+        {state.level !== "normal" && problem ? (
+          <p class={`tile-problem ${state.level}`} title={problem}>
+            {problem}
+          </p>
+        ) : (
+          <Services of={`robomesh/${site}/${robot}/`} />
+        )}
       </div>
     </a>
+  );
+}
+
+const LEVELS: readonly Level[] = ["alarm", "warning", "normal"];
+
+/** How many robots are how, the most urgent first: what a glance from across the room needs. */
+function Summary({ states }: { states: readonly StateWord[] }) {
+  const groups = Map.groupBy(states, (state) => state.word);
+  const sorted = [...groups.values()].sort(
+    ([a], [b]) => LEVELS.indexOf(a?.level ?? "normal") - LEVELS.indexOf(b?.level ?? "normal"),
+  );
+  return (
+    <ul class="summary">
+      {sorted.map((group) => {
+        const [state] = group;
+        return (
+          state && (
+            <li key={state.word} class={`state ${state.level}`}>
+              <span class={`shape ${state.level}`} aria-hidden="true" />
+              {group.length} {t(state.word)}
+            </li>
+          )
+        );
+      })}
+    </ul>
   );
 }
 
@@ -159,11 +193,10 @@ export function Services({ of: prefix }: { of: string }) {
 const PICTURE_EACH_MS = 5000;
 
 /** A still picture while the tile is on the screen; asked for now and then, so that nobody draws for it all day. */
-function Picture(props: { robotKey: string; description: Description | undefined; stale: boolean }) {
+function Picture(props: { robotKey: string; stale: boolean }) {
   const place = useRef<HTMLDivElement>(null);
   const [visible, setVisible] = useState(false);
   const [url, setUrl] = useState<string | null>(null);
-  const view = props.description?.views.find((each) => each.name === "free")?.name ?? "free";
   useEffect(() => {
     const observer = new IntersectionObserver(([entry]) => setVisible(entry?.isIntersecting ?? false));
     if (place.current) observer.observe(place.current);
@@ -174,7 +207,7 @@ function Picture(props: { robotKey: string; description: Description | undefined
     let stop: (() => void) | undefined;
     const look = () => {
       stop?.();
-      stop = watch(`${props.robotKey}/image/${view}`, (sample) => {
+      stop = watch(`${props.robotKey}/image/close`, (sample) => {
         const { data, format } = fromBinary(CompressedImageSchema, sample.payload);
         const blob = new Blob([data as Uint8Array<ArrayBuffer>], { type: `image/${format || "jpeg"}` });
         setUrl((old) => (old && URL.revokeObjectURL(old), URL.createObjectURL(blob)));
@@ -187,7 +220,7 @@ function Picture(props: { robotKey: string; description: Description | undefined
       clearInterval(timer);
       stop?.();
     };
-  }, [visible, props.robotKey, view]);
+  }, [visible, props.robotKey]);
   return (
     <div ref={place} class={`tile-picture ${props.stale ? "stale" : ""}`}>
       {url ? <img src={url} alt="" /> : <Silhouette label={t("no_picture")} />}

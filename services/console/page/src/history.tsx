@@ -14,6 +14,7 @@ import { theme } from "./theme";
 
 const SPAN_S = 60;
 const STEP_MS = 100; // finer than a pixel shows
+const CLOCK_SET_MS = 5000;
 const CURVES = ["--curve-1", "--curve-2", "--curve-3", "--curve-4", "--curve-5", "--curve-6", "--curve-7"];
 
 export function History({ robotKey, description }: { robotKey: string; description: Description | undefined }) {
@@ -25,20 +26,28 @@ export function History({ robotKey, description }: { robotKey: string; descripti
   const [rows] = useState<{ time: number[]; values: (number | null)[][] }>({ time: [], values: [] });
   const joints = description?.joints ?? [];
   const names = joints.map((joint) => joint.name).join(" ");
+  // Angles to the left, lengths, where there are any, to the right, each at its own scale.
+  const units = [...new Set(joints.map((joint) => jointUnit(joint).unit))].sort().reverse();
 
   useEffect(() => {
     rows.time = [];
     rows.values = joints.map(() => []);
     const factors = joints.map((joint) => jointUnit(joint).factor);
+    let ahead = Infinity; // this page's clock before the source's, less the quickest way here, in ms
     return watch(`${robotKey}/joints`, (sample) => {
+      if (!sample.live) return;
+      const early = sample.arrived - sample.sourceTime;
+      if (early < ahead || early - ahead > CLOCK_SET_MS) ahead = early;
       const last = rows.time.at(-1);
-      if (!sample.live || (last !== undefined && sample.arrived / 1000 - last < STEP_MS / 1000)) return;
+      // By the source's time: what the network held back is drawn when it was.
+      const at = (sample.sourceTime + ahead) / 1000;
+      if (last !== undefined && at - last < STEP_MS / 1000) return;
       // A gap is a gap: no line is drawn through what was not seen.
-      if (last !== undefined && sample.arrived / 1000 - last > 1) append(last + 0.1, () => null);
+      if (last !== undefined && at - last > 1) append(last + 0.1, () => null);
       const states = new Map(
         fromBinary(JointStatesSchema, sample.payload).joints.map((joint) => [joint.name, joint.position]),
       );
-      append(sample.arrived / 1000, (i) => {
+      append(at, (i) => {
         const position = states.get(joints[i]?.name ?? "");
         return position === undefined ? null : position * (factors[i] ?? 1);
       });
@@ -69,7 +78,10 @@ export function History({ robotKey, description }: { robotKey: string; descripti
         height: element.clientHeight,
         legend: { show: false },
         cursor: { y: false, drag: { x: false, y: false } },
-        scales: { x: { time: false, auto: false, range: shown }, y: { range: (_, min, max) => padded(min, max) } },
+        scales: {
+          x: { time: false, auto: false, range: shown },
+          ...Object.fromEntries(units.map((unit) => [unit, { range: padded }])),
+        },
         axes: [
           {
             ...axis,
@@ -78,12 +90,22 @@ export function History({ robotKey, description }: { robotKey: string; descripti
             splits: () => [-60, -45, -30, -15, 0].map((back) => end + back),
             values: (_, splits) => splits.map((at) => `${Math.round(at - end)} s`.replace("-", "−")),
           },
-          { ...axis, font, size: 46, values: (_, splits) => splits.map((at) => `${at}°`.replace("-", "−")) },
+          ...units.map((unit, i) => ({
+            ...axis,
+            scale: unit,
+            side: (i === 0 ? 3 : 1) as uPlot.Axis.Side,
+            grid: { ...axis.grid, show: i === 0 },
+            font,
+            size: unit === "°" ? 46 : 64,
+            values: (_: uPlot, splits: number[]) =>
+              splits.map((at) => `${at}${unit === "°" ? "" : "\u202f"}${unit}`.replace("-", "−")),
+          })),
         ],
         series: [
           {},
           ...joints.map((joint, i) => ({
             label: joint.name,
+            scale: jointUnit(joint).unit,
             stroke: colour(CURVES[i % CURVES.length] ?? "--text"),
             width: 1.5,
             points: { show: false },
@@ -134,7 +156,8 @@ export function History({ robotKey, description }: { robotKey: string; descripti
   );
 }
 
-function padded(min: number | null, max: number | null): [number, number] {
+/** A scale's range: what was seen and a little more, never so little that noise fills it. */
+function padded(_: uPlot, min: number | null, max: number | null): [number, number] {
   if (min === null || max === null) return [-90, 90];
   const room = Math.max(5, (max - min) * 0.08);
   return [min - room, max + room];

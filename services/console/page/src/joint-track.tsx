@@ -4,6 +4,7 @@
 // track does nothing. By keys: arrows set, Enter sends, Escape takes back.
 
 import { useRef, useState } from "preact/hooks";
+import { t } from "./texts";
 
 export interface TrackProps {
   label: string;
@@ -97,6 +98,7 @@ export function JointTrack(props: TrackProps) {
           role="slider"
           tabIndex={0}
           aria-label={props.label}
+          title={t("joint_keys")}
           aria-valuemin={lower}
           aria-valuemax={upper}
           aria-valuenow={shown}

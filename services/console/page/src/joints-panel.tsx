@@ -9,7 +9,7 @@ import { ControllerState_Activity as Activity } from "./gen/robomesh_pb";
 import type { ControllerState, Description, Description_Joint } from "./gen/robomesh_pb";
 import { showGhost } from "./ghost";
 import { JointTrack } from "./joint-track";
-import { Age, NoticeLine, Panel } from "./parts";
+import { Age, NoticeLine, Panel, Unit } from "./parts";
 import { t } from "./texts";
 
 const REACHED = 0.002; // rad or m: half of what a person reads off
@@ -74,7 +74,7 @@ export function JointsPanel(props: {
     : t(mine ? "joint_hint" : "joint_hint_take");
   return (
     <Panel
-      name="joints"
+      name={`joints ${enabled ? "can-move" : ""}`}
       title={t("joints")}
       end={props.age === undefined ? <span class="dim">{t("no_data")}</span> : <Age stale={stale} age={props.age} />}
     >
@@ -104,7 +104,7 @@ export function JointsPanel(props: {
               <span class="limit dim">{fixed(joint.upper * factor, 0)}</span>
               <span class={`value ${stale ? "stale" : ""}`} data-joint={joint.name}>
                 {position === undefined ? DASH : fixed(position * factor, decimals)}
-                <span class="unit">{unit}</span>
+                <Unit of={unit} />
               </span>
             </div>
           );

@@ -34,6 +34,11 @@ export function NoticeLine({ notice, idle }: { notice: Notice | null; idle?: str
   );
 }
 
+/** A unit after its number: the degree sign close to it and as large, words smaller and apart. */
+export function Unit({ of: unit }: { of: string }) {
+  return <span class={unit === "°" ? "unit degree" : "unit"}>{unit}</span>;
+}
+
 /** A state word with the shape and colour of its level. */
 export function State({ state }: { state: StateWord }) {
   return (

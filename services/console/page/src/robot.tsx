@@ -40,9 +40,10 @@ export function Robot({ site, robot }: RobotName) {
   useEffect(() => {
     if (lease && holder !== null) seeHolder(key, holder);
   }, [key, lease, holder]);
+  const [videoLarge, setVideoLarge] = useState(false);
   const inControl = holds(key) && held.value !== null;
   return (
-    <div class={`robot ${inControl ? "in-control" : ""}`}>
+    <div class={`robot ${inControl ? "in-control" : ""} ${videoLarge ? "video-large" : ""}`}>
       <Headline name={robot} controller={controller} description={description?.message} stale={stale} age={age} />
       <SceneView
         robotKey={key}
@@ -64,7 +65,7 @@ export function Robot({ site, robot }: RobotName) {
         <ToolPanel kinematics={kinematics} description={description?.message} />
         <EventsPanel robotKey={key} />
       </div>
-      <Camera robotKey={key} description={description?.message} />
+      <Camera robotKey={key} description={description?.message} large={videoLarge} setLarge={setVideoLarge} />
       <History robotKey={key} description={description?.message} />
     </div>
   );

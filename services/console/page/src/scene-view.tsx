@@ -15,7 +15,7 @@ import { useFramesAge } from "./frames-age";
 import { isStale } from "./topics";
 
 // Where the free camera stands, from the target, in lengths of the arm's reach.
-const FREE_EYE = { x: 1.32, y: -1.86, z: 0.84 };
+const FREE_EYE = { x: 1.2, y: -1.69, z: 0.72 };
 const NOMINAL_REACH = 1.1; // m, until the description is there
 
 /** Views of a description, the free one first. */

@@ -3,7 +3,7 @@
 import { DASH, fixed, rollPitchYaw, toDegrees } from "./format";
 import { Description_Joint_Type } from "./gen/robomesh_pb";
 import type { Description, KinematicState } from "./gen/robomesh_pb";
-import { Age, Panel } from "./parts";
+import { Age, Panel, Unit } from "./parts";
 import { t } from "./texts";
 import { ageOf, isStale } from "./topics";
 import type { Latest } from "./topics";
@@ -28,50 +28,34 @@ export function ToolPanel(props: {
       end={props.kinematics ? <Age stale={stale} age={age} /> : <span class="dim">{t("no_data")}</span>}
     >
       <dl class={`numbers ${stale && state ? "stale" : ""}`}>
-        {["x", "y", "z"].map((axis, i) => (
-          <div key={axis} class="short">
-            <dt>{axis}</dt>
-            <dd>
-              {fixed(at[i] === undefined ? undefined : at[i]! * 1000, 1)}
-              <span class="unit">mm</span>
-            </dd>
-          </div>
+        {(["x", "y", "z"] as const).map((axis, i) => (
+          <Number key={axis} label={axis} text={fixed(at[i] === undefined ? undefined : at[i]! * 1000, 1)} unit="mm" />
         ))}
-        {["roll", "pitch", "yaw"].map((axis, i) => (
-          <div key={axis} class="short">
-            <dt>{axis}</dt>
-            <dd>
-              {fixed(angles[i], 2)}
-              <span class="unit">°</span>
-            </dd>
-          </div>
+        {(["roll", "pitch", "yaw"] as const).map((axis, i) => (
+          <Number key={axis} label={t(axis)} text={fixed(angles[i], 2)} unit="°" />
         ))}
-        <div>
-          <dt>{t("tool_speed")}</dt>
-          <dd>
-            {fixed(speed, 1)}
-            <span class="unit">mm/s</span>
-          </dd>
-        </div>
-        <div>
-          <dt>{t("manipulability")}</dt>
-          <dd>
-            {fixed(state?.manipulability, 4)}
-            <span class="unit" />
-          </dd>
-        </div>
-        <div class={nearest && nearest.value < 0 ? "beyond" : ""}>
-          <dt>
-            {t("margins")}
-            {nearest ? `: ${nearest.name}` : ""}
-          </dt>
-          <dd>
-            {nearest ? fixed(nearest.value, nearest.unit === "mm" ? 1 : 2) : DASH}
-            <span class="unit">{nearest?.unit ?? ""}</span>
-          </dd>
-        </div>
+        <Number label={t("tool_speed")} text={fixed(speed, 1)} unit="mm/s" />
+        <Number label={t("manipulability")} text={fixed(state?.manipulability, 4)} unit="" />
+        <Number
+          label={nearest ? t("margins", { joint: nearest.name }) : t("margin")}
+          text={nearest ? fixed(nearest.value, nearest.unit === "mm" ? 1 : 2) : DASH}
+          unit={nearest?.unit ?? ""}
+          beyond={nearest !== null && nearest.value < 0}
+        />
       </dl>
     </Panel>
+  );
+}
+
+function Number(props: { label: string; text: string; unit: string; beyond?: boolean }) {
+  return (
+    <div class={props.beyond ? "beyond" : ""}>
+      <dt title={props.label}>{props.label}</dt>
+      <dd>
+        {props.text}
+        <Unit of={props.unit} />
+      </dd>
+    </div>
   );
 }
 
