@@ -1,12 +1,16 @@
 """The running of a service: logs, signals, session, presence, and an end that comes in time."""
 
 import asyncio
+import atexit
 import contextlib
 import logging
 import os
+import queue
 import signal
 import threading
+import time
 from collections.abc import Awaitable, Callable, Coroutine, Iterable
+from logging.handlers import QueueHandler, QueueListener
 from typing import Any, TypeVar
 
 from bus.session import Session, SessionSettings, open_session
@@ -15,6 +19,8 @@ AnySettings = TypeVar("AnySettings")
 
 # A site is down within 2 s of Ctrl-C, whatever hangs.
 _LAST_MOMENT_S = 1.7
+_MOST_RECORDS = 2000
+_LAST_WORDS_S = 0.2
 
 
 def run(
@@ -63,9 +69,30 @@ def run_until_signalled(main: Coroutine[Any, Any, None]) -> None:
     asyncio.run(guarded())
 
 
+class _Dropping(QueueHandler):
+    """Hands records to a writing thread, and drops them when that is held up.
+
+    A terminal that is held (Ctrl-S, a full pipe) must not hold a gateway.
+    """
+
+    def enqueue(self, record: logging.LogRecord) -> None:
+        with contextlib.suppress(queue.Full):
+            self.queue.put_nowait(record)
+
+
 def log_to_stderr(level: int = logging.INFO) -> None:
-    """One line a record on standard error, in words."""
-    logging.basicConfig(level=level, format="%(levelname)s %(message)s", force=True)
-    logging.addLevelName(logging.INFO, "info")
-    logging.addLevelName(logging.WARNING, "warning")
-    logging.addLevelName(logging.ERROR, "error")
+    """One line a record on standard error, in words, written by a thread of its own."""
+    for number, name in ((logging.INFO, "info"), (logging.WARNING, "warning"), (logging.ERROR, "error")):
+        logging.addLevelName(number, name)
+    records: queue.Queue[logging.LogRecord] = queue.Queue(_MOST_RECORDS)
+    writer = logging.StreamHandler()
+    writer.setFormatter(logging.Formatter("%(levelname)s %(message)s"))
+    QueueListener(records, writer).start()
+    logging.basicConfig(level=level, handlers=[_Dropping(records)], force=True)
+
+    def last_words() -> None:
+        deadline = time.monotonic() + _LAST_WORDS_S
+        while not records.empty() and time.monotonic() < deadline:
+            time.sleep(0.005)
+
+    atexit.register(last_words)

@@ -67,6 +67,7 @@ class _Seen:
     header: Header
     live_at: float | None = None
     lost: int = 0
+    skipped: int = 0
 
 
 class Subscription:
@@ -84,14 +85,13 @@ class Subscription:
         self._ring: deque[Sample] = deque(maxlen=newest)
         self._seen: dict[str, _Seen] = {}
         self._lock = threading.Lock()
-        self._skipped = 0
         self._malformed = 0
         self._closed = False
         self._asking: asyncio.TimerHandle | None = None
         # A list must come before what follows it: live samples wait for the answer.
-        self._held: list[zenoh.Sample] | None = None
+        self._held: deque[zenoh.Sample] | None = None
         if history and self.topic.history in (History.LAST_100, History.KEY_FRAME):
-            self._held = []
+            self._held = deque(maxlen=_ZENOH_RING)
         self._subscriber: Any = _declare(session, key_expr, self.topic)
         self._thread = threading.Thread(target=self._read, name=f"read {key_expr}", daemon=True)
         self._thread.start()
@@ -124,6 +124,11 @@ class Subscription:
         seen = self._seen.get(key)
         return 0 if seen is None else seen.lost
 
+    def missed(self, key: str) -> int:
+        """Samples of the key that the consumer never saw: lost, or dropped because it was too slow."""
+        seen = self._seen.get(key)
+        return 0 if seen is None else seen.lost + seen.skipped
+
     @property
     def keys(self) -> tuple[str, ...]:
         """The keys of which something came."""
@@ -132,7 +137,7 @@ class Subscription:
     @property
     def skipped(self) -> int:
         """Samples that arrived and that the consumer was too slow to take."""
-        return self._skipped
+        return sum(seen.skipped for seen in self._seen.values())
 
     @property
     def malformed(self) -> int:
@@ -178,12 +183,13 @@ class Subscription:
         def on_end() -> None:
             with self._lock:
                 for reply in replies:
-                    self._take(reply, live=False)
+                    self._take(reply, asked_at=asked_at)
                 held, self._held = self._held, None
                 for sample in held or ():
-                    self._take(sample, live=True)
+                    self._take(sample)
             self._wake()
 
+        asked_at = time.monotonic()
         self._session.get(
             key_expr,
             zenoh.handlers.Callback(on_reply, on_end),
@@ -199,12 +205,12 @@ class Subscription:
                 if self._held is not None:
                     self._held.append(sample)
                     continue
-                self._take(sample, live=True)
+                self._take(sample)
             if not self._ready.is_set():
                 self._wake()
 
-    def _take(self, sample: zenoh.Sample, *, live: bool) -> None:
-        """Keep a sample that is new (the lock is held)."""
+    def _take(self, sample: zenoh.Sample, *, asked_at: float | None = None) -> None:
+        """Keep a sample that is new (the lock is held); `asked_at`: it answers a question of then."""
         key = str(sample.key_expr)
         attachment = sample.attachment
         if attachment is None or sample.kind != zenoh.SampleKind.PUT:
@@ -216,23 +222,42 @@ class Subscription:
             self._malformed += 1
             return
         now = time.monotonic()
+        payload = sample.payload.to_bytes()
         seen = self._seen.get(key)
         if seen is None:
             self._seen[key] = seen = _Seen(header)
-        elif header.publisher == seen.header.publisher:
-            if header.sequence <= seen.header.sequence:
-                return
-            if live:
-                seen.lost += header.sequence - seen.header.sequence - 1
-        elif not live and seen.live_at is not None and self.topic.history_schema is None:
-            # Another publisher answered late: which of the two is newer cannot be told.
+        elif header.publisher != seen.header.publisher:
+            if asked_at is not None and seen.live_at is not None and seen.live_at > asked_at:
+                return  # an answer overtaken by what came live meanwhile
+        elif header.sequence <= seen.header.sequence:
             return
+        else:
+            gap = header.sequence - seen.header.sequence
+            if asked_at is not None and self.topic.history is History.KEY_FRAME:
+                return  # a picture's next key frame is near; frames twice would only disturb
+            if asked_at is not None and self.topic.history is History.LAST_100:
+                payload, new = self._newest_of_list(payload, gap)
+                seen.lost += gap - new
+            else:
+                seen.lost += gap - 1
         seen.header = header
-        if live or self.topic.heartbeat_s is not None:
-            seen.live_at = now if live else now - (self.topic.heartbeat_s or 0.0)
+        if asked_at is None or self.topic.heartbeat_s is not None:
+            seen.live_at = now - (self.topic.heartbeat_s or 0.0) if asked_at is not None else now
         if len(self._ring) == self._ring.maxlen:
-            self._skipped += 1
-        self._ring.append(Sample(key, sample.payload.to_bytes(), header, live, now))
+            self._seen[self._ring[0].key].skipped += 1
+        self._ring.append(Sample(key, payload, header, asked_at is None, now))
+
+    def _newest_of_list(self, payload: bytes, most: int) -> tuple[bytes, int]:
+        """A list message cut to its newest entries, and how many there are."""
+        assert self.topic.history_schema is not None
+        try:
+            message = decode(self.topic.history_schema, payload)
+        except MessageError:
+            return payload, 0  # for the consumer to refuse
+        (field,) = message.DESCRIPTOR.fields
+        entries = getattr(message, field.name)
+        del entries[: max(len(entries) - most, 0)]
+        return message.SerializeToString(), len(entries)
 
     def _wake(self) -> None:
         if not self._loop.is_closed():

@@ -33,6 +33,8 @@ async def main() -> None:
         answer = await session.ask(request, LeaseRequest(action=LeaseRequest.ACQUIRE, ttl_s=2.0))
         renewing = asyncio.create_task(renew(session, answer.lease))
         command = CommandRequest(lease=answer.lease, id=1, command=CommandRequest.HOME)
+        # By the gateway's clock: a command held up on the way must not move an arm later.
+        command.not_after.FromNanoseconds(answer.now.ToNanoseconds() + 2_000_000_000)
         print((await session.ask(f"robomesh/{ROBOT}/command/{OPERATOR}", command)).text)
         async for sample in session.subscribe(f"robomesh/{ROBOT}/lease", newest=20):
             if sample.live and not sample.message().motion:

@@ -12,7 +12,7 @@ import random
 import signal
 import sys
 import time
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from dataclasses import dataclass
 
 from services.errors import ServiceError
@@ -24,6 +24,8 @@ _LONGEST_WAIT_S = 10.0
 # What ran this long is taken for well: its next failure waits the shortest time again.
 _WELL_AFTER_S = 20.0
 _COULD_NOT = 2
+_READ_BYTES = 1 << 16
+_LONGEST_LINE = 2000
 _PR_SET_PDEATHSIG = 1
 
 
@@ -91,8 +93,8 @@ async def _keep(
         process = await _start(program)
         running[program.name] = process
         assert process.stdout is not None
-        async for line in process.stdout:
-            write(line.decode(errors="replace").rstrip())
+        async for line in _lines(process.stdout):
+            write(line)
         status = await process.wait()
         ran_s = time.monotonic() - started
         if status == _COULD_NOT and not ran_well and ran_s < _WELL_AFTER_S:
@@ -105,6 +107,18 @@ async def _keep(
         write(f"ended ({_status(status)}); again in {wait_s:.1f} s")
         await asyncio.sleep(wait_s * random.uniform(0.8, 1.2))
         wait_s = min(2 * wait_s, _LONGEST_WAIT_S)
+
+
+async def _lines(stream: asyncio.StreamReader) -> AsyncIterator[str]:
+    """Lines of log, cut where they are endless: no service may end the site by its words."""
+    rest = b""
+    while chunk := await stream.read(_READ_BYTES):
+        *lines, rest = (rest + chunk).split(b"\n")
+        for line in lines:
+            yield line[:_LONGEST_LINE].decode(errors="replace").rstrip()
+        rest = rest[:_LONGEST_LINE]
+    if rest:
+        yield rest.decode(errors="replace").rstrip()
 
 
 async def _start(program: Program) -> asyncio.subprocess.Process:

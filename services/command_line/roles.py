@@ -45,8 +45,9 @@ def gateway(path: Path | None, connect: str, controllers: list[str]) -> None:
             port=addresses[robot.name][1],
             codes=robot.codes,
             accept_unknown=frozenset(robot.accept_unknown),
-            stop_proven=robot.stop_proven,
+            stop_proven=robot.can_be_stopped,
             stale_after_s=robot.stale_after_s,
+            reconnect_after_s=max(4.0, 2.0 * robot.stale_after_s),
         )
         for robot in site.robot
     )

@@ -19,6 +19,9 @@ from services.errors import ServiceError
 _Command = schema.CommandRequest
 _Lease = schema.LeaseRequest
 _TTL_S = 2.0
+_LATEST_NS = 3_000_000_000
+# `lease` beats each second: without it the gateway is gone.
+_SILENCE_S = 5.0
 _MOTIONS = (_Command.HOME, _Command.MOVE_ABSOLUTE, _Command.MOVE_RELATIVE, _Command.RESUME)
 _WORDS = {
     ("home",): _Command.HOME,
@@ -57,8 +60,10 @@ async def _send(name: str, words: list[str], router: str, operator: str) -> tupl
         request = _parse(words, description if isinstance(description, schema.Description) else None)
         try:
             async with _control(session, robot, operator) as lease:
-                request.lease = lease
+                request.lease = lease.lease
                 request.id = 1
+                # By the gateway's clock: what is held up on the way must not move an arm later.
+                request.not_after.FromNanoseconds(lease.now.ToNanoseconds() + _LATEST_NS)
                 if request.command == _Command.RESET:
                     request.stop_id = await _latched_stop(session, robot)
                 answer = await session.ask(robot_key(*robot, f"command/{operator}"), request)
@@ -102,7 +107,16 @@ async def _until_done(session: Session, robot: find.Robot, operator: str, text: 
 
 async def _motion_ended(session: Session, robot: find.Robot, operator: str) -> tuple[bool, str] | None:
     """None: ended well; otherwise what ended it."""
-    async for sample in session.subscribe(robot_key(*robot, "lease"), newest=20):
+    leases = session.subscribe(robot_key(*robot, "lease"), newest=20)
+    while True:
+        try:
+            async with asyncio.timeout(_SILENCE_S):
+                sample = await anext(leases)
+        except TimeoutError:
+            return (
+                False,
+                f"the gateway fell silent: nobody knows what {robot} does; the dead-man stop is its own",
+            )
         lease = sample.message()
         assert isinstance(lease, schema.Lease)
         if not sample.live:
@@ -110,15 +124,21 @@ async def _motion_ended(session: Session, robot: find.Robot, operator: str) -> t
         if lease.holder != operator:
             return False, f"control went to {lease.holder or 'nobody'} before the motion ended"
         if not lease.motion:
-            state = await session.last(robot_key(*robot, "controller"))
-            if isinstance(state, schema.ControllerState) and state.HasField("stop"):
-                return False, f"stopped: {state.stop.reason or 'stop request'} by {state.stop.by}"
-            return None
+            return await _how_it_ended(session, robot)
+
+
+async def _how_it_ended(session: Session, robot: find.Robot) -> tuple[bool, str] | None:
+    state = await session.last(robot_key(*robot, "controller"))
+    if isinstance(state, schema.ControllerState):
+        if state.HasField("stop"):
+            return False, f"stopped: {state.stop.reason or 'stop request'} by {state.stop.by}"
+        if state.fault:
+            return False, f"the controller has a fault: {state.fault}"
     return None
 
 
 @asynccontextmanager
-async def _control(session: Session, robot: find.Robot, operator: str) -> AsyncIterator[str]:
+async def _control(session: Session, robot: find.Robot, operator: str) -> AsyncIterator[schema.LeaseAnswer]:
     """The lease, renewed until the block ends, then given back."""
     key = robot_key(*robot, f"lease/request/{operator}")
     answer = await session.ask(key, _Lease(action=_Lease.ACQUIRE, ttl_s=_TTL_S))
@@ -135,7 +155,7 @@ async def _control(session: Session, robot: find.Robot, operator: str) -> AsyncI
 
     renewing = asyncio.create_task(renew())
     try:
-        yield answer.lease
+        yield answer
     finally:
         renewing.cancel()
         with contextlib.suppress(BusError, asyncio.CancelledError):

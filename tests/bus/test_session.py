@@ -154,6 +154,48 @@ def test_a_gap_in_the_numbers_is_counted_as_lost(mesh):
     run(main())
 
 
+def test_a_publisher_restarted_while_the_link_was_down_is_asked_for_what_it_said(mesh):
+    async def main():
+        async with open_session(mesh) as monitor:
+            subscription = monitor.subscribe("robomesh/site/arm/description", newest=10)
+            async with open_session(mesh) as first:
+                first.declare_presence("site", "arm", "kinematics")
+                publisher = first.declare_publisher("site", "arm", "description")
+                await until(lambda: publisher.watched)
+                publisher.put(schema.Description(name="first"))
+                assert (await anext(subscription)).message().name == "first"
+            async with open_session(mesh) as second:
+                # As after an outage: its put was not heard, only its presence comes.
+                publisher = second.declare_publisher("site", "arm", "description")
+                publisher.remember(schema.Description(name="second"), source_time_ns=1)
+                second.declare_presence("site", "arm", "kinematics")
+                assert (await anext(subscription)).message().name == "second"
+
+    run(main())
+
+
+def test_what_an_outage_took_of_a_list_comes_with_the_answer_and_the_rest_is_counted(mesh):
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            subscription = monitor.subscribe("robomesh/site/arm/events", newest=1000)
+            publisher = gateway.declare_publisher("site", "arm", "events")
+            publisher.put(schema.Event(code="1"))
+            assert (await anext(subscription)).message().code == "1"
+            for number in range(2, 152):  # nobody hears these
+                publisher._sequence += 1
+                header = publisher._history[-1][0]._replace(sequence=publisher._sequence)
+                publisher._history.append((header, schema.Event(code=str(number))))
+            gateway.declare_presence("site", "arm", "gateway")
+            sample = await anext(subscription)
+            assert [event.code for event in sample.message().events] == [str(n) for n in range(52, 152)]
+            assert subscription.lost(publisher.key) == 50
+            publisher.put(schema.Event(code="152"))
+            assert (await anext(subscription)).message().code == "152"
+            assert subscription.lost(publisher.key) == 50
+
+    run(main())
+
+
 async def answer_lease(request: Request):
     if request.message.ttl_s > 5:
         raise RefusedError(f"ttl_s {request.message.ttl_s:g} is too long: 0.5 to 5")
