@@ -7,7 +7,6 @@ compared, and renamed over the live one.
 
 import contextlib
 import os
-import time
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +17,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 from mcap_protobuf.schema import build_file_descriptor_set
 
+from bus.header import Header
 from bus.topics import Topic
 from services.errors import ServiceError
 
@@ -26,8 +26,8 @@ ABOUT = "robomesh"
 LOST = "robomesh.lost"
 _PROFILE = ""
 _LIBRARY = "robomesh"
-# Larger files are not written again while their reader's service is told to end.
-REWRITE_AT_END_BYTES = 32 << 20
+# Ending of a file that is being written again.
+INDEXING = ".indexing"
 
 
 class CaptureError(ServiceError):
@@ -61,18 +61,22 @@ class Capture:
         about = {"site": self.site, "robot": self.robot, "name": self.name, "started_by": self.started_by}
         self._writer.add_metadata(ABOUT, about)
 
-    def add(self, key: str, topic: Topic, *, sequence: int, source_time_ns: int, payload: bytes) -> None:
-        """Write a publication of a topic as it came."""
+    def add(self, key: str, topic: Topic, header: Header, payload: bytes, *, received_ns: int) -> None:
+        """Write a publication of a topic as it came.
+
+        Args:
+            received_ns: When, ns since the Unix epoch.
+        """
         channel = self._channels.get(key)
         if channel is None:
             channel = self._channels[key] = self._register(key, topic)
         self._writer.add_message(
             channel_id=channel,
-            log_time=time.time_ns(),
-            publish_time=source_time_ns,
+            log_time=received_ns,
+            publish_time=header.source_time_ns,
             data=payload,
             # The format has 32 bits.
-            sequence=sequence & 0xFFFFFFFF,
+            sequence=header.sequence & 0xFFFFFFFF,
         )
         self.counts[key] += 1
 
@@ -82,19 +86,21 @@ class Capture:
         if sync:
             os.fsync(self._stream.fileno())
 
-    def finish(self, lost: dict[str, int], *, rewrite: bool) -> None:
+    def finish(self, missed: dict[str, int]) -> None:
         """Close the file; afterwards it is whole.
 
         Args:
-            lost: Publications that never arrived, by key.
-            rewrite: Write it again in indexed chunks (takes time with its size).
+            missed: Publications that are not in it, by key.
         """
-        self._writer.add_metadata(LOST, {key: str(number) for key, number in lost.items() if number})
+        self._writer.add_metadata(LOST, {key: str(number) for key, number in missed.items() if number})
         self._writer.finish()
         self.flush(sync=True)
         self._stream.close()
-        if rewrite:
-            _rewrite(self.path)
+
+    def abandon(self) -> None:
+        """Close the file as it is; the disk takes no more."""
+        with contextlib.suppress(OSError):
+            self._stream.close()
 
     def _register(self, key: str, topic: Topic) -> int:
         descriptor = topic.schema.DESCRIPTOR
@@ -109,9 +115,14 @@ class Capture:
         )
 
 
-def _rewrite(path: Path) -> None:
-    """The same file in 1 MiB zstd chunks with an index; the old one stays when anything differs."""
-    new = path.with_suffix(".indexed")
+def index(path: Path) -> None:
+    """Write a finished file again, in 1 MiB zstd chunks with an index; it stays when anything differs.
+
+    Raises:
+        CaptureError: If the new one is not the same.
+        OSError: If the disk refuses.
+    """
+    new = path.with_suffix(INDEXING)
     try:
         with path.open("rb") as source, new.open("wb") as target:
             writer = Writer(target)

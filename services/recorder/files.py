@@ -1,6 +1,8 @@
 """What is in the recorder's folder, told from the files themselves."""
 
+import struct
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from google.protobuf.duration_pb2 import Duration
@@ -15,6 +17,8 @@ from services.errors import ServiceError
 from services.recorder.capture import ABOUT, LOST
 
 SUFFIX = ".mcap"
+# What the library raises, besides its own errors, where a file was cut or its bytes were changed.
+_DAMAGE = (McapError, EOFError, struct.error, ValueError, KeyError, IndexError, OverflowError, MemoryError)
 
 
 class RecordingError(ServiceError):
@@ -38,10 +42,10 @@ def describe_file(path: Path) -> schema.Recording:
         RecordingError: If it cannot be read at all.
     """
     try:
-        content = _indexed(path) or _streamed(path)
-        size = path.stat().st_size
-    except (OSError, McapError) as error:
-        raise RecordingError(f"{path}: no recording that can be read: {error}") from None
+        found = path.stat()
+        content = _content(path, found.st_size, found.st_mtime_ns)
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror}") from None
     recording = schema.Recording(
         site=content.about.get("site", ""),
         robot=content.about.get("robot", ""),
@@ -50,7 +54,7 @@ def describe_file(path: Path) -> schema.Recording:
         file=path.name,
         start=_timestamp(content.start_ns),
         duration=_duration(content.end_ns - content.start_ns),
-        bytes=size,
+        bytes=found.st_size,
         problem="" if content.whole else "its writer was killed: it reads up to there",
     )
     for topic in sorted({*content.counts, *content.lost}):
@@ -60,8 +64,18 @@ def describe_file(path: Path) -> schema.Recording:
     return recording
 
 
+@lru_cache(maxsize=4096)
+def _content(path: Path, size: int, mtime_ns: int) -> _Content:
+    """What a file holds, read once for each state that it was in.
+
+    Raises:
+        RecordingError: If it cannot be read at all.
+    """
+    return _indexed(path) or _streamed(path)
+
+
 def _indexed(path: Path) -> _Content | None:
-    """From the summary at the end; None: there is none."""
+    """From the summary at the end; None: there is none that can be read."""
     with path.open("rb") as stream:
         try:
             reader = make_reader(stream)
@@ -69,23 +83,24 @@ def _indexed(path: Path) -> _Content | None:
             if summary is None or summary.statistics is None:
                 return None
             metadata = {record.name: record.metadata for record in reader.iter_metadata()}
-        except McapError:
+            statistics = summary.statistics
+            return _Content(
+                about=metadata.get(ABOUT, {}),
+                lost={key: int(number) for key, number in metadata.get(LOST, {}).items()},
+                counts={
+                    summary.channels[channel].topic: number
+                    for channel, number in statistics.channel_message_counts.items()
+                },
+                start_ns=statistics.message_start_time,
+                end_ns=statistics.message_end_time,
+                whole=True,
+            )
+        except _DAMAGE:
             return None
-        statistics = summary.statistics
-        return _Content(
-            about=metadata.get(ABOUT, {}),
-            lost={key: int(number) for key, number in metadata.get(LOST, {}).items()},
-            counts={
-                summary.channels[channel].topic: number
-                for channel, number in statistics.channel_message_counts.items()
-            },
-            start_ns=statistics.message_start_time,
-            end_ns=statistics.message_end_time,
-            whole=True,
-        )
 
 
 def _streamed(path: Path) -> _Content:
+    """As far as the records of a file without a summary go."""
     about: dict[str, str] = {}
     channels: dict[int, str] = {}
     counts: dict[str, int] = {}
@@ -102,9 +117,9 @@ def _streamed(path: Path) -> _Content:
                         topic = channels[record.channel_id]
                         counts[topic] = counts.get(topic, 0) + 1
                         first, last = first or record.log_time, record.log_time
-        except (McapError, EOFError):
+        except _DAMAGE as error:
             if not about and not counts:
-                raise
+                raise RecordingError(f"{path}: no recording that can be read: {error}") from None
     return _Content(about, {}, counts, first, last, whole=False)
 
 

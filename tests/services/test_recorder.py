@@ -1,11 +1,14 @@
 """The recorder over a real router: what it writes, what a kill leaves, what it refuses."""
 
 import asyncio
+import contextlib
+import os
 import signal
 import subprocess
 import sys
 import time
 from contextlib import asynccontextmanager
+from pathlib import Path
 
 import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
@@ -16,7 +19,7 @@ from bus.errors import NoAnswerError, RefusedError
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import open_session
 from services import recorder
-from services.recorder.files import describe_file
+from services.recorder.files import RecordingError, describe_file
 from tests.conftest import run
 
 _Request = schema.RecorderRequest
@@ -52,6 +55,11 @@ async def put_states(publisher, count, *, hz=200.0):
         await asyncio.sleep(1 / hz)
 
 
+def describe_chunks(file):
+    with file.open("rb") as stream:
+        return make_reader(stream).get_summary().statistics.chunk_count
+
+
 async def until_watched(publisher):
     while not publisher.watched:
         await asyncio.sleep(0.01)
@@ -67,7 +75,10 @@ def test_a_capture_holds_everything_and_opens_with_the_foxglove_schemas(mesh, tm
             done = await session.ask(KEY, _Request(action=_Request.TRACE_OFF), timeout_s=10.0)
             listed = await session.ask("robomesh/site/-/recordings/list")
             assert [(row.name, row.open, row.problem) for row in listed.recordings] == [("trial", False, "")]
-            return tmp_path / "arm" / done.file
+            file = tmp_path / "arm" / done.file
+            while describe_chunks(file) == 0:  # indexed beside what comes next
+                await asyncio.sleep(0.02)
+            return file
 
     file = run(main())
     with file.open("rb") as stream:
@@ -144,6 +155,60 @@ def test_an_end_of_the_service_closes_the_file(mesh, tmp_path):
     recording = describe_file(file)
     assert recording.problem == ""
     assert {row.topic.rsplit("/", 1)[-1]: row.messages for row in recording.topics}["joints"] == 20
+
+
+def test_a_full_disk_ends_the_capture_and_says_so_and_the_recorder_goes_on(mesh, tmp_path, caplog):
+    async def main():
+        async with recording_site(mesh, tmp_path) as (session, publisher):
+            await session.ask(KEY, _Request(action=_Request.TRACE_ON, name="full"))
+            await until_watched(publisher)
+            fill_disk_under(tmp_path / "arm")
+            await put_states(publisher, 60)
+            with pytest.raises(RefusedError, match="not being recorded"):
+                await session.ask(KEY, _Request(action=_Request.TRACE_OFF))
+            await session.ask(KEY, _Request(action=_Request.TRACE_ON, name="again"))
+            listed = await session.ask("robomesh/site/-/recordings/list")
+            assert {row.name: row.open for row in listed.recordings}["again"]
+
+    run(main())
+    assert "No space left on device" in caplog.text
+
+
+def fill_disk_under(folder):
+    """From now on the one open recording of a folder stands on a full disk."""
+    (file,) = folder.glob("*.mcap")
+    (descriptor,) = [int(link.name) for link in Path("/proc/self/fd").iterdir() if opens(link) == str(file)]
+    with Path("/dev/full").open("wb") as full:
+        os.dup2(full.fileno(), descriptor)
+
+
+def opens(link):
+    try:
+        return str(link.readlink())
+    except OSError:
+        return ""
+
+
+def test_a_file_cut_anywhere_or_with_a_changed_byte_is_told_of_and_breaks_nothing(mesh, tmp_path):
+    async def main():
+        async with recording_site(mesh, tmp_path) as (session, publisher):
+            await session.ask(KEY, _Request(action=_Request.TRACE_ON, name="whole"))
+            await until_watched(publisher)
+            await put_states(publisher, 5)
+            await session.ask(KEY, _Request(action=_Request.TRACE_OFF))
+
+    run(main())
+    (file,) = (tmp_path / "arm").glob("*.mcap")
+    data = file.read_bytes()
+    cut = tmp_path / "cut.mcap"
+    for length in range(0, len(data), 97):
+        cut.write_bytes(data[:length])
+        with contextlib.suppress(RecordingError):
+            assert describe_file(cut).problem
+    for place in range(0, len(data), 61):
+        cut.write_bytes(data[:place] + bytes([data[place] ^ 0xA5]) + data[place + 1 :])
+        with contextlib.suppress(RecordingError):
+            describe_file(cut)
 
 
 @pytest.mark.processes
