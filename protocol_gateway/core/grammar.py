@@ -21,7 +21,8 @@ TERMINATOR = b"@"
 BLANKS = " \t\r\n"
 
 _SEPARATORS = re.compile(r"[#*&;@]")
-_NUMBER_TYPE = re.compile(r"([+-]?)[ \t\r\n]*0*([0-9]+)")
+# There is one way only to read each text, so that a long wrong one is refused in linear time.
+_NUMBER_TYPE = re.compile(r"([+-]?)[ \t\r\n]*([0-9]+)")
 _INT32 = range(-(2**31), 2**31)
 
 
@@ -64,7 +65,7 @@ def type_code(type_text: str) -> int | None:
     # Most types are names, and a name may hold digits: look at one character before the pattern.
     if type_text[-1:] not in "0123456789" or not (match := _NUMBER_TYPE.fullmatch(type_text)):
         return None
-    sign, digits = match.groups()
+    sign, digits = match[1], match[2].lstrip("0") or "0"
     # Ten digits hold every int32; int() itself refuses thousands of them with an exception of its own.
     code = int(sign + digits) if len(digits) <= 10 else None
     # None in a range is looked for in each of its four thousand million numbers.

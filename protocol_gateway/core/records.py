@@ -25,7 +25,10 @@ from protocol_gateway.core.grammar import RawRecord, format_unit, parse_unit, pl
 from protocol_gateway.errors import UnitError, UnitFormatError
 
 # Some controllers send "- 67.10", with a blank after the sign (Chen et al. 2001, section 4).
-_NUMBER = re.compile(r"([+-]?)[ \t\r\n]*((?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)")
+# There is one way only to read each text, so that a long wrong one is refused in linear time.
+_NUMBER = re.compile(r"([+-]?)[ \t\r\n]*((?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)")
+# Every finite double can be written within it, without an exponent.
+_LONGEST_NUMBER = 400
 _SPEED = re.compile(r"speed[ \t\r\n]*=[ \t\r\n]*(.*)", re.DOTALL)
 
 
@@ -130,7 +133,7 @@ def read_number(text: str) -> float:
     Raises:
         UnitError: If it is none.
     """
-    match = _NUMBER.fullmatch(text)
+    match = _NUMBER.fullmatch(text) if len(text) <= _LONGEST_NUMBER else None
     value = float(match[1] + match[2]) if match else math.nan
     if not math.isfinite(value):
         raise UnitError(f"{text[:24]!r} is not a finite number")

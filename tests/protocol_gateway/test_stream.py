@@ -1,4 +1,5 @@
 import itertools
+import time
 
 import pytest
 from hypothesis import given
@@ -90,3 +91,27 @@ def test_any_bytes_in_any_pieces_are_events_and_no_exception(data, cuts):
 @given(st.text("0123456789#*&;@-. COMANDhome\n", max_size=80))
 def test_near_misses_of_units_are_events_and_no_exception(text):
     assert len(read(text.encode("ascii"))) == text.count("@")
+
+
+_N = LONGEST_UNIT_BYTES - 40
+
+SLOW_TO_READ = {
+    "digits": b"1#ABSOLUTE.DEG*" + b"1" * _N + b"x@",
+    "digits and a point": b"1#ABSOLUTE.DEG*" + b"1" * (_N // 2) + b"." + b"1" * (_N // 2) + b"x@",
+    "exponent": b"1#TIME*1e" + b"9" * _N + b"x@",
+    "blanks after a sign": b"1#TIME*-" + b" " * _N + b"x@",
+    "a type of zeros": b"1#" + b"0" * _N + b"x1*2@",
+    "a type of digits": b"1#" + b"7" * _N + b" 1@",
+    "a speed": b"1#COMMAND*speed" + b" " * _N + b"x@",
+    "a count": b"0" * _N + b"1#TIME*x@",
+    "many numbers": b"1#ABSOLUTE.DEG*" + (b"1" * 300 + b"x;") * (_N // 302) + b"@",
+    "many records": b"1#" + b"&" * _N + b"@",
+    "many units": b"@" * LONGEST_UNIT_BYTES,
+}
+
+
+@pytest.mark.parametrize("data", SLOW_TO_READ.values(), ids=SLOW_TO_READ)
+def test_no_unit_of_64_kib_takes_long_to_read(data):
+    begin = time.perf_counter()
+    assert read(data + HOME)[-1].data == HOME[:-1]
+    assert time.perf_counter() - begin < 1.0
