@@ -124,7 +124,7 @@ class Control:
     def _send_stop(self) -> str:
         """Put the stop unit on the socket; why not, or nothing."""
         if self._controller().read_only:
-            return "this controller is read-only, no stop unit is proven for it; stop it at its own panel"
+            return f"stop it at its own panel, for it is read-only: {self._controller().read_only}"
         try:
             self._send(self._driver.encode(Stop()))
         except (LinkError, CommandError) as error:
@@ -170,9 +170,9 @@ class Control:
 
     def _judge_lease(self, request: schema.LeaseRequest, operator: str, secret: str) -> LeaseOutcome:
         self.check_expiry()
-        if self._controller().read_only and request.action in (_A.ACQUIRE, _A.TAKE):
-            text = "this robot is read-only: no stop unit is configured and proven for its controller"
-            return LeaseOutcome(self.authority, Answer(False, text))
+        read_only = self._controller().read_only
+        if read_only and request.action in (_A.ACQUIRE, _A.TAKE):
+            return LeaseOutcome(self.authority, Answer(False, f"this robot is read-only: {read_only}"))
         return rules.request_lease(self.authority, request, operator=operator, now=_now(), secret=secret)
 
     def _take_effect(self, outcome: LeaseOutcome, record: Callable[..., Entry]) -> schema.LeaseAnswer:

@@ -165,7 +165,7 @@ class Driver(Protocol):
 
     @property
     def can_stop(self) -> bool:
-        """Whether the protocol has a stop unit. Whether this controller heeds it is proven at the site."""
+        """Whether there is a stop unit for the controller. Whether it is heeded is proven at the site."""
         ...
 
     def connected(self) -> None:

@@ -43,7 +43,7 @@ class Controller:
 
     Attributes:
         positions: Where its joints are [rad] or [m]; None: not told yet.
-        read_only: No stop unit is configured and proven for it.
+        read_only: Why nothing is ever sent to it, and what would be right; empty: it may be sent to.
         accept_unknown: What it never tells and the site file says to do without: "mode", "homed".
     """
 
@@ -51,7 +51,7 @@ class Controller:
     status: StatusReceived
     fault: str = ""
     positions: tuple[float, ...] | None = None
-    read_only: bool = False
+    read_only: str = ""
     accept_unknown: frozenset[str] = frozenset()
 
 
@@ -68,7 +68,7 @@ def obstacle(request: CommandRequest, controller: Controller, joints: Joints) ->
 
 def _link_obstacle(controller: Controller) -> str:
     if controller.read_only:
-        return "this controller is read-only: no stop unit is configured and proven for it"
+        return f"this robot is read-only: {controller.read_only}"
     match controller.link.state:
         case LinkState.DOWN:
             return f"the link to the controller is down ({controller.link.text})"

@@ -48,6 +48,7 @@ class RobotSettings:
         codes: Type codes, where the controller sends numbers: {2: "ABSOLUTE.DEG", 101: "COMMAND:home"}.
         accept_unknown: What the controller never tells and is done without: "mode", "homed".
         stop_proven: The stop unit was tried on this controller; without that the robot is read-only.
+            How to try it: docs/safety.md.
         stale_after_s: Without a unit for this long, nothing is known of the robot any more.
         reconnect_after_s: Without a unit for this long, the connection is made anew.
     """
@@ -58,7 +59,7 @@ class RobotSettings:
     port: int
     codes: Mapping[int, str] = field(default_factory=dict)
     accept_unknown: frozenset[str] = frozenset()
-    stop_proven: bool = True
+    stop_proven: bool = False
     stale_after_s: float = 1.0
     reconnect_after_s: float = 4.0
 
@@ -74,7 +75,7 @@ class Robot:
         joints = joints_of(load(settings.description))
         driver: Driver = UnitDriver(joints.types, settings.codes)
         self._settings = settings
-        self._read_only = not (settings.stop_proven and driver.can_stop)
+        self._read_only = _why_read_only(settings, driver)
 
         def publisher(topic: str) -> Publisher:
             return session.declare_publisher(site, settings.name, topic)
@@ -126,8 +127,7 @@ class Robot:
                 _S.ERROR, "audit.mended", f"audit log {self._audit.path.name}: {self._audit.mended}"
             )
         if self._read_only:
-            text = "no stop unit is configured and proven for this controller: the robot is read-only"
-            self._journal.say(_S.WARNING, "robot.read_only", text)
+            self._journal.say(_S.WARNING, "robot.read_only", f"the robot is read-only: {self._read_only}")
         stop = self._control.authority.stop
         if stop is not None:
             text = f"stop request {stop.id} ({stop.by}: {stop.reason}) is latched since before this start"
@@ -247,3 +247,18 @@ class Robot:
             )
         )
         self._lease_topic.put(lease_state(authority, now))
+
+
+def _why_read_only(settings: RobotSettings, driver: Driver) -> str:
+    """Why nothing may be sent to the controller, and what would be right; empty: it may be sent to."""
+    if not driver.can_stop:
+        return (
+            "the site file's codes have no stop for its controller: "
+            'add the code of "COMMAND:stop", or of "COMMAND"'
+        )
+    if not settings.stop_proven:
+        return (
+            "its stop is not proven: try the stop unit on its controller (docs/safety.md says how), "
+            "then write stop_proven = true at this robot in the site file"
+        )
+    return ""

@@ -69,13 +69,13 @@ def controller_state(
     state = schema.ControllerState(
         timestamp=timestamp(now.wall_ns),
         link=_LINKS[controller.link.state],
-        link_text=controller.link.text,
+        link_text=_link_text(controller),
         mode=_MODES[status.mode],
         activity=_ACTIVITIES[status.activity],
         homed=_KNOWN[status.homed],
         trace=_KNOWN[status.trace],
         fault=controller.fault,
-        read_only=controller.read_only,
+        read_only=bool(controller.read_only),
         last_unit_age_s=age_s,
         controller_time_s=controller_time_s,
         rate_hz=rate_hz,
@@ -101,6 +101,11 @@ def controller_state(
             )
         )
     return state
+
+
+def _link_text(controller: Controller) -> str:
+    text = controller.link.text
+    return f"{text}; read-only: {controller.read_only}" if controller.read_only else text
 
 
 def lease_state(authority: Authority, now: Now) -> schema.Lease:

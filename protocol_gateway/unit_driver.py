@@ -62,8 +62,6 @@ class UnitDriver:
         CodeTableError: If the table cannot be used.
     """
 
-    can_stop = True
-
     def __init__(self, joint_types: Sequence[JointType], codes: Mapping[int, str] = _NO_CODES) -> None:
         self._table = code_table(codes)
         self._stream = UnitStream(self._table)
@@ -72,6 +70,11 @@ class UnitDriver:
             0.001 if joint_type is JointType.PRISMATIC else math.pi / 180.0 for joint_type in joint_types
         )
         self.units_received = 0
+
+    @property
+    def can_stop(self) -> bool:
+        """Whether there is a stop unit: a controller of codes does not know the word `stop`."""
+        return self._table.can_say(_WORDS[Stop])
 
     def connected(self) -> None:
         """Forget the unfinished unit of the connection before."""

@@ -47,6 +47,10 @@ class CodeTable:
     meanings: Mapping[int, Meaning]
     codes: Mapping[Meaning, int]
 
+    def can_say(self, word: str) -> bool:
+        """Whether its controller knows a command: by name, or, where it knows codes only, by a code."""
+        return not self.codes or Meaning(COMMAND) in self.codes or Meaning(COMMAND, word) in self.codes
+
 
 def code_table(codes: Mapping[int, str]) -> CodeTable:
     """The table of a site file's `codes`; the default one, written as names, when there are none.

@@ -90,6 +90,7 @@ class Plant:
                                         description="pt600",
                                         host="127.0.0.1",
                                         port=self.controllers[name][1],
+                                        stop_proven=True,
                                     )
                                     for name in self.robots
                                 ),

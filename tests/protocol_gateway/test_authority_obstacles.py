@@ -43,7 +43,7 @@ SITUATIONS = {
     "ready": READY,
     "link down": linked(LinkState.DOWN),
     "silent": linked(LinkState.SILENT),
-    "read only": replace(READY, read_only=True),
+    "read only": replace(READY, read_only="its stop is not proven"),
     "local": in_state(mode=Mode.LOCAL),
     "mode unknown": in_state(mode=None),
     "mode unknown, accepted": replace(in_state(mode=None), accept_unknown=frozenset({"mode"})),

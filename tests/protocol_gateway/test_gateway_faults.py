@@ -256,10 +256,28 @@ def test_a_controller_without_a_proven_stop_is_read_only(mesh, tmp_path):
     async def main():
         async with simulator(demo=True) as port, gateway(mesh, tmp_path, port, stop_proven=False) as plant:
             assert plant.controller.read_only
-            assert "read-only" in await refusal(plant.lease(A.ACQUIRE))
+            assert "read-only: its stop is not proven: try the stop unit" in plant.controller.link_text
+            assert "then write stop_proven = true" in await refusal(plant.lease(A.ACQUIRE))
+            assert "then write stop_proven = true" in plant.events("robot.read_only")[0].text
             stop = await plant.stop()
             assert not stop.sent
             assert "stop it at its own panel" in stop.text
+            assert plant.controller.counters.units_sent == 0
+
+    run(main())
+
+
+def test_a_controller_of_codes_without_one_for_stop_is_read_only_whatever_is_said_to_be_proven(
+    mesh, tmp_path
+):
+    codes = {2: "ABSOLUTE.DEG", 101: "COMMAND:home"}
+
+    async def main():
+        coded = simulator(demo=True, codes=codes)
+        async with coded as port, gateway(mesh, tmp_path, port, codes=codes) as plant:
+            assert plant.controller.read_only
+            assert 'add the code of "COMMAND:stop"' in await refusal(plant.lease(A.ACQUIRE))
+            assert not (await plant.stop()).sent
             assert plant.controller.counters.units_sent == 0
 
     run(main())

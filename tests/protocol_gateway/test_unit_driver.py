@@ -52,6 +52,19 @@ def test_commands_are_told_in_the_papers_words_and_units(command, data):
     assert driver().encode(command) == data
 
 
+@pytest.mark.parametrize(
+    ("codes", "can_stop"),
+    [
+        ({}, True),
+        ({2: "ABSOLUTE.DEG", 1: "COMMAND"}, True),
+        ({2: "ABSOLUTE.DEG", 102: "COMMAND:stop"}, True),
+        ({2: "ABSOLUTE.DEG", 101: "COMMAND:home"}, False),
+    ],
+)
+def test_a_controller_of_codes_can_be_stopped_only_by_a_code(codes, can_stop):
+    assert driver(codes=codes).can_stop is can_stop
+
+
 def test_commands_are_told_in_codes_where_the_site_file_has_them():
     coded = driver(codes={2: "ABSOLUTE.DEG", 102: "COMMAND:stop"})
     assert coded.encode(Stop()) == b"1#102@"
