@@ -10,7 +10,6 @@ import signal
 import threading
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Iterable
-from logging.handlers import QueueHandler, QueueListener
 from typing import Any, TypeVar
 
 from bus.session import Session, SessionSettings, open_session
@@ -19,7 +18,7 @@ AnySettings = TypeVar("AnySettings")
 
 # A site is down within 2 s of Ctrl-C, whatever hangs.
 _LAST_MOMENT_S = 1.7
-_MOST_RECORDS = 2000
+_MOST_LINES = 2000
 _LAST_WORDS_S = 0.2
 
 
@@ -69,30 +68,40 @@ def run_until_signalled(main: Coroutine[Any, Any, None]) -> None:
     asyncio.run(guarded())
 
 
-class _Dropping(QueueHandler):
-    """Hands records to a writing thread, and drops them when that is held up.
+class _Stderr(logging.Handler):
+    """Hands lines to a writing thread, and drops them when that is held up.
 
-    A terminal that is held (Ctrl-S, a full pipe) must not hold a gateway.
+    A terminal that is held (Ctrl-S, a full pipe) must hold neither a gateway nor its end.
     """
 
-    def enqueue(self, record: logging.LogRecord) -> None:
+    def __init__(self) -> None:
+        super().__init__()
+        self.setFormatter(logging.Formatter("%(levelname)s %(message)s"))
+        self.lines: queue.Queue[str] = queue.Queue(_MOST_LINES)
+        threading.Thread(target=self._write, name="log", daemon=True).start()
+
+    def emit(self, record: logging.LogRecord) -> None:
         with contextlib.suppress(queue.Full):
-            self.queue.put_nowait(record)
+            self.lines.put_nowait(self.format(record))
+
+    def _write(self) -> None:
+        while True:
+            line = self.lines.get()
+            with contextlib.suppress(OSError):
+                os.write(2, f"{line}\n".encode(errors="replace"))
+            self.lines.task_done()
 
 
 def log_to_stderr(level: int = logging.INFO) -> None:
     """One line a record on standard error, in words, written by a thread of its own."""
     for number, name in ((logging.INFO, "info"), (logging.WARNING, "warning"), (logging.ERROR, "error")):
         logging.addLevelName(number, name)
-    records: queue.Queue[logging.LogRecord] = queue.Queue(_MOST_RECORDS)
-    writer = logging.StreamHandler()
-    writer.setFormatter(logging.Formatter("%(levelname)s %(message)s"))
-    QueueListener(records, writer).start()
-    logging.basicConfig(level=level, handlers=[_Dropping(records)], force=True)
+    handler = _Stderr()
+    logging.basicConfig(level=level, handlers=[handler], force=True)
 
     def last_words() -> None:
         deadline = time.monotonic() + _LAST_WORDS_S
-        while not records.empty() and time.monotonic() < deadline:
+        while handler.lines.unfinished_tasks and time.monotonic() < deadline:
             time.sleep(0.005)
 
     atexit.register(last_words)
