@@ -16,7 +16,13 @@ Two states that do not know each other, the lease's and the stop's:
 "no" is a refusal in words, * but the holder's own ACQUIRE renews. OFFER and ACCEPT pass a lease that
 does not move on to another operator; TAKE gives a reason. Every stop has a number of its own, so a
 RESET never clears a stop that its sender has not seen. "moving" covers motion that is held (HOLD):
-it would go on with anybody's RESUME.
+it would go on with anybody's RESUME. Foreign motion stops the robot too, where motion had been
+commanded under the lease: it may be that motion, begun far too late.
+
+    motion of the holder   seen to move   still 0.5 s   at its target   refused   30 s without motion
+    --------------------   ------------   -----------   -------------   -------   -------------------
+    commanded, not seen    seen           -             over after 2 s  over      over
+    seen                   seen           over          -               -         -
 """
 
 import hmac
@@ -29,8 +35,10 @@ DEFAULT_TTL_S = 2.0
 SHORTEST_TTL_S = 0.5
 LONGEST_TTL_S = 5.0
 
-# Servos and brakes take their time: no motion within this long after a command, and none will come.
+# Servos and brakes take their time: this long even a robot that is at its target already may begin to move.
 START_S = 2.0
+# A controller may do much else first: until then motion is that which was commanded, and not foreign.
+LATEST_START_S = 30.0
 # A controller that goes from one motion to the next is idle for a moment in between.
 SETTLE_S = 0.5
 # A robot that was moved by others this short a while ago may go on: no surprise to the next operator.
@@ -55,11 +63,15 @@ class Motion:
         last_s: When it was last commanded, or seen to move (monotonic).
         seen: It was seen to move.
         held: HOLD was sent; it goes on with RESUME.
+        target: Where it goes [rad] or [m]; None: not known.
+        newest: Nothing was commanded since, so a refusal of the controller's is an answer to it.
     """
 
     last_s: float
     seen: bool = False
     held: bool = False
+    target: tuple[float, ...] | None = None
+    newest: bool = True
 
 
 class Answer(NamedTuple):
@@ -76,6 +88,7 @@ class Lease:
     Attributes:
         until_s: End, monotonic; `until_ns` is the same moment on the wall clock.
         last_id: Highest command id so far, and `last_answer` what it got.
+        commanded: Motion was commanded under it.
         tolerates_motion: The robot moved by itself when the lease began, so that is no surprise.
     """
 
@@ -90,6 +103,7 @@ class Lease:
     offered_to: str = ""
     renewals: int = 0
     motion: Motion | None = None
+    commanded: bool = False
     tolerates_motion: bool = False
 
 
@@ -106,7 +120,7 @@ class Stop:
 
 @dataclass(frozen=True, kw_only=True)
 class LeaseEnd:
-    """A lease that is over. `stop`: its holder's motion ran, the robot must be stopped."""
+    """A lease that is over. `stop`: its holder's motion runs, or may, so the robot must be stopped."""
 
     holder: str
     why: str
@@ -199,12 +213,17 @@ def expire(authority: Authority, now: Now) -> tuple[Authority, LeaseEnd | None]:
     return end_lease(authority, f"{lease.holder}'s lease was not renewed within {lease.ttl_s:g} s")
 
 
-def end_lease(authority: Authority, why: str) -> tuple[Authority, LeaseEnd | None]:
-    """End the lease, if there is one; says whether its holder's motion has to be stopped."""
+def end_lease(authority: Authority, why: str, *, foreign: bool = False) -> tuple[Authority, LeaseEnd | None]:
+    """End the lease, if there is one; says whether its holder's motion has to be stopped.
+
+    Args:
+        foreign: Because of motion that nobody is known to have commanded.
+    """
     lease = authority.lease
     if lease is None:
         return authority, None
-    ended = LeaseEnd(holder=lease.holder, why=why, renewals=lease.renewals, stop=lease.motion is not None)
+    stop = lease.motion is not None or (foreign and lease.commanded)
+    ended = LeaseEnd(holder=lease.holder, why=why, renewals=lease.renewals, stop=stop)
     return replace(authority, lease=None), ended
 
 
@@ -248,8 +267,14 @@ def why_not_holder(authority: Authority, operator: str) -> str:
     return f"{operator} is in control with another lease (another window or program?): this one is not valid"
 
 
-def command_sent(authority: Authority, request: CommandRequest, now: Now) -> Authority:
-    """The command's unit is on the controller's socket."""
+def command_sent(
+    authority: Authority, request: CommandRequest, now: Now, *, target: tuple[float, ...] | None = None
+) -> Authority:
+    """The command's unit is on the controller's socket.
+
+    Args:
+        target: Where a motion command goes [rad] or [m]; None: not known.
+    """
     lease = authority.lease
     if request.command == _C.RESET and authority.stop is not None and authority.stop.id == request.stop_id:
         authority = replace(authority, stop=None)
@@ -257,12 +282,24 @@ def command_sent(authority: Authority, request: CommandRequest, now: Now) -> Aut
         return authority
     motion = lease.motion
     if request.command in MOTION_COMMANDS:
-        motion = Motion(last_s=now.monotonic_s)
-    elif request.command == _C.HOLD and motion is not None:
-        motion = replace(motion, held=True)
-    # From its first motion on, whatever else moves the robot is a surprise.
-    tolerates = lease.tolerates_motion and request.command not in MOTION_COMMANDS
-    return replace(authority, lease=replace(lease, motion=motion, tolerates_motion=tolerates))
+        if request.command == _C.RESUME and motion is not None:
+            target = motion.target
+        # From its first motion on, whatever else moves the robot is a surprise.
+        lease = replace(lease, commanded=True, tolerates_motion=False)
+        motion = Motion(last_s=now.monotonic_s, target=target)
+    elif motion is not None:
+        motion = replace(motion, held=motion.held or request.command == _C.HOLD, newest=False)
+    return replace(authority, lease=replace(lease, motion=motion))
+
+
+def refused(authority: Authority) -> Authority:
+    """The controller refused a unit: a motion that was just commanded, and has not begun, will not."""
+    lease = authority.lease
+    if lease is None or lease.motion is None or authority.moving:
+        return authority
+    if lease.motion.seen or not lease.motion.newest:
+        return authority
+    return replace(authority, lease=replace(lease, motion=None))
 
 
 def stop(authority: Authority, *, by: str, reason: str, now: Now) -> tuple[Authority, Stop]:
@@ -282,11 +319,14 @@ def stop_sent(authority: Authority, stop_id: int, now: Now) -> Authority:
     return replace(authority, stop=replace(authority.stop, sent_s=now.monotonic_s))
 
 
-def observe(authority: Authority, *, moving: bool, pending: bool, now: Now) -> tuple[Authority, bool]:
+def observe(
+    authority: Authority, *, moving: bool, pending: bool, arrived: bool, now: Now
+) -> tuple[Authority, bool]:
     """Follow the robot's motion.
 
     Args:
         moving: Whether it moves now.
+        arrived: It is where its holder's motion goes.
         pending: A held motion may still be waiting for RESUME: the controller says so, or does not say.
 
     Returns:
@@ -296,9 +336,11 @@ def observe(authority: Authority, *, moving: bool, pending: bool, now: Now) -> t
     authority = replace(authority, moving=moving)
     lease = authority.lease
     if lease is not None and lease.motion is not None:
-        return replace(
-            authority, lease=replace(lease, motion=_follow(lease.motion, moving, pending, now))
-        ), False
+        if not moving:
+            motion = _at_rest(lease.motion, pending=pending, arrived=arrived, now=now)
+        else:
+            motion = replace(lease.motion, last_s=now.monotonic_s, seen=True)
+        return replace(authority, lease=replace(lease, motion=motion)), False
     foreign_s = authority.foreign_s
     goes_on = foreign_s is not None and now.monotonic_s - foreign_s < SETTLE_S
     # A robot that is still slowing down from a stop is neither.
@@ -312,10 +354,9 @@ def moved_recently(authority: Authority, now: Now) -> bool:
     return authority.foreign_s is not None and now.monotonic_s - authority.foreign_s < RECENT_S
 
 
-def _follow(motion: Motion, moving: bool, pending: bool, now: Now) -> Motion | None:
-    if moving:
-        return replace(motion, last_s=now.monotonic_s, seen=True)
+def _at_rest(motion: Motion, *, pending: bool, arrived: bool, now: Now) -> Motion | None:
+    """What becomes of the holder's motion while the robot does not move; None: it is over."""
     if motion.held and pending:
         return motion
-    patience_s = SETTLE_S if motion.seen else START_S
+    patience_s = SETTLE_S if motion.seen else START_S if arrived else LATEST_START_S
     return motion if now.monotonic_s - motion.last_s < patience_s else None

@@ -27,7 +27,8 @@ from protocol_gateway.driver import Activity, Driver, Stop
 from protocol_gateway.errors import AuditError, CommandError, LinkError
 from protocol_gateway.journal import Journal
 from protocol_gateway.ledger import Ledger, command_entry, entry_of, lease_entry
-from protocol_gateway.obstacles import Controller, controller_command, obstacle
+from protocol_gateway.motion import has_arrived, motion_may_be_held
+from protocol_gateway.obstacles import Controller, controller_command, obstacle, target_of
 from protocol_gateway.states import lease_answer
 from robots.joints import Joints
 
@@ -190,9 +191,9 @@ class Control:
         if ended is not None:
             self._end(authority, ended, "EXPIRE")
 
-    def end_lease(self, why: str) -> None:
-        """End the lease, if there is one, for a reason of the gateway's."""
-        authority, ended = rules.end_lease(self.authority, why)
+    def end_lease(self, why: str, *, foreign: bool = False) -> None:
+        """End the lease, if there is one, for a reason of the gateway's; `foreign`: of foreign motion."""
+        authority, ended = rules.end_lease(self.authority, why, foreign=foreign)
         if ended is not None:
             self._end(authority, ended, "REVOKE")
 
@@ -311,7 +312,8 @@ class Control:
     def _sent(self, request: schema.CommandRequest) -> None:
         now = _now()
         latched = self.authority.stop
-        self.authority = rules.command_sent(self.authority, request, now)
+        target = target_of(request, self._controller(), self._joints)
+        self.authority = rules.command_sent(self.authority, request, now, target=target)
         if request.command == _C.RESET:
             self._reset_s = now.monotonic_s
             if latched is not None:
@@ -321,13 +323,25 @@ class Control:
 
     # ----------------------------------------------------------------- motion
 
-    def observe(self, *, moving: bool | None, may_be_held: bool) -> None:
-        """Follow whether the robot moves; called some times a second."""
+    def refused(self) -> None:
+        """The controller refused a unit."""
+        before, self.authority = self.authority, rules.refused(self.authority)
+        if before is not self.authority:
+            self._on_change()
+
+    def observe(self, *, moving: bool | None) -> None:
+        """Follow whether the robot moves; called some times a second. None: it is not known."""
         if moving is None:
             return
         now = _now()
         before = self.authority
-        self.authority, foreign = rules.observe(before, moving=moving, pending=may_be_held, now=now)
+        self.authority, foreign = rules.observe(
+            before,
+            moving=moving,
+            pending=motion_may_be_held(self._controller().status.activity),
+            arrived=self._has_arrived(),
+            now=now,
+        )
         lease = self.authority.lease
         if foreign and not rules.moved_recently(before, now):
             self._journal.say(
@@ -336,10 +350,16 @@ class Control:
                 "the robot began to move, and nobody commanded it through the gateway",
             )
         if foreign and lease is not None and not lease.tolerates_motion:
-            self.end_lease("the robot began to move, and its holder had not commanded it")
+            self.end_lease("the robot began to move, and its holder had not commanded it", foreign=True)
         if (before.lease and before.lease.motion is None) != (lease and lease.motion is None):
             self._on_change()
         self._check_heeded(moving, now)
+
+    def _has_arrived(self) -> bool:
+        lease, controller = self.authority.lease, self._controller()
+        if lease is None or lease.motion is None or controller.status.homed is False:
+            return False  # a robot that is at its home, but does not know it, has still to be homed
+        return has_arrived(lease.motion.target, controller.positions, self._joints.types)
 
     def _check_heeded(self, moving: bool, now: Now) -> None:
         latched = self.authority.stop

@@ -1,8 +1,10 @@
 """Whether a robot moves: told by its controller, or seen from its positions. No I/O."""
 
 from collections import deque
+from collections.abc import Sequence
 
 from protocol_gateway.driver import Activity
+from robots.joints import JointType
 
 # A window long enough to tell the slowest motion (1 % of 20 degrees a second) from a sensor's last digit.
 WINDOW_S = 0.5
@@ -14,8 +16,8 @@ _STILL_PRISMATIC = 1e-4  # m
 class PositionWatch:
     """Sees motion in positions, for controllers that do not tell their activity."""
 
-    def __init__(self, prismatic: tuple[bool, ...]) -> None:
-        self._still = tuple(_STILL_PRISMATIC if each else _STILL_ROTARY for each in prismatic)
+    def __init__(self, joint_types: Sequence[JointType]) -> None:
+        self._still = _still(joint_types)
         self._samples: deque[tuple[float, tuple[float, ...]]] = deque()
 
     def see(self, positions: tuple[float, ...], time_s: float) -> None:
@@ -41,6 +43,22 @@ class PositionWatch:
             for _, sample in self._samples
             for there, here, still in zip(sample, last, self._still, strict=True)
         )
+
+
+def _still(joint_types: Sequence[JointType]) -> tuple[float, ...]:
+    return tuple(_STILL_PRISMATIC if each is JointType.PRISMATIC else _STILL_ROTARY for each in joint_types)
+
+
+def has_arrived(
+    target: Sequence[float] | None, positions: Sequence[float] | None, joint_types: Sequence[JointType]
+) -> bool:
+    """Whether the joints are where they were to go [rad] or [m]; where one of both is not known: no."""
+    if target is None or positions is None:
+        return False
+    return all(
+        abs(there - here) <= still
+        for there, here, still in zip(target, positions, _still(joint_types), strict=True)
+    )
 
 
 def is_moving(activity: Activity | None, watch: PositionWatch) -> bool | None:

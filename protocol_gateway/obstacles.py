@@ -123,16 +123,28 @@ def _value_obstacle(request: CommandRequest, controller: Controller, joints: Joi
             return f"speed {request.speed_percent:g} % is outside 1 to 100 %"
     if request.command not in _MOVES:
         return ""
-    values = tuple(request.joint_positions)
-    if len(values) != len(joints):
+    count = len(request.joint_positions)
+    if count != len(joints):
         names = ", ".join(joints.names)
-        return f"{len(values)} joint positions, but the robot has {len(joints)} joints ({names})"
-    if request.command == _C.MOVE_RELATIVE:
-        if controller.positions is None:
-            return "the controller has not told where the joints are, so nothing can be added to that"
-        values = tuple(start + offset for start, offset in zip(controller.positions, values, strict=True))
+        return f"{count} joint positions, but the robot has {len(joints)} joints ({names})"
+    target = target_of(request, controller, joints)
+    if target is None:
+        return "the controller has not told where the joints are, so nothing can be added to that"
     # Limits and constraints are linear: all of a straight path in joint space is within them when its end is.
-    return "; ".join(violations(joints, values))
+    return "; ".join(violations(joints, target))
+
+
+def target_of(request: CommandRequest, controller: Controller, joints: Joints) -> tuple[float, ...] | None:
+    """Where a command takes the joints [rad] or [m]; None: nowhere, or it is not known."""
+    match request.command:
+        case _C.HOME:
+            return tuple(joints.home.tolist())
+        case _C.MOVE_ABSOLUTE:
+            return tuple(request.joint_positions)
+        case _C.MOVE_RELATIVE if controller.positions is not None:
+            pairs = zip(controller.positions, request.joint_positions, strict=True)
+            return tuple(start + offset for start, offset in pairs)
+    return None
 
 
 def controller_command(request: CommandRequest) -> ControllerCommand:

@@ -18,7 +18,7 @@ from protocol_gateway.driver import Driver
 from protocol_gateway.journal import Journal
 from protocol_gateway.ledger import Ledger
 from protocol_gateway.link import ControllerLink, LinkSettings, LinkState, LinkStatus
-from protocol_gateway.motion import is_moving, motion_may_be_held
+from protocol_gateway.motion import is_moving
 from protocol_gateway.obstacles import Controller
 from protocol_gateway.restart import remembered
 from protocol_gateway.states import audit_entry, controller_state, lease_state
@@ -91,6 +91,7 @@ class Robot:
             raw=publisher("raw"),
             journal=self._journal,
             on_status=self._on_told,
+            on_refused=lambda: self._control.refused(),
         )
         self._link = ControllerLink(
             LinkSettings(
@@ -216,10 +217,7 @@ class Robot:
     def _observe(self) -> None:
         if self._link.status.state is not LinkState.UP:
             return
-        activity = self._telemetry.status.activity
-        self._control.observe(
-            moving=is_moving(activity, self._telemetry.watch), may_be_held=motion_may_be_held(activity)
-        )
+        self._control.observe(moving=is_moving(self._telemetry.status.activity, self._telemetry.watch))
 
     def _controller(self) -> Controller:
         return Controller(

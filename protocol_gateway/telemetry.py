@@ -20,7 +20,7 @@ from protocol_gateway.journal import Journal
 from protocol_gateway.link import Received
 from protocol_gateway.motion import PositionWatch
 from protocol_gateway.states import joint_states, raw_record
-from robots.joints import Joints, JointType
+from robots.joints import Joints
 
 _SLOW_S = 0.1
 _FAULT = 9  # the protocol's ERROR number for a fault
@@ -47,6 +47,7 @@ class Telemetry:
         raw: Publisher,
         journal: Journal,
         on_status: Callable[[], None],
+        on_refused: Callable[[], None],
     ) -> None:
         self._joints = joints
         self._fast = fast
@@ -54,8 +55,9 @@ class Telemetry:
         self._raw = raw
         self._journal = journal
         self._on_status = on_status
+        self._on_refusal = on_refused
         self._next_slow_s = 0.0
-        self.watch = PositionWatch(tuple(each is JointType.PRISMATIC for each in joints.types))
+        self.watch = PositionWatch(joints.types)
         self.status = StatusReceived()
         self.positions: tuple[float, ...] | None = None
         self.controller_time_s: float | None = None
@@ -125,6 +127,7 @@ class Telemetry:
         self.watch.see(joints.positions, received.monotonic_s)
 
     def _on_refused(self, number: int, text: str) -> None:
+        self._on_refusal()
         if number == _FAULT:
             self.fault = text
         self._journal.say(

@@ -100,7 +100,14 @@ async def gateway(mesh, folder, *ports, up=True, **robot):
         audit_folder=folder,
         robots=tuple(
             RobotSettings(
-                **{"name": name, "description": "pt600", "host": "127.0.0.1", "port": port, "stop_proven": True, **robot}
+                **{
+                    "name": name,
+                    "description": "pt600",
+                    "host": "127.0.0.1",
+                    "port": port,
+                    "stop_proven": True,
+                    **robot,
+                }
             )
             for name, port in zip(names, ports, strict=True)
         ),

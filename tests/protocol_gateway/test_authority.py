@@ -17,6 +17,7 @@ from protocol_gateway.authority import (
     expire,
     holds,
     observe,
+    refused,
     request_lease,
     stop,
     stop_sent,
@@ -47,8 +48,8 @@ def moving(time_s=0.0):
     return command_sent(held(), command(C.MOVE_ABSOLUTE), at(time_s))
 
 
-def see(authority, moves, time_s, *, pending=False):
-    return observe(authority, moving=moves, pending=pending, now=at(time_s))
+def see(authority, moves, time_s, *, pending=False, arrived=False):
+    return observe(authority, moving=moves, pending=pending, arrived=arrived, now=at(time_s))
 
 
 @pytest.mark.parametrize(("asked", "kept"), [(0, 2.0), (0.1, 0.5), (3, 3.0), (60, 5.0), (-1, 0.5)])
@@ -129,13 +130,49 @@ def test_motion_is_over_when_the_robot_has_been_still_for_half_a_second():
     assert state.lease.motion is not None
     state, _ = see(state, False, 0.6)
     assert state.lease.motion is None
+    assert state.lease.commanded
 
 
-def test_a_slow_start_is_waited_for():
-    state, _ = see(moving(), False, 1.9)
+@pytest.mark.parametrize(("arrived", "patience_s"), [(True, 2.0), (False, 30.0)])
+def test_motion_that_has_not_begun_is_the_holders_until_it_is_there_or_long_after(arrived, patience_s):
+    state, _ = see(moving(), False, patience_s - 0.1, arrived=arrived)
     assert state.lease.motion is not None
-    state, _ = see(state, False, 2.0)
+    state, _ = see(state, False, patience_s, arrived=arrived)
     assert state.lease.motion is None
+
+
+def test_motion_that_begins_late_is_its_holders_and_is_stopped_with_his_lease():
+    state, _ = see(moving(), False, 2.5)
+    state, foreign = see(state, True, 2.6)
+    assert not foreign
+    assert expire(state, at(2.7))[1].stop
+
+
+def test_motion_that_begins_after_all_patience_is_stopped_because_it_may_be_the_holders():
+    state, _ = see(moving(), False, 31.0)
+    state, foreign = see(state, True, 32.0)
+    assert foreign
+    assert end_lease(state, "foreign", foreign=True)[1].stop
+    assert not end_lease(held(), "foreign", foreign=True)[1].stop
+
+
+def test_what_the_controller_refused_does_not_begin():
+    assert refused(moving()).lease.motion is None
+
+
+def test_a_refusal_of_something_else_does_not_end_the_holders_motion():
+    seen, _ = see(moving(), True, 0.1)
+    later = command_sent(moving(), command(C.SPEED), at(0.1))
+    while_it_moves, _ = see(held(), True, 0.0)
+    while_it_moves = command_sent(while_it_moves, command(C.MOVE_ABSOLUTE), at(0.1))
+    for state in (seen, later, while_it_moves):
+        assert refused(state) == state
+
+
+def test_what_is_resumed_goes_where_it_was_sent():
+    state = command_sent(held(), command(C.MOVE_ABSOLUTE), at(0), target=(1.0,))
+    state = command_sent(state, command(C.HOLD), at(1))
+    assert command_sent(state, command(C.RESUME), at(2)).lease.motion.target == (1.0,)
 
 
 def test_a_held_motion_stays_the_holders_until_the_controller_says_that_there_is_none():

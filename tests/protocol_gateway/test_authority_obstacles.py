@@ -8,14 +8,15 @@ import pytest
 from bus.schemas.robomesh_pb2 import CommandRequest
 from protocol_gateway.driver import Activity, Mode, MoveAbsolute, Speed, StatusReceived, Trace
 from protocol_gateway.link import LinkState, LinkStatus
-from protocol_gateway.motion import PositionWatch, is_moving, motion_may_be_held
+from protocol_gateway.motion import PositionWatch, has_arrived, is_moving, motion_may_be_held
 from protocol_gateway.obstacles import Controller, controller_command, obstacle
 from robots.description import load
-from robots.joints import joints_of
+from robots.joints import JointType, joints_of
 
 C = CommandRequest.Command
 JOINTS = joints_of(load("pt600"))
 HOME = tuple(JOINTS.home.tolist())
+TYPES = (JointType.ROTARY, JointType.PRISMATIC)
 READY = Controller(
     link=LinkStatus(LinkState.UP, ""),
     status=StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=True, trace=False),
@@ -131,7 +132,7 @@ def test_commands_become_the_drivers_own():
 
 
 def watched(positions_at):
-    watch = PositionWatch((False, True))
+    watch = PositionWatch(TYPES)
     for number in range(200):
         watch.see(positions_at(number * 0.01), number * 0.01)
     return watch
@@ -155,9 +156,23 @@ def test_the_controllers_word_counts_where_it_gives_one():
     still, moving = watched(lambda t: (0.0, 0.0)), watched(lambda t: (t, 0.0))
     assert is_moving(Activity.HOMING, still) is True
     assert is_moving(Activity.IDLE, moving) is False
-    assert is_moving(None, PositionWatch((False,))) is None
+    assert is_moving(None, PositionWatch(TYPES)) is None
     assert [motion_may_be_held(each) for each in (None, Activity.HOLDING, Activity.IDLE)] == [
         True,
         True,
         False,
     ]
+
+
+@pytest.mark.parametrize(
+    ("target", "positions", "arrived"),
+    [
+        ((1.0, 0.5), (1.0009, 0.50009), True),
+        ((1.0, 0.5), (1.0011, 0.5), False),
+        ((1.0, 0.5), (1.0, 0.50011), False),
+        (None, (1.0, 0.5), False),
+        ((1.0, 0.5), None, False),
+    ],
+)
+def test_a_robot_has_arrived_within_a_sensors_last_digit(target, positions, arrived):
+    assert has_arrived(target, positions, TYPES) is arrived

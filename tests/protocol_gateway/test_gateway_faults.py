@@ -337,3 +337,65 @@ def test_a_robot_that_moves_on_after_its_stop_is_a_critical_event(mesh, tmp_path
                 await until(lambda: heard.count(b"stop") == 2)
 
     run(main())
+
+
+@contextlib.asynccontextmanager
+async def slow_starter(after_s):
+    """A controller that begins to move so long after it was sent a target: (port, heard)."""
+    waist, begins = 0.0, None
+
+    def state():
+        nonlocal waist, begins
+        if begins is None and b"ABSOLUTE" in heard:
+            begins = time.monotonic() + after_s
+        moves = begins is not None and time.monotonic() >= begins
+        waist += 0.1 if moves else 0.0
+        return f"2#ABSOLUTE.DEG*{waist:.2f};0;0;0;0&STATUS*{'moving' if moves else 'idle'};remote;homed@"
+
+    async with bare_controller() as (port, say, heard), repeated(say, state):
+        yield port, heard
+
+
+def test_a_motion_that_begins_late_stays_under_its_lease_and_is_stopped_with_it(mesh, tmp_path):
+    async def main():
+        async with slow_starter(2.6) as (port, heard), gateway(mesh, tmp_path, port) as plant:
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            await plant.command(C.MOVE_ABSOLUTE, joint_positions=[1.0, 0, 0, 0, 0])
+            await until(lambda: plant.controller.activity == STATE.MOVING)
+            assert plant.seen["lease"][-1].motion
+            assert not plant.events("motion.foreign")
+            await plant.lease(A.RELEASE)
+            await until(lambda: b"stop" in heard)
+
+    run(main())
+
+
+def test_a_lease_that_ends_before_its_motion_has_begun_stops_the_robot(mesh, tmp_path):
+    async def main():
+        async with slow_starter(60.0) as (port, heard), gateway(mesh, tmp_path, port) as plant:
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            await plant.command(C.MOVE_ABSOLUTE, joint_positions=[1.0, 0, 0, 0, 0])
+            await asyncio.sleep(2.2)
+            await plant.lease(A.RELEASE)
+            await until(lambda: b"stop" in heard)
+
+    run(main())
+
+
+def test_a_motion_that_the_controller_refuses_is_over_at_once(mesh, tmp_path):
+    async def main():
+        async with (
+            bare_controller() as (port, say, heard),
+            repeated(say, lambda: "2#ABSOLUTE.DEG*0;0;0;0;0&STATUS*idle;remote;homed@"),
+            gateway(mesh, tmp_path, port) as plant,
+        ):
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            await plant.command(C.MOVE_ABSOLUTE, joint_positions=[1.0, 0, 0, 0, 0])
+            await until(lambda: plant.seen["lease"][-1].motion)
+            say("1#ERROR*5;no@")
+            await until(lambda: not plant.seen["lease"][-1].motion)
+            await plant.lease(A.RELEASE)
+            await until(lambda: not plant.seen["lease"][-1].holder)
+            assert b"stop" not in heard
+
+    run(main())
