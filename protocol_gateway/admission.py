@@ -4,6 +4,7 @@
     id = the last one           a repeat: the first answer again, nothing is done
     id < the last one, or 0     refused
     not_after has passed        refused: it was delayed on the way
+    waited here for over 1 s    refused: its sender may have been told that nobody answered
     a stop is latched           motion refused; RESET only with that stop's id
 
 What the controller's state and the joints' limits forbid is for `protocol_gateway.obstacles` to say.
@@ -17,6 +18,9 @@ from bus.schemas.robomesh_pb2 import CommandRequest
 from protocol_gateway.authority import MOTION_COMMANDS, Answer, Authority, Now, holds, why_not_holder
 
 _RESET = CommandRequest.Command.RESET
+
+# Well below the time after which who asks is told that nobody answered (2 s unless he says otherwise).
+LONGEST_WAIT_S = 1.0
 
 
 class Verdict(NamedTuple):
@@ -61,6 +65,21 @@ def lateness(request: CommandRequest, now: Now) -> str:
     return (
         f"Not sent: it came {late_s:.2f} s after its not_after: delayed on the way, or dated by another "
         "clock than the gateway's (`now` in each lease answer)."
+    )
+
+
+def delay(arrived_s: float, now: Now) -> str:
+    """Why a command has waited for too long in the gateway; empty: it has not.
+
+    Args:
+        arrived_s: When it arrived (monotonic).
+    """
+    waited_s = now.monotonic_s - arrived_s
+    if waited_s <= LONGEST_WAIT_S:
+        return ""
+    return (
+        f"Not sent: it waited {waited_s:.1f} s in the gateway (for the audit log, or others before it); "
+        f"after {LONGEST_WAIT_S:g} s nobody may be waiting for it: send it again."
     )
 
 

@@ -7,7 +7,7 @@
 
 Commands wait for each other, so that they reach the controller in the order of the audit log; stops
 and renewals wait for nothing. Between the two judgements the disk may take its time: a stop or the
-lease's end in between is obeyed.
+lease's end in between is obeyed, and what has waited too long is not sent any more.
 """
 
 import asyncio
@@ -20,7 +20,7 @@ from functools import partial
 from bus.errors import RefusedError
 from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway import authority as rules
-from protocol_gateway.admission import Verdict, admit, lateness, remember, stop_refusal
+from protocol_gateway.admission import Verdict, admit, delay, lateness, remember, stop_refusal
 from protocol_gateway.audit import Entry, Outcome
 from protocol_gateway.authority import Answer, Authority, LeaseEnd, LeaseOutcome, Now
 from protocol_gateway.driver import Activity, Driver, Stop
@@ -38,7 +38,7 @@ _S = schema.Event.Severity
 
 # Longer than any arm takes to come to rest: one that still moves does not heed its stop unit.
 HEEDED_WITHIN_S = 2.0
-# A controller's status follows its RESET by so much at most.
+# A controller goes on telling the stop that was just reset for so long at most.
 RESET_SHOWS_WITHIN_S = 0.3
 GATEWAY = "gateway"
 
@@ -242,21 +242,27 @@ class Control:
         Raises:
             RefusedError: With what, why and what next; nothing was sent.
         """
+        arrived_s = time.monotonic()
         async with self._one_at_a_time:
             self.check_expiry()
             verdict = admit(self.authority, request, operator=operator, now=_now())
             answer = verdict.answer
             if not verdict.repeat:
-                answer = await self._do(request, verdict, operator, source)
+                answer = await self._do(request, verdict, arrived_s, operator, source)
         if not answer.accepted:
             raise RefusedError(answer.text)
         return schema.CommandAnswer(accepted=True, text=answer.text)
 
     async def _do(
-        self, request: schema.CommandRequest, verdict: Verdict, operator: str, source: str
+        self,
+        request: schema.CommandRequest,
+        verdict: Verdict,
+        arrived_s: float,
+        operator: str,
+        source: str,
     ) -> Answer:
         entry = command_entry(request, operator=operator, source=source)
-        refusal = verdict.answer.text or self._obstacle(request)
+        refusal = verdict.answer.text or delay(arrived_s, _now()) or self._obstacle(request)
         unit = b""
         if not refusal:
             try:
@@ -272,33 +278,41 @@ class Control:
         # Used up before anything is done: whatever happens below, a repeat does not do it again.
         broken_off = Answer(False, "Not sent: it was broken off while it was being written down.")
         self.authority = remember(self.authority, request, broken_off)
-        answer = await self._write_and_send(request, unit, entry)
+        answer = await self._write_and_send(request, unit, arrived_s, entry)
         self.authority = remember(self.authority, request, answer)
         return answer
 
-    async def _write_and_send(self, request: schema.CommandRequest, unit: bytes, entry: Entry) -> Answer:
+    async def _write_and_send(
+        self, request: schema.CommandRequest, unit: bytes, arrived_s: float, entry: Entry
+    ) -> Answer:
         try:
             await self._ledger.before(entry)
         except AuditError as error:
             return Answer(False, f"Not sent: {error}, and what is not written down is not done.")
         self.check_expiry()
-        problem = self._no_longer(request, entry.operator)
+        problem = self._no_longer(request, arrived_s, entry.operator)
         if not problem:
             try:
                 self._send(unit)
             except LinkError as error:
                 problem = f"Not sent: {_plain(error)}."
         if problem:
-            await self._ledger.after(replace(entry, outcome=Outcome.FAILED, text=problem))
+            self._ledger.after_later(replace(entry, outcome=Outcome.FAILED, text=problem))
             return Answer(False, problem)
         self._sent(request)
         return Answer(True, f"{_C.Name(request.command)} is on the controller's socket")
 
-    def _no_longer(self, request: schema.CommandRequest, operator: str) -> str:
+    def _no_longer(self, request: schema.CommandRequest, arrived_s: float, operator: str) -> str:
         """Why a command that was allowed is not any more, after it was written down."""
         if not rules.holds(self.authority, operator, request.lease):
             return "Not sent: control ended while the command was being written down."
-        return lateness(request, _now()) or stop_refusal(self.authority, request) or self._obstacle(request)
+        now = _now()
+        return (
+            delay(arrived_s, now)
+            or lateness(request, now)
+            or stop_refusal(self.authority, request)
+            or self._obstacle(request)
+        )
 
     def _obstacle(self, request: schema.CommandRequest) -> str:
         controller = self._controller()
@@ -322,6 +336,10 @@ class Control:
         self._on_change()
 
     # ----------------------------------------------------------------- motion
+
+    def news(self) -> None:
+        """The controller told something new of itself: after a RESET, a stop or fault is a new one."""
+        self._reset_s = None
 
     def refused(self) -> None:
         """The controller refused a unit."""

@@ -22,10 +22,10 @@ def remembered(entries: Iterable[Entry]) -> Authority:
                 id=number, by=entry.operator, reason=entry.values.get("reason", ""), since_ns=entry.time_ns
             )
             authority = replace(authority, stop=latched, last_stop_id=max(number, authority.last_stop_id))
-        elif entry.request == "RESET" and authority.stop is not None and number == authority.stop.id:
-            if entry.outcome is Outcome.ACCEPTED:
-                authority, cleared = replace(authority, stop=None), authority.stop
-        elif entry.request == "RESET" and entry.outcome is Outcome.FAILED and cleared is not None:
+        elif entry.request == "RESET" and entry.outcome is Outcome.ACCEPTED:
+            cleared = authority.stop if authority.stop and authority.stop.id == number else None
+            authority = replace(authority, stop=None if cleared else authority.stop)
+        elif entry.request == "RESET" and entry.outcome is Outcome.FAILED:
             # It was written down before it was sent, and then it was not sent.
-            authority = replace(authority, stop=authority.stop or cleared)
+            authority, cleared = replace(authority, stop=authority.stop or cleared), None
     return authority

@@ -208,6 +208,7 @@ class Robot:
         self._publish_state()
 
     def _on_told(self) -> None:
+        self._control.news()
         self._observe()
         self._publish_state()
 

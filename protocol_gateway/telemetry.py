@@ -130,6 +130,7 @@ class Telemetry:
         self._on_refusal()
         if number == _FAULT:
             self.fault = text
+            self._on_status()
         self._journal.say(
             _S.WARNING,
             "controller.refused",

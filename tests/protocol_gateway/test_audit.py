@@ -213,6 +213,24 @@ def test_what_was_said_to_be_written_is_there_after_kill_nine(tmp_path):
             1,
         ),
         ([entry("STOP", stop_id="1"), entry("STOP", stop_id="2"), entry("RESET", stop_id="1")], 2),
+        (
+            [
+                entry("STOP", stop_id="1"),
+                entry("RESET", stop_id="1"),
+                entry("RESET"),
+                entry("RESET", Outcome.FAILED),
+            ],
+            None,
+        ),
+        (
+            [
+                entry("STOP", stop_id="1"),
+                entry("RESET", stop_id="1"),
+                entry("STOP", stop_id="2"),
+                entry("RESET", Outcome.FAILED, stop_id="1"),
+            ],
+            2,
+        ),
     ],
 )
 def test_a_stop_that_nobody_reset_is_remembered_from_the_log(entries, latched):

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
-from protocol_gateway.admission import admit, remember
+from protocol_gateway.admission import admit, delay, remember
 from protocol_gateway.authority import (
     Answer,
     Authority,
@@ -264,6 +264,11 @@ def test_what_was_delayed_on_the_way_is_refused():
     refused = admit(held(), late, operator="li", now=at(1.5))
     assert "0.50 s after its not_after" in refused.answer.text
     assert refused.counted
+
+
+def test_what_waited_over_a_second_in_the_gateway_is_not_sent():
+    assert delay(at(0).monotonic_s, at(0.9)) == ""
+    assert delay(at(0).monotonic_s, at(6)).startswith("Not sent: it waited 6.0 s in the gateway")
 
 
 def test_the_secret_is_not_in_the_leases_own_text():

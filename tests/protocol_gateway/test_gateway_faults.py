@@ -399,3 +399,51 @@ def test_a_motion_that_the_controller_refuses_is_over_at_once(mesh, tmp_path):
             assert b"stop" not in heard
 
     run(main())
+
+
+def test_a_command_that_waited_for_a_slow_disk_is_not_sent_after_its_sender_has_given_up(
+    mesh, tmp_path, monkeypatch
+):
+    async def main():
+        async with simulator(demo=True) as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            fsync = os.fsync
+
+            def slow(file):
+                time.sleep(1.2)
+                fsync(file)
+
+            monkeypatch.setattr(os, "fsync", slow)
+            text = await refusal(plant.command(C.TRACE_ON))
+            assert text.startswith("Not sent: it waited 1.")
+            monkeypatch.setattr(os, "fsync", fsync)
+            await until(lambda: plant.seen["audit"][-1].outcome == schema.AuditEntry.FAILED)
+            await plant.command(C.TRACE_OFF)
+            await until(lambda: plant.controller.counters.units_sent == 1)
+        outcomes = [(each.request, each.outcome) for each in read_entries(plant.audit)]
+        assert outcomes[1:4] == [("TRACE_ON", "ACCEPTED"), ("TRACE_ON", "FAILED"), ("TRACE_OFF", "ACCEPTED")]
+
+    run(main())
+
+
+def test_after_a_reset_the_old_stop_is_overlooked_for_a_moment_but_not_a_new_fault(mesh, tmp_path):
+    async def main():
+        activity = "stopped"
+
+        def state():
+            return f"2#ABSOLUTE.DEG*0;0;0;0;0&STATUS*{activity};remote;homed@"
+
+        async with (
+            bare_controller() as (port, say, _),
+            repeated(say, state),
+            gateway(mesh, tmp_path, port) as plant,
+        ):
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            await plant.command(C.RESET)
+            await plant.command(C.HOME)
+            await plant.command(C.RESET)
+            activity = "fault"
+            await until(lambda: plant.controller.activity == STATE.FAULT)
+            assert "has a fault" in await refusal(plant.command(C.HOME))
+
+    run(main())
