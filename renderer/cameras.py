@@ -13,7 +13,7 @@ FloatArray = NDArray[np.float64]
 FIELD_OF_VIEW = float(np.deg2rad(30.0))
 _NEAREST_M = 0.01
 # A close-up stays as it is while its object fills so much of it, and keeps off its edges.
-_CLOSE_LEAST, _CLOSE_EDGE, _CLOSE_MARGIN = 0.62, 0.03, 1.2
+_CLOSE_LEAST, _CLOSE_EDGE, _CLOSE_MARGIN = 0.68, 0.03, 1.16
 
 
 @dataclass(frozen=True, eq=False)

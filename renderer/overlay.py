@@ -56,7 +56,7 @@ def write_over(picture: Picture, overlay: Overlay) -> None:
     """Write an overlay on an RGB picture (height, width, 3), in place."""
     height, width = picture.shape[:2]
     # Readable at 480p, and not larger than it must be at 1080p.
-    size = max(13, round(height / 38))
+    size = max(13, round(height / 34))
     margin = round(size * 0.9)
     baseline = margin + size
     x = margin + _text(picture, overlay.title, (margin, baseline), size=round(size * 1.2), weight=_BOLD)
@@ -97,7 +97,7 @@ def _write_rows(picture: Picture, overlay: Overlay, *, size: int, margin: int) -
         if overlay.stale:
             middle = baseline - round(0.34 * size)
             picture[middle : middle + 1, x - text_width(row.value, size) : x] = color
-        x += gap // 2
+        x += 0 if row.unit == "°" else gap // 2
         _text(picture, row.unit, (x, baseline), size=size, color=FAINT)
         x += units + gap
         middle = baseline - round(0.36 * size)

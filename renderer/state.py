@@ -131,8 +131,11 @@ def overlay_of(state: RobotState, look: Look, view: str, *, age: float) -> Overl
 
 
 def warning_of(state: RobotState, *, age: float) -> Overlay:
-    """What even a small picture must say: that it is old."""
-    return Overlay(title="", view="", time="", state="", rows=(), stale=_stale_words(state, age))
+    """What even a small picture must say; no number, for it is looked at long after it was drawn."""
+    stale = "STALE" if age > STALE_AFTER_S else ""
+    if not state.link_placements:
+        stale = "NO DATA"
+    return Overlay(title="", view="", time="", state="", rows=(), stale=stale)
 
 
 def _told(description: Description, state: RobotState) -> list[Description.Joint]:

@@ -33,7 +33,7 @@ class Plant:
     """
 
     audit: Path
-    robots: tuple[str, ...] = ("arm", "second")
+    robots: tuple[str, ...] = ("arm", "pt600")
     address: str = ""
     loop: asyncio.AbstractEventLoop = field(default_factory=asyncio.new_event_loop)
     session: Session | None = None
@@ -66,7 +66,7 @@ class Plant:
         mesh = SessionSettings(connect=(endpoint,), wait_s=5.0)
         with zenoh.open(router_config((endpoint,))):
             await self.start_controller("arm")
-            await self.start_controller("second", demo=True)
+            await self.start_controller("pt600", demo=True)
             async with (
                 open_session(mesh) as self.session,
                 open_session(mesh) as for_gateway,
@@ -143,7 +143,7 @@ class Plant:
 
 @pytest.fixture(scope="module")
 def plant(tmp_path_factory) -> Iterator[Plant]:
-    """A site `hall` with two arms: `arm` rests, `second` moves by itself."""
+    """A site `hall` with two arms: `arm` rests, `pt600` moves by itself."""
     if not CHROMIUM.exists():
         pytest.skip(f"no {CHROMIUM}: the page is not driven here")
     build_page.build()

@@ -56,7 +56,7 @@ def drag(page, joint, pixels, *, release=True):
 
 
 def test_a_moving_arm_is_drawn_as_it_moves(open_page):
-    page = open_page("#/hall/second")
+    page = open_page("#/hall/pt600")
     page.wait_for_selector('canvas[data-loaded="true"]')
     before = degrees(page, "waist"), int(page.locator(".canvas-place canvas").get_attribute("data-drawn"))
     page.wait_for_function(
@@ -184,19 +184,19 @@ def test_going_to_another_page_gives_control_back(open_page):
 
 
 def test_when_the_controller_falls_silent_nothing_looks_live(open_page, plant):
-    page = open_page("#/hall/second")
+    page = open_page("#/hall/pt600")
     page.wait_for_selector('canvas[data-loaded="true"]')
     expect(page.locator(".scene-stale")).to_have_count(0)
-    port = plant.call(plant.stop_controller("second"))
+    port = plant.call(plant.stop_controller("pt600"))
     try:
         expect(page.locator(".scene-stale")).to_contain_text(re.compile(r"stale \d"))
         expect(page.locator('[data-joint="waist"]')).to_have_class(re.compile("stale"))
         expect(page.locator(".headline .state")).to_have_text("No link")
-        late = open_page("#/hall/second")  # who comes now sees old values as old too
+        late = open_page("#/hall/pt600")  # who comes now sees old values as old too
         expect(late.locator('[data-joint="waist"]')).to_have_class(re.compile("stale"))
         expect(late.locator(".scene-stale")).to_be_visible()
     finally:
-        plant.call(plant.start_controller("second", port, demo=True))
+        plant.call(plant.start_controller("pt600", port, demo=True))
     expect(page.locator(".scene-stale")).to_have_count(0, timeout=30_000)
 
 
@@ -204,16 +204,16 @@ def test_the_fleet_shows_every_robot_with_its_state_and_leads_to_it(open_page):
     page = open_page()
     tiles = page.locator(".tile")
     expect(tiles).to_have_count(2)
-    expect(tiles.nth(1)).to_contain_text("second")
+    expect(tiles.nth(1)).to_contain_text("pt600")
     expect(tiles.nth(1)).to_contain_text("Nobody is in control")
     expect(tiles.nth(1)).to_contain_text("gateway")
-    page.get_by_placeholder("Filter robots").fill("sec")
+    page.get_by_placeholder("Filter robots").fill("pt6")
     expect(tiles).to_have_count(1)
     tiles.click()
-    expect(page.locator("h1")).to_have_text("second")
+    expect(page.locator("h1")).to_have_text("pt600")
 
 
-@pytest.mark.parametrize("path", ["", "#/hall/second"])
+@pytest.mark.parametrize("path", ["", "#/hall/pt600"])
 def test_a_phone_shows_one_column_with_stop_under_the_thumb(open_page, path):
     page = open_page(path, width=360, height=740, has_touch=True)
     page.wait_for_selector(".tile" if not path else '[data-joint="waist"]')
@@ -223,13 +223,13 @@ def test_a_phone_shows_one_column_with_stop_under_the_thumb(open_page, path):
     assert stop["y"] + stop["height"] <= 740
     small = page.evaluate(
         "[...document.querySelectorAll('button, input, a.tile')]"
-        ".filter(e => e.getBoundingClientRect().height < 44).map(e => e.outerHTML.slice(0, 80))"
+        ".filter(e => e.offsetParent && e.getBoundingClientRect().height < 44).map(e => e.outerHTML.slice(0, 80))"
     )
     assert small == []
 
 
 def test_a_control_room_sees_everything_of_a_robot_without_scrolling(open_page):
-    page = open_page("#/hall/second")
+    page = open_page("#/hall/pt600")
     page.wait_for_selector('canvas[data-loaded="true"]')
     assert page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]") == [
         1440,
@@ -239,6 +239,17 @@ def test_a_control_room_sees_everything_of_a_robot_without_scrolling(open_page):
         box = page.locator(f".panel.{name}").bounding_box()
         assert box["y"] + box["height"] <= 900, name
         assert box["height"] >= 80, name
+
+
+def test_the_video_can_have_the_large_place_and_stop_stays_where_it_is(open_page):
+    page = open_page(ARM)
+    stop = page.locator("button.stop").bounding_box()
+    button(page, "Enlarge").click()
+    sizes = [page.locator(f".panel.{name}").bounding_box()["height"] for name in ("camera", "scene")]
+    assert sizes[0] > 1.5 * sizes[1]
+    assert page.locator("button.stop").bounding_box() == stop
+    button(page, "Enlarge").click()
+    assert page.locator(".panel.scene").bounding_box()["height"] == pytest.approx(sizes[0], abs=2)
 
 
 def test_the_language_and_the_colours_can_be_switched_and_are_kept(open_page):

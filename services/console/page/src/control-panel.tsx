@@ -58,30 +58,6 @@ export function ControlPanel(props: {
           </button>
         )}
       </div>
-      {stopped && (
-        <div class="stopped">
-          <div>
-            <strong>
-              <span class="shape alarm" aria-hidden="true" />
-              <span title={stampFull(stopped.since)}>
-                {t("stopped_by", { by: stopped.by || "–", time: stampTime(stopped.since) })}
-              </span>
-            </strong>
-            <p>
-              {!stopped.sent && `${t("stopped_unsent")} `}
-              {stopped.reason && stopped.reason !== "console" && `${stopped.reason}. `}
-              {t("reset_needs")}
-            </p>
-          </div>
-          <button
-            class="action"
-            disabled={!mine}
-            onClick={() => send(Command.RESET, t("reset", { id: String(stopped.id) }), { stopId: stopped.id })}
-          >
-            {t("reset", { id: String(stopped.id) })}
-          </button>
-        </div>
-      )}
       <div class="command-row">
         <button class="action" disabled={!can} onClick={() => send(Command.HOME, t("home"))}>
           {t("home")}
@@ -106,7 +82,31 @@ export function ControlPanel(props: {
           {t(tracing ? "trace_off" : "trace_on")}
         </button>
       </div>
-      {!stopped && (
+      {stopped ? (
+        <div class="stopped">
+          <div>
+            <strong>
+              <span class="shape alarm" aria-hidden="true" />
+              <span title={stampFull(stopped.since)}>
+                {t("stopped_by", { by: stopped.by || "–", time: stampTime(stopped.since) })}
+              </span>
+            </strong>
+            <p>
+              {!stopped.sent && `${t("stopped_unsent")} `}
+              {stopped.reason && stopped.reason !== "console" && `${stopped.reason}. `}
+              {t("reset_needs")}
+            </p>
+          </div>
+          <button
+            class="action"
+            disabled={!mine}
+            title={mine ? "" : t("reset_take")}
+            onClick={() => send(Command.RESET, t("reset", { id: String(stopped.id) }), { stopId: stopped.id })}
+          >
+            {t("reset", { id: String(stopped.id) })}
+          </button>
+        </div>
+      ) : (
         <Speed
           enabled={can}
           send={(value) => command(robotKey, Command.SPEED, t("what_speed", { value }), { speedPercent: value })}

@@ -21,12 +21,15 @@ export class FramePlayer {
   private skew = Number.POSITIVE_INFINITY; // page's clock minus source clock, of the least delayed frame, ms
   private readonly placements = new Map<string, THREE.Matrix4>();
   private settled = false;
+  private shownTime = Number.NEGATIVE_INFINITY; // source time of what was told last, ms
+  private passedTime = Number.NEGATIVE_INFINITY;
 
   add(message: FrameTransforms, sourceTime: number, arrived: number): void {
     const newest = this.frames.at(-1);
     if (newest && (sourceTime <= newest.time || sourceTime - newest.time > 1000)) {
       this.frames.length = 0; // a new publisher, or a long gap: no motion is made up between
       this.skew = Number.POSITIVE_INFINITY;
+      this.passedTime = Number.NEGATIVE_INFINITY;
     }
     this.frames.push({ time: sourceTime, poses: inSite(message) });
     if (this.frames.length > KEPT) this.frames.shift();
@@ -40,6 +43,15 @@ export class FramePlayer {
     this.settled = false;
   }
 
+  /** Where a frame was on its way to where it is shown, each place once, however seldom it is drawn. */
+  passed(name: string): readonly THREE.Vector3[] {
+    const from = this.passedTime;
+    this.passedTime = this.shownTime;
+    return this.frames
+      .filter((frame) => frame.time > from && frame.time <= this.shownTime)
+      .flatMap((frame) => frame.poses.get(name)?.position ?? []);
+  }
+
   /** Placements at a time of the page's clock [ms]; null: as before. */
   at(time: number): ReadonlyMap<string, THREE.Matrix4> | null {
     const newest = this.frames.at(-1);
@@ -47,6 +59,7 @@ export class FramePlayer {
     const wanted = time - this.skew - BEHIND_MS;
     const after = this.frames.find((frame) => frame.time >= wanted) ?? newest;
     const before = this.frames[this.frames.indexOf(after) - 1] ?? after;
+    this.shownTime = Math.min(wanted, newest.time);
     const span = after.time - before.time;
     const share = span > 0 ? THREE.MathUtils.clamp((wanted - before.time) / span, 0, 1) : 1;
     this.settled = after === newest && share === 1;

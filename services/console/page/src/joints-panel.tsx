@@ -71,7 +71,11 @@ export function JointsPanel(props: {
   const set = preview && rows[preview.index];
   const idle = set
     ? `${t("target")} ${set.name}: ${jointText(set, preview.value)}`
-    : t(mine ? "joint_hint" : "joint_hint_take");
+    : enabled
+      ? t("joint_hint")
+      : mine
+        ? ""
+        : t("joint_hint_take");
   return (
     <Panel
       name={`joints ${enabled ? "can-move" : ""}`}

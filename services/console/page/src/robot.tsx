@@ -87,6 +87,7 @@ function Headline(props: {
 }) {
   const { controller, description } = props;
   const message = controller?.message;
+  const state = stateWord(controller);
   const facts: string[] = [];
   // What was so is not said as if it were so.
   if (message && !isStale("controller", ageOf(controller))) {
@@ -98,17 +99,17 @@ function Headline(props: {
   return (
     <div class="headline">
       <h1>{props.name}</h1>
-      <State state={stateWord(controller)} />
+      <State state={state} />
       <span class="facts dim">{facts.join(" · ")}</span>
       {description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>}
+      {trouble && <span class={`trouble ${state.level}`}>{trouble}</span>}
+      {message?.stop && (
+        <span class="trouble">{t("stopped_by", { by: message.stop.by || "–", time: stampTime(message.stop.since) })}</span>
+      )}
       {description?.provenance && (
         <span class="provenance dim" title={description.provenance}>
           {description.title}: {description.provenance}
         </span>
-      )}
-      {trouble && <span class="trouble">{trouble}</span>}
-      {message?.stop && (
-        <span class="trouble">{t("stopped_by", { by: message.stop.by || "–", time: stampTime(message.stop.since) })}</span>
       )}
     </div>
   );

@@ -327,18 +327,18 @@ export class RobotScene {
         placement.decompose(axes.position, axes.quaternion, axes.scale);
       }
     }
-    this.extendTrail(placements.get(`${this.prefix}/tool`));
+    for (const at of this.player.passed(`${this.prefix}/tool`)) this.extendTrail(at);
     this.dirty = true;
   }
 
-  private extendTrail(tool: THREE.Matrix4 | undefined): void {
-    if (!this.trail.visible || !tool) return;
+  private extendTrail(at: THREE.Vector3): void {
+    if (!this.trail.visible) return;
     const points = this.trail.geometry.getAttribute("position") as THREE.BufferAttribute;
     if (this.trailLength === TRAIL_POINTS) {
       points.array.copyWithin(0, 3);
       this.trailLength--;
     }
-    points.setXYZ(this.trailLength++, tool.elements[12] ?? 0, tool.elements[13] ?? 0, tool.elements[14] ?? 0);
+    points.setXYZ(this.trailLength++, at.x, at.y, at.z);
     points.needsUpdate = true;
     this.trail.geometry.setDrawRange(0, this.trailLength);
   }
