@@ -164,6 +164,11 @@ class Driver(Protocol):
         ...
 
     @property
+    def refusals_received(self) -> int:
+        """Of these, the units that hold refusals alone: an answer is no sign that the arm's state comes."""
+        ...
+
+    @property
     def can_stop(self) -> bool:
         """Whether there is a stop unit for the controller. Whether it is heeded is proven at the site."""
         ...

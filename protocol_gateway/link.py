@@ -218,7 +218,7 @@ class ControllerLink:
     def _receive(self, data: bytes) -> None:
         # Dated before it is parsed: what we do with it is not part of its age.
         now = Received(self._monotonic_s(), self._wall_ns())
-        units_before = self._driver.units_received
+        units_before, refusals_before = self._driver.units_received, self._driver.refusals_received
         events = self._driver.receive(data)
         self._counts["bytes_received"] += len(data)
         if units := self._driver.units_received - units_before:
@@ -226,8 +226,7 @@ class ControllerLink:
         dates = [self._date(event, now) for event in events]
         for event in events:
             self._count(event)
-        # A refusal is an answer, not a sign that the arm's state comes.
-        if units > sum(isinstance(event, Refused) for event in events):
+        if units > self._driver.refusals_received - refusals_before:
             self._refusal = ""
             self._alive(max(dates, key=lambda date: date.monotonic_s, default=now), now)
         for event, date in zip(events, dates, strict=True):

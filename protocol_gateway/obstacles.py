@@ -1,13 +1,13 @@
 """Why a command cannot go to a controller as it is now: its state, the joints' limits. No I/O.
 
-    command                     link  mode  stopped, fault  homed  limits
-    --------------------------  ----  ----  --------------  -----  ------
+    command                     link  mode  stopped, fault  positions  homed  limits
+    --------------------------  ----  ----  --------------  ---------  -----  ------
     HOLD                        x
     RESET TRACE_ON TRACE_OFF    x     x
-    SPEED                       x     x                            1-100 %
-    HOME                        x     x     x
-    RESUME                      x     x     x               x
-    MOVE_ABSOLUTE MOVE_RELATIVE x     x     x               x      x
+    SPEED                       x     x                                       1-100 %
+    HOME                        x     x     x               not gone
+    RESUME                      x     x     x               x          x
+    MOVE_ABSOLUTE MOVE_RELATIVE x     x     x               x          x      x
 
 HOLD only ever makes a robot slower, so a mode that nobody knows does not forbid it.
 """
@@ -42,7 +42,8 @@ class Controller:
     """What is known of a controller now.
 
     Attributes:
-        positions: Where its joints are [rad] or [m]; None: not told yet.
+        positions: Where its joints are [rad] or [m]; None: not told, or not any more.
+        positions_gone: That they are not told any more, in words; empty: they are, or never were.
         read_only: Why nothing is ever sent to it, and what would be right; empty: it may be sent to.
         accept_unknown: What it never tells and the site file says to do without: "mode", "homed".
     """
@@ -51,6 +52,7 @@ class Controller:
     status: StatusReceived
     fault: str = ""
     positions: tuple[float, ...] | None = None
+    positions_gone: str = ""
     read_only: str = ""
     accept_unknown: frozenset[str] = frozenset()
 
@@ -103,6 +105,11 @@ def _state_obstacle(request: CommandRequest, controller: Controller) -> str:
         return f"the controller has a fault ({fault}): mend it, then send RESET"
     if status.activity is Activity.HOLDING and request.command != _C.RESUME:
         return "a motion is on hold: RESUME it, or give it up with RESET"
+    if controller.positions_gone:
+        return f"where the robot is now is not known ({controller.positions_gone})"
+    # Many an arm cannot tell where it is before it is homed; one that could and cannot any more is not moved.
+    if controller.positions is None and request.command != _C.HOME:
+        return "the controller has not told where the joints are"
     if request.command == _C.HOME or status.homed:
         return ""
     if status.homed is False:
@@ -127,11 +134,9 @@ def _value_obstacle(request: CommandRequest, controller: Controller, joints: Joi
     if count != len(joints):
         names = ", ".join(joints.names)
         return f"{count} joint positions, but the robot has {len(joints)} joints ({names})"
-    target = target_of(request, controller, joints)
-    if target is None:
-        return "the controller has not told where the joints are, so nothing can be added to that"
     # Limits and constraints are linear: all of a straight path in joint space is within them when its end is.
-    return "; ".join(violations(joints, target))
+    target = target_of(request, controller, joints)
+    return "; ".join(violations(joints, target)) if target is not None else ""
 
 
 def target_of(request: CommandRequest, controller: Controller, joints: Joints) -> tuple[float, ...] | None:

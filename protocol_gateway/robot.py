@@ -49,7 +49,8 @@ class RobotSettings:
         accept_unknown: What the controller never tells and is done without: "mode", "homed".
         stop_proven: The stop unit was tried on this controller; without that the robot is read-only.
             How to try it: docs/safety.md.
-        stale_after_s: Without a unit for this long, nothing is known of the robot any more.
+        stale_after_s: Without a unit for this long, nothing is known of the robot any more; without positions
+            for this long, it is not moved.
         reconnect_after_s: Without a unit for this long, the connection is made anew.
     """
 
@@ -90,6 +91,7 @@ class Robot:
             slow=publisher("joints/slow"),
             raw=publisher("raw"),
             journal=self._journal,
+            stale_after_s=settings.stale_after_s,
             on_status=self._on_told,
             on_refused=lambda: self._control.refused(),
         )
@@ -167,8 +169,10 @@ class Robot:
         while True:
             await asyncio.sleep(_LOOK_S)
             self._control.check_expiry()
-            self._observe()
             now_s = time.monotonic()
+            if self._link.status.state is LinkState.UP:
+                self._telemetry.look(now_s)
+            self._observe()
             if now_s >= next_s:
                 next_s = now_s + _HEARTBEAT_S
                 self._publish_state()
@@ -218,14 +222,17 @@ class Robot:
     def _observe(self) -> None:
         if self._link.status.state is not LinkState.UP:
             return
-        self._control.observe(moving=is_moving(self._telemetry.status.activity, self._telemetry.watch))
+        activity = self._telemetry.status(time.monotonic()).activity
+        self._control.observe(moving=is_moving(activity, self._telemetry.watch))
 
     def _controller(self) -> Controller:
+        now_s = time.monotonic()
         return Controller(
             link=self._link.status,
-            status=self._telemetry.status,
-            fault=self._telemetry.fault,
-            positions=self._telemetry.positions,
+            status=self._telemetry.status(now_s),
+            fault=self._telemetry.fault(now_s),
+            positions=self._telemetry.positions(now_s),
+            positions_gone=self._telemetry.positions_gone(now_s),
             read_only=self._read_only,
             accept_unknown=self._settings.accept_unknown,
         )

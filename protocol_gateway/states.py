@@ -104,8 +104,8 @@ def controller_state(
 
 
 def _link_text(controller: Controller) -> str:
-    text = controller.link.text
-    return f"{text}; read-only: {controller.read_only}" if controller.read_only else text
+    read_only = controller.read_only and f"read-only: {controller.read_only}"
+    return "; ".join(filter(None, (controller.link.text, controller.positions_gone, read_only)))
 
 
 def lease_state(authority: Authority, now: Now) -> schema.Lease:

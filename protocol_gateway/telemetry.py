@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from bus.publisher import Publisher
 from bus.schemas.robomesh_pb2 import Event
+from protocol_gateway.beat import STALE_S, Beat
 from protocol_gateway.driver import (
     Activity,
     ControllerEvent,
@@ -31,11 +32,11 @@ _S = Event.Severity
 class Telemetry:
     """The newest of what one controller tells, and its publication.
 
+    Each of both is known for a time of its own: a controller may go on with one and not with the other.
+
     Attributes:
-        status: Newest; all unknown after the link was lost, for a controller may come back another.
-        positions: Newest [rad] or [m]; None: not told since the link came up.
-        fault: Text of the fault, while there is one.
         watch: Sees motion in the positions.
+        controller_time_s: On the controller's own clock; None: it does not tell.
     """
 
     def __init__(
@@ -46,6 +47,7 @@ class Telemetry:
         slow: Publisher,
         raw: Publisher,
         journal: Journal,
+        stale_after_s: float,
         on_status: Callable[[], None],
         on_refused: Callable[[], None],
     ) -> None:
@@ -56,20 +58,53 @@ class Telemetry:
         self._journal = journal
         self._on_status = on_status
         self._on_refusal = on_refused
+        self._stale_after_s = stale_after_s
         self._next_slow_s = 0.0
         self.watch = PositionWatch(joints.types)
-        self.status = StatusReceived()
-        self.positions: tuple[float, ...] | None = None
-        self.controller_time_s: float | None = None
-        self.fault = ""
+        self.forget()
 
     def forget(self) -> None:
-        """The link was lost: what was known is not known any more."""
-        self.status = StatusReceived()
-        self.positions = None
-        self.controller_time_s = None
-        self.fault = ""
+        """The link was lost: nothing is known any more, for a controller may come back another."""
+        self._status = StatusReceived()
+        self._beat = Beat()
+        self._positions: tuple[tuple[float, ...], float] | None = None  # and when they were so
+        self._fault = ""
+        self._gone = (False, False)
+        self.controller_time_s: float | None = None
         self.watch.forget()
+
+    def positions(self, now_s: float) -> tuple[float, ...] | None:
+        """The newest [rad] or [m]; None: not told since the link came up, or not for the stale time."""
+        return None if self._positions is None or self.positions_gone(now_s) else self._positions[0]
+
+    def positions_gone(self, now_s: float) -> str:
+        """That positions came and come no more, in words; empty: they come, or never did."""
+        if self._positions is None or now_s - self._positions[1] < self._stale_after_s:
+            return ""
+        return f"joint positions have not come for {self._stale_after_s:g} s"
+
+    def status(self, now_s: float) -> StatusReceived:
+        """The newest; all unknown when it beat and has ceased to."""
+        return StatusReceived() if self._beat.ceased(now_s) else self._status
+
+    def fault(self, now_s: float) -> str:
+        """Text of the fault, while there is one."""
+        return "" if self._beat.ceased(now_s) else self._fault
+
+    def look(self, now_s: float) -> None:
+        """Say when positions or status come no more; to be called now and then while the link is up."""
+        before, self._gone = self._gone, (bool(self.positions_gone(now_s)), self._beat.ceased(now_s))
+        if self._gone == before:
+            return
+        positions, status = self._gone
+        if positions and not before[0]:
+            self.watch.forget()
+            text = f"{self.positions_gone(now_s)}: where the robot is is not known, motion is refused"
+            self._journal.say(_S.WARNING, "joints.gone", text)
+        if status and not before[1]:
+            text = f"the controller's status has not come for {STALE_S:g} s: it is not known any more"
+            self._journal.say(_S.WARNING, "status.gone", text)
+        self._on_status()
 
     def on_event(self, event: ControllerEvent, received: Received) -> None:
         """Publish an event of the driver's and keep what it tells."""
@@ -80,6 +115,7 @@ class Telemetry:
                 if event.controller_time_s is not None:
                     self.controller_time_s = event.controller_time_s
                 if any(each is not None for each in _told(event)):  # not the time alone
+                    self._beat.see(_told(event), received.monotonic_s)
                     self._on_told(event)
             case UnknownReceived():
                 self._raw.put(raw_record(event, received.wall_ns), source_time_ns=received.wall_ns)
@@ -96,26 +132,15 @@ class Telemetry:
                 self._on_refused(number, text)
 
     def _on_told(self, status: StatusReceived) -> None:
-        changed = _told(status) != _told(self.status)
-        self.status = status
+        changed = _told(status) != _told(self._status)
+        self._status = status
         if status.activity is not Activity.FAULT:
-            self.fault = ""
+            self._fault = ""
         if changed:
             self._on_status()
 
     def _on_joints(self, joints: JointsReceived, received: Received) -> None:
-        expected, got = len(self._joints), len(joints.positions)
-        if got != expected:
-            self._journal.say(
-                _S.ERROR,
-                "joints.count",
-                f"the controller tells {got} joints, the description has {expected}: nothing is published; "
-                "is it the right robot in the site file?",
-                got=got,
-                expected=expected,
-            )
-            return
-        self.positions = joints.positions
+        self._positions = joints.positions, received.monotonic_s
         if joints.controller_time_s is not None:
             self.controller_time_s = joints.controller_time_s
         message = joint_states(self._joints.names, joints, received.wall_ns)
@@ -129,7 +154,7 @@ class Telemetry:
     def _on_refused(self, number: int, text: str) -> None:
         self._on_refusal()
         if number == _FAULT:
-            self.fault = text
+            self._fault = text
             self._on_status()
         self._journal.say(
             _S.WARNING,

@@ -70,6 +70,7 @@ class UnitDriver:
             0.001 if joint_type is JointType.PRISMATIC else math.pi / 180.0 for joint_type in joint_types
         )
         self.units_received = 0
+        self.refusals_received = 0
 
     @property
     def can_stop(self) -> bool:
@@ -124,6 +125,7 @@ class UnitDriver:
                 case _:
                     others.append(record)
         self.units_received += 1
+        self.refusals_received += all(isinstance(record, Error) for record in unit.records)
         for index, values in enumerate(positions):
             events.append(
                 JointsReceived(values, velocities[index] if index < len(velocities) else None, time_s)

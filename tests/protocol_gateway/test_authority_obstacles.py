@@ -120,9 +120,20 @@ def test_a_refused_value_is_named_with_what_would_be_allowed(asked, words):
     assert words in obstacle(asked, READY, JOINTS)
 
 
-def test_nothing_is_added_to_positions_that_are_not_known():
-    asked = command(C.MOVE_RELATIVE)
-    assert "has not told where the joints are" in obstacle(asked, replace(READY, positions=None), JOINTS)
+def test_a_robot_that_never_told_where_it_is_is_homed_but_not_moved():
+    untold = replace(READY, positions=None)
+    for kind in (C.MOVE_RELATIVE, C.MOVE_ABSOLUTE, C.RESUME):
+        assert "has not told where the joints are" in obstacle(command(kind), untold, JOINTS)
+    assert not obstacle(command(C.HOME), untold, JOINTS)
+
+
+def test_a_robot_that_tells_no_more_where_it_is_is_not_even_homed():
+    gone = replace(READY, positions=None, positions_gone="joint positions have not come for 1 s")
+    for kind in (C.MOVE_RELATIVE, C.MOVE_ABSOLUTE, C.RESUME, C.HOME):
+        text = obstacle(command(kind), gone, JOINTS)
+        assert text == (
+            "Not sent: where the robot is now is not known (joint positions have not come for 1 s)."
+        )
 
 
 def test_commands_become_the_drivers_own():

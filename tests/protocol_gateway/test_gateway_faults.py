@@ -447,3 +447,54 @@ def test_after_a_reset_the_old_stop_is_overlooked_for_a_moment_but_not_a_new_fau
             assert "has a fault" in await refusal(plant.command(C.HOME))
 
     run(main())
+
+
+def test_positions_that_come_no_more_are_not_taken_for_where_the_robot_is(mesh, tmp_path):
+    async def main():
+        positions = "ABSOLUTE.DEG*1;2;3;4;5&"
+
+        def state():
+            return f"{2 if positions else 1}#{positions}STATUS*idle;remote;homed@"
+
+        async with (
+            bare_controller() as (port, say, _),
+            repeated(say, state),
+            gateway(mesh, tmp_path, port) as plant,
+        ):
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            positions = ""
+            await until(lambda: plant.events("joints.gone"))
+            await until(lambda: "joint positions have not come for 1 s" in plant.controller.link_text)
+            assert plant.controller.link == STATE.UP
+            text = await refusal(plant.command(C.MOVE_RELATIVE, joint_positions=[0.1] * 5))
+            assert "where the robot is now is not known" in text
+            positions = "ABSOLUTE.DEG*1;2;3;4;5&"
+            await until(lambda: "positions" not in plant.controller.link_text)
+            await plant.lease(A.RENEW, ttl_s=5)
+            await plant.command(C.MOVE_RELATIVE, joint_positions=[0.1] * 5)
+
+    run(main())
+
+
+def test_a_status_that_came_again_and_again_and_comes_no_more_is_not_known(mesh, tmp_path):
+    async def main():
+        status = "&STATUS*idle;remote;homed"
+
+        def state():
+            return f"{2 if status else 1}#ABSOLUTE.DEG*1;2;3;4;5{status}@"
+
+        async with (
+            bare_controller() as (port, say, _),
+            repeated(say, state),
+            gateway(mesh, tmp_path, port) as plant,
+        ):
+            await until(lambda: plant.controller.mode == STATE.REMOTE)
+            await asyncio.sleep(0.1)
+            status = ""
+            await until(lambda: plant.events("status.gone"))
+            await until(lambda: plant.controller.mode == STATE.MODE_UNKNOWN)
+            assert plant.controller.homed == STATE.UNKNOWN
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            assert "does not tell whether" in await refusal(plant.command(C.HOME))
+
+    run(main())

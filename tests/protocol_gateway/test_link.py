@@ -249,7 +249,7 @@ def test_an_answer_alone_does_not_bring_a_silent_link_up_but_the_state_after_it_
             writer.write(b"1#ERROR*8;stopped@")
             await until(lambda: seen.events)
             assert it.status.state is LinkState.SILENT
-            writer.write(STATE)
+            writer.write(b"2#STATUS*idle&ERROR*8;stopped@")
             await until(lambda: it.status.state is LinkState.UP)
             await end(writer)
 

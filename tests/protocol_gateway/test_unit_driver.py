@@ -109,6 +109,12 @@ def test_unknown_words_types_and_a_clients_records_are_handed_over_raw_and_not_a
     assert not any(isinstance(event, JointsReceived) for event in events)
 
 
+def test_units_of_refusals_alone_are_counted_apart():
+    fresh = driver()
+    fresh.receive(b"2#ERROR*5;a&ERROR*5;b@" + b"2#STATUS*idle&ERROR*5@" + b"1#TIME*1@" + b"x@")
+    assert (fresh.units_received, fresh.refusals_received) == (3, 1)
+
+
 def test_a_refusal_comes_with_its_number_and_text():
     assert driver().receive(b"1#ERROR*5;joint waist@") == [Refused(5, "joint waist")]
 

@@ -1,0 +1,30 @@
+"""Whether what beat has ceased to beat. No I/O; time is an argument."""
+
+STALE_S = 3.0
+"""Without a beat for this long, what it told is not known any more."""
+
+_REPEATS = 3
+
+
+class Beat:
+    """Sees something that is told again and again, and whether that ends.
+
+    A controller that tells its status on change only is silent for hours, and nothing is wrong with it:
+    only one that was seen to repeat itself, unchanged and within 3 s, three times in a row, is waited for.
+    """
+
+    def __init__(self) -> None:
+        self._told: object = None
+        self._last_s = float("-inf")
+        self._repeats = 0
+
+    def see(self, told: object, time_s: float) -> None:
+        """Something was told, at a monotonic time."""
+        if self._repeats < _REPEATS:
+            again = told == self._told and time_s - self._last_s < STALE_S
+            self._repeats = self._repeats + 1 if again else 0
+        self._told, self._last_s = told, time_s
+
+    def ceased(self, now_s: float) -> bool:
+        """Whether it beat once, and does no more."""
+        return self._repeats >= _REPEATS and now_s - self._last_s >= STALE_S

@@ -1,0 +1,36 @@
+"""What beat and has ceased to."""
+
+import pytest
+
+from protocol_gateway.beat import Beat
+
+
+def seen(*told_at):
+    beat = Beat()
+    for told, time_s in told_at:
+        beat.see(told, time_s)
+    return beat
+
+
+@pytest.mark.parametrize(
+    ("told_at", "ceased"),
+    [
+        ([], False),
+        ([("idle", t) for t in range(4)], True),
+        ([("idle", t) for t in range(3)], False),
+        ([("idle", t * 3.0) for t in range(9)], False),
+        ([("idle" if t % 2 else "moving", t) for t in range(9)], False),
+        ([("idle", 0), ("idle", 1), ("moving", 2), ("idle", 3), ("idle", 4)], False),
+        ([*(("idle", t) for t in range(4)), ("moving", 5), ("fault", 6)], True),
+    ],
+)
+def test_only_what_was_seen_to_repeat_itself_can_cease(told_at, ceased):
+    assert seen(*told_at).ceased(1000.0) is ceased
+
+
+def test_it_has_ceased_after_three_seconds_and_beats_again_at_once():
+    beat = seen(*(("idle", t) for t in range(4)))
+    assert not beat.ceased(5.9)
+    assert beat.ceased(6.0)
+    beat.see("idle", 6.1)
+    assert not beat.ceased(6.2)
