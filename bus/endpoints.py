@@ -8,8 +8,14 @@ from typing import Any
 import zenoh
 
 from bus.errors import SessionError
+from bus.topics import Priority
 
 DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
+
+_LINKS = ("1-4", "5-7")
+_ON_THE_SECOND_LINK = (Priority.DATA, Priority.DATA_LOW, Priority.BACKGROUND)
+_NOBODYS_KEY = "robomesh/-/-/-"
+_SETTLE_S = 0.25
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,9 +70,26 @@ def router_config(
     )
 
 
+def settle(session: zenoh.Session, priority: Priority) -> None:
+    """Wait until the router knows what was declared, where what follows may overtake it.
+
+    Declarations travel on the session's first link, and Zenoh shortens keys to numbers that they
+    declare: what follows at once on the second link is dropped in silence when it comes first
+    (a fifth of the first puts and gets on a busy machine). Returns at once without a router.
+    """
+    if priority in _ON_THE_SECOND_LINK:
+        for _ in session.get(
+            _NOBODYS_KEY,
+            priority=zenoh.Priority.REAL_TIME,
+            congestion_control=zenoh.CongestionControl.DROP,
+            timeout=_SETTLE_S,
+        ):
+            pass
+
+
 def _two_links(endpoint: str) -> dict[str, Any]:
     separator = "&" if "?" in endpoint else "?"
-    return {"strategy": "allOf", "locators": [f"{endpoint}{separator}prio={p}" for p in ("1-4", "5-7")]}
+    return {"strategy": "allOf", "locators": [f"{endpoint}{separator}prio={p}" for p in _LINKS]}
 
 
 def _shared(tls: Tls | None) -> dict[str, Any]:

@@ -13,6 +13,7 @@ import zenoh.ext
 from google.protobuf.message import Message
 
 from bus import keys
+from bus.endpoints import settle
 from bus.header import Header, pack
 from bus.messages import PROTOBUF
 from bus.schemas.robomesh_pb2 import VideoFrames
@@ -49,6 +50,7 @@ class Publisher:
             self._queryable = session.declare_queryable(self.key, lambda q: self._hand_over(q, on_get, loop))
         elif self.topic.history is not History.NONE:
             self._queryable = session.declare_queryable(self.key, self._answer)
+        settle(session, self.topic.priority)
 
     def put(self, message: Message, *, source_time_ns: int | None = None, key_frame: bool = False) -> Header:
         """Publish a message of the topic's schema; it is kept for late joiners, so change it no more.

@@ -9,13 +9,14 @@ import zenoh
 from google.protobuf.message import Message
 
 from bus import keys, topics
-from bus.endpoints import first_line
+from bus.endpoints import first_line, settle
 from bus.errors import MessageError, NoAnswerError, RefusedError
 from bus.messages import JSON, PROTOBUF, TEXT, decode, decode_request, encode, is_json
 
 log = logging.getLogger(__name__)
 
 _OCTETS = "application/octet-stream"
+_AGAIN_S = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,6 +157,7 @@ async def ask_all(
             loop.call_soon_threadsafe(finish)
 
     row = topics.request(keys.parse_key(key).topic)
+    await asyncio.to_thread(settle, session, row.priority)
     try:
         session.get(
             key,
@@ -181,11 +183,16 @@ async def ask_bytes(session: zenoh.Session, key: str, payload: bytes, *, timeout
         RefusedError: With the owner's words.
         NoAnswerError: If nobody answered in time.
     """
-    for _, answer, error in await ask_all(session, key, payload, timeout_s=timeout_s):
-        if error is not None:
-            raise RefusedError(error)
-        if answer is not None:
-            return answer
+    loop = asyncio.get_running_loop()
+    deadline = loop.time() + timeout_s
+    while (left_s := deadline - loop.time()) > 0:
+        for _, answer, error in await ask_all(session, key, payload, timeout_s=left_s):
+            if error is not None:
+                raise RefusedError(error)
+            if answer is not None:
+                return answer
+        # Zenoh answers at once that there is no owner; it may be starting.
+        await asyncio.sleep(min(_AGAIN_S, left_s))
     raise NoAnswerError(f"nobody answered {key} within {timeout_s:g} s: is its service running?")
 
 

@@ -17,6 +17,7 @@ import zenoh.ext
 from google.protobuf.message import Message
 
 from bus import keys
+from bus.endpoints import settle
 from bus.errors import MessageError
 from bus.header import Header, unpack
 from bus.messages import decode
@@ -189,6 +190,7 @@ class Subscription:
                     self._take(sample)
             self._wake()
 
+        settle(self._session, self.topic.priority)
         asked_at = time.monotonic()
         self._session.get(
             key_expr,

@@ -15,7 +15,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from bus.errors import NoAnswerError, RefusedError
+from bus.errors import RefusedError
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import open_session
 from services import recorder
@@ -34,12 +34,7 @@ async def recording_site(mesh, folder):
         task = asyncio.create_task(recorder.serve(own, settings))
         publisher = gateway.declare_publisher("site", "arm", "joints")
         gateway.declare_publisher("site", "arm", "description").put(schema.Description(name="pt600"))
-        while True:
-            try:
-                await gateway.ask("robomesh/site/-/recordings/list")
-                break
-            except NoAnswerError:
-                await asyncio.sleep(0.01)
+        await gateway.ask("robomesh/site/-/recordings/list")
         try:
             yield gateway, publisher
         finally:
@@ -226,12 +221,7 @@ def test_a_kill_loses_at_most_a_quarter_of_a_second(mesh, tmp_path):
     async def main():
         async with open_session(mesh) as session:
             publisher = session.declare_publisher("site", "arm", "joints")
-            while True:
-                try:
-                    await session.ask(KEY, _Request(action=_Request.TRACE_ON, name="cut"), timeout_s=0.5)
-                    break
-                except (NoAnswerError, RefusedError):
-                    assert process.poll() is None
+            await session.ask(KEY, _Request(action=_Request.TRACE_ON, name="cut"), timeout_s=20.0)
             await until_watched(publisher)
             await put_states(publisher, 300)
             process.send_signal(signal.SIGKILL)
