@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 from bus.publisher import Publisher
 from bus.schemas.robomesh_pb2 import Event
+from protocol_gateway.texts import LONGEST_SENTENCE, one_line
 
 log = logging.getLogger(__name__)
 
 # A controller that sends rubbish must not fill logs and recordings: so many of a kind within so long.
 _MOST = 5
 _WINDOW_S = 1.0
-_LONGEST_VALUE = 200
 
 _LEVELS = {
     Event.Severity.DEBUG: logging.DEBUG,
@@ -61,9 +61,10 @@ class Journal:
             values["left_out"] = kind.left_out
             text = f"{text} (and {kind.left_out} more like it before)"
             kind.left_out = 0
+        text = one_line(text, LONGEST_SENTENCE)
         event = Event(severity=severity, code=code, text=text, source="gateway")
         event.timestamp.GetCurrentTime()
         for name, value in values.items():
-            event.values[name] = str(value)[:_LONGEST_VALUE]
+            event.values[name] = one_line(str(value))
         self._publisher.put(event)
         log.log(_LEVELS[severity], "%s: %s", self._robot, text)

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from bus.errors import KeyNameError, RefusedError
+from bus.keys import check_chunk
 from bus.publisher import Publisher
 from bus.requests import Request
 from bus.schemas import robomesh_pb2 as schema
@@ -23,6 +25,7 @@ from protocol_gateway.obstacles import Controller
 from protocol_gateway.restart import remembered
 from protocol_gateway.states import audit_entry, controller_state, lease_state
 from protocol_gateway.telemetry import Telemetry
+from protocol_gateway.texts import LONGEST, one_line
 from protocol_gateway.unit_driver import UnitDriver
 from robots.description import load
 from robots.joints import joints_of
@@ -183,17 +186,20 @@ class Robot:
     async def _answer_stop(self, request: Request) -> schema.StopAnswer:
         message = request.message
         assert isinstance(message, schema.StopRequest)
-        return self._control.stop(by=message.by or "somebody", reason=message.reason, source=MESH)
+        # Whatever is wrong with its texts, a stop is a stop.
+        by, reason = one_line(message.by).strip(), one_line(message.reason).strip()
+        return self._control.stop(by=by or "somebody", reason=reason, source=MESH)
 
     async def _answer_lease(self, request: Request) -> schema.LeaseAnswer:
         message = request.message
         assert isinstance(message, schema.LeaseRequest)
-        return await self._control.lease(message, operator=request.chunk, source=MESH)
+        message.reason, message.to = one_line(message.reason), one_line(message.to)
+        return await self._control.lease(message, operator=_operator(request), source=MESH)
 
     async def _answer_command(self, request: Request) -> schema.CommandAnswer:
         message = request.message
         assert isinstance(message, schema.CommandRequest)
-        return await self._control.command(message, operator=request.chunk, source=MESH)
+        return await self._control.command(message, operator=_operator(request), source=MESH)
 
     # ------------------------------------------------------------------ state
 
@@ -253,6 +259,21 @@ class Robot:
             )
         )
         self._lease_topic.put(lease_state(authority, now))
+
+
+def _operator(request: Request) -> str:
+    """In whose name something is asked.
+
+    Raises:
+        RefusedError: If it is no name: cut or mended, it might become somebody else's.
+    """
+    name = request.chunk
+    if len(name) > LONGEST:
+        raise RefusedError(f"operator {one_line(name, 40)}: a name has at most {LONGEST} characters")
+    try:
+        return check_chunk(name)
+    except KeyNameError as error:
+        raise RefusedError(str(error)) from None
 
 
 def _why_read_only(settings: RobotSettings, driver: Driver) -> str:

@@ -43,6 +43,7 @@ from protocol_gateway.driver import (
     UnknownReceived,
 )
 from protocol_gateway.errors import CommandError, UnitFormatError
+from protocol_gateway.texts import one_line
 from robots.joints import JointType
 
 _ACTIVITIES = {activity.value: activity for activity in Activity}
@@ -167,7 +168,7 @@ class UnitDriver:
 def _tell(record: Record, unit: Unit, time_s: float | None, events: list[ControllerEvent]) -> None:
     match record:
         case Error(number, text):
-            events.append(Refused(number, text))
+            events.append(Refused(number, one_line(text)))
         case Status(words):
             events.append(_status(words, time_s))
             if unknown := tuple(word for word in words if not _known(word)):

@@ -97,6 +97,23 @@ def test_stop_needs_no_lease_and_latches_until_the_holder_resets_that_stop(mesh,
     run(main())
 
 
+def test_operators_texts_are_cut_and_on_one_line_wherever_they_are_shown(mesh, tmp_path, caplog):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.stop(by="wang\nERROR arm: forged", reason="\x1b[2J" + "r" * 150_000)
+            await until(lambda: plant.controller.HasField("stop"))
+            await plant.lease(A.TAKE, reason="he\nleft" * 1000)
+            assert "at most 200 characters" in await refusal(plant.lease(A.ACQUIRE, operator="o" * 201))
+            stop = plant.controller.stop
+            assert stop.by == "wang ERROR arm: forged"
+            assert (len(stop.reason), stop.reason[:5]) == (200 - 1, "[2Jrr")
+            await until(lambda: len(plant.seen["audit"]) == 2)
+            assert max(map(len, plant.audit.read_text().splitlines())) < 1000
+        assert all(len(line) < 1000 and line.isprintable() for line in caplog.messages)
+
+    run(main())
+
+
 def test_stop_with_a_wildcard_stops_every_robot_and_reading_everything_stops_none(mesh, tmp_path):
     async def main():
         async with simulator() as one, simulator() as two, gateway(mesh, tmp_path, one, two) as plant:
