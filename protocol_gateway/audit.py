@@ -2,7 +2,7 @@
 
 A line an entry, JSON; `hash` is the SHA-256 of the same object without `hash`, keys sorted, no blanks:
 
-    {"hash":"5f…","number":7,"operator":"li","outcome":"ACCEPTED","previous":"c0…","repeated_count":0,
+    {"hash":"5f…","number":7,"operator":"li","outcome":"ACCEPTED","previous":"c0…",
      "request":"MOVE_ABSOLUTE","source":"mesh","text":"","time_ns":1790000000000000000,"values":{"id":"3"}}
 
 `previous` is the hash of the entry before, 64 zeros in the first, so a changed, missing or moved line
@@ -14,6 +14,7 @@ import asyncio
 import fcntl
 import hashlib
 import json
+import logging
 import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
@@ -21,6 +22,8 @@ from enum import StrEnum
 from pathlib import Path
 
 from protocol_gateway.errors import AuditError
+
+log = logging.getLogger(__name__)
 
 NOTHING_BEFORE = "0" * 64
 # Stops are noted after the wire, also while the disk is full: this many wait for it to be mended.
@@ -52,7 +55,6 @@ class Entry:
     outcome: Outcome
     text: str = ""
     values: Mapping[str, str] = field(default_factory=dict)
-    repeated_count: int = 0
     number: int = 0
     previous: str = NOTHING_BEFORE
     hash: str = ""
@@ -82,7 +84,9 @@ def _canonical(entry: Entry, *, with_hash: bool = True) -> bytes:
     row = asdict(entry)
     if not with_hash:
         del row["hash"]
-    return json.dumps(row, ensure_ascii=False, separators=(",", ":"), sort_keys=True).encode()
+    text = json.dumps(row, ensure_ascii=False, separators=(",", ":"), sort_keys=True)
+    # Half a surrogate pair is no character, and must not keep the rest from being written.
+    return text.encode(errors="backslashreplace")
 
 
 def parse_line(line: bytes) -> Entry:
@@ -245,30 +249,41 @@ class AuditLog:
         """Everything that waits, in one write and one fsync, again until nothing does."""
         while True:
             waiting, self._waiting = self._waiting, []
-            owed = self._owed[:]
-            placed, number, previous = [], self._number, self._previous
-            for entry in (*owed, *(entry for entry, _ in waiting)):
-                number += 1
-                placed.append(chained(entry, number=number, previous=previous))
-                previous = placed[-1].hash
+            owed = len(self._owed)
             try:
+                placed = self._placed([*self._owed, *(entry for entry, _ in waiting)])
                 # An fsync takes milliseconds, seconds on a busy disk: the joint stream must not wait for it.
                 await asyncio.to_thread(self._write, placed)
-            except OSError as error:
-                problem = f"the audit log {self.path.name} cannot be written ({error.strerror})"
+            except Exception as error:
+                reason = error.strerror if isinstance(error, OSError) else repr(error)
+                problem = f"the audit log {self.path.name} cannot be written ({reason})"
                 for _, future in waiting:
                     if not future.done():
                         future.set_exception(AuditError(problem))
             else:
-                self._number, self._previous = number, previous
-                del self._owed[: len(owed)]
-                for entry in placed:
-                    self._on_written(entry)
-                for (_, future), entry in zip(waiting, placed[len(owed) :], strict=True):
+                self._number, self._previous = placed[-1].number, placed[-1].hash
+                del self._owed[:owed]
+                for (_, future), entry in zip(waiting, placed[owed:], strict=True):
                     if not future.done():
                         future.set_result(entry)
+                self._tell(placed)
             if not self._waiting:
                 return
+
+    def _placed(self, entries: list[Entry]) -> list[Entry]:
+        placed, number, previous = [], self._number, self._previous
+        for entry in entries:
+            number += 1
+            placed.append(chained(entry, number=number, previous=previous))
+            previous = placed[-1].hash
+        return placed
+
+    def _tell(self, entries: list[Entry]) -> None:
+        for entry in entries:
+            try:
+                self._on_written(entry)
+            except Exception:
+                log.exception("audit log %s: entry %d was not published", self.path.name, entry.number)
 
     def _write(self, entries: list[Entry]) -> None:
         if self._torn:

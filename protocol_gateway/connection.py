@@ -1,6 +1,7 @@
 """One TCP connection to a controller: written at once or not at all, read straight into a callback."""
 
 import asyncio
+import contextlib
 import os
 import socket
 from collections.abc import Callable
@@ -12,6 +13,8 @@ from protocol_gateway.errors import LinkCloggedError, LinkDownError
 _SEND_BUFFER_BYTES = 4096
 # What we wrote and the controller's host has not acknowledged for this long breaks the connection.
 _UNACKNOWLEDGED_MS = 3000
+# How long a controller that goes on sending has to take what was sent to it last.
+_LAST_WORD_S = 0.1
 
 
 class Connection(asyncio.Protocol):
@@ -63,8 +66,19 @@ class Connection(asyncio.Protocol):
             raise LinkCloggedError("not sent: the controller does not read; connecting again")
 
     async def end(self) -> None:
-        """Close it, and wait until it is closed."""
-        self._transport.abort()
+        """Close it, and wait until it is closed: what was written last, a stop perhaps, still arrives.
+
+        A socket that is closed with something unread in it is reset, and a reset may take from the
+        controller what it has not read yet. So only the sending ends at first, and what comes is read.
+        """
+        self._receive = _ignore
+        try:
+            if not self._transport.is_closing():
+                with contextlib.suppress(OSError):  # the controller was faster
+                    self._transport.write_eof()
+                await asyncio.wait([self._closed], timeout=_LAST_WORD_S)
+        finally:
+            self._transport.abort()
         await self._closed
 
     def _guarded(self, call: Callable[[], None]) -> None:
@@ -75,6 +89,10 @@ class Connection(asyncio.Protocol):
             if not self.lost.done():
                 self.lost.set_exception(error)
             self._transport.abort()
+
+
+def _ignore(data: bytes) -> None:
+    """What comes after the end tells nobody anything."""
 
 
 def _configure(connected: socket.socket) -> None:

@@ -145,5 +145,4 @@ def audit_entry(entry: Entry) -> schema.AuditEntry:
         text=entry.text,
         previous=bytes.fromhex(entry.previous),
         hash=bytes.fromhex(entry.hash),
-        repeated_count=entry.repeated_count,
     )

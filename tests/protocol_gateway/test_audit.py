@@ -162,6 +162,30 @@ def test_what_a_full_disk_refused_is_not_in_the_log_and_what_is_owed_comes_later
     run(main())
 
 
+def test_whoever_waits_for_an_entry_is_told_whatever_fails(tmp_path, monkeypatch, caplog):
+    def broken(entry):
+        raise ZeroDivisionError("nobody listens")
+
+    async def main():
+        log = AuditLog(tmp_path / "arm.jsonl", on_written=broken)
+        assert (await log.append(entry(id="1"))).number == 1
+        assert "entry 1 was not published" in caplog.text
+        with monkeypatch.context() as patch:
+            patch.setattr(log, "_write", broken)
+            with pytest.raises(AuditError, match="nobody listens"):
+                await log.append(entry(id="not written"))
+        assert (await log.append(entry(id="2"))).number == 2
+        await log.close()
+        assert verify(log.path).ok
+
+    run(main())
+
+
+def test_a_text_that_is_no_text_is_written_all_the_same(tmp_path):
+    write(tmp_path / "arm.jsonl", entry(reason="\ud800"), entry(id="2"))
+    assert verify(tmp_path / "arm.jsonl").entries == 2
+
+
 WRITER = """
 import asyncio, sys
 from pathlib import Path

@@ -278,6 +278,23 @@ def test_a_unit_that_does_not_fit_is_an_error_and_is_never_completed_later():
     run(main())
 
 
+def test_what_was_sent_last_arrives_although_the_controller_goes_on_sending():
+    async def main():
+        async with controller() as arm:
+            async with link(arm.port) as (it, _):
+                reader, writer = await arm.next()
+                writer.write(STATE)
+                await until(lambda: it.status.state is LinkState.UP)
+                writer.transport.pause_reading()
+                writer.write(STATE * 500)  # still unread when the link is closed
+                it.send(STOP)
+            writer.transport.resume_reading()
+            assert await reader.read() == STOP
+            await end(writer)
+
+    run(main())
+
+
 def test_nothing_is_sent_over_a_connection_that_has_just_broken():
     async def main():
         async with controller() as arm, link(arm.port) as (it, _):
