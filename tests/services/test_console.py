@@ -14,6 +14,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from bus.errors import RefusedError
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import open_session
+from bus.subscription import Subscription
+from services.console import feeds
 from services.console.console import Settings, serve
 from services.console.errors import PageNotBuiltError
 from services.errors import ListenError
@@ -363,5 +365,28 @@ def test_beyond_loopback_every_page_is_told(mesh, page):
             async with browse(own) as browser:
                 await browser.until(lambda: browser.other)
                 assert browser.other[0].hello.insecure
+
+    run(main())
+
+
+def test_a_value_whose_answer_was_lost_is_asked_for_again(mesh, page, monkeypatch):
+    monkeypatch.setattr(feeds, "_ASK_AGAIN_S", 0.1)
+    ask, lost = Subscription._ask, []
+
+    def lose_the_first(subscription, key_expr):
+        if key_expr.endswith("/description") and not lost:
+            lost.append(key_expr)
+        else:
+            ask(subscription, key_expr)
+
+    monkeypatch.setattr(Subscription, "_ask", lose_the_first)
+
+    async def main():
+        async with console(mesh, page) as (address, other), browse(address) as browser:
+            publisher = other.declare_publisher("s", "arm", "description")
+            publisher.put(schema.Description(title="Arm"))
+            await browser.watch("robomesh/s/arm/description")
+            await browser.until(lambda: browser.samples)
+            assert lost
 
     run(main())
