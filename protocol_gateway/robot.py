@@ -1,15 +1,17 @@
 """One robot of a gateway: its link, topics and authority. What fails here, fails for this robot alone."""
 
 import asyncio
+import contextlib
 import logging
 import time
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from bus.errors import KeyNameError, RefusedError
 from bus.keys import check_chunk
-from bus.publisher import Publisher
+from bus.publisher import LIST_LENGTH, Publisher
 from bus.requests import Request
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
@@ -138,33 +140,39 @@ class Robot:
         if stop is not None:
             text = f"stop request {stop.id} ({stop.by}: {stop.reason}) is latched since before this start"
             self._journal.say(_S.WARNING, "stop.remembered", text, stop_id=stop.id)
+        for entry in deque(read_entries(self._audit.path), maxlen=LIST_LENGTH):
+            with contextlib.suppress(ValueError, TypeError):  # somebody changed that line: `verify` tells
+                self._audit_topic.remember(audit_entry(entry), source_time_ns=entry.time_ns)
         self._publish_state()
 
     async def run(self) -> None:
         """Keep the link and the heartbeats until cancelled; then stop what moves under a lease."""
-        link = asyncio.create_task(self._keep_link())
+        link = asyncio.create_task(self._go_on(self._link.run))
         try:
-            await self._beat()
+            await self._go_on(self._beat)
         finally:
-            # While there is a link to stop it over.
-            self._control.end_lease("the gateway is being ended")
-            link.cancel()
-            await asyncio.gather(link, return_exceptions=True)
+            try:
+                # While there is a link to stop it over.
+                self._control.end_lease("the gateway is being ended")
+            finally:
+                link.cancel()
+                await asyncio.gather(link, return_exceptions=True)
 
     async def close(self) -> None:
         """Write what is still to be written, and close the audit log."""
         await self._control.close()
         await self._audit.close()
 
-    async def _keep_link(self) -> None:
+    async def _go_on(self, work: Callable[[], Awaitable[None]]) -> None:
+        """Do endless work; when it fails begin it anew, for the other robots know nothing of it."""
         while True:
             try:
-                await self._link.run()
+                await work()
             except Exception:
-                log.exception("%s: the link failed and begins anew", self._settings.name)
-                self._journal.say(
-                    _S.ERROR, "gateway.failed", "the gateway failed at this robot and begins anew"
-                )
+                log.exception("%s: the gateway failed at this robot and begins anew", self._settings.name)
+                text = "the gateway failed at this robot and begins anew: its log says why"
+                with contextlib.suppress(Exception):  # what failed may be the saying itself
+                    self._journal.say(_S.ERROR, "gateway.failed", text)
                 await asyncio.sleep(_MEND_S)
 
     async def _beat(self) -> None:

@@ -235,6 +235,9 @@ def test_a_gateway_that_ends_stops_the_motion_and_one_that_begins_remembers_the_
                 await until(lambda: plant.controller.activity == STATE.MOVING)
             async with gateway(mesh, tmp_path, port) as plant:
                 await until(lambda: plant.controller.activity == STATE.STOPPED)
+                before = [entry.hash for entry in read_entries(plant.audit)]
+                told = await plant.session.last(plant.key("audit"))
+                assert [entry.hash.hex() for entry in told.entries] == before
                 assert plant.joints[0] < 2.0
                 assert plant.controller.stop.id == 1
                 await plant.lease(A.ACQUIRE)
@@ -259,7 +262,7 @@ def test_control_is_handed_over_and_taken_with_a_reason(mesh, tmp_path):
             assert "needs a reason" in await refusal(plant.lease(A.TAKE))
             await plant.lease(A.TAKE, reason="wang has gone home")
             await until(lambda: plant.seen["lease"][-1].holder == "li")
-            assert "wang has gone home" in plant.events("lease.ended")[-1].text
+            await until(lambda: "wang has gone home" in plant.events("lease.ended")[-1].text)
 
     run(main())
 

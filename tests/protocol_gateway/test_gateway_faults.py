@@ -15,6 +15,7 @@ from bus.endpoints import router_config
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import SessionSettings
 from protocol_gateway.audit import read_entries, verify
+from protocol_gateway.robot import Robot
 from tests.conftest import free_port, run
 from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
 
@@ -174,6 +175,34 @@ def test_one_robots_dead_controller_does_not_hurt_another(mesh, tmp_path):
             assert other.link == STATE.DOWN
             await until(lambda: len(plant.seen["joints"]) > 100)
             assert plant.controller.counters.connections == 1
+
+    run(main())
+
+
+def test_a_failure_at_one_robot_is_said_and_neither_ends_it_nor_another(mesh, tmp_path, monkeypatch):
+    async def main():
+        failing = True
+        observe = Robot._observe
+
+        def sometimes(robot):
+            if failing and robot._settings.name == "arm":
+                raise ZeroDivisionError
+            observe(robot)
+
+        async with (
+            simulator(demo=True) as one,
+            simulator(demo=True) as two,
+            gateway(mesh, tmp_path, one, two) as plant,
+        ):
+            monkeypatch.setattr(Robot, "_observe", sometimes)
+            await until(lambda: plant.events("gateway.failed"))
+            other = plant.session.subscribe("robomesh/hall/arm-2/joints")
+            for _ in range(20):
+                await anext(other)
+            failing = False
+            states = len(plant.seen["controller"])
+            await until(lambda: len(plant.seen["controller"]) > states)
+            await plant.lease(A.ACQUIRE)
 
     run(main())
 
