@@ -3,7 +3,6 @@
 A controller of the paper's own kind sends only ABSOLUTE.DEG. Everything else is optional.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
@@ -21,6 +20,7 @@ from protocol_gateway.core.records import (
     write_number,
     write_unit,
 )
+from protocol_gateway.core.scales import si_scales
 from protocol_gateway.core.stream import Malformed, Unit, UnitStream, printable
 from protocol_gateway.driver import (
     Activity,
@@ -66,10 +66,7 @@ class UnitDriver:
     def __init__(self, joint_types: Sequence[JointType], codes: Mapping[int, str] = _NO_CODES) -> None:
         self._table = code_table(codes)
         self._stream = UnitStream(self._table)
-        # SI over the protocol's unit, one a joint: rad per degree or m per millimetre.
-        self._scales = tuple(
-            0.001 if joint_type is JointType.PRISMATIC else math.pi / 180.0 for joint_type in joint_types
-        )
+        self._scales = si_scales(joint_types)
         self.units_received = 0
         self.refusals_received = 0
 

@@ -16,6 +16,8 @@ moving: "stopped" and "holding" are said of an arm that stands.
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 
+import numpy as np
+
 from protocol_gateway.core.codes import code_table
 from protocol_gateway.core.records import (
     AbsolutePositions,
@@ -26,6 +28,7 @@ from protocol_gateway.core.records import (
     Velocities,
     write_unit,
 )
+from protocol_gateway.core.scales import si_scales
 from robots.joints import FloatArray, Joints
 from services.simulator.motion import Motion
 from services.simulator.orders import (
@@ -36,7 +39,6 @@ from services.simulator.orders import (
     Word,
     asks_to_stop,
     orders_of,
-    scales_of,
 )
 
 # Homing is slow, because nothing is known yet; at its end the marks are looked for.
@@ -69,7 +71,7 @@ class Controller:
     ) -> None:
         self.table = code_table(codes)
         self._joints = joints
-        self._scales = scales_of(joints)
+        self._scales = np.array(si_scales(joints.types))
         self._motion = Motion(joints, joints.home.copy())
         self._demo = demo
         self._boot_s = now_s

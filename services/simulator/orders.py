@@ -4,7 +4,6 @@ The unit is rehearsed on a copy of the state before anything is done, so that `r
 move behind it, and a target beyond a limit takes the words before it with it.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
@@ -20,8 +19,9 @@ from protocol_gateway.core.records import (
     Unknown,
     speed_percent,
 )
+from protocol_gateway.core.scales import si_scales
 from protocol_gateway.errors import UnitError
-from robots.joints import FloatArray, Joints, JointType, violations
+from robots.joints import FloatArray, Joints, violations
 
 MALFORMED, UNKNOWN_WORD, JOINT_COUNT, LIMIT, STOPPED = 2, 3, 4, 5, 8
 
@@ -66,11 +66,6 @@ class Situation:
     where: FloatArray
 
 
-def scales_of(joints: Joints) -> FloatArray:
-    """(n,) SI over the protocol's unit: rad per degree, m per millimetre."""
-    return np.array([0.001 if kind is JointType.PRISMATIC else math.pi / 180.0 for kind in joints.types])
-
-
 def orders_of(records: Sequence[Record], joints: Joints, situation: Situation) -> list[Order] | Error:
     """The orders of a client's unit, or the record that refuses it."""
     orders: list[Order] = []
@@ -102,7 +97,7 @@ def _rehearsed(record: Record, joints: Joints, situation: Situation) -> Sequence
             if len(values) != len(joints):
                 return Error(JOINT_COUNT, f"{len(values)} values for {len(joints)} joints")
             origin = situation.where if isinstance(record, RelativePositions) else np.zeros(len(joints))
-            return (Move(origin + np.array(values) * scales_of(joints)),)
+            return (Move(origin + np.array(values) * si_scales(joints.types)),)
         case Unknown(type_name):
             return Error(UNKNOWN_WORD, f"unknown type {type_name[:40]}")
         case _:
