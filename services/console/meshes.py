@@ -1,5 +1,6 @@
 """Link meshes for the page: asked of the mesh, kept by what they are."""
 
+import contextlib
 import hashlib
 from collections import OrderedDict
 
@@ -11,7 +12,8 @@ from bus.errors import KeyNameError, NoAnswerError, RefusedError
 from bus.session import Session
 
 _MOST_BYTES = 256 * 1024 * 1024
-_TIMEOUT_S = 10.0
+# On a busy machine an answer can be lost: asking again costs less than an arm without a link.
+_TIMEOUTS_S = (3.0, 5.0, 10.0)
 
 
 class MeshCache:
@@ -36,6 +38,13 @@ class MeshCache:
             self._bytes -= len(self._meshes.popitem(last=False)[1])
 
 
+async def _ask(session: Session, key: str) -> bytes:
+    for timeout_s in _TIMEOUTS_S[:-1]:
+        with contextlib.suppress(NoAnswerError):
+            return await session.ask_bytes(key, timeout_s=timeout_s)
+    return await session.ask_bytes(key, timeout_s=_TIMEOUTS_S[-1])
+
+
 async def mesh_response(request: Request, session: Session, cache: MeshCache) -> Response:
     """Answers `GET /mesh/<site>/<robot>/<name>?sha=<SHA-256>`.
 
@@ -48,7 +57,7 @@ async def mesh_response(request: Request, session: Session, cache: MeshCache) ->
             path = request.path_params
             name = keys.check_chunk(path["name"], "mesh")
             key = keys.robot_key(path["site"], path["robot"], f"mesh/{name}")
-            data = await session.ask_bytes(key, timeout_s=_TIMEOUT_S)
+            data = await _ask(session, key)
         except KeyNameError as error:
             return PlainTextResponse(str(error), status_code=400)
         except RefusedError as error:

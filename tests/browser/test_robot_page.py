@@ -223,7 +223,8 @@ def test_a_phone_shows_one_column_with_stop_under_the_thumb(open_page, path):
     assert stop["y"] + stop["height"] <= 740
     small = page.evaluate(
         "[...document.querySelectorAll('button, input, a.tile')]"
-        ".filter(e => e.offsetParent && e.getBoundingClientRect().height < 44).map(e => e.outerHTML.slice(0, 80))"
+        ".filter(e => e.offsetParent && e.getBoundingClientRect().height < 44)"
+        ".map(e => e.outerHTML.slice(0, 80))"
     )
     assert small == []
 

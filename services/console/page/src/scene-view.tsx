@@ -82,11 +82,16 @@ export function SceneView(props: {
       return;
     }
     scene.current = made;
+    const missing = new Map<string, string>();
     const stop = watch(`${robotKey}/frames`, (sample) =>
       made.placeFrames(sample.payload, sample.sourceTime, sample.arrived),
     );
     void made
-      .load(description, (link, text) => setProblem(t("model_failed", { link, text })))
+      .load(description, (link, text) => {
+        if (text) missing.set(link, t("model_failed", { link, text }));
+        else missing.delete(link);
+        setProblem([...missing.values()][0] ?? "");
+      })
       .then(() => setLoaded(true));
     return () => {
       stop();
@@ -149,7 +154,7 @@ export function SceneView(props: {
       </div>
       {waiting && <p class="scene-word dim">{waiting}</p>}
       {problem && <p class="scene-word trouble">{problem}</p>}
-      {stale && loaded && (
+      {stale && (loaded || problem) && (
         <p class="scene-stale" role="status">
           <span class="shape warning" aria-hidden="true" />
           {age === undefined ? t("no_data") : staleText(age)}

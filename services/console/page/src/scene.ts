@@ -18,6 +18,8 @@ const LATE_MS = 45;
 const LATE_FRAMES = 15;
 const SOFTWARE_FRAME_MS = 60;
 const LATE_FRAME_MS = 120;
+const NO_ANSWER = 504; // the mesh's service did not answer
+const ASK_AGAIN_MS = 2000;
 const CREASE_ANGLE = 0.6; // rad: sharper edges stay sharp
 
 /** A scene on a canvas. Placements come by `placeFrames`; `dispose` frees the GPU. */
@@ -41,6 +43,7 @@ export class RobotScene {
   private request = 0;
   private drawnAt = 0;
   private late = 0;
+  private disposed = false;
   private spared: number;
   private shortest: number; // ms between two pictures, at least
   private readonly observer: ResizeObserver;
@@ -91,7 +94,7 @@ export class RobotScene {
     this.dirty = true;
   }
 
-  /** Loads the links' meshes; `failed` hears of each that cannot be. */
+  /** Loads the links' meshes; `failed` hears why one cannot be yet, and "" when it could. */
   async load(description: Description, failed: (link: string, why: string) => void): Promise<void> {
     if (description.baseToSite.length === 16) this.base.fromArray(description.baseToSite).transpose();
     this.setColours();
@@ -106,8 +109,17 @@ export class RobotScene {
       description.links.map(async ({ name, mesh, meshSha256, color }) => {
         if (!mesh) return;
         try {
-          const answer = await fetch(`/mesh/${this.prefix}/${encodeURIComponent(mesh)}?sha=${meshSha256}`);
+          const url = `/mesh/${this.prefix}/${encodeURIComponent(mesh)}?sha=${meshSha256}`;
+          let answer = await fetch(url);
+          // Its service may be starting: said at once, and asked until it is there.
+          while (answer.status === NO_ANSWER && !this.disposed) {
+            failed(name, await answer.text());
+            await new Promise((resolve) => setTimeout(resolve, ASK_AGAIN_MS));
+            answer = await fetch(url);
+          }
           if (!answer.ok) throw new Error(await answer.text());
+          if (this.disposed) return;
+          failed(name, "");
           const { scene } = await loader.parseAsync(await answer.arrayBuffer(), "");
           this.addLink(`${this.prefix}/${name}`, scene, color);
         } catch (error) {
@@ -344,6 +356,7 @@ export class RobotScene {
   }
 
   dispose(): void {
+    this.disposed = true;
     cancelAnimationFrame(this.request);
     this.observer.disconnect();
     this.controls.dispose();
