@@ -243,25 +243,20 @@ class Control:
             RefusedError: With what, why and what next; nothing was sent.
         """
         arrived_s = time.monotonic()
+        entry = command_entry(request, operator=operator, source=source)
         async with self._one_at_a_time:
             self.check_expiry()
             verdict = admit(self.authority, request, operator=operator, now=_now())
             answer = verdict.answer
             if not verdict.repeat:
-                answer = await self._do(request, verdict, arrived_s, operator, source)
+                answer = await self._do(request, verdict, arrived_s, entry)
         if not answer.accepted:
             raise RefusedError(answer.text)
         return schema.CommandAnswer(accepted=True, text=answer.text)
 
     async def _do(
-        self,
-        request: schema.CommandRequest,
-        verdict: Verdict,
-        arrived_s: float,
-        operator: str,
-        source: str,
+        self, request: schema.CommandRequest, verdict: Verdict, arrived_s: float, entry: Entry
     ) -> Answer:
-        entry = command_entry(request, operator=operator, source=source)
         refusal = verdict.answer.text or delay(arrived_s, _now()) or self._obstacle(request)
         unit = b""
         if not refusal:

@@ -2,8 +2,10 @@
 
 import asyncio
 import time
+from dataclasses import replace
 
 from bus.schemas.robomesh_pb2 import CommandRequest, Event, LeaseRequest
+from protocol_gateway.admission import LONGEST_WAIT_S
 from protocol_gateway.audit import AuditLog, Entry, Outcome
 from protocol_gateway.errors import AuditError
 from protocol_gateway.journal import Journal
@@ -21,13 +23,20 @@ class Ledger:
         """Write down what is about to be done; it is on disk when this returns.
 
         Raises:
-            AuditError: If it is not; then it must not be done.
+            AuditError: If it is not, or not within a second; then it must not be done.
         """
         try:
-            await self._audit.append(entry)
+            async with asyncio.timeout(LONGEST_WAIT_S):
+                await self._audit.append(entry)
         except AuditError as error:
             self._say_failed(error)
             raise
+        except TimeoutError:
+            late = AuditError(f"the audit log's disk takes longer than {LONGEST_WAIT_S:g} s")
+            # The entry will be on disk yet, so what became of it has to stand behind it.
+            self.after_later(replace(entry, outcome=Outcome.FAILED, text=f"not done: {late}"))
+            self._say_failed(late)
+            raise late from None
 
     async def after(self, entry: Entry) -> None:
         """Write down what has happened; a full disk makes it late."""
@@ -47,7 +56,7 @@ class Ledger:
         await asyncio.gather(*self._writing)
 
     def _say_failed(self, error: AuditError) -> None:
-        text = f"{error}: the robot is not moved until it can; stop still works"
+        text = f"{error}: the robot is not moved while that is so; stop still works"
         self._journal.say(Event.Severity.ERROR, "audit.failed", text)
 
 

@@ -439,18 +439,27 @@ def test_a_command_that_waited_for_a_slow_disk_is_not_sent_after_its_sender_has_
             fsync = os.fsync
 
             def slow(file):
-                time.sleep(1.2)
+                time.sleep(3.0)
                 fsync(file)
 
             monkeypatch.setattr(os, "fsync", slow)
-            text = await refusal(plant.command(C.TRACE_ON))
-            assert text.startswith("Not sent: it waited 1.")
+            asked = [plant.command(C.TRACE_ON), plant.command(C.SPEED, speed_percent=10)]
+            first, second = await asyncio.gather(*(refusal(each) for each in asked))
+            assert first.startswith("Not sent: the audit log's disk takes longer than 1 s, and what is not")
+            assert second.startswith("Not sent: it waited 1.0 s in the gateway")
+            assert plant.events("audit.failed")
             monkeypatch.setattr(os, "fsync", fsync)
-            await until(lambda: plant.seen["audit"][-1].outcome == schema.AuditEntry.FAILED)
+            await until(lambda: plant.seen["audit"][-1].request == "SPEED")
+            await plant.lease(A.RENEW, ttl_s=5)
             await plant.command(C.TRACE_OFF)
             await until(lambda: plant.controller.counters.units_sent == 1)
         outcomes = [(each.request, each.outcome) for each in read_entries(plant.audit)]
-        assert outcomes[1:4] == [("TRACE_ON", "ACCEPTED"), ("TRACE_ON", "FAILED"), ("TRACE_OFF", "ACCEPTED")]
+        assert outcomes[1:5] == [
+            ("TRACE_ON", "ACCEPTED"),
+            ("TRACE_ON", "FAILED"),
+            ("SPEED", "REFUSED"),
+            ("TRACE_OFF", "ACCEPTED"),
+        ]
 
     run(main())
 
