@@ -157,7 +157,9 @@ def test_key_frames_are_forced_at_most_once_a_second(mesh, tmp_path):
             key = "robomesh/hall/arm/video/front/keyframe"
             answers = [await monitor.ask(key, KeyFrameRequest()) for _ in range(5)]
             assert answers == [KeyFrameAnswer(forced=False)] * 5
-            with pytest.raises(RefusedError, match="no view 'behind'; there are close, free, front, left, top"):
+            with pytest.raises(
+                RefusedError, match="no view 'behind'; there are close, free, front, left, top"
+            ):
                 await monitor.ask(key.replace("front", "behind"), KeyFrameRequest())
 
     run(main())
