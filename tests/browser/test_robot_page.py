@@ -114,6 +114,20 @@ def test_a_slider_moves_the_joint_when_it_is_let_go_and_not_before(open_page, pl
     assert audited(plant, "MOVE_ABSOLUTE") == moves
 
 
+def test_a_target_that_homing_left_behind_moves_no_joint_that_nobody_touched(open_page, plant):
+    page = open_page(ARM)
+    ready(page)
+    drag(page, "waist", 60)
+    expect(page.locator(".headline .state")).to_have_text("Moving")
+    button(page, "Home").click()
+    expect(page.locator(".headline .state")).to_have_text("Idle", timeout=30_000)
+    home = degrees(page, "waist")
+    drag(page, "wrist", 20)
+    expect(page.locator(".headline .state")).to_have_text("Moving")
+    expect(page.locator(".headline .state")).to_have_text("Idle", timeout=30_000)
+    assert degrees(page, "waist") == pytest.approx(home, abs=0.02)
+
+
 def test_by_keys_a_target_is_set_and_enter_sends_it_and_escape_takes_it_back(open_page, plant):
     page = open_page(ARM)
     ready(page)

@@ -13,6 +13,7 @@ import { Age, NoticeLine, Panel, Unit } from "./parts";
 import { t } from "./texts";
 
 const REACHED = 0.002; // rad or m: half of what a person reads off
+const ABANDONED_MS = 1500;
 const DEGREE = Math.PI / 180;
 
 export function JointsPanel(props: {
@@ -38,13 +39,18 @@ export function JointsPanel(props: {
   const off = targets.some((target, i) => target !== undefined && Math.abs(target - (current[i] ?? target)) > REACHED);
   useEffect(() => {
     if (!enabled || (resting && !off)) setTargets([]);
+    // Homing, a stop or the controller's refusal left it behind.
+    const abandoned = resting && off ? setTimeout(() => setTargets([]), ABANDONED_MS) : undefined;
+    return () => clearTimeout(abandoned);
   }, [enabled, resting, off]);
   useEffect(() => {
     if (!mine) setNotice(null);
   }, [mine]);
 
+  // Only a motion that runs keeps its other targets: an abandoned one must not move a joint that nobody touched.
+  const running = resting ? [] : targets;
   const wantedAt = (index: number, value: number) =>
-    rows.map((_, i) => (i === index ? value : (targets[i] ?? current[i])));
+    rows.map((_, i) => (i === index ? value : (running[i] ?? current[i])));
   const show = (index: number, value: number | undefined) => {
     setPreview(value === undefined ? null : { index, value });
     const wanted = value === undefined ? null : wantedAt(index, value);
@@ -57,7 +63,7 @@ export function JointsPanel(props: {
     const joint = rows[index];
     const wanted = wantedAt(index, value);
     if (!joint || wanted.some((each) => each === undefined)) return;
-    setTargets(wanted.map((each, i) => (i === index || targets[i] !== undefined ? each : undefined)));
+    setTargets(wanted.map((each, i) => (i === index || running[i] !== undefined ? each : undefined)));
     const what = `${joint.name} ${jointText(joint, value)}`;
     const accepted = await command(
       robotKey,
