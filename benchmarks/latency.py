@@ -70,6 +70,7 @@ def measure(seconds: float, *, video: bool) -> dict[str, Any]:
         with contextlib.ExitStack() as stack:
             for role in roles:
                 stack.enter_context(service(role, site, endpoint))
+                until_connectable(router)
             go = multiprocessing.Event()
             for target, ports in (
                 (controller_process, (controller, written)),
@@ -231,6 +232,14 @@ def process(target: Any, arguments: tuple[Any, ...]) -> Iterator[None]:
     finally:
         running.terminate()
         running.join(10)
+
+
+def until_connectable(port: int) -> None:
+    """Wait for the router."""
+    while True:
+        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port)):
+            return
+        time.sleep(0.05)
 
 
 def free_port() -> int:
