@@ -13,7 +13,7 @@ from bus.topics import Priority
 DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
 
 _LINKS = ("1-4", "5-7")
-_ON_THE_SECOND_LINK = (Priority.DATA, Priority.DATA_LOW, Priority.BACKGROUND)
+ON_THE_SECOND_LINK = (Priority.DATA, Priority.DATA_LOW, Priority.BACKGROUND)
 _NOBODYS_KEY = "robomesh/-/-/-"
 _SETTLE_S = 0.25
 
@@ -77,7 +77,7 @@ def settle(session: zenoh.Session, priority: Priority) -> None:
     declare: what follows at once on the second link is dropped in silence when it comes first
     (a fifth of the first puts and gets on a busy machine). Returns at once without a router.
     """
-    if priority in _ON_THE_SECOND_LINK:
+    if priority in ON_THE_SECOND_LINK:
         for _ in session.get(
             _NOBODYS_KEY,
             priority=zenoh.Priority.REAL_TIME,

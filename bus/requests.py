@@ -9,7 +9,7 @@ import zenoh
 from google.protobuf.message import Message
 
 from bus import keys, topics
-from bus.endpoints import first_line, settle
+from bus.endpoints import ON_THE_SECOND_LINK, first_line, settle
 from bus.errors import MessageError, NoAnswerError, RefusedError
 from bus.messages import JSON, PROTOBUF, TEXT, decode, decode_request, encode, is_json
 
@@ -157,7 +157,9 @@ async def ask_all(
             loop.call_soon_threadsafe(finish)
 
     row = topics.request(keys.parse_key(key).topic)
-    await asyncio.to_thread(settle, session, row.priority)
+    if row.priority in ON_THE_SECOND_LINK:
+        # In a thread, which keeps no order: never before a command.
+        await asyncio.to_thread(settle, session, row.priority)
     try:
         session.get(
             key,

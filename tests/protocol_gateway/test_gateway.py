@@ -133,6 +133,7 @@ def test_a_lease_that_is_not_renewed_stops_its_holders_motion(mesh, tmp_path):
             await plant.command(C.MOVE_ABSOLUTE, joint_positions=FAR)
             await until(lambda: plant.controller.activity == STATE.STOPPED)
             assert plant.joints[0] < 2.0
+            await until(lambda: plant.events("lease.ended") and plant.seen["lease"][-1].holder == "")
             (event,) = plant.events("lease.ended")
             assert event.text == (
                 "control ended: li's lease was not renewed within 0.5 s, its motion was stopped"

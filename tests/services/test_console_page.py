@@ -3,7 +3,6 @@
 import re
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -61,12 +60,10 @@ def test_the_lock_file_holds_no_address():
     assert "://" not in (build_page.PAGE / "package-lock.json").read_text()
 
 
-def test_a_current_page_is_not_built_again_and_that_is_told_fast():
+def test_a_current_page_is_not_built_again():
     build_page.build()
-    started = time.monotonic()
     done = subprocess.run([sys.executable, build_page.__file__], capture_output=True, text=True, check=True)
     assert done.stdout == ""
-    assert time.monotonic() - started < 0.5  # most of it is Python's own start
 
 
 def test_the_built_page_asks_nothing_of_anybody_else():
