@@ -96,6 +96,8 @@ def _shared(tls: Tls | None) -> dict[str, Any]:
     values: dict[str, Any] = {
         "scouting/multicast/enabled": False,
         "transport/unicast/max_links": 4,
+        # Something that listens and is no router is given up after this, not after 10 s a link.
+        "transport/unicast/open_timeout": 3000,
         # A frozen host is noticed after 1.7 s instead of 10.
         "transport/link/tx/lease": 2000,
         # No gain at the sizes of this mesh, and not there in containers.
@@ -119,11 +121,15 @@ def _config(values: dict[str, Any]) -> zenoh.Config:
         try:
             config.insert_json5(key, json.dumps(value))
         except zenoh.ZError as error:
-            raise SessionError(
-                f"{key} = {json.dumps(value)} is not taken: {first_line(error)}; "
-                "an endpoint reads like tcp/127.0.0.1:7447"
-            ) from None
+            if key.endswith("/endpoints"):
+                given = ", ".join(_endpoint(each) for each in value) or "nothing"
+                raise SessionError(f"{given!r} is no endpoint: tcp/127.0.0.1:7447 is one") from None
+            raise SessionError(f"{key} = {json.dumps(value)} is not taken: {first_line(error)}") from None
     return config
+
+
+def _endpoint(value: str | dict[str, Any]) -> str:
+    return value if isinstance(value, str) else str(value["locators"][0]).removesuffix(f"?prio={_LINKS[0]}")
 
 
 def first_line(error: Exception) -> str:

@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, ValidationError, field_validator
 
 from bus import keys
 from bus.endpoints import Tls
@@ -38,7 +38,7 @@ class Router(BaseModel):
     listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)
     connect: tuple[str, ...] = ()
     tls: TlsFiles | None = None
-    insecure: bool = False
+    insecure: StrictBool = False
 
 
 class Robot(BaseModel):
@@ -54,9 +54,9 @@ class Robot(BaseModel):
     codes: dict[int, str] = Field(default_factory=dict)
     accept_unknown: tuple[Literal["mode", "homed"], ...] = ()
     # Whether somebody tried the stop unit on this controller; without that nothing is ever sent to it.
-    stop_proven: bool | None = None
+    stop_proven: StrictBool | None = None
     stale_after_s: Annotated[float, Field(gt=0.05, le=60)] = 1.0
-    demo: bool = False
+    demo: StrictBool = False
 
     @field_validator("name")
     @classmethod
@@ -118,7 +118,7 @@ class Console(BaseModel):
     listen: str = "127.0.0.1:8080"
     # Names that people reach it by, beside addresses and localhost.
     hosts: tuple[str, ...] = ()
-    insecure: bool = False
+    insecure: StrictBool = False
 
 
 class Audit(BaseModel):

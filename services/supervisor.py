@@ -69,8 +69,12 @@ async def supervise(
                 prefix = f"{program.name:<{width}} | "
                 group.create_task(_keep(program, running, _prefixed(write, prefix)))
             group.create_task(_once(ready))
-    except* ServiceError as errors:
-        raise errors.exceptions[0] from None
+    except ExceptionGroup as errors:
+        # Not `except*`: before Python 3.11.4 what it raises comes out in a group again.
+        could_not, others = errors.split(ServiceError)
+        if others is not None or could_not is None:
+            raise
+        raise could_not.exceptions[0] from None
     finally:
         await _end([*running.values()])
 

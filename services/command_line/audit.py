@@ -20,10 +20,18 @@ def verify(file: Path, head: str, as_json: bool) -> None:
     except OSError as error:
         raise AuditFileError(f"{file}: cannot be read: {error.strerror}") from None
     if as_json:
-        print_json({"ok": result.ok, "entries": result.entries, "first_break": result.first_break})
+        print_json(
+            {
+                "ok": result.ok and result.entries > 0,
+                "entries": result.entries,
+                "first_break": result.first_break,
+            }
+        )
+    elif not result.entries:
+        print(f"{file}: no entry at all: an emptied log looks like this")
     elif result.ok:
         print(f"{file}: {result.entries} entries, whole and unchanged")
     else:
         print(f"{file}: {result.text}")
-    if not result.ok:
+    if not result.ok or not result.entries:
         raise typer.Exit(1)

@@ -23,7 +23,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 robot_app = typer.Typer(help="Robot descriptions: check, show, export.", no_args_is_help=True)
-mesh_app = typer.Typer(help="Mesh files: what is in one, and conversion.", no_args_is_help=True)
+mesh_app = typer.Typer(help="Mesh files: what is in one.", no_args_is_help=True)
 recordings_app = typer.Typer(help="What is recorded.", no_args_is_help=True)
 audit_app = typer.Typer(help="The gateway's audit log.", no_args_is_help=True)
 for name, part in (

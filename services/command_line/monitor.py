@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import math
+import sys
 import time
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
@@ -28,7 +29,9 @@ _BAR_CELLS = 40
 def run(robot: str, router: str, as_json: bool, count: int | None) -> None:
     """Watch until Ctrl-C, or for `count` states."""
     with contextlib.suppress(KeyboardInterrupt):
-        find.run(_json(robot, router, count) if as_json else _live(robot, router, count))
+        # A pipe has no screen to draw on.
+        lines = as_json or not sys.stdout.isatty()
+        find.run(_json(robot, router, count) if lines else _live(robot, router, count))
 
 
 async def _json(name: str, router: str, count: int | None) -> None:

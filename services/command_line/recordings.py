@@ -1,16 +1,25 @@
 """`robomesh record` and `robomesh recordings`."""
 
 import asyncio
+import contextlib
 import signal
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from bus.errors import NoAnswerError
 from bus.keys import WHOLE_SITE, robot_key
 from bus.schemas import robomesh_pb2 as schema
+from bus.session import Session
 from services.command_line import find
+from services.errors import ServiceError
 
 _Request = schema.RecorderRequest
+_LOOK_EVERY_S = 2.0
+
+
+class RecorderGoneError(ServiceError):
+    """A recorder that went away while it recorded."""
 
 
 def record(robot: str, name: str, router: str, as_json: bool) -> None:
@@ -25,14 +34,39 @@ async def _record(text: str, name: str, router: str) -> schema.Recording:
         begun = await session.ask(key, _Request(action=_Request.TRACE_ON, name=name), timeout_s=5.0)
         assert isinstance(begun, schema.Recording)
         print(f"recording {robot} as {begun.name}; Ctrl-C ends it", flush=True)
-        ended = asyncio.Event()
-        loop = asyncio.get_running_loop()
-        for number in (signal.SIGINT, signal.SIGTERM):
-            loop.add_signal_handler(number, ended.set)
-        await ended.wait()
-        done = await session.ask(key, _Request(action=_Request.TRACE_OFF), timeout_s=60.0)
+        await _until_ended(session, robot)
+        done = await session.ask(key, _Request(action=_Request.TRACE_OFF), timeout_s=10.0)
         assert isinstance(done, schema.Recording)
         return done
+
+
+async def _until_ended(session: Session, robot: find.Robot) -> None:
+    """Until Ctrl-C; a second one ends the program.
+
+    Raises:
+        RecorderGoneError: If nobody records any more.
+    """
+    ended = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, ended.set)
+    while not ended.is_set():
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(_LOOK_EVERY_S):
+                await ended.wait()
+        if not ended.is_set() and await _open_recording(session, robot) is None:
+            raise RecorderGoneError(f"nobody records {robot} any more: is its recorder running?")
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.remove_signal_handler(number)
+
+
+async def _open_recording(session: Session, robot: find.Robot) -> schema.Recording | None:
+    try:
+        answer = await session.ask(robot_key(robot.site, WHOLE_SITE, "recordings/list"))
+    except NoAnswerError:
+        return None
+    assert isinstance(answer, schema.RecordingList)
+    return next((each for each in answer.recordings if each.open and each.robot == robot.name), None)
 
 
 def list_all(router: str, as_json: bool) -> None:

@@ -2,7 +2,7 @@
 
 import json
 import sys
-from math import degrees
+from math import degrees, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -123,7 +123,10 @@ def forward(robot: str, requests: str) -> None:
 def _joint_positions(line: str) -> list[float]:
     try:
         positions = json.loads(line, parse_constant=_refuse)["joints"]
-        return [float(position) for position in positions]
+        found = [float(position) for position in positions]
+        if not all(map(isfinite, found)):
+            raise ValueError
+        return found
     except (ValueError, TypeError, KeyError):
         raise RequestError(
             f'{line.strip()!r} is no request; {{"joints": [0.1, 0.2]}} is right, in rad and m'

@@ -69,7 +69,7 @@ async def _send(name: str, words: list[str], router: str, operator: str) -> tupl
                 answer = await session.ask(robot_key(*robot, f"command/{operator}"), request)
                 assert isinstance(answer, schema.CommandAnswer)
                 if answer.accepted and request.command in _MOTIONS:
-                    return await _until_done(session, robot, operator, answer.text)
+                    return await _until_done(session, robot, operator)
                 return answer.accepted, answer.text
         except RefusedError as error:
             return False, str(error)
@@ -87,7 +87,7 @@ async def _latched_stop(session: Session, robot: find.Robot) -> int:
     return state.stop.id if isinstance(state, schema.ControllerState) else 0
 
 
-async def _until_done(session: Session, robot: find.Robot, operator: str, text: str) -> tuple[bool, str]:
+async def _until_done(session: Session, robot: find.Robot, operator: str) -> tuple[bool, str]:
     """Wait until the gateway says that the holder's motion has ended; Ctrl-C stops the robot."""
     interrupted = asyncio.Event()
     asyncio.get_running_loop().add_signal_handler(signal.SIGINT, interrupted.set)
@@ -98,7 +98,7 @@ async def _until_done(session: Session, robot: find.Robot, operator: str, text: 
         if interrupted.is_set():
             _, said = await _stop(session, robot, operator)
             return False, f"interrupted: {said}"
-        return await ended or (True, text)
+        return await ended or (True, "done")
     finally:
         asyncio.get_running_loop().remove_signal_handler(signal.SIGINT)
         ended.cancel()

@@ -52,6 +52,7 @@ def test_codes_are_numbers(tmp_path):
         (f'site = "hall"\n{ROBOT}controller = "10.0.0.7"', "robot.arm.controller = '10.0.0.7': should be"),
         (f'site = "hall"\n{ROBOT}stale_after_s = 0', "robot.arm.stale_after_s = 0"),
         (f'site = "hall"\n{ROBOT}check = "require"', "would do nothing yet"),
+        (f'site = "hall"\n{ROBOT}stop_proven = "yes"', "robot.arm.stop_proven = 'yes'"),
         (f'site = "hall"\n{ROBOT}accept_unknown = ["link"]', "robot.arm.accept_unknown"),
         (
             'site = "hall"\n[renderer]\nsize = [333, 200]',
