@@ -93,6 +93,8 @@ class Control:
     def stop(self, *, by: str, reason: str, source: str) -> schema.StopAnswer:
         """Send the stop unit, latch it, and only then say and write down that it was so."""
         now = _now()
+        if self._controller().read_only:
+            return self._stop_of_read_only(by=by, reason=reason, source=source)
         problem = self._send_stop()
         self.authority, latched = rules.stop(self.authority, by=by, reason=reason, now=now)
         if not problem:
@@ -122,10 +124,18 @@ class Control:
         )
         return schema.StopAnswer(stop_id=latched.id, sent=not problem, text=text)
 
+    def _stop_of_read_only(self, *, by: str, reason: str, source: str) -> schema.StopAnswer:
+        """Nothing is sent, and nothing latched: nobody could clear it, and nothing needs it."""
+        why = self._controller().read_only
+        text = f"stop request not sent: stop it at its own panel, for it is read-only: {why}"
+        self._journal.say(_S.ERROR, "stop.not_sent", f"{text} ({by}: {reason})", by=by)
+        self._ledger.after_later(
+            entry_of("STOP", operator=by, source=source, outcome=Outcome.FAILED, text=text, reason=reason)
+        )
+        return schema.StopAnswer(sent=False, text=text)
+
     def _send_stop(self) -> str:
         """Put the stop unit on the socket; why not, or nothing."""
-        if self._controller().read_only:
-            return f"stop it at its own panel, for it is read-only: {self._controller().read_only}"
         try:
             self._send(self._driver.encode(Stop()))
         except (LinkError, CommandError) as error:

@@ -287,6 +287,8 @@ def test_a_controller_without_a_proven_stop_is_read_only(mesh, tmp_path):
             stop = await plant.stop()
             assert not stop.sent
             assert "stop it at its own panel" in stop.text
+            # Nothing is latched that nobody could ever clear, and nobody reads "stopped".
+            assert not plant.controller.HasField("stop")
             assert plant.controller.counters.units_sent == 0
 
     run(main())

@@ -3,7 +3,8 @@
 import { useState } from "preact/hooks";
 import { Command, command, controlNotice, holds, operator, release, setOperator, take } from "./control";
 import type { CommandValues } from "./control";
-import { fixed, stampFull, stampTime } from "./format";
+import { fixed, stampFull } from "./format";
+import { stopText } from "./robot-state";
 import { ControllerState_Activity as Activity, ControllerState_Known as Known } from "./gen/robomesh_pb";
 import type { ControllerState, Lease } from "./gen/robomesh_pb";
 import { NoticeLine, Panel } from "./parts";
@@ -88,7 +89,7 @@ export function ControlPanel(props: {
             <strong>
               <span class="shape alarm" aria-hidden="true" />
               <span title={stampFull(stopped.since)}>
-                {t("stopped_by", { by: stopped.by || "–", time: stampTime(stopped.since) })}
+                {stopText(stopped)}
               </span>
             </strong>
             <p>

@@ -9,7 +9,7 @@ import { fromBinary } from "@bufbuild/protobuf";
 import { staleText, stampFull, stampTime } from "./format";
 import { presence, watch } from "./mesh";
 import { State, Tag } from "./parts";
-import { stateWord } from "./robot-state";
+import { stateWord, stopText } from "./robot-state";
 import type { Level, StateWord } from "./robot-state";
 import { robotLink } from "./route";
 import { t } from "./texts";
@@ -163,7 +163,7 @@ function Summary({ states }: { states: readonly StateWord[] }) {
 function problemOf(controller: ControllerState | undefined): string {
   if (controller?.fault) return controller.fault;
   const stop = controller?.stop;
-  if (stop) return t("stopped_by", { by: stop.by || "–", time: stampTime(stop.since) });
+  if (stop) return stopText(stop);
   return controller?.linkText ?? "";
 }
 

@@ -1,9 +1,11 @@
 // The one word that says how a robot is, with its colour and shape.
 
 import { ControllerState_Activity as Activity, ControllerState_Link as Link } from "./gen/robomesh_pb";
-import type { ControllerState } from "./gen/robomesh_pb";
+import type { ControllerState, StopState } from "./gen/robomesh_pb";
+import { stampTime } from "./format";
 import { ageOf, isStale } from "./topics";
 import type { Latest } from "./topics";
+import { t } from "./texts";
 import type { TextName } from "./texts";
 
 /** How much a state asks to be looked at; each has a colour and a shape of its own. */
@@ -25,13 +27,23 @@ const ACTIVITIES: Record<Activity, StateWord> = {
   [Activity.FAULT]: { word: "state_fault", level: "alarm" },
 };
 
+const MOVES = new Set([Activity.MOVING, Activity.HOMING]);
+
+/** A latched stop in words: by whom, since when, and whether the controller had it. */
+export function stopText(stop: StopState): string {
+  const values = { by: stop.by || "–", time: stampTime(stop.since) };
+  return t(stop.sent ? "stopped_by" : "stop_unsent_by", values);
+}
+
 /** The state word of a robot, the most urgent first. */
 export function stateWord(controller: Latest<ControllerState> | undefined): StateWord {
   if (!controller) return { word: "state_unknown", level: "warning" };
   if (isStale("controller", ageOf(controller))) return { word: "state_stale", level: "warning" };
   const { link, stop, fault, activity } = controller.message;
   if (fault) return { word: "state_fault", level: "alarm" };
-  if (stop) return { word: "state_stopped", level: "alarm" };
+  // Asked for is not stopped: the word says what is known of the arm.
+  if (stop && !stop.sent) return { word: "state_stop_unsent", level: "alarm" };
+  if (stop) return { word: MOVES.has(activity) ? "state_stopping" : "state_stopped", level: "alarm" };
   if (link === Link.DOWN) return { word: "state_no_link", level: "alarm" };
   if (link === Link.SILENT) return { word: "state_silent", level: "warning" };
   return ACTIVITIES[activity] ?? { word: "state_unknown", level: "warning" };

@@ -5,7 +5,6 @@ import { Camera } from "./camera";
 import { held, holds, seeHolder } from "./control";
 import { ControlPanel } from "./control-panel";
 import { EventsPanel } from "./events-panel";
-import { stampTime } from "./format";
 import {
   ControllerStateSchema,
   ControllerState_Known as Known,
@@ -18,7 +17,7 @@ import { JointStatesSchema } from "./gen/foxglove/JointStates_pb";
 import { History } from "./history";
 import { JointsPanel } from "./joints-panel";
 import { State, Tag } from "./parts";
-import { stateWord } from "./robot-state";
+import { stateWord, stopText } from "./robot-state";
 import type { RobotName } from "./route";
 import { SceneView } from "./scene-view";
 import { t } from "./texts";
@@ -104,7 +103,7 @@ function Headline(props: {
       {description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>}
       {trouble && <span class={`trouble ${state.level}`}>{trouble}</span>}
       {message?.stop && (
-        <span class="trouble">{t("stopped_by", { by: message.stop.by || "–", time: stampTime(message.stop.since) })}</span>
+        <span class="trouble">{stopText(message.stop)}</span>
       )}
       {description?.provenance && (
         <span class="provenance dim" title={description.provenance}>
