@@ -1,4 +1,5 @@
-# One image a role, each with what that role needs and no more: a gateway holds no OpenGL.
+# One image a role, each with what that role needs and no more: a gateway holds no OpenGL. ROLE is one of
+# router, gateway, kinematics, simulator, recorder, player, renderer, console, watch, foxglove, ros2, keys, all.
 #
 #   docker build --build-arg ROLE=gateway -t robomesh-gateway .
 
@@ -16,6 +17,7 @@ COPY pyproject.toml requirements.lock README.md LICENSE ./
 COPY bus bus
 COPY robots robots
 COPY protocol_gateway protocol_gateway
+COPY mcap_files mcap_files
 COPY renderer renderer
 COPY services services
 RUN /opt/uv/bin/uv build --quiet --wheel --build-constraint requirements.lock --out-dir /dist
@@ -29,10 +31,15 @@ RUN if [ "$ROLE" = renderer ] || [ "$ROLE" = all ]; then \
     fi
 COPY --from=wheel /dist /dist
 COPY requirements.lock /dist/
-RUN /opt/uv/bin/uv venv --quiet /opt/robomesh \
- && /opt/uv/bin/uv pip install --quiet --python /opt/robomesh/bin/python --constraint /dist/requirements.lock \
-      "$(echo /dist/robomesh-*.whl)[$ROLE]"
-RUN useradd --create-home robomesh && mkdir /data && chown robomesh /data
-USER robomesh
+RUN --mount=type=cache,target=/root/.cache/uv \
+    /opt/uv/bin/uv venv --quiet /opt/robomesh \
+ && UV_LINK_MODE=copy /opt/uv/bin/uv pip install --quiet --python /opt/robomesh/bin/python \
+      --constraint /dist/requirements.lock "$(echo /dist/robomesh-*.whl)[$ROLE]" \
+ && /opt/robomesh/bin/python -m compileall -q /opt/robomesh
+# What a role keeps is below /data, each part a volume of its own; everything else may be read-only.
+RUN useradd --uid 10001 --create-home robomesh \
+ && mkdir -p /data/audit /data/recordings /data/robots /data/watch /data/cache && chown -R robomesh /data
+ENV PATH=/opt/robomesh/bin:$PATH XDG_CACHE_HOME=/data/cache
+USER 10001
 WORKDIR /data
 ENTRYPOINT ["/opt/robomesh/bin/robomesh"]

@@ -7,11 +7,17 @@ Runs on software OpenGL and on a GPU alike, and says which it was, and which enc
 
 import argparse
 import json
+import sys
 import time
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+if __name__ == "__main__":
+    # A program beside this one has a room's name: what is imported is looked for from the root.
+    sys.path[0] = str(Path(__file__).parents[1])
 
 from renderer.cameras import Camera, fitted
 from renderer.drawing import Drawing

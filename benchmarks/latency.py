@@ -209,7 +209,7 @@ def summary(values: list[int]) -> dict[str, float]:
 
 
 @contextlib.contextmanager
-def service(role: str, site: Path, endpoint: str) -> Iterator[None]:
+def service(role: str, site: Path, endpoint: str) -> Iterator[subprocess.Popen[bytes]]:
     attach = [] if role == "router" else ["--connect", endpoint]
     running = subprocess.Popen(
         [sys.executable, "-m", "services.command_line.main", role, "--site", str(site), *attach],
@@ -217,7 +217,7 @@ def service(role: str, site: Path, endpoint: str) -> Iterator[None]:
         stderr=subprocess.DEVNULL,
     )
     try:
-        yield
+        yield running
     finally:
         running.terminate()
         running.wait(10)

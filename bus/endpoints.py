@@ -1,8 +1,11 @@
 """Zenoh configurations: a client of a router, and a router."""
 
 import json
+import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import zenoh
@@ -16,15 +19,47 @@ _LINKS = ("1-4", "5-7")
 ON_THE_SECOND_LINK = (Priority.DATA, Priority.DATA_LOW, Priority.BACKGROUND)
 _NOBODYS_KEY = "robomesh/-/-/-"
 _SETTLE_S = 0.25
+# When a machine goes without a word, closing its connections holds the thread that does it for up to 10 s
+# (Zenoh sets SO_LINGER), and by default a process receives with two: a cut line silenced a site's own
+# services for as long. So there are more than can be held at once; a client has four connections.
+_THREADS = {
+    "router": "(rx: (worker_threads: 16), tx: (worker_threads: 4), net: (worker_threads: 4), "
+    "acc: (worker_threads: 2))",
+    "client": "(rx: (worker_threads: 6), tx: (worker_threads: 2), net: (worker_threads: 4))",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Tls:
-    """Certificates of one end of a mutual TLS link (PEM files)."""
+    """Certificates of one end of a mutual TLS link (PEM files; one file may hold them all).
+
+    Attributes:
+        any_address: A router may have any address: its certificate says that it is one, not where. So do
+            those of `robomesh keys`, where only routers may serve.
+    """
 
     ca: Path
     certificate: Path
     key: Path
+    any_address: bool = False
+
+
+def bundle(file: Path, authority: Path | None = None) -> Tls:
+    """What one file of `robomesh keys` holds, as certificates of this end."""
+    return Tls(ca=authority or file, certificate=file, key=file, any_address=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Link:
+    """Another router to link to, and the certificates for it; None: the router's own.
+
+    Attributes:
+        site: The other site, whose authority signed them.
+    """
+
+    endpoint: str
+    tls: Tls | None = None
+    site: str = ""
 
 
 def client_config(routers: tuple[str, ...], tls: Tls | None = None) -> zenoh.Config:
@@ -40,34 +75,54 @@ def client_config(routers: tuple[str, ...], tls: Tls | None = None) -> zenoh.Con
         {
             "mode": "client",
             "connect/endpoints": [_two_links(router) for router in routers],
-            "connect/retry": {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 1.5},
+            # A router's restart must be over before a lease ends: its clients wait no longer than this.
+            "connect/retry": {"period_init_ms": 50, "period_max_ms": 200, "period_increase_factor": 1.5},
             **_shared(tls),
         }
     )
 
 
 def router_config(
-    listen: tuple[str, ...], connect: tuple[str, ...] = (), tls: Tls | None = None
+    listen: tuple[str, ...],
+    connect: tuple[str | Link, ...] = (),
+    tls: Tls | None = None,
+    access: Mapping[str, Any] = MappingProxyType({}),
 ) -> zenoh.Config:
     """The configuration of a router that listens, and links to other sites' routers.
+
+    Args:
+        access: Sections of Zenoh's configuration that say who may do what (`bus/access.py`).
 
     Raises:
         SessionError: If an endpoint is not one of Zenoh's.
     """
-    return _config(
-        {
-            "mode": "router",
-            "listen/endpoints": list(listen),
-            "connect/endpoints": [_two_links(router) for router in connect],
-            # Nobody is scouted for; the default waits half a second for nobody.
-            "scouting/delay": 1,
-            # Another site may be away for days: this site starts without it.
-            "connect/exit_on_failure": False,
-            "connect/timeout_ms": -1,
-            "connect/retry": {"period_init_ms": 200, "period_max_ms": 4000, "period_increase_factor": 1.5},
-            **_shared(tls),
-        }
-    )
+    return _config(router_values(listen, connect, tls, access))
+
+
+def router_values(
+    listen: tuple[str, ...],
+    connect: tuple[str | Link, ...] = (),
+    tls: Tls | None = None,
+    access: Mapping[str, Any] = MappingProxyType({}),
+) -> dict[str, Any]:
+    """As `router_config`, as keys of Zenoh's configuration and their values."""
+    return {
+        "mode": "router",
+        "listen/endpoints": list(listen),
+        "connect/endpoints": [
+            _two_links(each) if isinstance(each, str) else _two_links(each.endpoint, each.tls)
+            for each in connect
+        ],
+        # Nobody is scouted for; the default waits half a second for nobody.
+        "scouting/delay": 1,
+        # Another site may be away for days: this site starts without it.
+        "connect/exit_on_failure": False,
+        "connect/timeout_ms": -1,
+        # The most that a healed line waits for; what hangs is given up after `open_timeout`.
+        "connect/retry": {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 1.5},
+        **_shared(tls),
+        **access,
+    }
 
 
 def settle(session: zenoh.Session, priority: Priority) -> None:
@@ -87,9 +142,19 @@ def settle(session: zenoh.Session, priority: Priority) -> None:
             pass
 
 
-def _two_links(endpoint: str) -> dict[str, Any]:
-    separator = "&" if "?" in endpoint else "?"
-    return {"strategy": "allOf", "locators": [f"{endpoint}{separator}prio={p}" for p in _LINKS]}
+def _two_links(endpoint: str, tls: Tls | None = None) -> dict[str, Any]:
+    """Both links to a router; certificates that are for it alone stand in the endpoint itself."""
+    address, _, own = endpoint.partition("#")
+    separator = "&" if "?" in address else "?"
+    options = [own] if own else []
+    if tls is not None:
+        options += [
+            f"root_ca_certificate_file={tls.ca}",
+            f"connect_certificate_file={tls.certificate}",
+            f"connect_private_key_file={tls.key}",
+        ]
+    tail = "#" + ";".join(options) if options else ""
+    return {"strategy": "allOf", "locators": [f"{address}{separator}prio={p}{tail}" for p in _LINKS]}
 
 
 def _shared(tls: Tls | None) -> dict[str, Any]:
@@ -111,11 +176,17 @@ def _shared(tls: Tls | None) -> dict[str, Any]:
             "transport/link/tls/listen_private_key": str(tls.key),
             "transport/link/tls/connect_certificate": str(tls.certificate),
             "transport/link/tls/connect_private_key": str(tls.key),
+            "transport/link/tls/verify_name_on_connect": not tls.any_address,
+            # Who stays must not stay longer than the certificate says.
+            "transport/link/tls/close_link_on_expiration": True,
         }
     return values
 
 
 def _config(values: dict[str, Any]) -> zenoh.Config:
+    # Read once, at a process's first session. Who set it knows better, unless it was a parent of ours.
+    if os.environ.get("ZENOH_RUNTIME") in (None, *_THREADS.values()):
+        os.environ["ZENOH_RUNTIME"] = _THREADS[values["mode"]]
     config = zenoh.Config()
     for key, value in values.items():
         try:

@@ -6,6 +6,8 @@ BusError
 ├── MessageError            bytes or JSON that are not the message they should be
 ├── SessionError            a session that cannot be opened as it is configured
 ├── RefusedError            a request that its owner refused, with the reason
+│   ├── BusyError           a request that its owner has not begun: too many wait
+│   └── NoRightError        what this end's certificate may not do: it was not even asked
 └── NoAnswerError           a request that nobody answered in time
 """
 
@@ -35,6 +37,14 @@ class RefusedError(BusError):
 
     Raised by a request's handler to refuse it, and by `ask` at the other end.
     """
+
+
+class BusyError(RefusedError):
+    """A request that its owner has not begun, because too many wait; it may be asked again."""
+
+
+class NoRightError(RefusedError):
+    """What the certificate of this end may not do; the text says who may."""
 
 
 class NoAnswerError(BusError):

@@ -13,6 +13,8 @@ from bus.errors import KeyNameError
 
 ROOT = "robomesh"
 WHOLE_SITE = "-"
+# A recording played back is a robot named replay-<id>.
+REPLAY = "replay-"
 
 _NAME = re.compile(r"[a-z0-9][a-z0-9_-]*")
 # Operators and views come from people and certificates: what a key chunk can hold.
@@ -96,6 +98,19 @@ def parse_key(key: str) -> Key:
     return Key(*rest)
 
 
+def has_wildcard(key: str) -> bool:
+    """Whether a key stands for many: what is asked and listened to may, what is told may not.
+
+    Zenoh lets somebody put to, answer on and be present on such a key: it would count for every robot.
+    """
+    return "*" in key  # `$` comes before one only
+
+
+def is_replay(key: str) -> bool:
+    """Whether a key belongs to a recording that is played back, with the times of then."""
+    return f"/{REPLAY}" in key
+
+
 def presence_key(site: str, robot: str, service: str, identity: str) -> str:
     """The key of a liveliness token."""
     return f"{robot_key(site, robot, 'alive')}/{check_chunk(service, 'service')}/{identity}"
@@ -105,9 +120,11 @@ def parse_presence_key(key: str) -> PresenceKey:
     """Site, robot, service and id of a liveliness token's key.
 
     Raises:
-        KeyNameError: If it is not one.
+        KeyNameError: If it is not one, or stands for many.
     """
     site, robot, topic = parse_key(key)
+    if has_wildcard(key):
+        raise KeyNameError(f"{key!r} has a wildcard: nobody is present everywhere")
     match topic.split("/"):
         case ["alive", service, identity]:
             return PresenceKey(site, robot, service, identity)

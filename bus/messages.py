@@ -4,6 +4,7 @@ Requests are checked more strictly than protobuf does: NaN, infinities and unspe
 enums are refused by name.
 """
 
+import json
 import math
 from collections.abc import Iterator
 from typing import TypeVar
@@ -61,25 +62,53 @@ def decode_request(schema: type[AnyMessage], payload: bytes, encoding: str) -> A
     Raises:
         MessageError: If it is no such message, or holds a NaN, an infinity or an unspecified enum.
     """
-    if not is_json(encoding):
-        message = decode(schema, payload)
-    else:
-        message = schema()
-        try:
-            json_format.Parse(payload.decode() or "{}", message)
-        except (json_format.ParseError, UnicodeDecodeError) as error:
-            fields = ", ".join(field.name for field in schema.DESCRIPTOR.fields)
-            raise MessageError(f"not a {schema.DESCRIPTOR.name}: {error}; its fields are: {fields}") from None
+    message = decode(schema, payload) if not is_json(encoding) else _from_json(schema, payload)
     for problem in _problems(message):
         raise MessageError(problem)
     return message
+
+
+def _from_json(schema: type[AnyMessage], payload: bytes) -> AnyMessage:
+    name, message = schema.DESCRIPTOR.name, schema()
+    try:
+        text = payload.decode() or "{}"
+        values = json.loads(text)
+        if not isinstance(values, dict):
+            raise MessageError(f"not {_a(name)}: a JSON object is right, as in {{}}")
+        for key, value in values.items():
+            _check_key(schema, key, value)
+        json_format.Parse(text, message)
+    except (ValueError, RecursionError) as error:  # UnicodeDecodeError and JSON's own among them
+        raise MessageError(f"not JSON: {error}") from None
+    except json_format.ParseError as error:
+        # Behind " at " it repeats its own names.
+        raise MessageError(f"not {_a(name)}: {str(error).splitlines()[0].partition(' at ')[0]}") from None
+    return message
+
+
+def _check_key(schema: type[Message], key: str, value: object) -> None:
+    """What protobuf would say in its own names."""
+    descriptor = schema.DESCRIPTOR
+    fields = {name: field for field in descriptor.fields for name in (field.name, field.json_name)}
+    field = fields.get(key)
+    if field is None:
+        names = ", ".join(field.name for field in descriptor.fields)
+        raise MessageError(f"not {_a(descriptor.name)}: it has no field {key!r}; its fields are: {names}")
+    if field.enum_type is not None and isinstance(value, str) and value not in field.enum_type.values_by_name:
+        names = ", ".join(each.name for each in field.enum_type.values if each.number)
+        raise MessageError(f"{key}: {value!r} is none of {names}")
+
+
+def _a(name: str) -> str:
+    return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
 
 
 def _problems(message: Message, path: str = "") -> Iterator[str]:
     for field in message.DESCRIPTOR.fields:
         name = path + field.name
         enum = field.enum_type
-        if enum is not None and not field.is_repeated:
+        absent = field.has_presence and not message.HasField(field.name)
+        if enum is not None and not field.is_repeated and not absent:
             number = getattr(message, field.name)
             names = [value.name for value in enum.values if value.number]
             if number == 0 or number not in enum.values_by_number:

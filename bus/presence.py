@@ -11,6 +11,12 @@ from bus.errors import KeyNameError
 
 _TIMEOUT_S = 2.0
 EVERYBODY = f"{keys.ROOT}/*/*/alive/*/*"
+# In the service's place: a program or page through which somebody has control of the robot.
+OPERATOR = "operator"
+# A program that only watches.
+MONITOR = "monitor"
+# Who publishes nothing.
+SILENT = (OPERATOR, MONITOR)
 
 
 async def present(session: zenoh.Session, key_expr: str = EVERYBODY) -> list[keys.PresenceKey]:
@@ -40,14 +46,18 @@ class PresenceWatch:
         loop = asyncio.get_running_loop()
         self._closed = False
         self._changes: asyncio.Queue[tuple[keys.PresenceKey, bool] | None] = asyncio.Queue()
+        present: set[keys.PresenceKey] = set()
 
         def on_change(sample: zenoh.Sample) -> None:
             try:
                 key = keys.parse_presence_key(str(sample.key_expr))
             except KeyNameError:
                 return
+            alive = sample.kind == zenoh.SampleKind.PUT
+            if alive == (key in present):
+                return  # who comes in the moment of asking is told twice: as there already, and as coming
+            (present.add if alive else present.discard)(key)
             if not loop.is_closed():
-                alive = sample.kind == zenoh.SampleKind.PUT
                 loop.call_soon_threadsafe(self._changes.put_nowait, (key, alive))
 
         self._subscriber = session.liveliness().declare_subscriber(key_expr, on_change, history=True)
@@ -60,6 +70,11 @@ class PresenceWatch:
         if change is None:
             raise StopAsyncIteration
         return change
+
+    @property
+    def closed(self) -> bool:
+        """Whether it was closed."""
+        return self._closed
 
     def close(self) -> None:
         """Watch no more; the iterator ends."""

@@ -20,6 +20,8 @@ from bus.schemas.robomesh_pb2 import VideoFrames
 from bus.topics import History, Topic, topic
 
 LIST_LENGTH = 100
+# A clock that is set jumps by more than this between two messages; one that is slewed does not.
+_SET_NS = 250_000_000
 # Two key frame intervals at 30 Hz: a publisher that never marks a key frame must not grow.
 _MOST_FRAMES = 150
 
@@ -37,13 +39,17 @@ class Publisher:
     ) -> None:
         self.key = keys.robot_key(site, robot, name)
         self.topic: Topic = topic(name)
-        # New at each start, so that a number that begins again is not taken for an old one.
+        # New at each start, so that a number that begins again is not taken for an old one; and whenever
+        # another clock dates what follows: receivers compare the lags of one identity (`bus/lateness.py`).
         self._identity = secrets.randbits(64)
+        self._epoch_ns = _epoch_ns()
+        self._dated_by: int | None = None
         self._sequence = 0
         self._closed = False
         self._lock = threading.Lock()
-        self._history: deque[tuple[Header, Message]] = deque(maxlen=_history_length(self.topic))
+        self._history: deque[tuple[Header, bytes]] = deque(maxlen=_history_length(self.topic))
         self._publisher: Any = _declare(session, self.key, self.topic)
+        self._listener: Any = None
         self._queryable: zenoh.Queryable[None] | None = None
         if on_get is not None:
             loop = asyncio.get_running_loop()
@@ -52,11 +58,19 @@ class Publisher:
             self._queryable = session.declare_queryable(self.key, self._answer)
         settle(session, self.topic.priority)
 
-    def put(self, message: Message, *, source_time_ns: int | None = None, key_frame: bool = False) -> Header:
-        """Publish a message of the topic's schema; it is kept for late joiners, so change it no more.
+    def put(
+        self,
+        message: Message,
+        *,
+        source_time_ns: int | None = None,
+        dated_by: int | None = None,
+        key_frame: bool = False,
+    ) -> Header:
+        """Publish a message of the topic's schema, as it is now.
 
         Args:
             source_time_ns: When what it tells was so, ns since the Unix epoch; now, unless given.
+            dated_by: The publisher in whose message that time stood; None: our own clock says it.
             key_frame: Of a video topic: the joiner's frames begin here.
 
         Returns:
@@ -64,35 +78,90 @@ class Publisher:
         """
         if source_time_ns is None:
             source_time_ns = time.time_ns()
+        return self.put_bytes(
+            message.SerializeToString(),
+            source_time_ns=source_time_ns,
+            dated_by=dated_by,
+            key_frame=key_frame,
+        )
+
+    def put_bytes(
+        self, payload: bytes, *, source_time_ns: int, dated_by: int | None = None, key_frame: bool = False
+    ) -> Header:
+        """As `put`, of a message that is bytes already."""
         with self._lock:
+            if self._clock_is_another(dated_by):
+                self._identity = secrets.randbits(64)
+                if self.topic.history is History.KEY_FRAME:
+                    self._history.clear()
             self._sequence += 1
             header = Header(self._identity, self._sequence, source_time_ns)
             if key_frame:
                 self._history.clear()
             if not (self.topic.history is History.KEY_FRAME and not (key_frame or self._history)):
-                self._history.append((header, message))
-        self._publisher.put(message.SerializeToString(), attachment=pack(header))
+                self._history.append((header, payload))
+        self._publisher.put(payload, attachment=pack(header))
         return header
+
+    def _clock_is_another(self, dated_by: int | None) -> bool:
+        """Whether what follows is dated by another clock than what went before, or by one that was set."""
+        before, self._dated_by = self._dated_by, dated_by
+        epoch_before_ns, self._epoch_ns = self._epoch_ns, _epoch_ns()
+        was_set = dated_by is None and abs(self._epoch_ns - epoch_before_ns) > _SET_NS
+        return self._sequence > 0 and (dated_by != before or was_set)
 
     def remember(self, message: Message, *, source_time_ns: int) -> None:
         """Answer late joiners with it, and publish nothing: what is old gets no new number."""
+        self.remember_bytes(message.SerializeToString(), source_time_ns=source_time_ns)
+
+    def remember_bytes(self, payload: bytes, *, source_time_ns: int) -> None:
+        """As `remember`, of a message that is bytes already."""
         with self._lock:
-            self._history.append((Header(self._identity, self._sequence, source_time_ns), message))
+            self._history.append((Header(self._identity, self._sequence, source_time_ns), payload))
+
+    def forget(self) -> None:
+        """Answer late joiners with nothing until something is put or remembered again."""
+        with self._lock:
+            self._history.clear()
+
+    @property
+    def published(self) -> int:
+        """How many were put."""
+        return self._sequence
 
     @property
     def watched(self) -> bool:
         """Whether anybody subscribes to it now; recovered topics always are, they are rare and small."""
+        if self._closed:
+            return False
         if not isinstance(self._publisher, zenoh.Publisher):
             return True
         # Typed as bool, but it is an object that is always true.
         status: Any = self._publisher.matching_status
         return bool(status.matching)
 
+    def on_watched(self, changed: Callable[[], None]) -> None:
+        """Call something, on the event loop, whenever the first subscriber comes or the last one goes."""
+        loop = asyncio.get_running_loop()
+
+        def hand_over(status: object) -> None:
+            if not loop.is_closed():
+                loop.call_soon_threadsafe(changed)
+
+        self._listener = self._publisher.declare_matching_listener(hand_over)
+
+    @property
+    def closed(self) -> bool:
+        """Whether it was closed."""
+        return self._closed
+
     def close(self) -> None:
         """Publish and answer no more."""
         if self._closed:
             return
         self._closed = True
+        if self._listener is not None:
+            self._listener.undeclare()
         if self._queryable is not None:
             self._queryable.undeclare()
         self._publisher.undeclare()
@@ -102,20 +171,26 @@ class Publisher:
             history = list(self._history)
         with query:
             if history:
-                self._reply(query, history[-1][0], _history_message(self.topic, history))
+                self._reply(query, history[-1][0], _history_payload(self.topic, history))
 
-    def _reply(self, query: zenoh.Query, header: Header, message: Message) -> None:
-        query.reply(self.key, message.SerializeToString(), encoding=PROTOBUF, attachment=pack(header))
+    def _reply(self, query: zenoh.Query, header: Header, payload: bytes) -> None:
+        query.reply(self.key, payload, encoding=PROTOBUF, attachment=pack(header))
 
     def _hand_over(self, query: zenoh.Query, on_get: OnGet, loop: asyncio.AbstractEventLoop) -> None:
         async def answer() -> None:
             with query:
                 message = await on_get()
                 if message is not None:
-                    self._reply(query, Header(self._identity, self._sequence, time.time_ns()), message)
+                    header = Header(self._identity, self._sequence, time.time_ns())
+                    self._reply(query, header, message.SerializeToString())
 
         if not loop.is_closed():
             asyncio.run_coroutine_threadsafe(answer(), loop)
+
+
+def _epoch_ns() -> int:
+    """When this machine's monotonic clock began, by its clock of the day."""
+    return time.time_ns() - time.monotonic_ns()
 
 
 def _history_length(row: Topic) -> int:
@@ -128,23 +203,19 @@ def _history_length(row: Topic) -> int:
             return 1
 
 
-def _history_message(row: Topic, history: list[tuple[Header, Message]]) -> Message:
-    """What a late joiner gets, as one message."""
+def _history_payload(row: Topic, history: list[tuple[Header, bytes]]) -> bytes:
+    """What a late joiner gets, as one message's bytes."""
     if row.history_schema is None:
         return history[-1][1]
     if row.history is History.KEY_FRAME:
         frames = VideoFrames(publisher=history[0][0].publisher)
-        for header, message in history:
-            frames.frames.add(
-                sequence=header.sequence,
-                source_time_ns=header.source_time_ns,
-                data=message.SerializeToString(),
-            )
-        return frames
+        for header, payload in history:
+            frames.frames.add(sequence=header.sequence, source_time_ns=header.source_time_ns, data=payload)
+        return frames.SerializeToString()
     answer = row.history_schema()
     (items,) = answer.DESCRIPTOR.fields
-    getattr(answer, items.name).extend(message for _, message in history)
-    return answer
+    getattr(answer, items.name).extend(row.schema.FromString(payload) for _, payload in history)
+    return answer.SerializeToString()
 
 
 def _declare(session: zenoh.Session, key: str, row: Topic) -> zenoh.Publisher | zenoh.ext.AdvancedPublisher:

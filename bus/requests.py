@@ -2,21 +2,34 @@
 
 import asyncio
 import logging
+import secrets
+import time
+from collections import Counter
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from threading import Lock
 
 import zenoh
 from google.protobuf.message import Message
 
 from bus import keys, topics
 from bus.endpoints import ON_THE_SECOND_LINK, first_line, settle
-from bus.errors import MessageError, NoAnswerError, RefusedError
+from bus.errors import BusyError, MessageError, NoAnswerError, RefusedError
+from bus.latencies import Latencies
 from bus.messages import JSON, PROTOBUF, TEXT, decode, decode_request, encode, is_json
 
 log = logging.getLogger(__name__)
 
 _OCTETS = "application/octet-stream"
 _AGAIN_S = 0.05
+# Of one owner's row so many have no answer yet, and so many of them are one asker's.
+_MOST = 256
+_MOST_OF_ONE = 16
+# Of a request that is asked over both links: what marks its two copies, and how many marks are known.
+_MARK_BYTES = 8
+_MOST_MARKS = 256
+_BUSY = "too many requests wait for this owner already: ask again, and less often"
+_BUSY_TEXT = f"{TEXT};busy"
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,14 +39,18 @@ class Request:
     Attributes:
         message: Of the request's schema; None where it has none.
         chunk: What stood in the place of the row's `*`: the operator, the view, the mesh.
+        received_ns: When it came, before it waited for anything; ns since the Unix epoch.
     """
 
     key: keys.Key
     message: Message | None
     chunk: str
+    received_ns: int = 0
 
 
 Handler = Callable[[Request], Awaitable[Message | bytes]]
+# What stood in the place of the row's `*`, and why no handler has seen the request.
+OnRefused = Callable[[str, str], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,17 +63,50 @@ class Answer:
 
 
 class Answerer:
-    """Answers a request's key by a coroutine; many at a time, none on Zenoh's thread."""
+    """Answers a request's key by a coroutine, none on Zenoh's thread.
 
-    def __init__(self, session: zenoh.Session, site: str, robot: str, name: str, handler: Handler) -> None:
+    Some at a time, and so many of one asker: who floods an owner is told so, takes no other's place and
+    delays no stop.
+
+    Args:
+        on_refused: Told of what cannot be read, or meant: no handler sees it.
+
+    Attributes:
+        turned_away: How many were told that too many wait.
+        latencies: How long the others took, from coming to their answer.
+    """
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        site: str,
+        robot: str,
+        name: str,
+        handler: Handler,
+        *,
+        on_refused: OnRefused = lambda chunk, text: None,
+    ) -> None:
         self._row = topics.request(name)
         self._own = keys.Key(site, robot, name)
         self._handler = handler
+        self._on_refused = on_refused
         self._loop = asyncio.get_running_loop()
         self._tasks: set[asyncio.Task[None]] = set()
+        self._begun: dict[bytes, asyncio.Future[Message | bytes]] = {}
+        # By the key that was asked, so by asker where the row has a place for one.
+        self._unanswered = Counter[str]()
+        self._most_of_one = _MOST_OF_ONE if "*" in name else _MOST
+        self._counting = Lock()  # Zenoh's thread counts up, the loop's down
+        self.turned_away = 0
+        self.latencies = Latencies()
         self._closed = False
         # `*` in the row is the asker's: one chunk.
         self._queryable = session.declare_queryable(keys.robot_key(site, robot, name), self._hand_over)
+
+    @property
+    def closed(self) -> bool:
+        """Whether it was closed."""
+        return self._closed
 
     def close(self) -> None:
         """Answer no more."""
@@ -67,29 +117,49 @@ class Answerer:
         for task in self._tasks:
             task.cancel()
 
+    @property
+    def name(self) -> str:
+        """Of its row."""
+        return self._row.name
+
     def _hand_over(self, query: zenoh.Query) -> None:
-        if not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._start, query)
+        received_ns = time.time_ns()
+        asked = str(query.key_expr)
+        with self._counting:
+            busy = self._unanswered.total() >= _MOST or self._unanswered[asked] >= self._most_of_one
+            if not busy or self._row.unread:  # a stop is a stop
+                self._unanswered[asked] += 1
+            else:
+                self.turned_away += 1
+        if busy and not self._row.unread:
+            with query:
+                query.reply_err(_BUSY.encode(), encoding=_BUSY_TEXT)
+        elif not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._start, query, asked, received_ns)
 
-    def _start(self, query: zenoh.Query) -> None:
-        task = self._loop.create_task(self._answer(query))
+    def _start(self, query: zenoh.Query, asked: str, received_ns: int) -> None:
+        task = self._loop.create_task(self._answer(query, received_ns))
         self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        task.add_done_callback(lambda task: self._done(task, asked, received_ns))
 
-    async def _answer(self, query: zenoh.Query) -> None:
+    def _done(self, task: asyncio.Task[None], asked: str, received_ns: int) -> None:
+        self._tasks.discard(task)
+        self.latencies.add((time.time_ns() - received_ns) * 1e-9)
+        with self._counting:
+            self._unanswered[asked] -= 1
+            if not self._unanswered[asked]:
+                del self._unanswered[asked]
+
+    async def _answer(self, query: zenoh.Query, received_ns: int) -> None:
         asked = str(query.key_expr)
         with query:
             key = self._own_key(asked)
             if key is None:
                 return
+            encoding = str(query.encoding) if query.encoding is not None else ""
             try:
-                if "*" in asked and not self._row.wildcard:
-                    raise RefusedError(f"{asked} has a wildcard: ask one {self._row.name} by its whole key")
-                encoding = str(query.encoding) if query.encoding is not None else ""
-                payload = query.payload.to_bytes() if query.payload is not None else b""
-                message = self._read(payload, encoding)
-                chunk = _chunk(self._row.name, key.topic)
-                answer = await self._handler(Request(key, message, chunk))
+                request = self._read(key, query, encoding, received_ns)
+                answer = await self._handled(request, query)
             except (RefusedError, MessageError) as error:
                 query.reply_err(str(error).encode(), encoding=TEXT)
                 return
@@ -105,7 +175,30 @@ class Answerer:
             else:
                 query.reply(str(key), encode(answer, as_json=as_json), encoding=JSON if as_json else PROTOBUF)
 
-    def _read(self, payload: bytes, encoding: str) -> Message | None:
+    async def _handled(self, request: Request, query: zenoh.Query) -> Message | bytes:
+        """The handler's answer; of two copies of one request, which came over two links, the same."""
+        mark = query.attachment.to_bytes() if query.attachment is not None else b""
+        if not self._row.both_links or len(mark) != _MARK_BYTES:
+            return await self._handler(request)
+        begun = self._begun.get(mark)
+        if begun is None:
+            begun = self._begun[mark] = asyncio.ensure_future(self._handler(request))
+            if len(self._begun) > _MOST_MARKS:
+                del self._begun[next(iter(self._begun))]
+        return await begun
+
+    def _read(self, key: keys.Key, query: zenoh.Query, encoding: str, received_ns: int) -> Request:
+        asked, chunk = str(query.key_expr), _chunk(self._row.name, key.topic)
+        try:
+            if keys.has_wildcard(asked) and not self._row.wildcard:
+                raise RefusedError(f"{asked} has a wildcard: ask one {self._row.name} by its whole key")
+            payload = query.payload.to_bytes() if query.payload is not None else b""
+            return Request(key, self._message(payload, encoding), chunk, received_ns)
+        except (RefusedError, MessageError) as error:
+            self._on_refused(chunk, str(error))
+            raise
+
+    def _message(self, payload: bytes, encoding: str) -> Message | None:
         schema = self._row.request
         if schema is None:
             return None
@@ -121,7 +214,7 @@ class Answerer:
 
         `robomesh/**` asks for everybody's last values: it must not stop a robot.
         """
-        if "*" not in asked:
+        if not keys.has_wildcard(asked):
             return keys.parse_key(asked)
         last = self._own.topic.rsplit("/", 1)[-1]
         return self._own if not self._row.wildcard or asked.rsplit("/", 1)[-1] == last else None
@@ -136,65 +229,102 @@ def _chunk(row: str, name: str) -> str:
 
 async def ask_all(
     session: zenoh.Session, key: str, payload: bytes, *, timeout_s: float
-) -> list[tuple[str, bytes | None, str | None]]:
-    """Every owner's (key, answer bytes, error text); exactly one of the two is there."""
+) -> list[tuple[str, bytes | None, RefusedError | None]]:
+    """Every owner's (key, answer bytes, error); exactly one of the two is there."""
     loop = asyncio.get_running_loop()
-    done: asyncio.Future[None] = loop.create_future()
-    answers: list[tuple[str, bytes | None, str | None]] = []
+    row = topics.request(keys.parse_key(key).topic)
+    if row.priority in ON_THE_SECOND_LINK:
+        # In a thread, which keeps no order: never before a command.
+        await asyncio.to_thread(settle, session, row.priority)
+    priorities = (row.priority, ON_THE_SECOND_LINK[0]) if row.both_links else (row.priority,)
+    mark = secrets.token_bytes(_MARK_BYTES) if row.both_links else None
+    asked = [loop.create_future() for _ in priorities]
+    for priority, done in zip(priorities, asked, strict=True):
+        try:
+            _get(session, key, payload, priority, mark, timeout_s, done)
+        except zenoh.ZError as error:
+            raise NoAnswerError(f"{key} could not be asked: {first_line(error)}") from None
+    answers: _Answers = []
+    for done in asyncio.as_completed(asked):
+        answers = max(answers, await done, key=len)
+        if answers:
+            break
+    return answers
+
+
+_Answers = list[tuple[str, bytes | None, RefusedError | None]]
+
+
+def _get(
+    session: zenoh.Session,
+    key: str,
+    payload: bytes,
+    priority: topics.Priority,
+    mark: bytes | None,
+    timeout_s: float,
+    done: asyncio.Future[_Answers],
+) -> None:
+    """Ask, and hand every owner's answer over when the last is there, or the time is over."""
+    loop = done.get_loop()
+    answers: _Answers = []
 
     def on_reply(reply: zenoh.Reply) -> None:
         if reply.ok is not None:
-            answers.append((str(reply.ok.key_expr), reply.ok.payload.to_bytes(), None))
-        elif reply.err is not None and str(reply.err.encoding).startswith(TEXT):
-            answers.append((key, None, reply.err.payload.to_string()))
+            # Zenoh sees to it that it is a key that was asked.
+            if not keys.has_wildcard(str(reply.ok.key_expr)):
+                answers.append((str(reply.ok.key_expr), reply.ok.payload.to_bytes(), None))
+        elif reply.err is not None and (encoding := str(reply.err.encoding)).startswith(TEXT):
+            error = BusyError if encoding == _BUSY_TEXT else RefusedError
+            answers.append((key, None, error(reply.err.payload.to_string())))
 
     def finish() -> None:
         if not done.done():
-            done.set_result(None)
+            done.set_result(answers)
 
     def on_end() -> None:
         if not loop.is_closed():
             loop.call_soon_threadsafe(finish)
 
-    row = topics.request(keys.parse_key(key).topic)
-    if row.priority in ON_THE_SECOND_LINK:
-        # In a thread, which keeps no order: never before a command.
-        await asyncio.to_thread(settle, session, row.priority)
-    try:
-        session.get(
-            key,
-            zenoh.handlers.Callback(on_reply, on_end),
-            payload=payload,
-            encoding=PROTOBUF,
-            consolidation=zenoh.ConsolidationMode.NONE,
-            # The default, BLOCK, would stall joint states on a full link.
-            congestion_control=zenoh.CongestionControl.DROP,
-            priority=getattr(zenoh.Priority, row.priority.value),
-            timeout=timeout_s,
-        )
-    except zenoh.ZError as error:
-        raise NoAnswerError(f"{key} could not be asked: {first_line(error)}") from None
-    await done
-    return answers
+    session.get(
+        key,
+        zenoh.handlers.Callback(on_reply, on_end),
+        payload=payload,
+        encoding=PROTOBUF,
+        attachment=mark,
+        # Else one who calls himself complete would be asked in the owner's place.
+        target=zenoh.QueryTarget.ALL,
+        consolidation=zenoh.ConsolidationMode.NONE,
+        # The default, BLOCK, would stall joint states on a full link.
+        congestion_control=zenoh.CongestionControl.DROP,
+        priority=getattr(zenoh.Priority, priority.value),
+        timeout=timeout_s,
+    )
 
 
 async def ask_bytes(session: zenoh.Session, key: str, payload: bytes, *, timeout_s: float) -> bytes:
-    """The one answer to a request, as bytes.
+    """The one answer to a request, as bytes; an owner who is busy or starting is asked again.
 
     Raises:
         RefusedError: With the owner's words.
+        BusyError: If the owner had no place for it, until the end.
         NoAnswerError: If nobody answered in time.
     """
     loop = asyncio.get_running_loop()
     deadline = loop.time() + timeout_s
+    busy: BusyError | None = None
     while (left_s := deadline - loop.time()) > 0:
+        busy = None
         for _, answer, error in await ask_all(session, key, payload, timeout_s=left_s):
-            if error is not None:
-                raise RefusedError(error)
-            if answer is not None:
+            if isinstance(error, BusyError):
+                busy = error
+            elif error is not None:
+                raise error
+            elif answer is not None:
                 return answer
-        # Zenoh answers at once that there is no owner; it may be starting.
+        # Zenoh answers at once that there is no owner.
         await asyncio.sleep(min(_AGAIN_S, left_s))
+    if busy is not None:
+        raise busy
     raise NoAnswerError(f"nobody answered {key} within {timeout_s:g} s: is its service running?")
 
 

@@ -12,6 +12,7 @@ import time
 from collections.abc import Awaitable, Callable, Coroutine, Iterable
 from typing import Any, TypeVar
 
+from bus.health import Served, present
 from bus.session import Session, SessionSettings, open_session
 
 AnySettings = TypeVar("AnySettings")
@@ -29,6 +30,7 @@ def run(
     service: str,
     session_settings: SessionSettings,
     present_for: Iterable[tuple[str, str]],
+    metrics: tuple[str, int] | None = None,
 ) -> None:
     """Run a service of the mesh until it is told to end.
 
@@ -36,12 +38,12 @@ def run(
         serve: Its coroutine; cancelled by SIGINT and SIGTERM.
         service: Its name in presence keys.
         present_for: The (site, robot) pairs that it serves; `-` as the robot for a whole site.
+        metrics: Host and port at which Prometheus may ask; None: nowhere.
     """
+    served = Served(service=service, present_for=tuple(present_for), metrics=metrics)
 
     async def serve_present() -> None:
-        async with open_session(session_settings) as session:
-            for site, robot in present_for:
-                session.declare_presence(site, robot, service)
+        async with open_session(session_settings) as session, present(session, served):
             await serve(session, settings)
 
     run_until_signalled(serve_present())

@@ -3,22 +3,29 @@
 import asyncio
 import logging
 import secrets
-from collections.abc import AsyncIterator
+import threading
+import time
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 
 import zenoh
 from google.protobuf.message import Message
 
-from bus import keys, presence, requests
-from bus.endpoints import DEFAULT_ROUTER, Tls, client_config
-from bus.errors import SessionError
+from bus import access, keys, presence, refused, requests, topics
+from bus.endpoints import DEFAULT_ROUTER, Tls, client_config, first_line
+from bus.errors import NoAnswerError, NoRightError, SessionError
 from bus.publisher import OnGet, Publisher
 from bus.subscription import Subscription
+from bus.tally import Measure, Tally
 
 log = logging.getLogger(__name__)
 
 _RETRY_S = 0.25
+# A measure of whoever has one [s].
+CERTIFICATE = "certificate_seconds"
+
+_Declared = Publisher | Subscription | requests.Answerer | presence.PresenceWatch
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,12 +46,20 @@ class Session:
     """An open session. What is declared on it ends with it."""
 
     zenoh_session: zenoh.Session
+    config: zenoh.Config
+    # Who it is by its certificate; None: it has none, or one that does not say.
+    principal: access.Principal | None = None
     # This process, in presence keys.
     identity: str = field(default_factory=lambda: secrets.token_hex(4))
-    _subscriptions: list[Subscription] = field(default_factory=list)
-    _declared: list[Publisher | requests.Answerer | presence.PresenceWatch] = field(default_factory=list)
+    # Numbers of the service's own, for who looks after it.
+    measures: list[Measure] = field(default_factory=list)
+    _declared: list[_Declared] = field(default_factory=list)
+    _ended: Tally = field(default_factory=Tally)
+    _keeping: threading.Lock = field(default_factory=threading.Lock)
     _tokens: list[zenoh.LivelinessToken] = field(default_factory=list)
     _refresher: asyncio.Task[None] | None = None
+    # A second connection, for what nothing may delay.
+    _apart: zenoh.Session | None = None
 
     @property
     def connected(self) -> bool:
@@ -54,9 +69,14 @@ class Session:
     def declare_publisher(
         self, site: str, robot: str, topic: str, *, on_get: OnGet | None = None
     ) -> Publisher:
-        """Publish a topic of the table; `on_get` answers late joiners instead of the last value."""
+        """Publish a topic of the table; `on_get` answers late joiners instead of the last value.
+
+        Raises:
+            NoRightError: If this session's certificate may not.
+        """
+        self._check("put", keys.robot_key(site, robot, topic))
         publisher = Publisher(self.zenoh_session, site, robot, topic, on_get=on_get)
-        self._declared.append(publisher)
+        self._keep(publisher)
         return publisher
 
     def subscribe(self, key_expr: str, *, newest: int = 1, history: bool = True) -> Subscription:
@@ -67,16 +87,16 @@ class Session:
             history: Begin with the last value, and ask for it again when a service comes back.
         """
         subscription = Subscription(self.zenoh_session, key_expr, newest=newest, history=history)
-        if history:
-            self._subscriptions.append(subscription)
-            if self._refresher is None:
-                self._refresher = asyncio.create_task(self._refresh())
+        self._keep(subscription)
+        if history and self._refresher is None:
+            self._refresher = asyncio.create_task(self._refresh())
         return subscription
 
     async def ask(self, key: str, request: Message | None = None, *, timeout_s: float = 2.0) -> Message:
         """The answer to a request.
 
         Raises:
+            NoRightError: If this session's certificate may not ask it.
             RefusedError: With the owner's words.
             NoAnswerError: If nobody answered in time.
         """
@@ -85,16 +105,28 @@ class Session:
 
     async def ask_bytes(self, key: str, payload: bytes = b"", *, timeout_s: float = 2.0) -> bytes:
         """As `ask`, with bytes both ways."""
-        return await requests.ask_bytes(self.zenoh_session, key, payload, timeout_s=timeout_s)
+        self._check("query", key)
+        try:
+            return await requests.ask_bytes(self.zenoh_session, key, payload, timeout_s=timeout_s)
+        except NoAnswerError as error:
+            if self.principal is None:
+                raise
+            # A router refuses in silence.
+            raise NoAnswerError(f"{error} Or was the certificate of {self.principal.name} revoked?") from None
 
     async def ask_all(
         self, key: str, request: Message | None = None, *, timeout_s: float = 2.0
     ) -> list[requests.Answer]:
         """Every owner's answer to a request on a key with a wildcard."""
+        self._check("query", key)
         payload = b"" if request is None else request.SerializeToString()
         answers = await requests.ask_all(self.zenoh_session, key, payload, timeout_s=timeout_s)
         return [
-            requests.Answer(owner, None if answer is None else requests.decode_answer(owner, answer), error)
+            requests.Answer(
+                owner,
+                None if answer is None else requests.decode_answer(owner, answer),
+                None if error is None else str(error),
+            )
             for owner, answer, error in answers
         ]
 
@@ -113,10 +145,25 @@ class Session:
         finally:
             subscription.close()
 
-    def answer(self, site: str, robot: str, name: str, handler: requests.Handler) -> requests.Answerer:
-        """Answer a request of the table: `stop`, `command/*`."""
-        answerer = requests.Answerer(self.zenoh_session, site, robot, name, handler)
-        self._declared.append(answerer)
+    def answer(
+        self,
+        site: str,
+        robot: str,
+        name: str,
+        handler: requests.Handler,
+        *,
+        on_refused: requests.OnRefused = lambda chunk, text: None,
+    ) -> requests.Answerer:
+        """Answer a request of the table: `stop`, `command/*`; `on_refused` is told of what cannot be read.
+
+        Raises:
+            NoRightError: If this session's certificate may not.
+            SessionError: If it is answered over a link of its own, and the router has just gone.
+        """
+        self._check("declare_queryable", keys.robot_key(site, robot, name))
+        over = self._link_apart() if topics.request(name).own_link else self.zenoh_session
+        answerer = requests.Answerer(over, site, robot, name, handler, on_refused=on_refused)
+        self._keep(answerer)
         return answerer
 
     def declare_presence(self, site: str, robot: str, service: str) -> None:
@@ -124,21 +171,66 @@ class Session:
         key = keys.presence_key(site, robot, service, self.identity)
         self._tokens.append(self.zenoh_session.liveliness().declare_token(key))
 
+    def declare_presence_of(
+        self, site: str, robot: str, service: str, identity: str
+    ) -> zenoh.LivelinessToken:
+        """As `declare_presence`, for somebody whom this process speaks for, until it is undeclared."""
+        key = keys.presence_key(site, robot, service, identity)
+        return self.zenoh_session.liveliness().declare_token(key)
+
     def watch_presence(self, key_expr: str = presence.EVERYBODY) -> presence.PresenceWatch:
         """Who comes alive and who goes; who is there already comes first."""
         watch = presence.PresenceWatch(self.zenoh_session, key_expr)
-        self._declared.append(watch)
+        self._keep(watch)
         return watch
 
     async def present(self) -> list[keys.PresenceKey]:
         """Who is alive now, everywhere, sorted."""
         return await presence.present(self.zenoh_session)
 
+    def _check(self, act: access.Act, key: str) -> None:
+        """Say at once, and in words, what the router would refuse in silence."""
+        who = self.principal
+        if who is not None and not access.may(who, who.site, act, key):
+            raise NoRightError(access.refusal(who, act, key))
+
+    def measure(self, name: str, text: str, read: Callable[[], float | Mapping[str, float]]) -> None:
+        """Tell a number of the service's own in its health and its metrics; see `Measure`."""
+        self.measures.append(Measure(name, text, read))
+
+    def tally(self) -> Tally:
+        """What was sent, received and answered until now; on any thread."""
+        with self._keeping:
+            tally = self._ended.copy()
+            for each in self._declared:
+                tally.add(each)
+        return tally
+
+    @property
+    def subscriptions(self) -> tuple[Subscription, ...]:
+        """Those that are open."""
+        return tuple(each for each in self._declared if isinstance(each, Subscription) and not each.closed)
+
+    def _keep(self, declared: _Declared) -> None:
+        with self._keeping:
+            for each in self._declared:
+                if each.closed:
+                    self._ended.add(each)
+            self._declared = [each for each in self._declared if not each.closed] + [declared]
+
+    def _link_apart(self) -> zenoh.Session:
+        """What comes over it waits behind nothing: what floods the other link is not in it."""
+        if self._apart is None:
+            try:
+                self._apart = zenoh.open(self.config)
+            except zenoh.ZError as error:
+                raise SessionError(f"the router has gone: {first_line(error)}") from None
+        return self._apart
+
     async def _refresh(self) -> None:
         async for who, alive in self.watch_presence():
-            self._subscriptions = [each for each in self._subscriptions if not each.closed]
-            if alive:
-                for subscription in self._subscriptions:
+            if alive and who.service not in presence.SILENT:
+                for subscription in self.subscriptions:
                     subscription.refresh(who.site, who.robot)
 
     async def close(self) -> None:
@@ -147,12 +239,12 @@ class Session:
             self._refresher.cancel()
         for token in self._tokens:
             token.undeclare()
-        for subscription in self._subscriptions:
-            subscription.close()
         for declared in self._declared:
             declared.close()
         # Closing waits for Zenoh's threads, which may wait for the loop.
         await asyncio.to_thread(self.zenoh_session.close)
+        if self._apart is not None:
+            await asyncio.to_thread(self._apart.close)
 
 
 @asynccontextmanager
@@ -160,8 +252,12 @@ async def open_session(settings: SessionSettings) -> AsyncIterator[Session]:
     """A session with a router, waiting for one as long as the settings say.
 
     Raises:
-        SessionError: If an endpoint is wrong, or no router came in time.
+        SessionError: If an endpoint is wrong, the certificate is not good, or no router came in time.
     """
+    identity, warning = refused.own_certificate(settings.tls)
+    if warning:
+        log.warning("%s", warning)
+    principal = None if identity is None else access.principal_of(identity)
     config = client_config(settings.connect, settings.tls)
     loop = asyncio.get_running_loop()
     deadline = None if settings.wait_s is None else loop.time() + settings.wait_s
@@ -169,21 +265,34 @@ async def open_session(settings: SessionSettings) -> AsyncIterator[Session]:
     told = False
     while True:
         try:
-            session = Session(await asyncio.to_thread(zenoh.open, config))
+            session = Session(await asyncio.to_thread(zenoh.open, config), config, principal)
             break
         except zenoh.ZError:
-            if deadline is not None and loop.time() >= deadline:
+            last = deadline is not None and loop.time() >= deadline
+            looked = last or (settings.tls is not None and not told)
+            reason = await asyncio.to_thread(_refusal, settings) if looked else None
+            if last:
                 raise SessionError(
-                    f"no router at {routers}: start one (robomesh up, robomesh router) or name another "
+                    reason
+                    or f"no router at {routers}: start one (robomesh up, robomesh router) or name another "
                     "with --connect"
                 ) from None
             if not told:
-                log.warning("no router at %s yet: waiting for one", routers)
+                log.warning("%s", reason or f"no router at {routers} yet: waiting for one")
                 told = True
             await asyncio.sleep(_RETRY_S)
     if told:
         log.info("router found at %s", routers)
+    if identity is not None and (expires := identity.expires) is not None:
+        session.measure(
+            CERTIFICATE, "Until the own certificate expires", lambda: expires.timestamp() - time.time()
+        )
     try:
         yield session
     finally:
         await session.close()
+
+
+def _refusal(settings: SessionSettings) -> str | None:
+    """Why the first router that is there does not let us in."""
+    return next((reason for each in settings.connect if (reason := refused.why(each, settings.tls))), None)

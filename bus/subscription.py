@@ -9,7 +9,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import AsyncIterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import zenoh
@@ -20,6 +20,7 @@ from bus import keys
 from bus.endpoints import settle
 from bus.errors import MessageError
 from bus.header import Header, unpack
+from bus.lateness import Lateness
 from bus.messages import decode
 from bus.topics import History, Topic, topic
 
@@ -27,6 +28,9 @@ from bus.topics import History, Topic, topic
 _ZENOH_RING = 1024
 # Services of one robot come alive together: one question for all of them.
 _ASK_AGAIN_AFTER_S = 0.1
+# Of rows with a key for each process, or view: whose nothing came for so long has gone.
+_FORGOTTEN_AFTER_S = 3600.0
+_LOOK_EACH_S = 60.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +41,7 @@ class Sample:
         live: Published since we listen; False: an answer to "what is the last value?", whose age
             nobody knows. It then has the topic's history schema, where there is one.
         received: When, on this process's monotonic clock [s].
+        late_s: How much longer it was on its way than its publisher's quickest: its age when it came [s].
     """
 
     key: str
@@ -44,6 +49,7 @@ class Sample:
     header: Header
     live: bool
     received: float
+    late_s: float = 0.0
 
     @property
     def parsed(self) -> keys.Key:
@@ -66,7 +72,9 @@ class _Seen:
     """What is known of one key."""
 
     header: Header
+    lateness: Lateness = field(default_factory=Lateness)
     live_at: float | None = None
+    came_at: float = 0.0
     lost: int = 0
     skipped: int = 0
 
@@ -85,8 +93,12 @@ class Subscription:
         self._ready = asyncio.Event()
         self._ring: deque[Sample] = deque(maxlen=newest)
         self._seen: dict[str, _Seen] = {}
+        self._gone = _Seen(Header(0, 0, 0))  # what keys that are forgotten have lost
+        self._looked_at = time.monotonic()
         self._lock = threading.Lock()
         self._malformed = 0
+        self._received = 0
+        self._history = history
         self._closed = False
         self._asking: asyncio.TimerHandle | None = None
         # A list must come before what follows it: live samples wait for the answer.
@@ -113,7 +125,7 @@ class Subscription:
             await self._ready.wait()
 
     def age_s(self, key: str) -> float | None:
-        """Time since a new sample of the key came [s]; None: none came while we listened.
+        """Time since a new sample of the key came, and how late it was [s]; None: none came as we listened.
 
         An answer to "the last value?" counts only for topics that beat at a known interval.
         """
@@ -138,11 +150,23 @@ class Subscription:
     @property
     def skipped(self) -> int:
         """Samples that arrived and that the consumer was too slow to take."""
-        return sum(seen.skipped for seen in self._seen.values())
+        with self._lock:
+            return sum(seen.skipped for seen in (self._gone, *self._seen.values()))
+
+    @property
+    def received(self) -> int:
+        """Samples that were new."""
+        return self._received
+
+    @property
+    def lost_in_all(self) -> int:
+        """Samples of every key that never arrived."""
+        with self._lock:
+            return sum(seen.lost for seen in (self._gone, *self._seen.values()))
 
     @property
     def malformed(self) -> int:
-        """Samples without a right attachment, left out."""
+        """Samples without a right attachment, or on a key for many, left out."""
         return self._malformed
 
     @property
@@ -155,7 +179,7 @@ class Subscription:
 
         What a publisher put while the link was down was lost in silence.
         """
-        if self._asking is None and not self._closed:
+        if self._history and self._asking is None and not self._closed:
             wanted = keys.parse_key(self.key_expr)
             if wanted.site in ("*", site) and wanted.robot in ("*", robot, keys.WHOLE_SITE):
                 self._asking = self._loop.call_later(_ASK_AGAIN_AFTER_S, self._ask_again)
@@ -195,6 +219,7 @@ class Subscription:
         self._session.get(
             key_expr,
             zenoh.handlers.Callback(on_reply, on_end),
+            target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
             congestion_control=zenoh.CongestionControl.DROP,
             priority=getattr(zenoh.Priority, self.topic.priority.value),
@@ -202,20 +227,27 @@ class Subscription:
         )
 
     def _read(self) -> None:
-        for sample in self._subscriber:
-            with self._lock:
-                if self._held is not None:
-                    self._held.append(sample)
-                    continue
-                self._take(sample)
-            if not self._ready.is_set():
-                self._wake()
+        try:
+            for sample in self._subscriber:
+                self._receive(sample)
+        except zenoh.ZError:
+            if not self._closed:  # closed before this thread had come to read
+                raise
+
+    def _receive(self, sample: zenoh.Sample) -> None:
+        with self._lock:
+            if self._held is not None:
+                self._held.append(sample)
+                return
+            self._take(sample)
+        if not self._ready.is_set():
+            self._wake()
 
     def _take(self, sample: zenoh.Sample, *, asked_at: float | None = None) -> None:
         """Keep a sample that is new (the lock is held); `asked_at`: it answers a question of then."""
         key = str(sample.key_expr)
         attachment = sample.attachment
-        if attachment is None or sample.kind != zenoh.SampleKind.PUT:
+        if attachment is None or sample.kind != zenoh.SampleKind.PUT or keys.has_wildcard(key):
             self._malformed += 1
             return
         try:
@@ -227,6 +259,7 @@ class Subscription:
         payload = sample.payload.to_bytes()
         seen = self._seen.get(key)
         if seen is None:
+            self._forget(now)
             self._seen[key] = seen = _Seen(header)
         elif header.publisher != seen.header.publisher:
             if asked_at is not None and seen.live_at is not None and seen.live_at > asked_at:
@@ -242,12 +275,28 @@ class Subscription:
                 seen.lost += gap - new
             else:
                 seen.lost += gap - 1
-        seen.header = header
-        if asked_at is None or self.topic.heartbeat_s is not None:
-            seen.live_at = now - (self.topic.heartbeat_s or 0.0) if asked_at is not None else now
+        seen.header, seen.came_at = header, now
+        self._received += 1
+        late_s = 0.0
+        if asked_at is None:
+            late_s = 0.0 if keys.is_replay(key) else seen.lateness.of(header, now)
+            seen.live_at = now - late_s
+        elif self.topic.heartbeat_s is not None:
+            seen.live_at = now - self.topic.heartbeat_s
         if len(self._ring) == self._ring.maxlen:
-            self._seen[self._ring[0].key].skipped += 1
-        self._ring.append(Sample(key, payload, header, asked_at is None, now))
+            self._seen.get(self._ring[0].key, self._gone).skipped += 1
+        self._ring.append(Sample(key, payload, header, asked_at is None, now, late_s))
+
+    def _forget(self, now: float) -> None:
+        """Processes come and go for years: of those that went only what they lost is kept."""
+        if "*" not in self.topic.name or now - self._looked_at < _LOOK_EACH_S:
+            return
+        self._looked_at = now
+        for key, seen in tuple(self._seen.items()):
+            if now - seen.came_at > _FORGOTTEN_AFTER_S:
+                del self._seen[key]
+                self._gone.lost += seen.lost
+                self._gone.skipped += seen.skipped
 
     def _newest_of_list(self, payload: bytes, most: int) -> tuple[bytes, int]:
         """A list message cut to its newest entries, and how many there are."""

@@ -5,102 +5,40 @@ knows a rate, a priority, a schema or a right.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from enum import Enum
 from types import MappingProxyType
 
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
-from google.protobuf.message import Message
 
-from bus.errors import UnknownTopicError
+from bus.errors import KeyNameError, UnknownTopicError
+from bus.keys import check_chunk
 from bus.schemas import robomesh_pb2 as schema
+from bus.topic_rows import EVERYONE, PEOPLE, SERVICES, History, Priority, Request, Role, Topic
+
+__all__ = [
+    "EVERYONE",
+    "PEOPLE",
+    "REQUESTS",
+    "SERVICES",
+    "TOPICS",
+    "History",
+    "Priority",
+    "Request",
+    "Role",
+    "Topic",
+    "check_operator",
+    "request",
+    "topic",
+]
 
 
-class Priority(Enum):
-    """Zenoh's priorities, by their own names; everything is dropped, never queued."""
-
-    REAL_TIME = "REAL_TIME"
-    INTERACTIVE_HIGH = "INTERACTIVE_HIGH"
-    INTERACTIVE_LOW = "INTERACTIVE_LOW"
-    DATA_HIGH = "DATA_HIGH"
-    DATA = "DATA"
-    DATA_LOW = "DATA_LOW"
-    BACKGROUND = "BACKGROUND"
-
-
-class History(Enum):
-    """What a plain `get` on a topic's key answers with, always as one reply."""
-
-    NONE = "none"
-    LAST = "the last value"
-    LAST_100 = "a list message of the last 100"
-    KEY_FRAME = "the frames since the last key frame"
-
-
-class Role(Enum):
-    """Who takes part in the mesh. Each right below names the roles that have it."""
-
-    GATEWAY = "gateway"
-    KINEMATICS = "kinematics"
-    RECORDER = "recorder"
-    RENDERER = "renderer"
-    CONSOLE = "console"
-    OPERATOR = "operator"
-    MONITOR = "monitor"
-
-
-EVERYONE = frozenset(Role)
 _GATEWAY = frozenset({Role.GATEWAY})
+# A player publishes robots named replay-<id>, and no other.
+_GATEWAY_OR_REPLAY = frozenset({Role.GATEWAY, Role.PLAYER})
+_KINEMATICS_OR_REPLAY = frozenset({Role.KINEMATICS, Role.PLAYER})
 _COMMANDERS = frozenset({Role.OPERATOR, Role.CONSOLE})
-
-
-@dataclass(frozen=True, kw_only=True)
-class Topic:
-    """A row: something published.
-
-    Attributes:
-        name: Topic below the robot's key; `*` stands for one chunk.
-        rate_hz: Highest rate; None: on change or as it comes.
-        heartbeat_s: Published at least this often while its publisher lives; None: no such promise.
-        stale_after_s: Age from which it must not look live; None: it does not age.
-        recovered: Lost samples are asked for again (Zenoh's advanced publisher and subscriber).
-    """
-
-    name: str
-    schema: type[Message]
-    priority: Priority
-    rate_hz: float | None = None
-    heartbeat_s: float | None = None
-    history: History = History.LAST
-    history_schema: type[Message] | None = None
-    recorded: bool = True
-    recovered: bool = False
-    stale_after_s: float | None = None
-    publishers: frozenset[Role]
-    subscribers: frozenset[Role] = EVERYONE
-
-
-@dataclass(frozen=True, kw_only=True)
-class Request:
-    """A row: something asked, below the robot's key; `*` stands for one chunk.
-
-    Attributes:
-        answer: Schema of the answer; None: plain bytes.
-        wildcard: May be asked on a key with a wildcard.
-        unread: A payload that cannot be read counts as an empty one: a stop is a stop.
-    """
-
-    name: str
-    request: type[Message] | None
-    answer: type[Message] | None
-    priority: Priority
-    owners: frozenset[Role]
-    askers: frozenset[Role]
-    wildcard: bool = False
-    unread: bool = False
 
 
 _TOPICS = (
@@ -110,7 +48,7 @@ _TOPICS = (
         rate_hz=100.0,
         priority=Priority.REAL_TIME,
         stale_after_s=1.0,
-        publishers=_GATEWAY,
+        publishers=_GATEWAY_OR_REPLAY,
     ),
     Topic(
         name="joints/slow",
@@ -119,7 +57,7 @@ _TOPICS = (
         priority=Priority.INTERACTIVE_HIGH,
         stale_after_s=1.0,
         recorded=False,  # the same states as `joints`, thinned
-        publishers=_GATEWAY,
+        publishers=_GATEWAY_OR_REPLAY,
     ),
     Topic(
         name="controller",
@@ -127,16 +65,16 @@ _TOPICS = (
         heartbeat_s=1.0,
         priority=Priority.INTERACTIVE_HIGH,
         stale_after_s=3.0,
-        publishers=_GATEWAY,
+        publishers=_GATEWAY_OR_REPLAY,
     ),
-    Topic(name="raw", schema=schema.RawRecord, priority=Priority.DATA_LOW, publishers=_GATEWAY),
+    Topic(name="raw", schema=schema.RawRecord, priority=Priority.DATA_LOW, publishers=_GATEWAY_OR_REPLAY),
     Topic(
         name="frames",
         schema=FrameTransforms,
         rate_hz=60.0,
         priority=Priority.INTERACTIVE_HIGH,
         stale_after_s=1.0,
-        publishers=frozenset({Role.KINEMATICS}),
+        publishers=_KINEMATICS_OR_REPLAY,
     ),
     Topic(
         name="kinematics",
@@ -144,7 +82,7 @@ _TOPICS = (
         rate_hz=20.0,
         priority=Priority.DATA_HIGH,
         stale_after_s=1.0,
-        publishers=frozenset({Role.KINEMATICS}),
+        publishers=_KINEMATICS_OR_REPLAY,
     ),
     Topic(
         name="lease",
@@ -152,7 +90,7 @@ _TOPICS = (
         heartbeat_s=1.0,
         priority=Priority.INTERACTIVE_HIGH,
         stale_after_s=3.0,
-        publishers=_GATEWAY,
+        publishers=_GATEWAY_OR_REPLAY,
     ),
     Topic(
         name="events",
@@ -161,7 +99,18 @@ _TOPICS = (
         history_schema=schema.EventList,
         recovered=True,
         priority=Priority.INTERACTIVE_LOW,
-        publishers=_GATEWAY,
+        publishers=_GATEWAY_OR_REPLAY,
+    ),
+    # What services other than the gateway notice: a key each, because two publishers of one key would
+    # answer a `get` twice.
+    Topic(
+        name="events/*",
+        schema=schema.Event,
+        history=History.LAST_100,
+        history_schema=schema.EventList,
+        recovered=True,
+        priority=Priority.INTERACTIVE_LOW,
+        publishers=SERVICES - _GATEWAY,
     ),
     Topic(
         name="audit",
@@ -170,13 +119,39 @@ _TOPICS = (
         history_schema=schema.AuditList,
         recovered=True,
         priority=Priority.INTERACTIVE_LOW,
-        publishers=_GATEWAY,
+        publishers=_GATEWAY_OR_REPLAY,
+    ),
+    Topic(
+        name="program",
+        schema=schema.ProgramState,
+        heartbeat_s=1.0,
+        priority=Priority.INTERACTIVE_HIGH,
+        stale_after_s=3.0,
+        publishers=_GATEWAY_OR_REPLAY,
     ),
     Topic(
         name="description",
         schema=schema.Description,
         priority=Priority.DATA,
-        publishers=frozenset({Role.KINEMATICS}),
+        publishers=_KINEMATICS_OR_REPLAY,
+    ),
+    Topic(
+        name="recording",
+        schema=schema.Recording,
+        heartbeat_s=1.0,
+        recorded=False,  # it tells of the recording itself
+        priority=Priority.DATA,
+        stale_after_s=3.0,
+        publishers=frozenset({Role.RECORDER}),
+    ),
+    Topic(
+        name="replay",
+        schema=schema.ReplayState,
+        heartbeat_s=0.2,
+        recorded=False,
+        priority=Priority.DATA,
+        stale_after_s=3.0,
+        publishers=frozenset({Role.PLAYER}),
     ),
     Topic(
         name="video/*",
@@ -186,7 +161,7 @@ _TOPICS = (
         history_schema=schema.VideoFrames,
         priority=Priority.DATA_LOW,
         stale_after_s=1.0,
-        publishers=frozenset({Role.RENDERER}),
+        publishers=frozenset({Role.RENDERER, Role.PLAYER}),  # a player's are named recorded-<view>
     ),
     Topic(
         name="image/*",
@@ -196,6 +171,34 @@ _TOPICS = (
         priority=Priority.BACKGROUND,
         publishers=frozenset({Role.RENDERER}),
     ),
+    # Below a site's `-`, as what follows. The chunk is <service>.<id>: one key a process.
+    Topic(
+        name="health/*",
+        schema=schema.ServiceHealth,
+        heartbeat_s=2.0,
+        recorded=False,
+        priority=Priority.BACKGROUND,
+        stale_after_s=6.0,
+        publishers=SERVICES,
+    ),
+    Topic(
+        name="mesh",
+        schema=schema.MeshState,
+        heartbeat_s=2.0,
+        recorded=False,
+        priority=Priority.DATA,
+        stale_after_s=6.0,
+        publishers=frozenset({Role.WATCH}),
+    ),
+    Topic(
+        name="alarms",
+        schema=schema.AlarmList,
+        heartbeat_s=1.0,
+        recorded=False,
+        priority=Priority.INTERACTIVE_HIGH,
+        stale_after_s=3.0,
+        publishers=frozenset({Role.WATCH}),
+    ),
 )
 
 _REQUESTS = (
@@ -204,31 +207,67 @@ _REQUESTS = (
         request=schema.StopRequest,
         answer=schema.StopAnswer,
         priority=Priority.REAL_TIME,
-        owners=_GATEWAY,
+        owners=_GATEWAY_OR_REPLAY,
         askers=EVERYONE,
         wildcard=True,
         unread=True,
+        own_link=True,
+        both_links=True,
     ),
     Request(
         name="lease/request/*",
         request=schema.LeaseRequest,
         answer=schema.LeaseAnswer,
         priority=Priority.REAL_TIME,
-        owners=_GATEWAY,
+        owners=_GATEWAY_OR_REPLAY,
         askers=_COMMANDERS,
+        in_name=True,
     ),
     Request(
         name="command/*",
         request=schema.CommandRequest,
         answer=schema.CommandAnswer,
         priority=Priority.REAL_TIME,
+        owners=_GATEWAY_OR_REPLAY,
+        askers=_COMMANDERS,
+        in_name=True,
+    ),
+    Request(
+        name="audit/find",
+        request=schema.AuditQuery,
+        answer=schema.AuditList,
+        priority=Priority.BACKGROUND,
         owners=_GATEWAY,
+        askers=EVERYONE,
+    ),
+    Request(
+        name="simulator/fault",
+        request=schema.FaultRequest,
+        answer=schema.FaultAnswer,
+        priority=Priority.BACKGROUND,
+        owners=frozenset({Role.SIMULATOR}),
         askers=_COMMANDERS,
     ),
     Request(
         name="kinematics/forward",
         request=schema.ForwardRequest,
         answer=schema.ForwardAnswer,
+        priority=Priority.DATA,
+        owners=frozenset({Role.KINEMATICS}),
+        askers=EVERYONE,
+    ),
+    Request(
+        name="kinematics/inverse",
+        request=schema.InverseRequest,
+        answer=schema.InverseAnswer,
+        priority=Priority.DATA,
+        owners=frozenset({Role.KINEMATICS}),
+        askers=EVERYONE,
+    ),
+    Request(
+        name="kinematics/check",
+        request=schema.CheckRequest,
+        answer=schema.CheckAnswer,
         priority=Priority.DATA,
         owners=frozenset({Role.KINEMATICS}),
         askers=EVERYONE,
@@ -242,11 +281,19 @@ _REQUESTS = (
         askers=EVERYONE,
     ),
     Request(
+        name="views",
+        request=schema.ViewRequest,
+        answer=schema.ViewAnswer,
+        priority=Priority.DATA,
+        owners=frozenset({Role.RENDERER}),
+        askers=EVERYONE,
+    ),
+    Request(
         name="mesh/*",
         request=None,
         answer=None,
         priority=Priority.BACKGROUND,
-        owners=frozenset({Role.KINEMATICS}),
+        owners=_KINEMATICS_OR_REPLAY,
         askers=EVERYONE,
     ),
     Request(
@@ -254,7 +301,7 @@ _REQUESTS = (
         request=schema.RecorderRequest,
         answer=schema.Recording,
         priority=Priority.BACKGROUND,
-        owners=frozenset({Role.RECORDER}),
+        owners=frozenset({Role.RECORDER, Role.PLAYER}),  # which refuses: a replay is recorded already
         askers=_COMMANDERS,
     ),
     Request(
@@ -263,6 +310,75 @@ _REQUESTS = (
         answer=schema.RecordingList,
         priority=Priority.BACKGROUND,
         owners=frozenset({Role.RECORDER}),
+        askers=EVERYONE,
+    ),
+    Request(
+        name="recordings/info",
+        request=schema.RecordingQuery,
+        answer=schema.Recording,
+        priority=Priority.BACKGROUND,
+        owners=frozenset({Role.RECORDER}),
+        askers=EVERYONE,
+    ),
+    Request(
+        name="recordings/range",
+        request=schema.RangeRequest,
+        answer=schema.RecordedMessages,
+        priority=Priority.BACKGROUND,
+        owners=frozenset({Role.RECORDER}),
+        askers=EVERYONE,
+    ),
+    Request(
+        name="recordings/series",
+        request=schema.SeriesRequest,
+        answer=schema.SeriesAnswer,
+        priority=Priority.BACKGROUND,
+        owners=frozenset({Role.RECORDER}),
+        askers=EVERYONE,
+    ),
+    Request(
+        name="recordings/piece",
+        request=schema.PieceRequest,
+        answer=schema.Piece,
+        priority=Priority.BACKGROUND,
+        owners=frozenset({Role.RECORDER}),
+        askers=EVERYONE,
+    ),
+    # Below a site's `-`.
+    Request(
+        name="player/open",
+        request=schema.PlayRequest,
+        answer=schema.ReplayState,
+        priority=Priority.DATA,
+        owners=frozenset({Role.PLAYER}),
+        askers=EVERYONE,
+    ),
+    # Below a site's `-`; the chunk is the process's id.
+    Request(
+        name="clock/*",
+        request=schema.ClockRequest,
+        answer=schema.ClockAnswer,
+        priority=Priority.INTERACTIVE_HIGH,
+        owners=SERVICES,
+        askers=EVERYONE,
+    ),
+    # Below a site's `-`, in an operator's name.
+    Request(
+        name="alarms/request/*",
+        request=schema.AlarmRequest,
+        answer=schema.AlarmList,
+        priority=Priority.INTERACTIVE_HIGH,
+        owners=frozenset({Role.WATCH}),
+        askers=_COMMANDERS,
+        in_name=True,
+    ),
+    # Below replay-<id>.
+    Request(
+        name="replay/request",
+        request=schema.ReplayRequest,
+        answer=schema.ReplayState,
+        priority=Priority.DATA,
+        owners=frozenset({Role.PLAYER}),
         askers=EVERYONE,
     ),
 )
@@ -304,3 +420,15 @@ def request(name: str) -> Request:
     if row is None:
         raise UnknownTopicError(f"no request {name!r}; there are {', '.join(REQUESTS)}")
     return REQUESTS[row]
+
+
+def check_operator(name: str) -> str:
+    """The name itself, when somebody may ask in it.
+
+    Raises:
+        KeyNameError: If it cannot stand in a key, or is what a request is called: no rule on a request's
+            key may ever mean somebody's.
+    """
+    if name in REQUESTS:
+        raise KeyNameError(f"operator {name!r} cannot be used: a request is called so")
+    return check_chunk(name)

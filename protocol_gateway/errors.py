@@ -9,7 +9,8 @@ ProtocolGatewayError
 │   ├── LinkDownError       there is no connection
 │   └── LinkCloggedError    the controller does not read: the connection was given up
 ├── AuthorityError          a failure of what guards the robot
-│   └── AuditError          an audit entry that is not on disk, or a line that is not an entry
+│   ├── AuditError          an audit entry that is not on disk, or a line that is not an entry
+│   └── CheckError          a motion that cannot be checked, or not in time
 └── GatewaySettingsError    settings that no gateway can run with
 """
 
@@ -52,6 +53,10 @@ class AuthorityError(ProtocolGatewayError):
 
 class AuditError(AuthorityError):
     """An entry that could not be written to the audit log, or a line that is not an entry."""
+
+
+class CheckError(AuthorityError):
+    """A motion that cannot be checked, or not in time; the text says why."""
 
 
 class GatewaySettingsError(ProtocolGatewayError):

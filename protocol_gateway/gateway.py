@@ -1,34 +1,21 @@
 """The gateway service: robots with legacy controllers, on the mesh. One process serves many."""
 
 import asyncio
+import gc
 import logging
 from contextlib import AsyncExitStack
-from dataclasses import dataclass
-from pathlib import Path
 
-from bus.keys import check_name
 from bus.session import Session
-from protocol_gateway.errors import GatewaySettingsError
-from protocol_gateway.robot import Robot, RobotSettings
+from protocol_gateway.checking.cell_mates import CellMates
+from protocol_gateway.checking.checker import checkers_of
+from protocol_gateway.checking.policy import Policy
+from protocol_gateway.link.measures import measure_links
+from protocol_gateway.robot import Robot
+from protocol_gateway.settings import RobotSettings, Settings, check
 
 __all__ = ["RobotSettings", "Settings", "serve"]
 
 log = logging.getLogger(__name__)
-
-_KNOWN_UNKNOWNS = frozenset({"mode", "homed"})
-
-
-@dataclass(frozen=True, kw_only=True)
-class Settings:
-    """A gateway of one site.
-
-    Attributes:
-        audit_folder: Holds <site>/<robot>.jsonl, the audit logs.
-    """
-
-    site: str
-    robots: tuple[RobotSettings, ...]
-    audit_folder: Path
 
 
 async def serve(session: Session, settings: Settings) -> None:
@@ -41,35 +28,38 @@ async def serve(session: Session, settings: Settings) -> None:
     check(settings)
     async with AsyncExitStack() as stack:
         robots = []
+        surroundings = {robot.name: robot.surroundings for robot in settings.robots}
+        # Processes of their own: whoever has a long program planned delays nobody's motion.
+        checked = [robot.name for robot in settings.robots if robot.check != Policy.OFF]
+        checkers = checkers_of(surroundings, at_once=checked)
+        planners = checkers_of(surroundings)
+        cells: dict[frozenset[str], CellMates] = {}
         for each in settings.robots:
-            robot = Robot(session, settings.site, each, settings.audit_folder)
+            path = settings.audit_folder / settings.site / f"{each.name}.jsonl"
+            names = frozenset(robot.name for robot in each.surroundings.robots)
+            robot = Robot(
+                session,
+                settings.site,
+                each,
+                audit_path=path,
+                rotate_bytes=settings.audit_rotate_bytes,
+                checker=checkers[each.name],
+                planner=planners[each.name],
+                mates=cells.setdefault(names, CellMates()),
+            )
             stack.push_async_callback(robot.close)
             robots.append(robot)
+            await robot.listen()
             log.info("%s: controller at %s:%d", each.name, each.host, each.port)
+        # What lives as long as the process is no garbage: looking through it all stops every robot for 20 ms.
+        measure_links(
+            session, {robot.name: each.link for robot, each in zip(settings.robots, robots, strict=True)}
+        )
+        gc.collect()
+        gc.freeze()
+        stack.callback(gc.unfreeze)
         async with asyncio.TaskGroup() as tasks:
+            for checker in {*checkers.values(), *planners.values()}:
+                tasks.create_task(checker.run())
             for robot in robots:
                 tasks.create_task(robot.run())
-
-
-def check(settings: Settings) -> None:
-    """Refuse settings that cannot be meant.
-
-    Raises:
-        GatewaySettingsError, KeyNameError: Naming what is wrong, and what would be right.
-    """
-    check_name(settings.site, "site")
-    names: set[str] = set()
-    for robot in settings.robots:
-        check_name(robot.name, "robot")
-        if robot.name in names:
-            raise GatewaySettingsError(f"two robots are named {robot.name!r}: each needs a name of its own")
-        names.add(robot.name)
-        if unknown := sorted(robot.accept_unknown - _KNOWN_UNKNOWNS):
-            raise GatewaySettingsError(
-                f"robot {robot.name}: accept_unknown {unknown[0]!r}: it can hold 'mode' and 'homed'"
-            )
-        if not 0 < robot.stale_after_s < robot.reconnect_after_s:
-            raise GatewaySettingsError(
-                f"robot {robot.name}: stale after {robot.stale_after_s:g} s, connected anew after "
-                f"{robot.reconnect_after_s:g} s: the first must be above 0, and below the second"
-            )

@@ -11,9 +11,10 @@ from protocol_gateway.texts import LONGEST_SENTENCE, one_line
 
 log = logging.getLogger(__name__)
 
-# A controller that sends rubbish must not fill logs and recordings: so many of a kind within so long.
-_MOST = 5
-_WINDOW_S = 1.0
+# A controller that sends rubbish must fill neither logs nor the hundred events that a late joiner is told:
+# so many of a kind at once, then one in so long.
+_AT_ONCE = 5.0
+_THEN_EACH_S = 5.0
 
 _LEVELS = {
     Event.Severity.DEBUG: logging.DEBUG,
@@ -26,8 +27,10 @@ _LEVELS = {
 
 @dataclass
 class _Kind:
-    began_s: float
-    said: int = 0
+    """`may_say`: so many more at once, at the time `at_s`."""
+
+    at_s: float
+    may_say: float = _AT_ONCE
     left_out: int = 0
 
 
@@ -43,7 +46,7 @@ class Journal:
         self._kinds: dict[str, _Kind] = {}
 
     def say(self, severity: Event.Severity, code: str, text: str, **values: object) -> None:
-        """Publish an event, unless five of its code were within the last second; then it is counted.
+        """Publish an event; of many of one code one each 5 s, which counts the others.
 
         Args:
             code: Stable, for programs: "unit.malformed".
@@ -51,12 +54,12 @@ class Journal:
         """
         now_s = self._monotonic_s()
         kind = self._kinds.setdefault(code, _Kind(now_s))
-        if now_s - kind.began_s >= _WINDOW_S:
-            kind.began_s, kind.said = now_s, 0
-        if kind.said >= _MOST:
+        kind.may_say = min(kind.may_say + (now_s - kind.at_s) / _THEN_EACH_S, _AT_ONCE)
+        kind.at_s = now_s
+        if kind.may_say < 1.0:
             kind.left_out += 1
             return
-        kind.said += 1
+        kind.may_say -= 1.0
         if kind.left_out:
             values["left_out"] = kind.left_out
             text = f"{text} (and {kind.left_out} more like it before)"

@@ -3,12 +3,14 @@
 from collections import deque
 from collections.abc import Sequence
 
-from protocol_gateway.driver import Activity
+from protocol_gateway.drivers.driver import Activity
 from robots.joints import JointType
 
 # A window long enough to tell the slowest motion (1 % of 20 degrees a second) from a sensor's last digit.
 WINDOW_S = 0.5
 _SAMPLE_S = 0.1
+# Longer than the window: what is left in it of the motion before is no motion.
+_SETTLED_S = 2 * WINDOW_S
 _STILL_ROTARY = 1e-3  # rad
 _STILL_PRISMATIC = 1e-4  # m
 
@@ -61,11 +63,18 @@ def has_arrived(
     )
 
 
-def is_moving(activity: Activity | None, watch: PositionWatch) -> bool | None:
-    """Whether the robot moves: the controller's word where it gives one; None: not known."""
+def is_moving(activity: Activity | None, watch: PositionWatch, said_for_s: float = 0.0) -> bool | None:
+    """Whether the robot moves: the controller's word where it gives one; None: not known.
+
+    Args:
+        said_for_s: How long the controller has said so. An arm that has been at rest for a while by its
+            controller's word, and whose positions change, moves all the same.
+    """
     if activity is None:
         return watch.moving
-    return activity in (Activity.MOVING, Activity.HOMING)
+    if activity in (Activity.MOVING, Activity.HOMING):
+        return True
+    return said_for_s >= _SETTLED_S and bool(watch.moving)
 
 
 def motion_may_be_held(activity: Activity | None) -> bool:

@@ -4,31 +4,44 @@ import asyncio
 import contextlib
 import logging
 import time
-from collections import deque
-from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Awaitable, Callable, Hashable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from bus.errors import KeyNameError, RefusedError
-from bus.keys import check_chunk
+from bus.keys import presence_key
 from bus.publisher import LIST_LENGTH, Publisher
-from bus.requests import Request
+from bus.requests import Answerer, Handler, Request
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
-from protocol_gateway.audit import AuditLog, Entry, read_entries
-from protocol_gateway.authority import Now
-from protocol_gateway.control import Control
-from protocol_gateway.driver import Driver
+from bus.topics import Role, check_operator
+from protocol_gateway.audit.entry import audit_entry
+from protocol_gateway.audit.find import Query, Searches, find
+from protocol_gateway.audit.log import AuditLog, Entry, Outcome
+from protocol_gateway.audit.restart import ROTATE
+from protocol_gateway.authority.obstacles import Controller
+from protocol_gateway.authority.rules import Authority, Now
+from protocol_gateway.checking.cell_mates import CellMates
+from protocol_gateway.checking.checker import Checker
+from protocol_gateway.checking.policy import Policy
+from protocol_gateway.control.checks import Checks
+from protocol_gateway.control.control import Control
+from protocol_gateway.control.ledger import Ledger, entry_of
+from protocol_gateway.control.program import Programs
+from protocol_gateway.control.stops import Guarded
+from protocol_gateway.core.codes import code_table
+from protocol_gateway.drivers.driver import Driver
+from protocol_gateway.drivers.registry import DRIVERS
+from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.journal import Journal
-from protocol_gateway.ledger import Ledger
-from protocol_gateway.link import ControllerLink, LinkSettings, LinkState, LinkStatus
-from protocol_gateway.motion import is_moving
-from protocol_gateway.obstacles import Controller
-from protocol_gateway.restart import remembered
-from protocol_gateway.states import audit_entry, controller_state, lease_state
+from protocol_gateway.legacy.clients import LegacyClients
+from protocol_gateway.link.link import ControllerLink, LinkSettings, LinkState, LinkStatus
+from protocol_gateway.link.status import news
+from protocol_gateway.settings import RobotSettings
+from protocol_gateway.states import controller_state, lease_state, timestamp
 from protocol_gateway.telemetry import Telemetry
-from protocol_gateway.texts import LONGEST, one_line
-from protocol_gateway.unit_driver import UnitDriver
+from protocol_gateway.texts import LONGEST, LONGEST_SENTENCE, one_line
 from robots.description import load
 from robots.joints import joints_of
 
@@ -36,38 +49,14 @@ log = logging.getLogger(__name__)
 
 _S = schema.Event.Severity
 
-_LOOK_S = 0.05
+_LOOK_S = 0.1
+# Of the stale time: that a controller is silent takes a moment to be with the monitors.
+_SHOWN_WITHIN = 0.95
 _HEARTBEAT_S = 1.0
 _MEND_S = 1.0
 MESH = "mesh"
-
-
-@dataclass(frozen=True, kw_only=True)
-class RobotSettings:
-    """One robot, as the site file gives it.
-
-    Attributes:
-        name: In keys.
-        description: A library robot's name, or a path.
-        host: Of the controller; `port` too.
-        codes: Type codes, where the controller sends numbers: {2: "ABSOLUTE.DEG", 101: "COMMAND:home"}.
-        accept_unknown: What the controller never tells and is done without: "mode", "homed".
-        stop_proven: The stop unit was tried on this controller; without that the robot is read-only.
-            How to try it: docs/safety.md.
-        stale_after_s: Without a unit for this long, nothing is known of the robot any more; without positions
-            for this long, it is not moved.
-        reconnect_after_s: Without a unit for this long, the connection is made anew.
-    """
-
-    name: str
-    description: str | Path
-    host: str
-    port: int
-    codes: Mapping[int, str] = field(default_factory=dict)
-    accept_unknown: frozenset[str] = frozenset()
-    stop_proven: bool = False
-    stale_after_s: float = 1.0
-    reconnect_after_s: float = 4.0
+# In the audit log, where it cannot be read which one.
+_LEASE, _COMMAND = "LEASE", "COMMAND"
 
 
 class Robot:
@@ -77,10 +66,23 @@ class Robot:
         DescriptionError, CodeTableError, AuditError, KeyNameError: If it cannot be run as it is set.
     """
 
-    def __init__(self, session: Session, site: str, settings: RobotSettings, audit_folder: Path) -> None:
+    def __init__(
+        self,
+        session: Session,
+        site: str,
+        settings: RobotSettings,
+        *,
+        audit_path: Path,
+        rotate_bytes: int,
+        checker: Checker,
+        planner: Checker,
+        mates: CellMates,
+    ) -> None:
         joints = joints_of(load(settings.description))
-        driver: Driver = UnitDriver(joints.types, settings.codes)
+        relay = None if settings.legacy_clients is None else self._relay
+        driver = DRIVERS[settings.protocol](joints.types, settings.codes, relay=relay)
         self._settings = settings
+        self._legacy: LegacyClients | None = None
         self._read_only = _why_read_only(settings, driver)
 
         def publisher(topic: str) -> Publisher:
@@ -89,6 +91,7 @@ class Robot:
         self._controller_topic = publisher("controller")
         self._lease_topic = publisher("lease")
         self._audit_topic = publisher("audit")
+        self._program_topic = publisher("program")
         self._journal = Journal(publisher("events"), settings.name)
         self._telemetry = Telemetry(
             joints,
@@ -104,62 +107,116 @@ class Robot:
             LinkSettings(
                 host=settings.host,
                 port=settings.port,
-                stale_after_s=settings.stale_after_s,
+                stale_after_s=_SHOWN_WITHIN * settings.stale_after_s,
                 reconnect_after_s=settings.reconnect_after_s,
             ),
             driver,
             on_event=self._telemetry.on_event,
             on_status=self._on_link,
         )
-        self._link_state = LinkState.DOWN
-        path = audit_folder / site / f"{settings.name}.jsonl"
-        self._audit = AuditLog(path, on_written=self._on_written)
-        self._control = Control(
-            joints,
-            driver,
-            Ledger(self._audit, self._journal),
-            self._journal,
-            authority=remembered(read_entries(path)),
+        self._link_status = self._link.status
+        self._audit = AuditLog(audit_path, on_written=self._on_written, rotate_bytes=rotate_bytes)
+        self._ledger = Ledger(self._audit, self._journal)
+        guarded = Guarded(
+            authority=self._remembered(),
+            driver=driver,
+            ledger=self._ledger,
+            journal=self._journal,
             send=self._link.send,
             controller=self._controller,
             on_change=self._publish_state,
+            orphan=self._audit.memory.mover,
         )
+        self._checks = Checks(
+            settings.name,
+            Policy(settings.check),
+            cell=[robot.name for robot in settings.surroundings.robots],
+            checker=checker,
+            planner=planner,
+            mates=mates,
+            joints=joints,
+            guarded=guarded,
+        )
+        self._control = Control(joints, guarded, self._checks)
+        self._programs = Programs(self._control, guarded, self._checks)
+        if settings.legacy_clients is not None:
+            table = code_table(settings.codes)
+            self._legacy = LegacyClients(settings.legacy_clients, table, joints, self._control, guarded)
+        self._operators = session.watch_presence(presence_key(site, settings.name, Role.OPERATOR.value, "*"))
         session.answer(site, settings.name, "stop", self._answer_stop)
-        session.answer(site, settings.name, "lease/request/*", self._answer_lease)
-        session.answer(site, settings.name, "command/*", self._answer_command)
+
+        def answer(name: str, handler: Handler, what: str) -> Answerer:
+            refused = partial(self._refused, what)
+            return session.answer(site, settings.name, name, handler, on_refused=refused)
+
+        self._asked = (
+            answer("lease/request/*", self._answer_lease, _LEASE),
+            answer("command/*", self._answer_command, _COMMAND),
+        )
+        self._turned_away = 0
+        session.answer(site, settings.name, "audit/find", Searches(audit_path).answer)
         self._say_how_it_starts()
+
+    def _remembered(self) -> Authority:
+        """The authority that the log leaves; of a read-only robot no stop, which nobody could reset."""
+        authority = self._audit.memory.authority
+        return replace(authority, stop=None) if self._read_only else authority
 
     def _say_how_it_starts(self) -> None:
         if self._audit.mended:
             self._journal.say(
-                _S.ERROR, "audit.mended", f"audit log {self._audit.path.name}: {self._audit.mended}"
+                _S.ERROR, "audit.damaged", f"audit log {self._audit.path.name}: {self._audit.mended}"
             )
         if self._read_only:
             self._journal.say(_S.WARNING, "robot.read_only", f"the robot is read-only: {self._read_only}")
         stop = self._control.authority.stop
         if stop is not None:
-            text = f"stop request {stop.id} ({stop.by}: {stop.reason}) is latched since before this start"
+            text = f"stop request {stop.id} ({stop.by}: {stop.reason}) is latched from the start"
             self._journal.say(_S.WARNING, "stop.remembered", text, stop_id=stop.id)
-        for entry in deque(read_entries(self._audit.path), maxlen=LIST_LENGTH):
+        for entry in find(self._audit.path, Query(most=LIST_LENGTH)):
             with contextlib.suppress(ValueError, TypeError):  # somebody changed that line: `verify` tells
                 self._audit_topic.remember(audit_entry(entry), source_time_ns=entry.time_ns)
         self._publish_state()
 
+    @property
+    def link(self) -> ControllerLink:
+        """To its controller."""
+        return self._link
+
+    async def listen(self) -> None:
+        """Let old client programs come, where the site file lets them.
+
+        Raises:
+            GatewaySettingsError: If it cannot listen there.
+        """
+        if self._legacy is None:
+            return
+        try:
+            await self._legacy.listen()
+        except GatewaySettingsError as error:
+            raise GatewaySettingsError(f"robot {self._settings.name}: {error}") from None
+
     async def run(self) -> None:
         """Keep the link and the heartbeats until cancelled; then stop what moves under a lease."""
+        self._control.send_latched_stop()  # there is no link yet, but now it hurries
         link = asyncio.create_task(self._go_on(self._link.run))
+        sessions = asyncio.create_task(self._go_on(self._watch_sessions))
         try:
             await self._go_on(self._beat)
         finally:
             try:
                 # While there is a link to stop it over.
-                self._control.end_lease("the gateway is being ended")
+                self._control.leases.end("the gateway is being ended")
             finally:
                 link.cancel()
-                await asyncio.gather(link, return_exceptions=True)
+                sessions.cancel()
+                await asyncio.gather(link, sessions, return_exceptions=True)
 
     async def close(self) -> None:
-        """Write what is still to be written, and close the audit log."""
+        """Close the old client programs, write what is still to be written, and close the audit log."""
+        if self._legacy is not None:
+            await self._legacy.close()
+        await self._programs.close()
         await self._control.close()
         await self._audit.close()
 
@@ -179,7 +236,7 @@ class Robot:
         next_s = 0.0
         while True:
             await asyncio.sleep(_LOOK_S)
-            self._control.check_expiry()
+            self._control.leases.expire()
             now_s = time.monotonic()
             if self._link.status.state is LinkState.UP:
                 self._telemetry.look(now_s)
@@ -187,7 +244,23 @@ class Robot:
             if now_s >= next_s:
                 next_s = now_s + _HEARTBEAT_S
                 self._publish_state()
-                self._audit.pay()
+                self._note_turned_away()
+                self._ledger.look()
+
+    def _note_turned_away(self) -> None:
+        """What was refused at the door, because too many requests waited, is in the audit log as a number."""
+        turned_away = sum(each.turned_away for each in self._asked)
+        if more := turned_away - self._turned_away:
+            self._turned_away = turned_away
+            text = "turned away unread: too many requests waited already"
+            entry = entry_of("REQUESTS", operator="", source=MESH, outcome=Outcome.REFUSED, text=text)
+            self._ledger.after_later(replace(entry, repeated=more - 1))
+
+    async def _watch_sessions(self) -> None:
+        """An operator's program or page that is gone holds no robot."""
+        async for who, alive in self._operators:
+            if not alive:
+                self._control.leases.end_session(who.id)
 
     # --------------------------------------------------------------- requests
 
@@ -202,27 +275,59 @@ class Robot:
         message = request.message
         assert isinstance(message, schema.LeaseRequest)
         message.reason, message.to = one_line(message.reason), one_line(message.to)
-        return await self._control.lease(message, operator=_operator(request), source=MESH)
+        return await self._control.leases.ask(message, operator=self._operator(_LEASE, request), source=MESH)
 
     async def _answer_command(self, request: Request) -> schema.CommandAnswer:
         message = request.message
         assert isinstance(message, schema.CommandRequest)
-        return await self._control.command(message, operator=_operator(request), source=MESH)
+        operator = self._operator(_COMMAND, request)
+        if message.command == schema.CommandRequest.RUN_PROGRAM:
+            return await self._programs.run(message, operator=operator, source=MESH)
+        return await self._control.command(message, operator=operator, source=MESH)
+
+    def _operator(self, what: str, request: Request) -> str:
+        """In whose name something is asked.
+
+        Raises:
+            RefusedError: If it is no name: cut or mended, it might become somebody else's.
+        """
+        name = request.chunk
+        try:
+            if len(name) > LONGEST:
+                raise KeyNameError(f"operator {one_line(name, 40)}: a name has at most {LONGEST} characters")
+            return check_operator(name)
+        except KeyNameError as error:
+            self._refused(what, name, str(error))
+            raise RefusedError(str(error)) from None
+
+    def _refused(self, what: str, name: str, text: str) -> None:
+        """Write down what nobody judged, because it cannot be read, or its operator's name is none."""
+        who, why = one_line(name, 40), one_line(text, LONGEST_SENTENCE)
+        entry = entry_of(what, operator=who, source=MESH, outcome=Outcome.REFUSED, text=why)
+        self._ledger.after_later(entry)
 
     # ------------------------------------------------------------------ state
 
+    def _relay(self, unit: bytes, answer: bool, kind: Hashable) -> None:
+        if self._legacy is None:
+            return
+        relay = partial(self._legacy.relay, unit, answer)
+        if answer or not self._link.thins(("relay", kind), relay):
+            relay()
+
     def _on_link(self, status: LinkStatus) -> None:
-        before, self._link_state = self._link_state, status.state
+        before, self._link_status = self._link_status, status
         if status.state is LinkState.DOWN:
             self._telemetry.forget()
-        if before is not status.state:
-            lost = status.state is LinkState.DOWN or before is LinkState.UP
-            severity = _S.WARNING if lost else _S.INFO
-            self._journal.say(
-                severity, f"link.{status.state.value}", f"link to the controller: {status.text}"
-            )
-            if before is LinkState.DOWN:
-                self._control.link_is_back()
+        for severity, code, text in news(before, status):
+            self._journal.say(severity, code, text)
+        if before.state is not status.state:
+            if before.state is LinkState.UP:
+                self._control.link_lost(status.text)
+            if status.state is LinkState.DOWN and self._legacy is not None:
+                self._legacy.link_is_down(status.text)
+            if before.state is LinkState.DOWN:
+                self._control.send_latched_stop()
         self._publish_state()
 
     def _on_told(self) -> None:
@@ -232,12 +337,13 @@ class Robot:
 
     def _on_written(self, entry: Entry) -> None:
         self._audit_topic.put(audit_entry(entry), source_time_ns=entry.time_ns)
+        if entry.request == ROTATE:
+            self._journal.say(_S.INFO, "audit.rotated", f"audit log {self._audit.path.name}: {entry.text}")
 
     def _observe(self) -> None:
         if self._link.status.state is not LinkState.UP:
             return
-        activity = self._telemetry.status(time.monotonic()).activity
-        self._control.observe(moving=is_moving(activity, self._telemetry.watch))
+        self._control.observe(moving=self._telemetry.moving(time.monotonic()))
 
     def _controller(self) -> Controller:
         now_s = time.monotonic()
@@ -260,28 +366,21 @@ class Robot:
                 self._controller(),
                 authority.stop,
                 counters=self._link.counters,
+                health=self._link.health,
                 age_s=None if last is None else now.monotonic_s - last.monotonic_s,
                 rate_hz=self._link.rate_hz,
                 controller_time_s=self._telemetry.controller_time_s,
+                audit_head=self._audit.head,
+                speed_percent=self._control.speed_percent,
+                legacy_clients=None if self._legacy is None else self._legacy.counts,
+                policy=self._checks.policy,
+                unchecked=self._checks.problem,
                 now=now,
             )
         )
         self._lease_topic.put(lease_state(authority, now))
-
-
-def _operator(request: Request) -> str:
-    """In whose name something is asked.
-
-    Raises:
-        RefusedError: If it is no name: cut or mended, it might become somebody else's.
-    """
-    name = request.chunk
-    if len(name) > LONGEST:
-        raise RefusedError(f"operator {one_line(name, 40)}: a name has at most {LONGEST} characters")
-    try:
-        return check_chunk(name)
-    except KeyNameError as error:
-        raise RefusedError(str(error)) from None
+        self._programs.state.timestamp.CopyFrom(timestamp(now.wall_ns))
+        self._program_topic.put(self._programs.state)
 
 
 def _why_read_only(settings: RobotSettings, driver: Driver) -> str:

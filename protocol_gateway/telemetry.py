@@ -8,19 +8,20 @@ from collections.abc import Callable
 from bus.publisher import Publisher
 from bus.schemas.robomesh_pb2 import Event
 from protocol_gateway.beat import STALE_S, Beat
-from protocol_gateway.driver import (
+from protocol_gateway.drivers.driver import (
     Activity,
     ControllerEvent,
     JointsReceived,
     MalformedReceived,
+    Mode,
     Refused,
     StatusReceived,
     UnknownReceived,
 )
 from protocol_gateway.journal import Journal
-from protocol_gateway.link import Received
-from protocol_gateway.motion import PositionWatch
-from protocol_gateway.states import joint_states, raw_record
+from protocol_gateway.link.link import Received
+from protocol_gateway.motion import PositionWatch, is_moving
+from protocol_gateway.states import JointStatesMessage, raw_record
 from robots.joints import Joints
 
 _SLOW_S = 0.1
@@ -51,7 +52,7 @@ class Telemetry:
         on_status: Callable[[], None],
         on_refused: Callable[[], None],
     ) -> None:
-        self._joints = joints
+        self._message = JointStatesMessage(joints.names)
         self._fast = fast
         self._slow = slow
         self._raw = raw
@@ -67,6 +68,7 @@ class Telemetry:
         """The link was lost: nothing is known any more, for a controller may come back another."""
         self._status = StatusReceived()
         self._beat = Beat()
+        self._activity_since_s = 0.0
         self._positions: tuple[tuple[float, ...], float] | None = None  # and when they were so
         self._fault = ""
         self._gone = (False, False)
@@ -87,6 +89,10 @@ class Telemetry:
         """The newest; all unknown when it beat and has ceased to."""
         return StatusReceived() if self._beat.ceased(now_s) else self._status
 
+    def moving(self, now_s: float) -> bool | None:
+        """Whether the robot moves; None: not known."""
+        return is_moving(self.status(now_s).activity, self.watch, now_s - self._activity_since_s)
+
     def fault(self, now_s: float) -> str:
         """Text of the fault, while there is one."""
         return "" if self._beat.ceased(now_s) else self._fault
@@ -101,9 +107,13 @@ class Telemetry:
             self.watch.forget()
             text = f"{self.positions_gone(now_s)}: where the robot is is not known, motion is refused"
             self._journal.say(_S.WARNING, "joints.gone", text)
+        if before[0] and not positions:
+            self._journal.say(_S.INFO, "joints.back", "joint positions come again")
         if status and not before[1]:
             text = f"the controller's status has not come for {STALE_S:g} s: it is not known any more"
             self._journal.say(_S.WARNING, "status.gone", text)
+        if before[1] and not status:
+            self._journal.say(_S.INFO, "status.back", "the controller's status comes again")
         self._on_status()
 
     def on_event(self, event: ControllerEvent, received: Received) -> None:
@@ -116,7 +126,7 @@ class Telemetry:
                     self.controller_time_s = event.controller_time_s
                 if any(each is not None for each in _told(event)):  # not the time alone
                     self._beat.see(_told(event), received.monotonic_s)
-                    self._on_told(event)
+                    self._on_told(event, received.monotonic_s)
             case UnknownReceived():
                 self._raw.put(raw_record(event, received.wall_ns), source_time_ns=received.wall_ns)
             case MalformedReceived(offset, text, reason):
@@ -131,19 +141,32 @@ class Telemetry:
             case Refused(number, text):
                 self._on_refused(number, text)
 
-    def _on_told(self, status: StatusReceived) -> None:
+    def _on_told(self, status: StatusReceived, now_s: float) -> None:
         changed = _told(status) != _told(self._status)
-        self._status = status
+        if status.activity is not self._status.activity:
+            self._activity_since_s = now_s
+        before, self._status = self._status, status
         if status.activity is not Activity.FAULT:
             self._fault = ""
         if changed:
+            self._say_what_changed(before, status)
             self._on_status()
+
+    def _say_what_changed(self, before: StatusReceived, now: StatusReceived) -> None:
+        if now.mode is Mode.LOCAL and before.mode is not Mode.LOCAL:
+            text = "the controller is in local mode: people at it move the robot, and nobody from here"
+            self._journal.say(_S.WARNING, "controller.local", text)
+        if now.mode is Mode.REMOTE and before.mode is Mode.LOCAL:
+            self._journal.say(_S.INFO, "controller.remote", "the controller is in remote mode again")
+        if now.activity is Activity.FAULT and before.activity is not Activity.FAULT:
+            text = f"the controller has a fault: {self._fault or 'it does not say which'}"
+            self._journal.say(_S.ERROR, "controller.fault", text)
 
     def _on_joints(self, joints: JointsReceived, received: Received) -> None:
         self._positions = joints.positions, received.monotonic_s
         if joints.controller_time_s is not None:
             self.controller_time_s = joints.controller_time_s
-        message = joint_states(self._joints.names, joints, received.wall_ns)
+        message = self._message.of(joints, received.wall_ns)
         self._fast.put(message, source_time_ns=received.wall_ns)
         if received.monotonic_s >= self._next_slow_s:
             # In step with the grid, so that 100 Hz gives 10 Hz and not 9; after a gap it begins anew.

@@ -16,7 +16,7 @@ from renderer import mesh as mesh_module
 from renderer.mesh import Mesh, prepared
 
 # Counted up whenever a mesh is prepared differently.
-_VERSION = 2
+_VERSION = 4
 
 
 def cache_folder() -> Path:

@@ -5,28 +5,53 @@ the rectangle of the picture that they fill is drawn and resolved: on software O
 the time.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from enum import StrEnum
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.backdrop import EDGE_ON, Backdrops
+from renderer.body_shaders import KEY
 from renderer.cameras import Camera, site_to_clip
+from renderer.lamp import Lamp
 from renderer.mesh import Mesh
+from renderer.obstruction import contains, hides
 from renderer.opengl import Uploaded, columns, compile_programs, set_uniforms, upload
-from renderer.scene import Part, Scene
-from renderer.shadow import NOTHING, soft_shadow
+from renderer.ribbons import ribbons
+from renderer.scene import Finish, Line, Part, Scene
+from renderer.shadow import FloorShadow
 
 Picture = NDArray[np.uint8]
 FloatArray = NDArray[np.float64]
+Bodies = list[tuple[Part, Uploaded]]
 
-_SHADOW_TEXELS = 160
-_EDGE_TONE = (0.07, 0.08, 0.10, 0.42)
-_LINE_TONE = (0.30, 0.34, 0.39, 0.9)
-_STALE_OPACITY = 0.66
-# Seen so flat, the floor is a line.
-_EDGE_ON = 0.05
-_MOST_BACKDROPS = 16
+_EDGE_TONE = (0.06, 0.07, 0.09, 0.42)
+# Linear red, green, blue, and their share of a body's paint; then its opacity.
+_FINISHES: dict[Finish, tuple[tuple[float, float, float, float], float]] = {
+    Finish.PLAIN: ((0.0, 0.0, 0.0, 0.0), 1.0),
+    Finish.STALE: ((0.0, 0.0, 0.0, 0.0), 1.0),
+    Finish.RED: ((0.80, 0.03, 0.02, 0.85), 1.0),
+    Finish.GHOST: ((0.05, 0.28, 0.85, 1.0), 0.38),
+}
+# Of a fixture between the camera and the arm.
+_SEEN_THROUGH = 0.16
+# A fence a mile off must not take the depth's steps from the arm: over the arm's room.
+_FARTHEST = 6.0
+_MOST_RIBBON_BYTES = 1 << 20
+# How far faces stand behind where they are (factor, units), and a ghost's behind a body's.
+_BACK = ((1.0, 2.0), (3.0, 12.0))
+
+
+class Shading(StrEnum):
+    """How much light is computed.
+
+    FAST: a soft shadow on the floor. FULL: the lamp's shadow on robots and fixtures too.
+    """
+
+    FAST = "fast"
+    FULL = "full"
 
 
 class Drawing:
@@ -36,31 +61,33 @@ class Drawing:
         renderer_name: What draws, in the driver's words.
     """
 
-    def __init__(self, context: moderngl.Context, size: tuple[int, int], *, samples: int = 4) -> None:
+    def __init__(
+        self,
+        context: moderngl.Context,
+        size: tuple[int, int],
+        *,
+        samples: int = 4,
+        shading: Shading | str = Shading.FAST,
+    ) -> None:
         self.context = context
         self.size = size
         self.renderer_name = str(context.info["GL_RENDERER"])
         samples = min(samples, context.max_samples)
-        self._programs = compile_programs(context, samples=samples)
+        programs = compile_programs(context, samples=samples, full=Shading(shading) is Shading.FULL)
+        self._programs = programs
         self._bodies_layer = context.texture(size, 4, samples=samples)
         self._bodies = context.framebuffer(
             [self._bodies_layer], context.depth_renderbuffer(size, samples=samples)
         )
         self._final = context.framebuffer([context.renderbuffer(size, 4)])
-        n = _SHADOW_TEXELS
-        self._heights = context.framebuffer(
-            [context.renderbuffer((n, n), 1, dtype="f4")], context.depth_renderbuffer((n, n))
+        self._backdrops = Backdrops(context, programs, size)
+        self._shadow = FloorShadow(context, programs)
+        self._lamp = Lamp(context, programs) if Shading(shading) is Shading.FULL else None
+        self._compose = context.vertex_array(programs.compose, [])
+        self._ribbon_buffer = context.buffer(reserve=_MOST_RIBBON_BYTES, dynamic=True)
+        self._ribbon = context.vertex_array(
+            programs.ribbon, [(self._ribbon_buffer, "4f 4f", "place", "tone")]
         )
-        self._shadow = context.texture((n, n), 1, dtype="f1")
-        self._shadow.repeat_x = self._shadow.repeat_y = False
-        self._shadow_of: tuple[object, ...] | None = None
-        self._backdrop = context.vertex_array(self._programs.backdrop, [])
-        self._plane = context.vertex_array(self._programs.plane, [])
-        self._shade = context.vertex_array(self._programs.shade, [])
-        self._compose = context.vertex_array(self._programs.compose, [])
-        self._line_buffer = context.buffer(reserve=24)
-        self._line = context.vertex_array(self._programs.edge, [(self._line_buffer, "3f", "position")])
-        self._backdrops: dict[tuple[object, ...], moderngl.Framebuffer] = {}
         self._meshes: dict[str, Uploaded] = {}
         self._picture = np.empty((size[1], size[0], 3), dtype=np.uint8)
 
@@ -73,7 +100,7 @@ class Drawing:
         self.forget([name])
         with self.context:
             self._meshes[name] = upload(self.context, self._programs, mesh)
-        self._shadow_of = None
+        self._shadow.forget()
 
     def forget(self, names: Iterable[str]) -> None:
         """Let meshes go."""
@@ -90,10 +117,22 @@ class Drawing:
             return self._draw(scene, camera)
 
     def corners(self, scene: Scene) -> FloatArray | None:
-        """(n, 3) corners of boxes around the bodies, in the site's frame [m]; None: there are none."""
-        return _corners(
-            [(part, self._meshes[part.mesh]) for part in scene.parts if part.mesh in self._meshes]
-        )
+        """(n, 3) corners of boxes around what moves, in the site's frame [m]; None: nothing does."""
+        known = self._known(scene.parts)
+        return _corners(known) if known else None
+
+    def inside(self, scene: Scene, camera: Camera) -> str:
+        """Name of the body that a perspective camera's eye is in; empty where it is in none."""
+        if camera.orthographic:
+            return ""
+        for part, uploaded in self._known(scene.parts + scene.others + scene.fixtures):
+            eye = part.part_to_site[:3, :3].T @ (camera.eye - part.part_to_site[:3, 3])
+            box = uploaded.corners
+            if part.finish is not Finish.GHOST and (eye >= box[0]).all() and (eye <= box[-1]).all():
+                mesh = uploaded.mesh
+                if contains(mesh.positions.astype(np.float64), mesh.triangles, eye):
+                    return part.name
+        return ""
 
     def close(self) -> None:
         """Release everything; the context too."""
@@ -102,41 +141,58 @@ class Drawing:
 
     def _draw(self, scene: Scene, camera: Camera) -> Picture:
         aspect = self.size[0] / self.size[1]
-        matrix = site_to_clip(camera, aspect, center=scene.center, radius=4.0 * scene.radius)
-        self.context.copy_framebuffer(self._final, self._backdrop_of(scene, camera, matrix))
-        if abs(camera.forward[2]) > _EDGE_ON or not camera.orthographic:
-            self._cast_shadow(scene)
-            self._lay_shadow(scene, matrix)
-        parts = self._known(scene)
-        rectangle = _rectangle(parts, matrix, self.size)
+        fixtures = self._known(scene.fixtures)
+        moving = self._known(scene.parts + scene.others)
+        center, radius = _room(scene, fixtures)
+        matrix = site_to_clip(camera, aspect, center=center, radius=4.0 * radius)
+        backdrop = self._backdrops.of(
+            camera, matrix, center=scene.center, radius=scene.radius, floor=scene.floor
+        )
+        self.context.copy_framebuffer(self._final, backdrop)
+        solid = [pair for pair in moving + fixtures if pair[0].finish is not Finish.GHOST]
+        if abs(camera.forward[2]) > EDGE_ON or not camera.orthographic:
+            self._shadow.cast(solid, center=center, radius=radius, floor=scene.floor)
+            self._final.use()
+            self._shadow.lay(matrix, center=center, radius=radius, floor=scene.floor)
+        rectangle = _rectangle(moving + fixtures, scene.lines, matrix, self.size)
         if rectangle is not None:
-            self._draw_bodies(parts, scene, camera, matrix, rectangle)
-            self._lay_bodies(rectangle, opacity=1.0 - (1.0 - _STALE_OPACITY) * scene.stale)
+            if self._lamp is not None:
+                self._lamp.light(solid, center=center, radius=radius)
+            through = {
+                pair[0].mesh
+                for pair in fixtures
+                if hides(camera, aspect, _corners([pair]), center=scene.center, radius=scene.radius)
+            }
+            self._draw_bodies(moving + fixtures, scene, camera, matrix, rectangle, through)
+            self._lay_bodies(rectangle)
         self._final.read_into(self._picture, components=3)
         return self._picture
 
-    def _known(self, scene: Scene) -> list[tuple[Part, Uploaded]]:
-        return [(part, self._meshes[part.mesh]) for part in scene.parts if part.mesh in self._meshes]
+    def _known(self, parts: tuple[Part, ...]) -> Bodies:
+        return [(part, self._meshes[part.mesh]) for part in parts if part.mesh in self._meshes]
 
     def _draw_bodies(
         self,
-        parts: list[tuple[Part, Uploaded]],
+        bodies: Bodies,
         scene: Scene,
         camera: Camera,
         matrix: FloatArray,
         rectangle: tuple[int, int, int, int],
+        through: set[str],
     ) -> None:
         context, programs = self.context, self._programs
+        key = np.array(KEY) / np.linalg.norm(KEY)
         set_uniforms(
             programs.body,
             site_to_clip=columns(matrix),
             eye=tuple(camera.eye),
             forward=tuple(camera.forward),
             orthographic=float(camera.orthographic),
-            stale=scene.stale,
             floor_height=scene.floor,
+            near_floor=0.18 * scene.radius,
+            key=tuple(key),
         )
-        set_uniforms(programs.edge, site_to_clip=columns(matrix), tone=_EDGE_TONE)
+        set_uniforms(programs.edge, site_to_clip=columns(matrix))
         self._bodies.use()
         self._bodies.scissor = rectangle
         self._bodies.clear(depth=1.0)
@@ -145,156 +201,124 @@ class Drawing:
         context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         # The projection turns the picture over, and with it which way round a face goes.
         context.front_face = "cw"
-        # What lets light through comes last, over what stands behind it.
-        for part, uploaded in sorted(parts, key=lambda pair: pair[1].transparent):
-            placement = columns(part.part_to_site)
-            if uploaded.body is not None:
-                # Faces a little back, so that the edges drawn over them are whole.
-                context.polygon_offset = 1.0, 2.0
-                set_uniforms(programs.body, part_to_site=placement)
-                uploaded.body.render()
-                context.polygon_offset = 0.0, 0.0
-            if uploaded.edges is not None:
-                set_uniforms(programs.edge, part_to_site=placement)
-                uploaded.edges.render()
+        solid, glass, ghosts = [], [], []
+        for pair in sorted(bodies, key=lambda pair: _depth(pair, camera)):
+            part, uploaded = pair
+            if part.finish is Finish.GHOST:
+                ghosts.append(pair)
+            elif uploaded.mesh.transparent or part.mesh in through:
+                glass.append(pair)
+            else:
+                solid.append(pair)
+        # The nearest first, and unblended: what is hidden, or covers all, costs least so.
+        context.disable(moderngl.BLEND)
+        for pair in solid:
+            self._draw_faces(pair)
+        context.enable(moderngl.BLEND)
+        for pair in solid:
+            self._draw_edges(pair)
+        self._draw_lines(scene.lines, matrix)
+        # What lets light through comes last, the farthest first; over all of it what is nowhere.
+        for pair in reversed(glass):
+            self._draw_faces(pair, opacity=_SEEN_THROUGH if pair[0].mesh in through else 1.0)
+            self._draw_edges(pair)
+        # Its nearest faces only: first their depth, then what has it.
+        self._bodies.color_mask = False, False, False, False
+        for pair in ghosts:
+            self._draw_faces(pair)
+        self._bodies.color_mask = True, True, True, True
+        context.depth_func = "<="
+        for pair in ghosts:
+            self._draw_faces(pair)
+            self._draw_edges(pair)
+        context.depth_func = "<"
 
-    def _lay_bodies(self, rectangle: tuple[int, int, int, int], *, opacity: float) -> None:
+    def _draw_faces(self, pair: tuple[Part, Uploaded], *, opacity: float = 1.0) -> None:
+        part, uploaded = pair
+        if uploaded.body is None:
+            return
+        tint, own_opacity = _FINISHES[part.finish]
+        # A little back, so that the edges drawn over them are whole.
+        self.context.polygon_offset = _BACK[part.finish is Finish.GHOST]
+        set_uniforms(
+            self._programs.body,
+            part_to_site=columns(part.part_to_site),
+            tint=tint,
+            opacity=opacity * own_opacity,
+            stale=float(part.finish is Finish.STALE),
+        )
+        uploaded.body.render()
+        self.context.polygon_offset = 0.0, 0.0
+
+    def _draw_edges(self, pair: tuple[Part, Uploaded]) -> None:
+        part, uploaded = pair
+        if uploaded.edges is not None:
+            red, green, blue, share = _EDGE_TONE
+            tone = red, green, blue, share * _FINISHES[part.finish][1]
+            set_uniforms(self._programs.edge, part_to_site=columns(part.part_to_site), tone=tone)
+            uploaded.edges.render()
+
+    def _draw_lines(self, lines: Sequence[Line], matrix: FloatArray) -> None:
+        if not lines:
+            return
+        corners = ribbons(lines, matrix, self.size)
+        most = _MOST_RIBBON_BYTES // corners[:1].nbytes if len(corners) else 0
+        corners = corners[-most:] if most else corners
+        if len(corners):
+            self._ribbon_buffer.write(corners.tobytes())
+            self.context.disable(moderngl.CULL_FACE)
+            self._ribbon.render(vertices=len(corners))
+            self.context.enable(moderngl.CULL_FACE)
+
+    def _lay_bodies(self, rectangle: tuple[int, int, int, int]) -> None:
         x, y, width, height = rectangle
         corners = np.array([x, y, x + width, y + height]) / np.array([*self.size, *self.size]) * 2.0 - 1.0
         self._final.use()
         self.context.enable_only(moderngl.BLEND)
         self.context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         self._bodies_layer.use(0)
-        set_uniforms(self._programs.compose, rectangle=tuple(corners), opacity=opacity)
+        set_uniforms(self._programs.compose, rectangle=tuple(corners))
         self._compose.render(moderngl.TRIANGLE_STRIP, vertices=4)
 
-    def _backdrop_of(self, scene: Scene, camera: Camera, matrix: FloatArray) -> moderngl.Framebuffer:
-        """Backdrop and grid of a camera, drawn when it is first asked for."""
-        key = (matrix.tobytes(), scene.floor)
-        backdrop = self._backdrops.get(key)
-        if backdrop is None:
-            if len(self._backdrops) >= _MOST_BACKDROPS:
-                oldest = self._backdrops.pop(next(iter(self._backdrops)))
-                oldest.color_attachments[0].release()
-                oldest.release()
-            backdrop = self.context.framebuffer([self.context.renderbuffer(self.size, 4)])
-            self._backdrops[key] = backdrop
-            self._draw_backdrop(backdrop, scene, camera, matrix)
-        return backdrop
 
-    def _draw_backdrop(
-        self, target: moderngl.Framebuffer, scene: Scene, camera: Camera, matrix: FloatArray
-    ) -> None:
-        """A calm gradient and the floor's grid; seen edge-on, squared paper and the floor's line."""
-        forward = camera.forward
-        edge_on = camera.orthographic and abs(forward[2]) < _EDGE_ON
-        extent = 6.0 * scene.radius
-        # Lines stay where they are in the site, wherever the scene's middle is.
-        floor = np.array([*np.round(scene.center[:2]), scene.floor])
-        up = np.array([0.0, 0.0, 1.0])
-        origin, u, v = floor, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
-        if edge_on:
-            origin, u, v = floor + forward * 3.5 * scene.radius, np.cross(forward, up), up
-        target.use()
-        self.context.enable_only(moderngl.BLEND)
-        self.context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
-        # Looked at from above, there is no horizon to shade towards.
-        set_uniforms(self._programs.backdrop, level=1.0 - abs(float(forward[2])) ** 4)
-        self._backdrop.render(vertices=3)
-        set_uniforms(
-            self._programs.plane,
-            site_to_clip=columns(matrix),
-            origin=tuple(origin),
-            u=tuple(u),
-            v=tuple(v),
-            extent=extent,
-            fine=0.1,
-            coarse=0.5,
-            strength=0.55 if edge_on else 1.0,
-        )
-        self._plane.render(moderngl.TRIANGLE_STRIP, vertices=4)
-        if edge_on:
-            ends = np.array([origin - u * extent, origin + u * extent], dtype=np.float32)
-            self._line_buffer.write(ends.tobytes())
-            identity = columns(np.eye(4))
-            set_uniforms(
-                self._programs.edge, site_to_clip=columns(matrix), part_to_site=identity, tone=_LINE_TONE
-            )
-            self.context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
-            self._line.render(moderngl.LINES)
-
-    def _cast_shadow(self, scene: Scene) -> None:
-        """Draw the shadow map anew, unless nothing has moved since."""
-        placements = tuple((part.mesh, part.part_to_site.tobytes()) for part in scene.parts)
-        key = (placements, scene.center.tobytes(), scene.radius, scene.floor)
-        if key == self._shadow_of:
-            return
-        program, extent = self._programs.cast, _shadow_extent(scene)
-        self._heights.use()
-        self._heights.clear(NOTHING, depth=1.0)
-        self.context.enable_only(moderngl.DEPTH_TEST)
-        set_uniforms(
-            program,
-            center=tuple(scene.center[:2]),
-            extent=extent,
-            floor_height=scene.floor,
-            tallest=4.0 * scene.radius,
-        )
-        for part in scene.parts:
-            uploaded = self._meshes.get(part.mesh)
-            if uploaded is not None and uploaded.shadow is not None:
-                set_uniforms(program, part_to_site=columns(part.part_to_site))
-                uploaded.shadow.render()
-        n = _SHADOW_TEXELS
-        heights = np.frombuffer(self._heights.read(components=1, dtype="f4"), dtype=np.float32).reshape(n, n)
-        dark = soft_shadow(heights / scene.radius, texel=2.0 * extent / n / scene.radius)
-        self._shadow.write((np.clip(dark, 0.0, 1.0) * 255.0).astype(np.uint8).tobytes())
-        self._shadow_of = key
-
-    def _lay_shadow(self, scene: Scene, matrix: FloatArray) -> None:
-        self._final.use()
-        self.context.enable_only(moderngl.BLEND)
-        self.context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
-        self._shadow.use(0)
-        set_uniforms(
-            self._programs.shade,
-            site_to_clip=columns(matrix),
-            origin=(*scene.center[:2], scene.floor),
-            u=(1.0, 0.0, 0.0),
-            v=(0.0, 1.0, 0.0),
-            extent=_shadow_extent(scene),
-            strength=1.0 - 0.5 * scene.stale,
-        )
-        self._shade.render(moderngl.TRIANGLE_STRIP, vertices=4)
+def _room(scene: Scene, fixtures: Bodies) -> tuple[FloatArray, float]:
+    """Middle and radius of what the floor's shadow and the depths must hold, fixtures that are near too."""
+    if not fixtures:
+        return scene.center, scene.radius
+    corners = _corners(fixtures)
+    low = np.minimum(corners.min(axis=0), scene.center - scene.radius)
+    high = np.maximum(corners.max(axis=0), scene.center + scene.radius)
+    radius = float(np.linalg.norm(high - low)) / 2.0
+    if radius > _FARTHEST * scene.radius:
+        return scene.center, _FARTHEST * scene.radius
+    return (low + high) / 2.0, radius
 
 
-def _shadow_extent(scene: Scene) -> float:
-    return 1.5 * scene.radius
+def _depth(pair: tuple[Part, Uploaded], camera: Camera) -> float:
+    return float((_corners([pair]).mean(axis=0) - camera.eye) @ camera.forward)
 
 
-def _corners(parts: list[tuple[Part, Uploaded]]) -> FloatArray | None:
-    if not parts:
-        return None
-    return np.concatenate(
-        [
-            uploaded.corners @ part.part_to_site[:3, :3].T + part.part_to_site[:3, 3]
-            for part, uploaded in parts
-        ]
-    )
+def _corners(bodies: Bodies) -> FloatArray:
+    """(8n, 3) of the boxes about bodies, in the site's frame [m]."""
+    boxes = [
+        uploaded.corners @ part.part_to_site[:3, :3].T + part.part_to_site[:3, 3] for part, uploaded in bodies
+    ]
+    return np.concatenate([np.empty((0, 3)), *boxes])
 
 
 def _rectangle(
-    parts: list[tuple[Part, Uploaded]], matrix: FloatArray, size: tuple[int, int]
+    bodies: Bodies, lines: Sequence[Line], matrix: FloatArray, size: tuple[int, int]
 ) -> tuple[int, int, int, int] | None:
-    """(x, y, width, height) of the picture that the parts can fill [px]; None: nothing of it."""
-    corners = _corners(parts)
-    if corners is None:
+    """(x, y, width, height) of the picture that bodies and lines can fill [px]; None: nothing of it."""
+    points = np.concatenate([_corners(bodies), *(line.points for line in lines)])
+    if not len(points):
         return None
-    clip = np.c_[corners, np.ones(len(corners))] @ matrix.T
+    clip = np.c_[points, np.ones(len(points))] @ matrix.T
     if (clip[:, 3] <= 1e-6).any():
         return 0, 0, *size  # something stands beside or behind the eye
     places = (clip[:, :2] / clip[:, 3:] + 1.0) / 2.0 * np.array(size)
-    low = np.clip(np.floor(places.min(axis=0)) - 2, 0, size).astype(int)
-    high = np.clip(np.ceil(places.max(axis=0)) + 2, 0, size).astype(int)
+    edge = 2 + (size[1] // 180 if lines else 0)
+    low = np.clip(np.floor(places.min(axis=0)) - edge, 0, size).astype(int)
+    high = np.clip(np.ceil(places.max(axis=0)) + edge, 0, size).astype(int)
     width, height = (high - low).tolist()
     return (int(low[0]), int(low[1]), width, height) if width > 0 and height > 0 else None

@@ -27,6 +27,10 @@ Picture = NDArray[np.uint8]
 _NEVER = 1_000_000
 _ITU601, _LIMITED_RANGE = 6, 1
 
+# Of a stream that may have few bits: this much of a second may come at once, so key frames stay small.
+_BURST_S = 0.5
+_FEW_BITS_QUALITY = "28"
+
 # The first that opens is used: a GPU's if there is one, then x264.
 _CODECS: dict[str, dict[str, str]] = {
     "h264_nvenc": {
@@ -68,8 +72,14 @@ class VideoEncoder(Protocol):
 class H264Encoder:
     """H.264 by one of FFmpeg's encoders."""
 
-    def __init__(self, size: tuple[int, int], fps: float, *, codec: str) -> None:
+    def __init__(
+        self, size: tuple[int, int], fps: float, *, codec: str, most_bits_per_s: float = 0.0
+    ) -> None:
         """Open the encoder.
+
+        Args:
+            fps: Highest rate; the bits of a slower stream are fewer.
+            most_bits_per_s: Highest; 0: as many as the quality needs.
 
         Raises:
             NoEncoderError: If this machine cannot.
@@ -87,12 +97,13 @@ class H264Encoder:
             # Said in the stream, or a player guesses by the picture's height.
             context.colorspace = context.color_primaries = context.color_trc = _ITU601
             context.color_range = _LIMITED_RANGE
-            context.options = _CODECS[codec]
+            context.options = _CODECS[codec] | _limit(codec, most_bits_per_s)
             # One slice a picture, and no core taken from the drawing.
             context.thread_count = 1
             context.open()
         except (FFmpegError, ValueError) as error:
-            raise NoEncoderError(f"{codec} cannot be opened: {error}") from None
+            reason = getattr(error, "strerror", None) or error
+            raise NoEncoderError(f"{codec} cannot be opened: {reason}") from None
         self._context = context
 
     def encode(self, picture: Picture, *, key_frame: bool) -> Packet:
@@ -116,7 +127,18 @@ class H264Encoder:
         return Packet(bytes(packets[0]), bool(packets[0].is_keyframe))
 
 
-def open_encoder(size: tuple[int, int], fps: float) -> VideoEncoder:
+def _limit(codec: str, most_bits_per_s: float) -> dict[str, str]:
+    if not most_bits_per_s:
+        return {}
+    quality = "cq" if codec == "h264_nvenc" else "crf"
+    return {
+        quality: _FEW_BITS_QUALITY,
+        "maxrate": str(round(most_bits_per_s)),
+        "bufsize": str(round(most_bits_per_s * _BURST_S)),
+    }
+
+
+def best_codec(size: tuple[int, int], fps: float) -> str:
     """The best H.264 encoder of this machine, tried on a picture.
 
     Raises:
@@ -127,14 +149,34 @@ def open_encoder(size: tuple[int, int], fps: float) -> VideoEncoder:
         try:
             trial = H264Encoder(size, fps, codec=codec)
             trial.encode(np.zeros((size[1], size[0], 3), dtype=np.uint8), key_frame=True)
-            encoder = H264Encoder(size, fps, codec=codec)
         except NoEncoderError as error:
             reasons.append(str(error))
             continue
         for reason in reasons:
-            log.debug("%s; %s is used", reason, codec)
-        return encoder
+            log.info("%s: %s is used instead", reason, codec)
+        return codec
     raise NoEncoderError("no H.264 encoder here: " + "; ".join(reasons))
+
+
+def open_encoder(
+    size: tuple[int, int], fps: float, *, codec: str | None = None, most_bits_per_s: float = 0.0
+) -> VideoEncoder:
+    """An encoder for a stream.
+
+    Args:
+        codec: The one that was found best; None: it is looked for.
+
+    Raises:
+        NoEncoderError: If none works; the text tells why of each.
+    """
+    try:
+        found = codec or best_codec(size, fps)
+        return H264Encoder(size, fps, codec=found, most_bits_per_s=most_bits_per_s)
+    except NoEncoderError:
+        if codec is None:
+            raise
+    # A GPU has no room for another stream, or takes no picture as small.
+    return open_encoder(size, fps, most_bits_per_s=most_bits_per_s)
 
 
 def jpeg(picture: Picture, *, quality: int = 88) -> bytes:

@@ -5,6 +5,10 @@ RendererError
 ├── NoEncoderError          no H.264 encoder could be opened, or one failed
 ├── GlbError                bytes that are not the GLB that a mesh should be
 ├── ChainError              a URDF that is not a serial chain
+├── Mp4Error                packets that cannot be put into an MP4 file
+├── ViewRequestError        a view of one's own that is not possible
+│   └── NoRoomError         as it is possible, but too much is drawn already
+├── CameraError             a camera that hangs on nothing, or looks nowhere
 └── UnknownViewError        a view that neither the description nor the renderer has
 """
 
@@ -18,11 +22,17 @@ class RendererError(Exception):
 class NoOpenGLError(RendererError):
     """OpenGL cannot be used on this machine."""
 
-    def __init__(self, reason: str) -> None:
-        super().__init__(
+    def __init__(self, reason: str, *, device: int | None = None) -> None:
+        text = (
             f"no OpenGL here ({reason}): install it with 'apt-get install libegl1 libgl1'; "
             "everything but the renderer runs without it"
         )
+        if device is not None:
+            text = (
+                f"EGL device {device} cannot be used ({reason}): name another (they count from 0), or none "
+                "for EGL's own choice; libegl1 and libgl1 must be installed"
+            )
+        super().__init__(text)
 
 
 class NoEncoderError(RendererError):
@@ -35,6 +45,27 @@ class GlbError(RendererError):
 
 class ChainError(RendererError):
     """A URDF that is not a serial chain."""
+
+
+class Mp4Error(RendererError):
+    """Packets that cannot be put into an MP4 file."""
+
+
+class ViewRequestError(RendererError):
+    """A view of one's own that is not possible."""
+
+
+class NoRoomError(ViewRequestError):
+    """A view of one's own that there is no room for now; its text begins with `SIGN`, for who asked."""
+
+    SIGN = "no room: "
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(self.SIGN + reason)
+
+
+class CameraError(RendererError):
+    """A camera that hangs on nothing, looks nowhere, or has numbers that are not possible."""
 
 
 class UnknownViewError(RendererError):

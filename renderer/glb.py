@@ -156,6 +156,9 @@ def _surface(
         colors = np.ones((len(positions), 4))
         given = _accessor(document, binary, attributes["COLOR_0"])
         colors[:, : given.shape[1]] = given
+        # As the factors of materials: linear light in the file.
+        low = colors[:, :3] <= 0.0031308
+        colors[:, :3] = np.where(low, 12.92 * colors[:, :3], 1.055 * colors[:, :3] ** (1 / 2.4) - 0.055)
     return Surface(
         positions=positions @ node_to_file[:3, :3].T + node_to_file[:3, 3],
         normals=normals,

@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer import shaders
+from renderer import body_shaders, shaders
 from renderer.errors import NoOpenGLError
 from renderer.mesh import VERTEX, Mesh
 
@@ -31,7 +31,8 @@ def open_context(device: int | None = None) -> moderngl.Context:
     try:
         return moderngl.create_context(**options)
     except Exception as error:  # moderngl raises bare Exception, ImportError and OSError here.
-        raise NoOpenGLError(" ".join(str(error).split()) or type(error).__name__) from None
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise NoOpenGLError(reason, device=device) from None
 
 
 def _keep_freed_memory() -> None:
@@ -50,6 +51,8 @@ class Programs:
 
     body: moderngl.Program
     edge: moderngl.Program
+    ribbon: moderngl.Program
+    lamp: moderngl.Program
     cast: moderngl.Program
     backdrop: moderngl.Program
     plane: moderngl.Program
@@ -57,17 +60,21 @@ class Programs:
     compose: moderngl.Program
 
 
-def compile_programs(context: moderngl.Context, *, samples: int) -> Programs:
-    """The shaders, compiled for so many samples a pixel."""
-    compose = f"#version 330\n#define SAMPLES {samples}\n{shaders.COMPOSE_FRAGMENT}"
+def compile_programs(context: moderngl.Context, *, samples: int, full: bool) -> Programs:
+    """The shaders, compiled for so many samples a pixel; `full`: with the lamp's shadow on bodies."""
+    body, compose = body_shaders.BODY_FRAGMENT, f"#define SAMPLES {samples}\n{shaders.COMPOSE_FRAGMENT}"
+    if full:
+        body = f"#define FULL\n{body}"
     return Programs(
-        body=context.program(shaders.BODY_VERTEX, shaders.BODY_FRAGMENT),
-        edge=context.program(shaders.EDGE_VERTEX, shaders.EDGE_FRAGMENT),
+        body=context.program(body_shaders.BODY_VERTEX, f"{shaders.VERSION}{body}"),
+        edge=context.program(body_shaders.EDGE_VERTEX, body_shaders.EDGE_FRAGMENT),
+        ribbon=context.program(body_shaders.RIBBON_VERTEX, body_shaders.RIBBON_FRAGMENT),
+        lamp=context.program(body_shaders.LAMP_VERTEX, body_shaders.LAMP_FRAGMENT),
         cast=context.program(shaders.SHADOW_VERTEX, shaders.SHADOW_FRAGMENT),
         backdrop=context.program(shaders.FULL_PICTURE_VERTEX, shaders.BACKDROP_FRAGMENT),
         plane=context.program(shaders.PLANE_VERTEX, shaders.PLANE_FRAGMENT),
         shade=context.program(shaders.PLANE_VERTEX, shaders.SHADE_FRAGMENT),
-        compose=context.program(shaders.RECTANGLE_VERTEX, compose),
+        compose=context.program(shaders.RECTANGLE_VERTEX, f"{shaders.VERSION}{compose}"),
     )
 
 
@@ -76,19 +83,22 @@ class Uploaded:
     """A mesh on the GPU.
 
     Attributes:
+        mesh: What was brought.
         corners: (8, 3) of the box around it, in its own frame [m].
     """
+
+    mesh: Mesh
 
     body: moderngl.VertexArray | None
     edges: moderngl.VertexArray | None
     shadow: moderngl.VertexArray | None
-    transparent: bool
+    lamp: moderngl.VertexArray | None
     corners: NDArray[np.float64]
     _buffers: list[moderngl.Buffer] = field(default_factory=list)
 
     def release(self) -> None:
         """Let it go."""
-        for array in (self.body, self.edges, self.shadow):
+        for array in (self.body, self.edges, self.shadow, self.lamp):
             if array is not None:
                 array.release()
         for buffer in self._buffers:
@@ -106,11 +116,13 @@ def upload(context: moderngl.Context, programs: Programs, mesh: Mesh) -> Uploade
     vertices = np.zeros(len(mesh.positions), dtype=VERTEX)
     vertices["position"], vertices["normal"] = mesh.positions, mesh.normals
     vertices["color"], vertices["surface"] = mesh.colors, mesh.surface
-    body = edges = shadow = None
+    body = edges = shadow = lamp = None
     if len(mesh.triangles):
-        layout = (buffer(vertices.tobytes()), "3f 3f 4f1 4f1", "position", "normal", "paint", "surface")
+        content = buffer(vertices.tobytes())
+        layout = (content, "3f 3f 4f1 4f1", "position", "normal", "paint", "surface")
         indices = buffer(mesh.triangles.astype("u4").tobytes())
         body = context.vertex_array(programs.body, [layout], index_buffer=indices)
+        lamp = context.vertex_array(programs.lamp, [(content, "3f 20x", "position")], index_buffer=indices)
     if len(mesh.edges):
         ends = buffer(mesh.edges.tobytes())
         edges = context.vertex_array(programs.edge, [(ends, "3f", "position")], mode=moderngl.LINES)
@@ -118,7 +130,8 @@ def upload(context: moderngl.Context, programs: Programs, mesh: Mesh) -> Uploade
         shadow = context.vertex_array(programs.cast, [(buffer(mesh.shadow.tobytes()), "3f", "position")])
     low, high = (mesh.positions.min(axis=0), mesh.positions.max(axis=0)) if len(vertices) else (0.0, 0.0)
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=np.float64)
-    return Uploaded(body, edges, shadow, mesh.transparent, low + corners * (np.subtract(high, low)), buffers)
+    box = low + corners * np.subtract(high, low)
+    return Uploaded(mesh, body, edges, shadow, lamp, box, buffers)
 
 
 def columns(matrix: NDArray[np.float64]) -> bytes:

@@ -3,7 +3,7 @@
 Figures have one width, so that columns stand still while values run.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import cv2
@@ -15,10 +15,10 @@ Mask = NDArray[np.float32]
 Color = tuple[int, int, int]
 
 INK: Color = (34, 40, 48)
-FAINT: Color = (74, 83, 94)
+FAINT: Color = (58, 66, 77)
 PAPER: Color = (228, 232, 237)
 AMBER: Color = (250, 176, 24)
-MAGENTA: Color = (168, 36, 128)
+MAGENTA: Color = (140, 14, 104)
 
 _FIGURES = "0123456789"
 _REGULAR, _BOLD = 420, 650
@@ -39,7 +39,8 @@ class Overlay:
     """All that is written.
 
     Attributes:
-        mark: A word that must not be missed ("simulated"), or nothing.
+        marks: Words that must not be missed ("simulated", "replay", "inside forearm").
+        scale: What a square of the floor is ("100 mm"), or nothing.
         stale: "STALE 3 s", or nothing while the picture shows what is so.
     """
 
@@ -48,8 +49,14 @@ class Overlay:
     time: str
     state: str
     rows: tuple[Row, ...]
-    mark: str = ""
+    marks: tuple[str, ...] = ()
+    scale: str = ""
     stale: str = ""
+
+
+def inside(overlay: Overlay, body: str) -> Overlay:
+    """An overlay that tells that the camera stands in a body; as it is where it stands in none."""
+    return replace(overlay, marks=(*overlay.marks, f"inside {body}")) if body else overlay
 
 
 def write_over(picture: Picture, overlay: Overlay) -> None:
@@ -62,15 +69,30 @@ def write_over(picture: Picture, overlay: Overlay) -> None:
     x = margin + _text(picture, overlay.title, (margin, baseline), size=round(size * 1.2), weight=_BOLD)
     x += round(size * 0.7)
     x += _text(picture, overlay.view, (x, baseline), size=size, color=FAINT)
-    if overlay.mark:
-        _text(picture, overlay.mark, (x + round(size * 0.7), baseline), size=size, color=MAGENTA)
+    for mark in overlay.marks:
+        x += round(size * 0.7)
+        x += _text(picture, mark, (x, baseline), size=size, color=MAGENTA)
     at = width - margin - text_width(overlay.time, size)
     _text(picture, overlay.time, (at, baseline), size=size)
     at = width - margin - text_width(overlay.state, size)
     _text(picture, overlay.state, (at, baseline + round(1.45 * size)), size=size, color=FAINT)
     _write_rows(picture, overlay, size=size, margin=margin)
+    if overlay.scale:
+        _write_scale(picture, overlay.scale, size=size, margin=margin)
     if overlay.stale:
         _write_badge(picture, overlay.stale, size=round(size * 1.5), y=margin)
+
+
+def write_label(picture: Picture, text: str, at: tuple[int, int], *, color: Color) -> None:
+    """Write a word on paper with its left end at a place in a picture, moved to where all of it shows."""
+    height, width = picture.shape[:2]
+    size = max(13, round(height / 34))
+    pad = size // 3
+    extent = text_width(text, size) + 2 * pad, round(1.3 * size)
+    x = min(max(at[0], 0), max(width - extent[0], 0))
+    y = min(max(at[1], 0), max(height - extent[1], 0))
+    _wash(picture, (x, y), extent)
+    _text(picture, text, (x + pad, y + size), size=size, color=color)
 
 
 def _write_rows(picture: Picture, overlay: Overlay, *, size: int, margin: int) -> None:
@@ -107,6 +129,20 @@ def _write_rows(picture: Picture, overlay: Overlay, *, size: int, margin: int) -
         picture[middle - half : middle + half, at - 1 : at + 2] = color
 
 
+def _write_scale(picture: Picture, text: str, *, size: int, margin: int) -> None:
+    """What a square of the floor is: a square, and its width."""
+    height, width = picture.shape[:2]
+    small, gap = round(0.85 * size), round(0.4 * size)
+    side = round(0.62 * size)
+    extent = side + text_width(text, small) + 3 * gap, round(1.45 * small)
+    x, y = width - margin - extent[0], height - margin - extent[1]
+    _wash(picture, (x, y), extent)
+    middle = y + extent[1] // 2
+    corner = x + gap, middle - side // 2
+    cv2.rectangle(picture, corner, (corner[0] + side, corner[1] + side), FAINT, max(1, size // 16))
+    _text(picture, text, (corner[0] + side + gap, middle + round(0.36 * small)), size=small, color=FAINT)
+
+
 def _write_badge(picture: Picture, text: str, *, size: int, y: int) -> None:
     width = picture.shape[1]
     pad = round(0.55 * size)
@@ -119,8 +155,10 @@ def _write_badge(picture: Picture, text: str, *, size: int, y: int) -> None:
 def _wash(picture: Picture, at: tuple[int, int], size: tuple[int, int]) -> None:
     """A veil of paper, so that what is written on it reads over anything."""
     x, y = at
-    area = picture[max(y, 0) : y + size[1], x : x + size[0]]
-    cv2.addWeighted(area, 0.42, np.full_like(area, PAPER), 0.58, 0.0, dst=area)
+    area = picture[max(y, 0) : max(y + size[1], 0), max(x, 0) : max(x + size[0], 0)]
+    if not area.size:
+        return
+    cv2.addWeighted(area, 0.34, np.full_like(area, PAPER), 0.66, 0.0, dst=area)
 
 
 def text_width(text: str, size: int, weight: int = _REGULAR) -> int:

@@ -1,40 +1,44 @@
 """The renderer service: video and pictures of a site's robots, drawn only while watched."""
 
 import asyncio
+import contextlib
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
-from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
-from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
-
-from bus.errors import BusError, MessageError, RefusedError
-from bus.keys import ROOT, robot_key
-from bus.requests import Request
-from bus.schemas.robomesh_pb2 import ControllerState, Description, KeyFrameAnswer
+from bus.errors import RefusedError
+from bus.keys import WHOLE_SITE
+from bus.requests import Answerer, Request
+from bus.schemas.robomesh_pb2 import Event, KeyFrameAnswer, ViewAnswer, ViewRequest
 from bus.session import Session
-from bus.subscription import Subscription
-from renderer.cache import cache_folder, store_glb, stored_glb
-from renderer.errors import RendererError, UnknownViewError
-from renderer.look import CLOSE, Look, look_of, mesh_name
+from renderer.cache import cache_folder
+from renderer.composing import Composition
+from renderer.errors import NoRoomError, RendererError, UnknownViewError
+from renderer.finishing import Finished, Finishing, Order
+from renderer.pace import Pace, next_of
+from renderer.requested import FAR, Shot, far, requested, standing
+from renderer.robots import Robots
 from renderer.state import Ages, RobotState
 from renderer.stream import Stream
-from renderer.studio import Studio, open_thread
+from renderer.studio import Drawn, Studio, open_thread
+from renderer.views import CLOSE, FREE, camera_of, view_names
 
 log = logging.getLogger(__name__)
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
-_MESH_TIMEOUT_S = 10.0
-_ASK_AGAIN_S = 2.0
-# For a site of many robots; each robot's newest counts, and the rest is skipped when read.
-_RING = 512
+_TIDY_EACH_S = 1.0
+# A view of one's own: so long for the first watcher to come, and for another after the last one.
+_COMES_WITHIN_S, _COMES_BACK_WITHIN_S = 10.0, 5.0
+# Of as many views as may be asked for, so many may be as large and fast as the renderer's own, or as this.
+_FULL_VIEWS = 0.25
+_FULL_PIXELS_PER_S = 1280 * 720 * 30.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,11 +47,13 @@ class Settings:
 
     Attributes:
         robots: Their names; none: every robot of the site.
-        views: Of each robot, beside a close-up that follows the arm.
+        views: Of each robot, beside a close-up that follows the arm and one for slow links.
         size: Width and height of the pictures, both even [px].
         fps: Highest rate of a view's video [1/s].
         samples: Of anti-aliasing; 0: none.
+        shading: "fast" or "full".
         device: Number of the EGL device; None: EGL's own choice.
+        most_views: That may be asked for beside its own, of all robots together.
         folder: Where meshes are kept.
     """
 
@@ -57,7 +63,9 @@ class Settings:
     size: tuple[int, int] = (1280, 720)
     fps: float = 30.0
     samples: int = 4
+    shading: str = "fast"
     device: int | None = None
+    most_views: int = 16
     folder: Path = field(default_factory=cache_folder)
 
 
@@ -72,29 +80,28 @@ async def serve(session: Session, settings: Settings) -> None:
         raise RendererError(f"renderer size {width} x {height}: even numbers from 64 to 4096 are possible")
     if not 1.0 <= settings.fps <= 120.0:
         raise RendererError(f"renderer fps {settings.fps:g}: 1 to 120 is possible")
-    with open_thread() as thread:
-        studio = await _in(thread, _open_studio, settings)
-        log.info("drawing with %s, encoding with %s", studio.renderer_name, studio.encoder_name)
+    with open_thread("drawing") as drawing, open_thread("encoding") as encoding:
+        studio = await _in(
+            drawing,
+            Studio,
+            settings.size,
+            samples=settings.samples,
+            shading=settings.shading,
+            device=settings.device,
+            folder=settings.folder,
+        )
         try:
-            await _Renderer(session, settings, thread, studio).run()
+            finishing = await _in(encoding, Finishing, settings.size, settings.fps)
+            log.info("drawing with %s, encoding with %s", studio.renderer_name, finishing.codec)
+            await _Renderer(session, settings, (drawing, studio), (encoding, finishing)).run()
         finally:
-            thread.submit(studio.close)
-
-
-def _open_studio(settings: Settings) -> Studio:
-    return Studio(
-        settings.size,
-        settings.fps,
-        samples=settings.samples,
-        device=settings.device,
-        folder=settings.folder,
-    )
+            drawing.submit(studio.close)
 
 
 def _in(
     thread: ThreadPoolExecutor, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs
 ) -> asyncio.Future[T]:
-    """Run something in the studio's thread."""
+    """Run something in a thread of its own."""
     return asyncio.get_running_loop().run_in_executor(thread, partial(function, *args, **kwargs))
 
 
@@ -102,124 +109,250 @@ class _Renderer:
     """One run of the service: the robots that it knows, and their streams."""
 
     def __init__(
-        self, session: Session, settings: Settings, thread: ThreadPoolExecutor, studio: Studio
+        self,
+        session: Session,
+        settings: Settings,
+        drawing: tuple[ThreadPoolExecutor, Studio],
+        encoding: tuple[ThreadPoolExecutor, Finishing],
     ) -> None:
-        self._session, self._settings, self._thread, self._studio = session, settings, thread, studio
-        self._robots: dict[str, RobotState] = {}
-        self._streams: list[Stream] = []
-        self._loading: dict[str, asyncio.Task[None]] = {}
-        self._subscriptions: dict[str, Subscription] = {}
+        self._session, self._settings = session, settings
+        self._drawing, self._studio = drawing
+        self._encoding, self._finishing = encoding
+        self._robots = Robots(
+            session,
+            settings.site,
+            self,
+            wanted=lambda robot: not settings.robots or robot in settings.robots,
+            folder=settings.folder,
+        )
+        # By robot and view.
+        self._streams: dict[tuple[str, str], Stream] = {}
+        self._answerers: dict[str, list[Answerer]] = {}
+        self._active: set[Stream] = set()
+        self._wake = asyncio.Event()
+        self._pace = Pace()
+        self._pictures = 0
+        self._events = session.declare_publisher(settings.site, WHOLE_SITE, "events/renderer")
+        session.measure("views", "Views that can be watched", lambda: len(self._streams))
+        session.measure("pictures_total", "Pictures drawn", lambda: self._pictures)
+        session.measure("views_drawn", "Views that somebody watches", lambda: len(self._active))
 
     async def run(self) -> None:
         async with asyncio.TaskGroup() as group:
-            for name in ("description", "frames", "joints", "controller"):
-                key_expr = f"{ROOT}/{self._settings.site}/*/{name}"
-                subscription = self._session.subscribe(key_expr, newest=_RING)
-                self._subscriptions[name] = subscription
-                group.create_task(self._follow(subscription, group))
+            group.create_task(self._robots.follow())
             group.create_task(self._paint_forever())
+            group.create_task(self._tidy_forever())
 
-    async def _follow(self, subscription: Subscription, group: asyncio.TaskGroup) -> None:
-        async for sample in subscription:
-            robot = sample.parsed.robot
-            if self._settings.robots and robot not in self._settings.robots:
-                continue
+    # ---------------------------------------------------------------- robots
+
+    async def has_mesh(self, name: str) -> bool:
+        return self._studio.has_mesh(name)
+
+    async def take_mesh(self, name: str, glb: bytes, color: str) -> None:
+        await _in(self._drawing, self._studio.take_mesh, name, glb, color)
+
+    def appeared(self, state: RobotState) -> None:
+        if state.name in self._answerers:
+            return  # described anew: its streams go on
+        look, settings = state.look, self._settings
+        assert look is not None
+        names = []
+        for name in dict.fromkeys((*settings.views, CLOSE)):
             try:
-                message = sample.message()
-            except MessageError as error:
-                log.warning("%s: %s", sample.key, error)
-                continue
-            state = self._robots.setdefault(robot, RobotState(self._settings.site, robot))
-            if isinstance(message, FrameTransforms):
-                state.take_frames(message, sample.header.source_time_ns)
-            elif isinstance(message, JointStates):
-                state.take_joints(message)
-            elif isinstance(message, ControllerState):
-                state.take_controller(message)
-            elif isinstance(message, Description):
-                before = self._loading.get(robot)
-                if before is not None:
-                    before.cancel()
-                self._loading[robot] = group.create_task(self._load(state, message))
-
-    async def _load(self, state: RobotState, description: Description) -> None:
-        """Make a robot's pictures possible: its meshes, its cameras, its streams."""
-        width, height = self._settings.size
-        try:
-            look = await _in(self._thread, look_of, description, aspect=width / height)
-        except RendererError as error:
-            log.error("%s/%s cannot be drawn: %s", state.site, state.name, error)
-            return
-        for link in description.links:
-            if link.mesh:
-                await self._load_mesh(state, link)
-        first = state.look is None
-        state.look = look
-        state.version += 1
-        if first:
-            self._open_streams(state, look)
-
-    async def _load_mesh(self, state: RobotState, link: Description.Link) -> None:
-        name = mesh_name(link)
-        if await _in(self._thread, self._studio.has_mesh, name):
-            return
-        folder = self._settings.folder
-        glb = await asyncio.to_thread(stored_glb, link.mesh_sha256, folder)
-        key = robot_key(state.site, state.name, f"mesh/{link.mesh}")
-        told = False
-        while glb is None:
-            try:
-                glb = await self._session.ask_bytes(key, timeout_s=_MESH_TIMEOUT_S)
-            except BusError as error:
-                if not told:
-                    log.warning("mesh of %s: %s; asking until it comes", link.name, error)
-                    told = True
-                await asyncio.sleep(_ASK_AGAIN_S)
-                continue
-            await asyncio.to_thread(store_glb, glb, folder)
-        try:
-            await _in(self._thread, self._studio.take_mesh, name, glb, link.color)
-        except RendererError as error:
-            log.error("link %s of %s/%s is not drawn: %s", link.name, state.site, state.name, error)
-
-    def _open_streams(self, state: RobotState, look: Look) -> None:
-        streams: dict[str, Stream] = {}
-        for view in dict.fromkeys((*self._settings.views, CLOSE)):
-            try:
-                streams[view] = Stream(
-                    self._session,
-                    state,
-                    look,
-                    view,
-                    fps=self._settings.fps,
-                    ages=partial(self._ages, state),
-                    paint=lambda job: _in(self._thread, self._studio.paint, job),
-                )
+                camera_of(look, name)
             except RendererError as error:
                 log.error("%s/%s: %s", state.site, state.name, error)
+                continue
+            names.append(name)
+            self._open(state, standing(name, size=settings.size, fps=settings.fps))
+        self._open(state, far(self._first(state), size=settings.size, fps=settings.fps))
+        self._answerers[state.name] = [
+            self._session.answer(
+                state.site, state.name, "video/*/keyframe", partial(self._answer_key_frame, state)
+            ),
+            self._session.answer(state.site, state.name, "views", partial(self._answer_view, state)),
+        ]
+        log.info("%s/%s: views %s", state.site, state.name, ", ".join((*names, FAR)))
 
-        async def answer_key_frame(request: Request) -> KeyFrameAnswer:
-            if request.chunk not in streams:
-                raise RefusedError(str(UnknownViewError(request.chunk, streams)))
-            return KeyFrameAnswer(forced=streams[request.chunk].ask_key_frame())
+    def moved(self, state: RobotState) -> None:
+        cell = state.cell
+        if any(each.state is state or (cell and each.state.cell == cell) for each in self._active):
+            self._wake.set()
 
-        self._session.answer(state.site, state.name, "video/*/keyframe", answer_key_frame)
-        self._streams += streams.values()
-        log.info("%s/%s: views %s", state.site, state.name, ", ".join(streams))
+    def gone(self, state: RobotState) -> None:
+        for answerer in self._answerers.pop(state.name, ()):
+            answerer.close()
+        for key in [key for key in self._streams if key[0] == state.name]:
+            self._close(key)
 
-    def _ages(self, state: RobotState) -> Ages:
-        age = {
-            name: subscription.age_s(robot_key(state.site, state.name, name))
-            for name, subscription in self._subscriptions.items()
-        }
-        return Ages(frames=age["frames"], joints=age["joints"], controller=age["controller"])
+    # --------------------------------------------------------------- streams
+
+    def ages(self, state: RobotState) -> Ages:
+        return self._robots.ages(state)
+
+    def neighbours(self, state: RobotState) -> Sequence[RobotState]:
+        return self._robots.neighbours(state)
+
+    def watched(self, stream: Stream) -> None:
+        (self._active.add if stream.watched else self._active.discard)(stream)
+        if not self._active:
+            self._pace.rested()
+        self._wake.set()
+
+    async def draw(self, stream: str, shot: Shot, composition: Composition) -> Drawn:
+        return await _in(
+            self._drawing,
+            self._studio.draw,
+            composition.scene,
+            composition.camera,
+            size=shot.size,
+            coarse=self._pace.coarse,
+            close_up_of=stream if composition.follow else None,
+        )
+
+    async def finish(self, drawn: Drawn, order: Order) -> Finished:
+        return await _in(self._encoding, self._finishing.finish, drawn.picture, drawn.camera, order)
+
+    def _open(self, state: RobotState, shot: Shot) -> Stream:
+        stream = self._streams[state.name, shot.name] = Stream(self._session, state, shot, self)
+        return stream
+
+    def _close(self, key: tuple[str, str]) -> None:
+        stream = self._streams.pop(key)
+        self._active.discard(stream)
+        stream.close()
+        self._encoding.submit(self._finishing.end, [stream.name])
+
+    def _first(self, state: RobotState) -> str:
+        """The view that the one for slow links is of."""
+        known = () if state.look is None else view_names(state.look)
+        return next((view for view in self._settings.views if view in known), FREE)
+
+    # -------------------------------------------------------------- requests
+
+    async def _answer_key_frame(self, state: RobotState, request: Request) -> KeyFrameAnswer:
+        stream = self._streams.get((state.name, request.chunk))
+        if stream is None:
+            streams = [each for each in self._streams.values() if each.state is state]
+            known = [each.shot.name for each in streams if not each.shot.requested]
+            raise RefusedError(str(UnknownViewError(request.chunk, known)))
+        return KeyFrameAnswer(forced=stream.ask_key_frame())
+
+    async def _answer_view(self, state: RobotState, request: Request) -> ViewAnswer:
+        wanted, settings = request.message, self._settings
+        assert isinstance(wanted, ViewRequest)
+        assert state.look is not None
+        try:
+            stream = self._standing(state, wanted)
+            if stream is None:
+                shot = requested(
+                    wanted, state.look, first=self._first(state), size=settings.size, fps=settings.fps
+                )
+                stream = self._streams.get((state.name, shot.name))
+            if stream is None:
+                self._check_room(shot)
+                stream = self._open(state, shot)
+        except RendererError as error:
+            raise RefusedError(str(error)) from None
+        stream.stay()
+        shot = stream.shot
+        width, height = shot.size
+        return ViewAnswer(
+            topic=f"video/{shot.name}", image=f"image/{shot.name}", width=width, height=height, fps=shot.fps
+        )
+
+    def _standing(self, state: RobotState, wanted: ViewRequest) -> Stream | None:
+        """One of the renderer's own views, where it is asked for as it is: nothing more is drawn for it."""
+        stream = self._streams.get((state.name, wanted.of))
+        own = stream is not None and not stream.shot.requested and wanted == ViewRequest(of=wanted.of)
+        return stream if own else None
+
+    def _check_room(self, shot: Shot) -> None:
+        settings = self._settings
+        others = [stream.shot for stream in self._streams.values() if stream.shot.requested]
+        if len(others) >= settings.most_views:
+            raise NoRoomError(
+                f"{len(others)} views were asked for already, and {settings.most_views} are possible "
+                "(most_views of the site file's [renderer]): ask again when some of them end"
+            )
+        own = standing("", size=settings.size, fps=settings.fps).pixels_per_s
+        most = max(settings.most_views * _FULL_VIEWS, 1.0) * max(own, _FULL_PIXELS_PER_S)
+        left = most - sum(other.pixels_per_s for other in others)
+        if shot.pixels_per_s > left:
+            raise NoRoomError(
+                f"{shot.size[0]} x {shot.size[1]} at {shot.fps:g} a second is {shot.pixels_per_s / 1e6:.1f} "
+                f"million pixels a second: {max(left, 0.0) / 1e6:.1f} of {most / 1e6:.1f} million are left "
+                "for views that are asked for; ask for a smaller or slower one"
+            )
+
+    # -------------------------------------------------------------- painting
 
     async def _paint_forever(self) -> None:
-        """One picture after another, each of the newest state; what comes meanwhile is not queued."""
-        interval = 1.0 / self._settings.fps
-        due = time.monotonic()
+        """One picture after another, each of the newest state; one is encoded while the next is drawn."""
+        encoding = asyncio.create_task(asyncio.sleep(0))
         while True:
-            for stream in list(self._streams):
-                await stream.paint_if_due()
-            due = max(due + interval, time.monotonic())
-            await asyncio.sleep(due - time.monotonic())
+            self._wake.clear()
+            stream, due_at = next_of(self._active, time.monotonic())
+            if stream is None:
+                wait_s = None if due_at == float("inf") else max(due_at - time.monotonic(), 0.0)
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(wait_s):
+                        await self._wake.wait()
+                continue
+            began = time.monotonic()
+            rest = await stream.draw(began)
+            try:
+                await encoding
+            except asyncio.CancelledError:
+                rest.close()  # it will not be begun
+                raise
+            encoding = asyncio.create_task(rest)
+            self._drew(began)
+
+    def _drew(self, began: float) -> None:
+        self._pictures += 1
+        now, slow = time.monotonic(), self._pace.slow
+        wanted_hz = sum(stream.wanted_hz for stream in self._active)
+        self._pace.drew(now, now - began, wanted_hz=wanted_hz)
+        if self._pace.slow == slow:
+            return
+        if slow:
+            severity, code, text = (
+                Event.INFO,
+                "renderer.keeps_up",
+                "the renderer draws all that is watched again",
+            )
+        else:
+            severity, code = Event.WARNING, "renderer.slow"
+            text = (
+                f"the renderer draws {self._pace.rate_hz(now):.0f} of the {wanted_hz:.0f} pictures a second "
+                "that are watched: this machine can do no more"
+            )
+        log.log(logging.INFO if slow else logging.WARNING, "%s", text)
+        event = Event(severity=severity, code=code, text=text, source="renderer")
+        event.timestamp.GetCurrentTime()
+        self._events.put(event)
+
+    async def _tidy_forever(self) -> None:
+        while True:
+            await asyncio.sleep(_TIDY_EACH_S)
+            now = time.monotonic()
+            silent = []
+            for key, stream in list(self._streams.items()):
+                # Who was not told of in time is found here.
+                stream.look_for_watchers()
+                if stream.quiet_since is None:
+                    continue
+                quiet_s = now - stream.quiet_since
+                if quiet_s > _COMES_BACK_WITHIN_S:
+                    silent.append(stream.name)
+                patience_s = _COMES_WITHIN_S if stream.awaited else _COMES_BACK_WITHIN_S
+                if stream.shot.requested and quiet_s > patience_s:
+                    self._close(key)
+            await _in(self._encoding, self._finishing.end, silent)
+            await _in(
+                self._drawing,
+                self._studio.tidy,
+                meshes=self._robots.meshes,
+                streams={stream.name for stream in self._streams.values()},
+            )

@@ -1,19 +1,24 @@
-"""The shaders: a calm backdrop, a floor with its grid, and bodies under a soft box of light.
+"""The shaders of what does not move: a calm backdrop, a floor with its grid, the shadow on it."""
 
-Colours are computed in linear light and written as sRGB.
-"""
+VERSION = "#version 330\n"
 
-_COMMON = """#version 330
-vec3 to_linear(vec3 c) { return pow(c, vec3(2.2)); }
-vec3 to_srgb(vec3 c) { return pow(clamp(c, 0.0, 1.0), vec3(1.0 / 2.2)); }
+COLORS = """
+// A polynomial in place of a power, within 0.002 of sRGB.
+vec3 to_linear(vec3 c) { return c * (c * (c * 0.305306 + 0.682171) + 0.012523); }
+// Roots in place of a power: within 0.005 of sRGB, and much faster in software.
+vec3 to_srgb(vec3 c) {
+    vec3 root = sqrt(clamp(c, 0.0, 1.0)), second = sqrt(root);
+    return 0.585122 * root + 0.783140 * second - 0.368263 * sqrt(second);
+}
 vec3 backdrop(float height) {
     // Neutral grey-blue, lighter towards the floor: eyes rest on it for hours.
-    return mix(vec3(0.80, 0.825, 0.85), vec3(0.585, 0.630, 0.680), smoothstep(0.0, 1.0, height));
+    return mix(vec3(0.805, 0.825, 0.845), vec3(0.665, 0.700, 0.740), smoothstep(0.0, 1.0, height));
 }
 """
+COMMON = VERSION + COLORS
 
 FULL_PICTURE_VERTEX = (
-    _COMMON
+    COMMON
     + """
 out vec2 place;                       // 0 to 1, upwards
 void main() {
@@ -25,7 +30,7 @@ void main() {
 )
 
 BACKDROP_FRAGMENT = (
-    _COMMON
+    COMMON
     + """
 in vec2 place;
 out vec4 color;
@@ -36,7 +41,6 @@ void main() { color = vec4(backdrop(mix(0.35, place.y, level)), 1.0); }
 
 # One texture as it is, or several samples a pixel laid over what is there.
 COMPOSE_FRAGMENT = """
-uniform float opacity;
 out vec4 color;
 #if SAMPLES > 0
 uniform sampler2DMS layer;
@@ -48,9 +52,9 @@ void main() {
 #if SAMPLES > 0
     vec4 sum = vec4(0.0);
     for (int each = 0; each < SAMPLES; ++each) sum += texelFetch(layer, at, each);
-    color = sum * (opacity / float(SAMPLES));
+    color = sum / float(SAMPLES);
 #else
-    color = texelFetch(layer, at, 0) * opacity;
+    color = texelFetch(layer, at, 0);
 #endif
 }
 """
@@ -66,14 +70,15 @@ void main() {
 
 # A plane through `origin`, spanned by `u` and `v`, with lines each `fine` and `coarse` metres.
 PLANE_VERTEX = (
-    _COMMON
+    COMMON
     + """
 uniform mat4 site_to_clip;
 uniform vec3 origin, u, v;
 uniform float extent;
+uniform vec4 drawn;                   // part of it that is drawn, -1 to 1
 out vec2 place;                       // on the plane [m]
 void main() {
-    vec2 corner = vec2((gl_VertexID & 1) * 2 - 1, (gl_VertexID >> 1) * 2 - 1) * extent;
+    vec2 corner = mix(drawn.xy, drawn.zw, vec2(gl_VertexID & 1, gl_VertexID >> 1)) * extent;
     place = corner;
     gl_Position = site_to_clip * vec4(origin + u * corner.x + v * corner.y, 1.0);
 }
@@ -81,9 +86,9 @@ void main() {
 )
 
 PLANE_FRAGMENT = (
-    _COMMON
+    COMMON
     + """
-uniform float fine, coarse, extent, strength;
+uniform float fine, coarse, extent, strength, floor_light;
 in vec2 place;
 out vec4 color;
 float line(float step_m, float width_px) {
@@ -95,9 +100,13 @@ float line(float step_m, float width_px) {
     return max(on.x, on.y);
 }
 void main() {
-    float far = 1.0 - smoothstep(0.35, 1.0, length(place) / extent);
-    float lines = max(0.20 * line(fine, 0.55), 0.42 * line(coarse, 0.7)) * strength;
-    color = vec4(vec3(0.42, 0.47, 0.53), lines * far);
+    float out_there = length(place) / extent;
+    float far = 1.0 - smoothstep(0.30, 1.0, out_there);
+    float lines = max(0.15 * line(fine, 0.5), 0.40 * line(coarse, 0.65)) * strength * far;
+    // A pool of light about the arm, that the floor be one.
+    float pool = 0.55 * floor_light * (1.0 - smoothstep(0.05, 0.75, out_there));
+    vec3 shade = mix(vec3(0.90, 0.91, 0.92), vec3(0.40, 0.45, 0.51), lines / max(lines + pool, 1e-4));
+    color = vec4(shade, lines + pool - lines * pool);
 }
 """
 )
@@ -110,97 +119,8 @@ out vec4 color;
 void main() {
     // Nothing at the map's edge, whatever lies there: a shadow has no corners.
     float inside = 1.0 - smoothstep(0.8, 1.0, length(place) / extent);
-    color = vec4(0.13, 0.15, 0.18, texture(shadow, place / (2.0 * extent) + 0.5).r * strength * inside);
+    color = vec4(0.10, 0.12, 0.15, texture(shadow, place / (2.0 * extent) + 0.5).r * strength * inside);
 }
-"""
-
-BODY_VERTEX = (
-    _COMMON
-    + """
-uniform mat4 site_to_clip, part_to_site;
-in vec3 position, normal;
-in vec4 paint, surface;
-out vec3 at, facing;
-out vec4 body_paint, body_surface;
-void main() {
-    vec4 place = part_to_site * vec4(position, 1.0);
-    at = place.xyz;
-    facing = mat3(part_to_site) * normal;
-    body_paint = vec4(to_linear(paint.rgb), paint.a);
-    body_surface = surface;
-    gl_Position = site_to_clip * place;
-}
-"""
-)
-
-BODY_FRAGMENT = (
-    _COMMON
-    + """
-uniform vec3 eye, forward;            // eye: of a perspective camera; forward: of an orthographic one
-uniform float orthographic, stale, floor_height;
-in vec3 at, facing;
-in vec4 body_paint, body_surface;
-out vec4 color;
-
-const vec3 KEY = normalize(vec3(0.35, 0.45, 0.95));
-
-// The studio as a mirror sees it: a bright ceiling with a soft box, dim walls, the floor.
-vec3 studio(vec3 way, float roughness) {
-    float soft = 0.12 + 0.75 * roughness;
-    float ceiling = smoothstep(-soft, 0.55 + soft, way.z);
-    vec3 walls = mix(vec3(0.20, 0.21, 0.22), vec3(0.62, 0.65, 0.70), ceiling);
-    float box = smoothstep(0.80 - soft * 0.5, 0.97, dot(way, KEY));
-    return walls + vec3(1.00, 0.98, 0.94) * box * (1.5 - 1.1 * roughness);
-}
-
-void main() {
-    vec3 n = normalize(facing);
-    vec3 to_eye = orthographic > 0.5 ? -forward : normalize(eye - at);
-    vec3 albedo = body_paint.rgb;
-    float open = body_surface.r, roughness = clamp(body_surface.g, 0.12, 1.0), metallic = body_surface.b;
-
-    // Light from the whole ceiling, what the floor gives back, and a weaker light from the side.
-    float up = n.z * 0.5 + 0.5;
-    float near_floor = clamp((at.z - floor_height) * 6.0, 0.0, 1.0);
-    float sky = open * mix(1.0, 0.55 + 0.45 * near_floor, 1.0 - up);
-    vec3 diffuse = mix(vec3(0.21, 0.205, 0.20), vec3(0.50, 0.525, 0.56), up * up) * sky;
-    diffuse += vec3(0.60, 0.575, 0.535) * max(dot(n, KEY), 0.0) * mix(0.55, 1.0, open);
-    float facing_eye = max(dot(n, to_eye), 0.0);
-    diffuse += vec3(0.27, 0.275, 0.285) * facing_eye * open;
-    vec3 base = mix(vec3(0.04), albedo, metallic);
-    float grazing = (1.0 - facing_eye) * (1.0 - facing_eye);
-    grazing *= grazing * (1.0 - facing_eye);
-    vec3 fresnel = base + (max(vec3(1.0 - roughness), base) - base) * grazing;
-    vec3 mirror = studio(reflect(-to_eye, n), roughness) * fresnel * mix(0.4, 1.0, open) * sky;
-    vec3 light = albedo * diffuse * (1.0 - metallic) * (1.0 - fresnel) + mirror;
-
-    // The rim darkens a little, so that a body stands out against one of its own colour.
-    light *= mix(0.62, 1.0, smoothstep(0.0, 0.38, facing_eye));
-    light = light * 1.16 / (1.0 + 0.22 * light);
-
-    vec3 seen = to_srgb(light);
-    float grey = dot(seen, vec3(0.2126, 0.7152, 0.0722));
-    seen = mix(seen, vec3(mix(0.60, grey, 0.55)), stale);
-    color = vec4(seen, 1.0) * body_paint.a;
-}
-"""
-)
-
-EDGE_VERTEX = (
-    _COMMON
-    + """
-uniform mat4 site_to_clip, part_to_site;
-in vec3 position;
-void main() {
-    gl_Position = site_to_clip * part_to_site * vec4(position, 1.0);
-}
-"""
-)
-
-EDGE_FRAGMENT = """#version 330
-uniform vec4 tone;
-out vec4 color;
-void main() { color = vec4(tone.rgb, 1.0) * tone.a; }
 """
 
 # Seen from below against the light: the height of the lowest thing above each place of the floor.
@@ -208,13 +128,14 @@ SHADOW_VERTEX = """#version 330
 uniform mat4 part_to_site;
 uniform vec2 center;
 uniform float extent, floor_height, tallest;
+uniform vec3 key;                     // towards the lamp
 in vec3 position;
 out float height;
-const vec2 SLANT = vec2(0.35, 0.45) / 0.95;
 void main() {
     vec3 at = (part_to_site * vec4(position, 1.0)).xyz;
     height = max(at.z - floor_height, 0.0);
-    vec2 falls = at.xy - SLANT * 0.45 * height - center;
+    // Steeper than the lamp: a shadow that stays near its body tells where it stands.
+    vec2 falls = at.xy - key.xy / key.z * 0.75 * height - center;
     gl_Position = vec4(falls / extent, clamp(height / tallest, 0.0, 1.0) * 2.0 - 1.0, 1.0);
 }
 """

@@ -1,22 +1,120 @@
 """The soft shadow on the floor: sharp where a body touches it, wide and faint below what is high."""
 
+from collections.abc import Sequence
+
 import cv2
+import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.body_shaders import KEY
+from renderer.opengl import Programs, Uploaded, columns, set_uniforms
+from renderer.scene import Part
+
 FloatArray = NDArray[np.float32]
 
+_TEXELS = 160
 # What the shadow map holds where nothing is above the floor [m], and what is surely less.
 NOTHING = 1e6
 _ANY_HEIGHT = 1e3
+# How far it reaches, and what moves less than that leaves it as it is: over the room's radius.
+_EXTENT, _NOTICEABLE = 1.6, 0.002
 
-# (up to this height, blurred by this much, this dark), heights and widths over the scene's radius.
+# (up to this height, blurred by this much, this dark), heights and widths over the room's radius.
 _LAYERS = (
-    (0.04, 0.030, 0.75),
-    (0.20, 0.045, 0.50),
-    (0.55, 0.075, 0.42),
-    (_ANY_HEIGHT, 0.11, 0.34),
+    (0.035, 0.018, 0.62),
+    (0.16, 0.030, 0.50),
+    (0.45, 0.050, 0.46),
+    (_ANY_HEIGHT, 0.080, 0.42),
 )
+
+
+class FloorShadow:
+    """The shadow of a scene's bodies, computed anew only when they have moved noticeably."""
+
+    def __init__(self, context: moderngl.Context, programs: Programs) -> None:
+        self._context, self._programs = context, programs
+        n = _TEXELS
+        self._heights = context.framebuffer(
+            [context.renderbuffer((n, n), 1, dtype="f4")], context.depth_renderbuffer((n, n))
+        )
+        self._shadow = context.texture((n, n), 1, dtype="f1")
+        self._shadow.repeat_x = self._shadow.repeat_y = False
+        self._plane = context.vertex_array(programs.shade, [])
+        self._of: tuple[object, ...] | None = None
+        self._placements = np.empty((0, 4, 4))
+        self._drawn = (-1.0, -1.0, 1.0, 1.0)
+
+    def forget(self) -> None:
+        """Compute it anew next time."""
+        self._of = None
+
+    def cast(
+        self,
+        parts: Sequence[tuple[Part, Uploaded]],
+        *,
+        center: NDArray[np.float64],
+        radius: float,
+        floor: float,
+    ) -> None:
+        """See that it is the shadow of these bodies.
+
+        Args:
+            center: (3,) of the room [m]; the shadow is about it.
+            floor: Its height [m].
+        """
+        placements = np.array([part.part_to_site for part, _ in parts]).reshape(-1, 4, 4)
+        key = (tuple(part.mesh for part, _ in parts), center.tobytes(), radius, floor)
+        if key == self._of and np.abs(placements - self._placements).max(initial=0.0) < _NOTICEABLE * radius:
+            return
+        self._of, self._placements = key, placements
+        extent = _EXTENT * radius
+        self._heights.use()
+        self._heights.clear(NOTHING, depth=1.0)
+        self._context.enable_only(moderngl.DEPTH_TEST)
+        set_uniforms(
+            self._programs.cast,
+            center=tuple(center[:2]),
+            extent=extent,
+            floor_height=floor,
+            tallest=4.0 * radius,
+            key=KEY,
+        )
+        for part, uploaded in parts:
+            if uploaded.shadow is not None:
+                set_uniforms(self._programs.cast, part_to_site=columns(part.part_to_site))
+                uploaded.shadow.render()
+        n = _TEXELS
+        heights = np.frombuffer(self._heights.read(components=1, dtype="f4"), dtype=np.float32).reshape(n, n)
+        dark = soft_shadow(heights / radius, texel=2.0 * extent / n / radius)
+        levels = (np.clip(dark, 0.0, 1.0) * 255.0).astype(np.uint8)
+        self._shadow.write(levels.tobytes())
+        # Only where there is some is it laid: most of the floor has none.
+        places = np.argwhere(levels > 0)
+        low, high = (
+            (places.min(axis=0), places.max(axis=0) + 1) if len(places) else (np.zeros(2), np.zeros(2))
+        )
+        rows_and_columns = np.clip(np.array([low - 1, high + 1]), 0, n) / n * 2.0 - 1.0
+        self._drawn = tuple(rows_and_columns[:, ::-1].ravel().tolist())
+
+    def lay(
+        self, site_to_clip: NDArray[np.float64], *, center: NDArray[np.float64], radius: float, floor: float
+    ) -> None:
+        """Darken the floor in the framebuffer in use."""
+        self._context.enable_only(moderngl.BLEND)
+        self._context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
+        self._shadow.use(0)
+        set_uniforms(
+            self._programs.shade,
+            site_to_clip=columns(site_to_clip),
+            origin=(*center[:2], floor),
+            u=(1.0, 0.0, 0.0),
+            v=(0.0, 1.0, 0.0),
+            extent=_EXTENT * radius,
+            drawn=self._drawn,
+            strength=1.0,
+        )
+        self._plane.render(moderngl.TRIANGLE_STRIP, vertices=4)
 
 
 def soft_shadow(heights: FloatArray, *, texel: float) -> FloatArray:

@@ -1,6 +1,8 @@
 """What is known of a robot now, and what a picture says of it."""
 
 import math
+from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 
@@ -10,17 +12,21 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from numpy.typing import NDArray
 
-from bus.schemas.robomesh_pb2 import ControllerState, Description
+from bus.schemas.robomesh_pb2 import ControllerState, Description, KinematicState
 from bus.topics import topic
 from renderer.look import Look, home_placements
 from renderer.overlay import Overlay, Row
+from renderer.span import Span, same_span, span_of
 
 FloatArray = NDArray[np.float64]
 
 # Metres, or the rotation's entries: less is below a pixel.
 _NOTICEABLE = 3e-5
 
-STALE_AFTER_S = topic("frames").stale_after_s or 1.0
+_STALE_AFTER_S = topic("frames").stale_after_s or 1.0
+_TOOL = "tool"
+# Of the trail: how long ago, and how many points of it are kept.
+_TRAIL_S, _TRAIL_POINTS = 6.0, 240
 
 
 @dataclass
@@ -31,7 +37,11 @@ class RobotState:
         look: None until its description and meshes came.
         link_placements: (4, 4) link to site by link; empty until frames came.
         positions: By joint [rad] or [m]; empty until joint states came.
+        span: Between it and what is nearest; None: nothing is, or nobody tells.
+        touching: Links that touch something.
+        trail: Where the tool was, and when [ns]; oldest first.
         source_time_ns: Of what the placements show.
+        dated_by: The publisher of that time.
         version: Counts what came and would change a picture.
     """
 
@@ -41,23 +51,51 @@ class RobotState:
     link_placements: dict[str, FloatArray] = field(default_factory=dict)
     positions: dict[str, float] = field(default_factory=dict)
     controller: ControllerState | None = None
+    span: Span | None = None
+    touching: frozenset[str] = frozenset()
+    trail: deque[tuple[int, FloatArray]] = field(default_factory=lambda: deque(maxlen=_TRAIL_POINTS))
     source_time_ns: int = 0
+    dated_by: int | None = None
     version: int = 0
     _noticed: dict[str, FloatArray] = field(default_factory=dict)
 
-    def take_frames(self, message: FrameTransforms, source_time_ns: int) -> None:
-        """Take newer placements of the links."""
+    @property
+    def stale_after_s(self) -> float:
+        """Older than this, what is known of where it is must not look live [s]."""
+        told = self.look is not None and self.look.description.HasField("stale_after_s")
+        return self.look.description.stale_after_s if self.look is not None and told else _STALE_AFTER_S
+
+    @property
+    def cell(self) -> str:
+        """That it shares with other robots; empty: it is drawn alone, as all that is played back."""
+        alone = self.look is None or self.look.description.HasField("replay")
+        return "" if self.look is None or alone else self.look.description.cell
+
+    def take_frames(self, message: FrameTransforms, source_time_ns: int, dated_by: int) -> None:
+        """Take newer placements of the links; `dated_by`: the publisher who dates them."""
         prefix = f"{self.site}/{self.name}/"
         placements = {
             transform.child_frame_id.removeprefix(prefix): _placement(transform)
             for transform in message.transforms
             if transform.child_frame_id.startswith(prefix)
         }
+        if source_time_ns < self.source_time_ns:
+            self.trail.clear()  # a replay that was turned back
         self.link_placements, self.source_time_ns = placements, source_time_ns
+        self.dated_by = dated_by
+        if _TOOL in placements:
+            self._leave_trail(placements[_TOOL][:3, 3], source_time_ns)
         # Frames come all the time; a picture is only worth drawing when they differ, by creeping too.
         if not _same(placements, self._noticed):
             self._noticed = placements
             self.version += 1
+
+    def _leave_trail(self, tool: FloatArray, now_ns: int) -> None:
+        trail = self.trail
+        while trail and now_ns - trail[0][0] > _TRAIL_S * 1e9:
+            trail.popleft()
+        if not trail or now_ns - trail[-1][0] >= _TRAIL_S * 1e9 / _TRAIL_POINTS:
+            trail.append((now_ns, tool))
 
     def take_joints(self, message: JointStates) -> None:
         """Take newer joint positions; a picture waits for the frames that belong to them."""
@@ -69,6 +107,35 @@ class RobotState:
             self.version += 1
         self.controller = message
 
+    def take_kinematics(self, message: KinematicState, robots: Mapping[str, "RobotState"]) -> None:
+        """Take newer kinematics.
+
+        Args:
+            robots: Of the site, by name: how near this one may come to them they tell.
+        """
+        span = None
+        if message.HasField("clearance"):
+            # <site>/<robot>/<link>, or a fixture's <site>/<fixture>.
+            frames = (message.clearance.first, message.clearance.second)
+            ends = {frame.partition("/")[2].partition("/")[0] for frame in frames}
+            looks = [robot.look for name, robot in robots.items() if name in ends]
+            span = span_of(message.clearance, [look.description for look in looks if look is not None])
+        touching = self._touching(message)
+        # The arm may stand, and the other come.
+        if not same_span(span, self.span) or touching != self.touching:
+            self.version += 1
+        self.span, self.touching = span, touching
+
+    def _touching(self, message: KinematicState) -> frozenset[str]:
+        prefix = f"{self.site}/{self.name}/"
+        frames = [
+            frame
+            for name in ("clearance", "own_clearance")
+            if message.HasField(name) and not (near := getattr(message, name)).distance
+            for frame in (near.first, near.second)
+        ]
+        return frozenset(frame.removeprefix(prefix) for frame in frames if frame.startswith(prefix))
+
 
 @dataclass(frozen=True, kw_only=True)
 class Ages:
@@ -77,6 +144,7 @@ class Ages:
     frames: float | None
     joints: float | None
     controller: float | None
+    kinematics: float | None = None
 
 
 def age_s(state: RobotState, ages: Ages) -> float:
@@ -87,7 +155,7 @@ def age_s(state: RobotState, ages: Ages) -> float:
     """
     if ages.frames is None or ages.joints is None:
         told = _told_age(state, ages)
-        return math.inf if told is None else max(told, STALE_AFTER_S * 1.001)
+        return math.inf if told is None else max(told, state.stale_after_s * 1.001)
     return max(ages.frames, ages.joints, _told_age(state, ages) or 0.0)
 
 
@@ -99,6 +167,26 @@ def _told_age(state: RobotState, ages: Ages) -> float | None:
         # Its next word is up to a second away, and units come meanwhile: joints tell their age.
         return controller.last_unit_age_s
     return controller.last_unit_age_s + ages.controller
+
+
+def span_now(state: RobotState, ages: Ages) -> Span | None:
+    """What is drawn between the arm and what is nearest; None: nobody tells what it is now."""
+    return state.span if _near_known(state, ages) else None
+
+
+def touching_now(state: RobotState, ages: Ages) -> frozenset[str]:
+    """Links that touch something; none where nobody tells it now."""
+    return state.touching if _near_known(state, ages) else frozenset()
+
+
+def is_stale(state: RobotState, ages: Ages) -> bool:
+    """Whether nobody knows where it is now."""
+    return age_s(state, ages) > state.stale_after_s
+
+
+def _near_known(state: RobotState, ages: Ages) -> bool:
+    known = ages.kinematics is not None and ages.kinematics <= state.stale_after_s
+    return known and not is_stale(state, ages)
 
 
 def _same(some: dict[str, FloatArray], others: dict[str, FloatArray]) -> bool:
@@ -122,20 +210,28 @@ def overlay_of(state: RobotState, look: Look, view: str, *, age: float) -> Overl
     return Overlay(
         title=state.name,
         view=view,
-        time=_time(state.source_time_ns),
+        time=_time(state.source_time_ns, dated=description.HasField("replay")),
         state=_state_words(state.controller),
         rows=tuple(_row(joint, state.positions[joint.name]) for joint in _told(description, state)),
-        mark="simulated" if description.simulated else "",
+        marks=_marks(description),
+        scale=f"{look.square_m * 1e3:g} mm",
         stale=_stale_words(state, age),
     )
 
 
 def warning_of(state: RobotState, *, age: float) -> Overlay:
     """What even a small picture must say; no number, for it is looked at long after it was drawn."""
-    stale = "STALE" if age > STALE_AFTER_S else ""
+    stale = "STALE" if age > state.stale_after_s else ""
     if not state.link_placements:
         stale = "NO DATA"
-    return Overlay(title="", view="", time="", state="", rows=(), stale=stale)
+    replay = state.look is not None and state.look.description.HasField("replay")
+    marks = ("replay",) if replay else ()
+    return Overlay(title="", view="", time="", state="", rows=(), marks=marks, stale=stale)
+
+
+def _marks(description: Description) -> tuple[str, ...]:
+    marks = {"replay": description.HasField("replay"), "simulated": description.simulated}
+    return tuple(mark for mark, holds in marks.items() if holds)
 
 
 def _told(description: Description, state: RobotState) -> list[Description.Joint]:
@@ -145,7 +241,7 @@ def _told(description: Description, state: RobotState) -> list[Description.Joint
 def _stale_words(state: RobotState, age: float) -> str:
     if not state.link_placements:
         return "NO DATA, drawn at home"
-    if age <= STALE_AFTER_S:
+    if age <= state.stale_after_s:
         return ""
     if math.isinf(age):
         return "STALE"
@@ -165,11 +261,13 @@ def _state_words(controller: ControllerState | None) -> str:
     return ", ".join(dict.fromkeys(known))
 
 
-def _time(source_time_ns: int) -> str:
+def _time(source_time_ns: int, *, dated: bool) -> str:
     if not source_time_ns:
         return ""
     local = datetime.fromtimestamp(source_time_ns * 1e-9, tz=UTC).astimezone()
-    return f"{local:%H:%M:%S}.{local.microsecond // 100_000} {local:%Z}"
+    return (
+        f"{local:%Y-%m-%d} " if dated else ""
+    ) + f"{local:%H:%M:%S}.{local.microsecond // 100_000} {local:%Z}"
 
 
 def _row(joint: Description.Joint, position: float) -> Row:

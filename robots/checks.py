@@ -2,6 +2,8 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from pydantic_core import ErrorDetails
@@ -9,6 +11,7 @@ from pydantic_core import ErrorDetails
 from robots.schema import (
     BASE_LINK,
     TOOL_FRAME,
+    DhDescription,
     Joint,
     JointType,
     RobotDescription,
@@ -16,23 +19,53 @@ from robots.schema import (
     View,
     nearest,
 )
+from robots.units import length_factor
+
+Step = str | int
+
+# No arm is as long: such a number is a slip, or metres where the file says millimetres.
+_LONGEST_M = 100.0
 
 
-def sentence(error: ErrorDetails, values: Mapping[str, Any]) -> str:
-    """One of pydantic's errors as one line: key, value and what would be right."""
-    location = list(error["loc"])
+@dataclass(frozen=True)
+class Problem:
+    """Something wrong with a description.
+
+    Attributes:
+        path: Keys and numbers that lead to it: ("joint", 2, "limits"); empty for the whole file.
+        text: A sentence: key, value and what would be right.
+    """
+
+    path: tuple[Step, ...]
+    text: str
+
+
+def type_problem(error: ErrorDetails, values: Mapping[str, Any]) -> Problem:
+    """One of pydantic's errors as a problem."""
+    location = tuple(error["loc"])
     kind = error["type"]
     if kind == "unknown_key":
-        return f"{_key([*location, error['ctx']['key']], values)}: {error['ctx']['text']}"
+        location = (*location, error["ctx"]["key"])
+        return Problem(location, f"{_key(location, values)}: {error['ctx']['text']}")
     key = _key(location, values)
     if kind == "missing":
-        return f"{key} is missing"
+        return Problem(location, f"{key} is missing")
     wanted = error["msg"][0].lower() + error["msg"][1:]
     wanted = wanted.replace("input should be", "must be").replace("string should match", "must match")
-    return f"{key} = {error['input']!r}: {wanted}"
+    return Problem(location, f"{key} = {_short(error['input'])}: {wanted}")
 
 
-def _key(location: list[int | str], values: Any) -> str:
+def _short(value: Any) -> str:
+    try:
+        text = repr(value)
+    except ValueError:  # Python writes no number of over 4,300 digits
+        text = "(a number of too many digits)"
+    except RecursionError:
+        text = "(nested too deeply)"
+    return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def _key(location: tuple[Step, ...], values: Any) -> str:
     """`joint 'elbow' limits` rather than `joint.2.limits`: people look for names."""
     words: list[str] = []
     for step in location:
@@ -44,82 +77,155 @@ def _key(location: list[int | str], values: Any) -> str:
             name = values.get("name") if isinstance(values, dict) else None
             words.append(f"{name!r}" if isinstance(name, str) else f"number {step + 1}")
         else:
-            words.append(str(step))
+            words.append(step if step.isprintable() else _short(step))
     return " ".join(words) or "the file"
 
 
-def problems_of(description: RobotDescription) -> tuple[str, ...]:
-    """Every contradiction inside a description, and every mesh file that is not there."""
-    return tuple(
-        problem
-        for check in (_joint_problems, _name_problems, _reference_problems, _view_problems, _mesh_problems)
-        for problem in check(description)
-    )
-
-
-def _joint_problems(description: RobotDescription) -> Iterator[str]:
+def row_problems(description: DhDescription) -> Iterator[Problem]:
+    """Every contradiction inside a description by D-H rows; its files are `file_problems`'s."""
     if not description.joints:
-        yield "joint = []: an arm has at least one joint"
-    for joint in description.joints:
-        lower, upper = joint.limits
-        unit = _unit(joint, description.units)
-        if lower >= upper:
-            yield f"joint {joint.name!r} limits = [{lower:g}, {upper:g}]: the lower must be below the upper"
-        elif not lower <= joint.home <= upper:
-            yield (
-                f"joint {joint.name!r} home = {joint.home:g}: must be within its limits "
-                f"{lower:g} to {upper:g} {unit}"
-            )
-    for constraint in description.constraints:
-        if not constraint.joints:
-            yield "constraint joints = {}: name at least one joint"
-            continue
-        lower, upper = constraint.limits
-        if lower >= upper:
-            yield f"constraint limits = [{lower:g}, {upper:g}]: the lower must be below the upper"
-            continue
-        homes = {joint.name: joint.home for joint in description.joints}
-        total = sum(factor * homes.get(name, 0.0) for name, factor in constraint.joints.items())
-        if not lower <= total <= upper and set(constraint.joints) <= set(homes):
-            names = " and ".join(constraint.joints)
-            yield f"constraint on {names} limits = [{lower:g}, {upper:g}]: home gives {total:g}, outside them"
+        yield Problem(("joint",), "joint = []: an arm has at least one joint")
+    for number, joint in enumerate(description.joints):
+        yield from _joint_problems(("joint", number), joint, description.units)
+    for name, numbers in _repeated(joint.name for joint in description.joints):
+        text = f"joint {name!r}: {len(numbers)} joints have that name; each needs its own"
+        yield Problem(("joint", numbers[-1], "name"), text)
+    yield from _body_problems(("base",), "'base'", description.base.mesh_pose.xyz, description.units)
+    joints = {joint.name: JointFacts(joint.type, joint.home) for joint in description.joints}
+    yield from common_problems(description, links=description.link_names, joints=joints)
 
 
-def _name_problems(description: RobotDescription) -> Iterator[str]:
-    for name, count in Counter(joint.name for joint in description.joints).items():
-        if count > 1:
-            yield f"joint {name!r}: {count} joints have that name; each needs its own"
-    # Links and frames share one list of frames in the model, in URDF and on the network.
-    frames = [*description.link_names, TOOL_FRAME, *(frame.name for frame in description.frames)]
-    for name, count in Counter(frames).items():
-        if count > 1:
-            reserved = f" ({name!r} is taken already)" if name in (BASE_LINK, TOOL_FRAME) else ""
-            yield f"name {name!r}: {count} links or frames have it{reserved}; each needs its own"
+@dataclass(frozen=True)
+class JointFacts:
+    """What the checks of a whole robot ask of a joint; home in the file's units."""
+
+    type: JointType
+    home: float
 
 
-def _reference_problems(description: RobotDescription) -> Iterator[str]:
-    links = description.link_names
-    for frame in description.frames:
-        if frame.link not in links:
-            yield f"frame {frame.name!r} link = {frame.link!r}: no such link{nearest(frame.link, links)}"
-    for pair in description.collision.ignore:
-        for name in pair:
-            if name not in links:
-                yield f"collision ignore = {list(pair)}: no link {name!r}{nearest(name, links)}"
-    joints = {joint.name: joint for joint in description.joints}
-    for constraint in description.constraints:
-        for name in constraint.joints:
-            if name not in joints:
-                yield f"constraint joints: no joint {name!r}{nearest(name, joints)}"
-        types = {joints[name].type for name in constraint.joints if name in joints}
-        if len(types) > 1:
-            yield f"constraint on {' and '.join(constraint.joints)}: adds degrees to millimetres"
-
-
-def _view_problems(description: RobotDescription) -> Iterator[str]:
+def common_problems(
+    description: RobotDescription, *, links: tuple[str, ...], joints: Mapping[str, JointFacts]
+) -> Iterator[Problem]:
+    """Contradictions in what both forms of a description hold."""
+    yield from _name_problems(description, links)
+    yield from _reference_problems(description, links)
+    yield from _constraint_problems(description, joints)
+    yield from _length_problems(("tool", "xyz"), "tool xyz", description.tool.xyz, description.units)
+    for place, frame in enumerated("frame", description.frames):
+        key = f"frame {frame.name!r} xyz"
+        yield from _length_problems((*place, "xyz"), key, frame.xyz, description.units)
     for name, view in description.views.items():
         if _is_degenerate(view):
-            yield f"view {name!r} up = {list(view.up)}: must not be zero or along the line from eye to target"
+            text = (
+                f"view {name!r} up = {list(view.up)}: must not be zero or along the line from eye to target"
+            )
+            yield Problem(("view", name, "up"), text)
+
+
+def enumerated(key: str, rows: tuple[Any, ...]) -> Iterator[tuple[tuple[Step, ...], Any]]:
+    """Each row of a list of tables with its path."""
+    return (((key, number), row) for number, row in enumerate(rows))
+
+
+def limit_problems(
+    place: tuple[Step, ...], name: str, limits: tuple[float, float], home: float | None, unit: str
+) -> Iterator[Problem]:
+    """Limits the wrong way round, and a home outside them."""
+    lower, upper = limits
+    if lower >= upper:
+        text = f"joint {name!r} limits = [{lower:g}, {upper:g}]: the lower must be below the upper"
+        yield Problem((*place, "limits"), text)
+    elif home is not None and not lower <= home <= upper:
+        text = f"joint {name!r} home = {home:g}: must be within its limits {lower:g} to {upper:g} {unit}"
+        yield Problem((*place, "home"), text)
+
+
+def _joint_problems(place: tuple[Step, ...], joint: Joint, units: Units) -> Iterator[Problem]:
+    unit = units.angle if joint.type is JointType.ROTARY else units.length
+    yield from limit_problems(place, joint.name, joint.limits, joint.home, unit)
+    for key in ("a", "d"):
+        yield from _length_problems((*place, key), f"joint {joint.name!r} {key}", getattr(joint, key), units)
+    yield from _body_problems((*place, "link"), f"{joint.link_name!r}", joint.link.mesh_pose.xyz, units)
+
+
+def _body_problems(
+    place: tuple[Step, ...], name: str, xyz: tuple[float, ...], units: Units
+) -> Iterator[Problem]:
+    yield from _length_problems((*place, "mesh_pose", "xyz"), f"link {name} mesh_pose xyz", xyz, units)
+
+
+def _length_problems(
+    place: tuple[Step, ...], key: str, value: float | tuple[float, ...], units: Units
+) -> Iterator[Problem]:
+    metres = length_factor(units)
+    numbers = value if isinstance(value, tuple) else (value,)
+    if any(abs(number) * metres > _LONGEST_M for number in numbers):
+        found = list(value) if isinstance(value, tuple) else value
+        yield Problem(place, f"{key} = {found}: more than {_LONGEST_M:g} m; is it in {units.length}?")
+
+
+def _repeated(names: Any) -> Iterator[tuple[str, list[int]]]:
+    places: dict[str, list[int]] = {}
+    for number, name in enumerate(names):
+        places.setdefault(name, []).append(number)
+    return ((name, numbers) for name, numbers in places.items() if len(numbers) > 1)
+
+
+def _name_problems(description: RobotDescription, links: tuple[str, ...]) -> Iterator[Problem]:
+    # Links and frames share one list of frames in the model, in URDF and on the network.
+    frames = [frame.name for frame in description.frames]
+    taken = (links[0], TOOL_FRAME)
+    for name, count in Counter([*links, TOOL_FRAME, *frames]).items():
+        if count > 1 and (isinstance(description, DhDescription) or name in frames):
+            reserved = f" ({name!r} is taken already)" if name in taken else ""
+            text = f"name {name!r}: {count} links or frames have it{reserved}; each needs its own"
+            yield Problem(_named(name, frames, links), text)
+
+
+def _named(name: str, frames: list[str], links: tuple[str, ...]) -> tuple[Step, ...]:
+    """Where a name that is taken twice was given the last time."""
+    if name in frames:
+        return ("frame", len(frames) - 1 - frames[::-1].index(name), "name")
+    return ("joint", len(links) - 2 - links[::-1].index(name), "link", "name")
+
+
+def _reference_problems(description: RobotDescription, links: tuple[str, ...]) -> Iterator[Problem]:
+    for number, frame in enumerate(description.frames):
+        if frame.link not in links:
+            text = f"frame {frame.name!r} link = {frame.link!r}: no such link{nearest(frame.link, links)}"
+            yield Problem(("frame", number, "link"), text)
+    for number, pair in enumerate(description.collision.ignore):
+        for name in pair:
+            if name not in links:
+                text = f"collision ignore = {list(pair)}: no link {name!r}{nearest(name, links)}"
+                yield Problem(("collision", "ignore", number), text)
+
+
+def _constraint_problems(
+    description: RobotDescription, joints: Mapping[str, JointFacts]
+) -> Iterator[Problem]:
+    for number, constraint in enumerate(description.constraints):
+        place: tuple[Step, ...] = ("constraint", number)
+        lower, upper = constraint.limits
+        names = " and ".join(constraint.joints)
+        unknown = [name for name in constraint.joints if name not in joints]
+        if not constraint.joints:
+            yield Problem((*place, "joints"), "constraint joints = {}: name at least one joint")
+        for name in unknown:
+            yield Problem((*place, "joints"), f"constraint joints: no joint {name!r}{nearest(name, joints)}")
+        if lower >= upper:
+            text = f"constraint limits = [{lower:g}, {upper:g}]: the lower must be below the upper"
+            yield Problem((*place, "limits"), text)
+        elif constraint.joints and not unknown:
+            total = sum(factor * joints[name].home for name, factor in constraint.joints.items())
+            if len({joints[name].type for name in constraint.joints}) > 1:
+                yield Problem((*place, "joints"), f"constraint on {names}: adds degrees to millimetres")
+            elif not lower <= total <= upper:
+                text = (
+                    f"constraint on {names} limits = [{lower:g}, {upper:g}]: "
+                    f"home gives {total:g}, outside them"
+                )
+                yield Problem((*place, "limits"), text)
 
 
 def _is_degenerate(view: View) -> bool:
@@ -134,12 +240,56 @@ def _is_degenerate(view: View) -> bool:
     return sum(x * x for x in cross) <= 1e-12 * size
 
 
-def _mesh_problems(description: RobotDescription) -> Iterator[str]:
-    for name, body in description.bodies.items():
-        path = description.mesh_path(body)
-        if path is not None and not path.is_file():
-            yield f"link {name!r} mesh = {body.mesh!r}: no such file beside the description"
+def file_problems(values: Mapping[str, Any], folder: Path, *, confined: bool) -> Iterator[Problem]:
+    """Every file or folder that the values name and that is not there, whatever else is wrong with them.
+
+    Args:
+        confined: What lies outside the folder is refused, and not looked for.
+    """
+    for place, name in named_files(values):
+        what = f"link {_link_name(values, place)!r} mesh" if place[-1] == "mesh" else str(place[0])
+        path = folder / name
+        if "\0" in name:
+            yield Problem(place, f"{what} = {_short(name)}: no file has such a name")
+        elif confined and not path.resolve().is_relative_to(folder.resolve()):
+            yield Problem(place, f"{what} = {_short(name)}: must lie in the description's own folder")
+        elif place[0] == "packages":
+            if not path.is_dir():
+                yield Problem(place, f"packages {_short(name)}: no such folder beside the description")
+        elif not _is_file(path):
+            yield Problem(place, f"{what} = {_short(name)}: no such file beside the description")
 
 
-def _unit(joint: Joint, units: Units) -> str:
-    return units.angle if joint.type is JointType.ROTARY else units.length
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a name longer than any may be
+        return False
+
+
+def named_files(values: Mapping[str, Any]) -> Iterator[tuple[tuple[Step, ...], str]]:
+    """Every file or folder that the values name, with its path in them."""
+    joints = values.get("joint")
+    rows = joints if isinstance(joints, list) else []
+    bodies: list[tuple[tuple[Step, ...], Any]] = [(("base",), values.get("base"))]
+    bodies += [
+        (("joint", number, "link"), row.get("link"))
+        for number, row in enumerate(rows)
+        if isinstance(row, dict)
+    ]
+    for place, body in bodies:
+        if isinstance(body, dict) and isinstance(body.get("mesh"), str):
+            yield (*place, "mesh"), body["mesh"]
+    if isinstance(values.get("urdf"), str):
+        yield ("urdf",), values["urdf"]
+        folders = values.get("packages")
+        for number, folder in enumerate(folders if isinstance(folders, list) else []):
+            if isinstance(folder, str):
+                yield ("packages", number), folder
+
+
+def _link_name(values: Mapping[str, Any], place: tuple[Step, ...]) -> str:
+    if place[0] == "base":
+        return BASE_LINK
+    row = values["joint"][place[1]]
+    return str(row["link"].get("name") or row.get("name", ""))

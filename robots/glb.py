@@ -2,36 +2,39 @@
 
 Each link's mesh is brought into the link's frame, in metres and z upwards as the robot's own (not
 turned to glTF's y), painted as the description says, and kept in the user's cache by the content
-it was made from: with a warm cache trimesh, 1.5 s of import, is not needed.
+it was made from.
 """
 
 import hashlib
-import importlib
+import json
 import logging
 import os
 import tempfile
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from robots.joints import FloatArray
-from robots.meshes.mesh import PAINT, Color, Material, Mesh, Part, transformed
+from robots.meshes.lighten import lightened
+from robots.meshes.mesh import PAINT, Mesh, Part, Wire, transformed_mesh
 from robots.meshes.read import read_mesh
-from robots.poses import pose_matrix
-from robots.schema import Body, RobotDescription
+from robots.meshes.write_glb import glb_of
+from robots.schema import RobotDescription
+from robots.tree import Shape, tree_of
+
+__all__ = ["MOST_TRIANGLES", "cache_folder", "glb_of", "link_mesh", "link_meshes", "shapes_glb"]
 
 logger = logging.getLogger(__name__)
 
 # Part of each cache name: counts up when the same mesh file is to give another GLB.
-_VERSION = 1
-# How some materials reflect (metallic, roughness); mesh files of this age cannot say it.
-_FINISHES = {"paint": (0.0, 0.45), "casting": (0.25, 0.6), "steel": (0.85, 0.3), "rubber": (0.0, 0.9)}
+_VERSION = 4
+# A link goes over the network to phones too, and no screen shows more.
+MOST_TRIANGLES = 200_000
 
 
 def link_meshes(description: RobotDescription, *, cache: Path | None = None) -> dict[str, bytes]:
-    """GLB of each link that has a mesh, by link name, base first; in the link's frame, metres.
+    """GLB of each link that has a shape, by link name, base first; in the link's frame, metres.
 
     Args:
         cache: Folder of finished GLB files; the user's cache folder unless given.
@@ -40,12 +43,17 @@ def link_meshes(description: RobotDescription, *, cache: Path | None = None) -> 
         MeshError: If a mesh file cannot be read.
     """
     folder = cache_folder() if cache is None else cache
-    meshes = {}
-    for name, body in description.bodies.items():
-        path = description.mesh_path(body)
-        if path is not None:
-            meshes[name] = _cached_glb(description, body, path, folder)
-    return meshes
+    links = tree_of(description).links
+    return {link.name: shapes_glb(link.shapes, cache=folder) for link in links if link.shapes}
+
+
+def shapes_glb(shapes: tuple[Shape, ...], *, cache: Path | None = None) -> bytes:
+    """GLB of the shapes of a link, or of anything else, in its frame; metres.
+
+    Raises:
+        MeshError: If a mesh file cannot be read.
+    """
+    return _cached_glb(shapes, cache_folder() if cache is None else cache)
 
 
 def cache_folder() -> Path:
@@ -64,99 +72,119 @@ def cache_folder() -> Path:
     return Path(tempfile.mkdtemp(prefix="robomesh-meshes-"))
 
 
-def _cached_glb(description: RobotDescription, body: Body, path: Path, folder: Path) -> bytes:
-    placement = pose_matrix(body.mesh_pose, description.units)
-    recipe = f"{_VERSION} {path.suffix.lower()} {body.mesh_scale!r} {body.color} {placement.tolist()!r} "
-    content = path.read_bytes() if path.is_file() else b""
-    cached = folder / (hashlib.sha256(recipe.encode() + content).hexdigest() + ".glb")
+def _cached_glb(shapes: tuple[Shape, ...], folder: Path) -> bytes:
+    files = [_files_then(shape, folder) for shape in shapes]
+    cached = folder / f"{_key(shapes, files)}.glb"
     if cached.is_file():
         return cached.read_bytes()
-    mesh = read_mesh(path)
-    glb = glb_of(link_mesh(mesh, body, placement))
-    # What comes from other files too cannot be known by this file's content.
-    if mesh.self_contained:
-        _keep(cached, glb)
+    meshes = [_placed(shape) for shape in shapes]
+    mesh = _joined(meshes)
+    light = lightened(mesh, MOST_TRIANGLES)
+    if light is not mesh:
+        source = next((shape.mesh.name for shape in shapes if isinstance(shape.mesh, Path)), "a link")
+        logger.info("%s: %d triangles sent as %d", source, mesh.triangle_count, light.triangle_count)
+    glb = glb_of(light)
+    now = [mesh.files for mesh in meshes]
+    for shape, before, found in zip(shapes, files, now, strict=True):
+        if isinstance(shape.mesh, Path) and tuple(before) != found:
+            home = shape.mesh.resolve().parent
+            named = [os.path.relpath(file, home) for file in found]
+            _keep(_list_of_files(shape, folder), json.dumps(named).encode())
+    _keep(folder / f"{_key(shapes, now)}.glb", glb)
     return glb
 
 
-def link_mesh(mesh: Mesh, body: Body, mesh_to_link: FloatArray) -> Mesh:
-    """A mesh file's content in its link's frame [m] and in the description's colour."""
-    scale = np.diag([body.mesh_scale, body.mesh_scale, body.mesh_scale, 1.0])
-    parts = [transformed(part, mesh_to_link @ scale) for part in mesh.parts]
-    if body.color is not None:
-        names = {part.material.name for part in parts}
-        color = rgb(body.color)
-        parts = [
-            replace(part, material=replace(part.material, diffuse=color))
-            if PAINT not in names or part.material.name == PAINT
-            else part
-            for part in parts
-        ]
-    return replace(mesh, parts=tuple(parts))
+def _files_then(shape: Shape, folder: Path) -> tuple[Path, ...]:
+    """The other files that a shape's file asked for when it was read last, with this content."""
+    if not isinstance(shape.mesh, Path):
+        return ()
+    try:
+        home = shape.mesh.resolve().parent
+        named = json.loads(_list_of_files(shape, folder).read_bytes())
+        return tuple(Path(os.path.normpath(home / file)) for file in named)
+    except (OSError, ValueError):
+        return ()
 
 
-def rgb(color: str) -> Color:
-    """Red, green and blue, 0 to 1, of "#rrggbb"."""
-    red, green, blue = (int(color[start : start + 2], 16) / 255 for start in (1, 3, 5))
-    return red, green, blue
+def _list_of_files(shape: Shape, folder: Path) -> Path:
+    return folder / f"{_key([shape], [()])}.files"
 
 
-def glb_of(mesh: Mesh) -> bytes:
-    """A mesh as binary glTF: one primitive a part, its axes as they are."""
-    trimesh: Any = importlib.import_module("trimesh")  # 1.5 s; without types
+def _key(shapes: Sequence[Shape], files: Sequence[Sequence[Path]]) -> str:
+    """A name for what becomes of shapes, by all that it is made of.
 
-    scene = trimesh.Scene()
-    for number, part in enumerate(_merged(mesh)):
-        material = part.material
-        metallic, roughness = _FINISHES.get(material.name, (0.0, 0.55))
-        scene.add_geometry(
-            trimesh.Trimesh(
-                vertices=part.vertices,
-                faces=part.triangles,
-                vertex_normals=part.normals,
-                visual=trimesh.visual.TextureVisuals(
-                    material=trimesh.visual.material.PBRMaterial(
-                        name=material.name or f"material {number}",
-                        baseColorFactor=[*_linear(material.diffuse), 1.0 - material.transparency],
-                        emissiveFactor=_linear(material.emissive),
-                        metallicFactor=metallic,
-                        roughnessFactor=roughness,
-                        alphaMode="BLEND" if material.transparency > 0 else "OPAQUE",
-                        doubleSided=part.two_sided,
-                    )
-                ),
-                process=False,
-                validate=False,
-            ),
-            geom_name=f"{number} {part.name}".strip(),
-        )
-    return bytes(trimesh.exchange.gltf.export_glb(scene, include_normals=True))
+    Args:
+        files: Of each shape, the other files that its own asks for, there or not.
+    """
+    digest = hashlib.sha256(str(_VERSION).encode())
+    for shape, others in zip(shapes, files, strict=True):
+        how = f"{shape.shape_to_link.tolist()!r} {shape.color} {shape.opacity} {shape.in_stated_unit} "
+        # Who is confined to a folder has not read what lies outside.
+        if shape.within is not None and isinstance(shape.mesh, Path):
+            how += os.path.relpath(shape.within.resolve(), shape.mesh.resolve().parent)
+        digest.update(how.encode())
+        for part in _content(shape.mesh, others):
+            digest.update(hashlib.sha256(part).digest())
+    return digest.hexdigest()
 
 
-def _merged(mesh: Mesh) -> list[Part]:
-    """Parts of one material joined: fewer to draw."""
-    groups: dict[tuple[Material, bool], list[Part]] = {}
-    for part in mesh.parts:
-        groups.setdefault((part.material, part.two_sided), []).append(part)
-    merged = []
-    for parts in groups.values():
-        offsets = np.cumsum([0, *(len(part.vertices) for part in parts)])
-        merged.append(
-            replace(
-                parts[0],
-                vertices=np.concatenate([part.vertices for part in parts]),
-                normals=np.concatenate([part.normals for part in parts]),
-                triangles=np.concatenate(
-                    [part.triangles + offset for part, offset in zip(parts, offsets, strict=False)]
-                ),
-            )
-        )
-    return merged
+def _content(mesh: Path | Mesh, others: Sequence[Path]) -> Iterator[bytes]:
+    if isinstance(mesh, Path):
+        yield mesh.suffix.lower().encode()
+        for path in (mesh, *others):
+            yield b"there" if path.is_file() else b"missing"
+            yield path.read_bytes() if path.is_file() else b""
+        yield repr([os.path.relpath(path, mesh.resolve().parent) for path in others]).encode()
+        return
+    pieces: list[Part | Wire] = [*mesh.parts, *mesh.wires]
+    for piece in pieces:
+        for field in fields(piece):
+            value = getattr(piece, field.name)
+            yield value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode()
 
 
-def _linear(color: Color) -> list[float]:
-    """glTF's factors are linear light, the file's colours are sRGB."""
-    return [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in color]
+def link_mesh(shapes: Sequence[Shape]) -> Mesh:
+    """A link's shapes as one mesh in its frame [m], in the description's colours.
+
+    Raises:
+        MeshError: If a mesh file cannot be read.
+    """
+    return _joined([_placed(shape) for shape in shapes])
+
+
+def _joined(meshes: Sequence[Mesh]) -> Mesh:
+    return Mesh(
+        parts=tuple(part for mesh in meshes for part in mesh.parts),
+        wires=tuple(wire for mesh in meshes for wire in mesh.wires),
+        warnings=tuple(warning for mesh in meshes for warning in mesh.warnings),
+        files=tuple(file for mesh in meshes for file in mesh.files),
+    )
+
+
+def _placed(shape: Shape) -> Mesh:
+    mesh = read_mesh(shape.mesh, within=shape.within) if isinstance(shape.mesh, Path) else shape.mesh
+    placement = shape.shape_to_link
+    if shape.in_stated_unit and mesh.unit_m is not None:
+        placement = placement @ np.diag([mesh.unit_m, mesh.unit_m, mesh.unit_m, 1.0])
+    mesh = transformed_mesh(mesh, placement)
+    names = {part.material.name for part in mesh.parts}
+    return replace(
+        mesh,
+        parts=tuple(
+            _painted(part, shape) if PAINT not in names or part.material.name == PAINT else part
+            for part in mesh.parts
+        ),
+    )
+
+
+def _painted(part: Part, shape: Shape) -> Part:
+    material = part.material
+    if shape.color is not None:
+        material = replace(material, diffuse=shape.color)
+        part = replace(part, colors=None)
+    if shape.opacity is not None:
+        material = replace(material, transparency=1.0 - shape.opacity)
+    return replace(part, material=material)
 
 
 def _keep(path: Path, content: bytes) -> None:

@@ -1,13 +1,16 @@
 """A robot's joints in SI: limits, speeds, coupled limits. No kinematics, so nothing heavy is imported."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import degrees, isfinite, radians
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from robots.errors import JointCountError
-from robots.schema import Joint, JointType, RobotDescription, Units
+from robots.poses import FloatArray
+from robots.schema import DhDescription, JointSettings, JointType, RobotDescription, UrdfDescription
+from robots.tree import tree_of
+from robots.units import angle_factor, length_factor, position_factor
 
 __all__ = [
     "Constraint",
@@ -19,11 +22,12 @@ __all__ = [
     "constraint_values",
     "joints_of",
     "length_factor",
-    "position_factor",
     "violations",
 ]
 
-FloatArray = NDArray[np.float64]
+# What a URDF does not say, taken as the library's robots have it: a quarter of a second to full speed.
+ACCELERATION_PER_SPEED = 4.0
+JERK_PER_ACCELERATION = 10.0
 
 # A controller at its limit reports it rounded to 0.01 degrees or millimetres: that is not a violation.
 _ROUNDING_RAD = radians(0.005)
@@ -69,13 +73,20 @@ class Joints:
 
 def joints_of(description: RobotDescription) -> Joints:
     """The joints of a description, in SI."""
+    if isinstance(description, UrdfDescription):
+        joints = _urdf_joints(description)
+    else:
+        assert isinstance(description, DhDescription)
+        joints = _row_joints(description)
+    return replace(joints, constraints=_constraints_of(description, joints))
+
+
+def _row_joints(description: DhDescription) -> Joints:
     rows = description.joints
-    factors = np.array([position_factor(joint, description.units) for joint in rows])
+    factors = np.array([position_factor(joint.type, description.units) for joint in rows])
 
     def column(values: list[float]) -> FloatArray:
-        array: FloatArray = np.array(values, dtype=np.float64) * factors
-        array.flags.writeable = False
-        return array
+        return _fixed(np.array(values, dtype=np.float64) * factors)
 
     return Joints(
         names=tuple(joint.name for joint in rows),
@@ -86,41 +97,64 @@ def joints_of(description: RobotDescription) -> Joints:
         max_acceleration=column([joint.max_acceleration for joint in rows]),
         max_jerk=column([joint.max_jerk for joint in rows]),
         home=column([joint.home for joint in rows]),
-        constraints=_constraints_of(description),
     )
 
 
-def _constraints_of(description: RobotDescription) -> tuple[Constraint, ...]:
-    by_name = {joint.name: joint for joint in description.joints}
+def _urdf_joints(description: UrdfDescription) -> Joints:
+    """What the URDF says, unless the description says it otherwise."""
+    tree = tree_of(description)
+    settings = {row.name: row for row in description.joints}
+    columns = []
+    free = [tree.joints[number] for number in tree.free]
+    for joint in free:
+        said = settings.get(joint.name) or JointSettings(name=joint.name)
+        factor = position_factor(joint.type, description.units)
+
+        def value(number: float | None, otherwise: float, factor: float = factor) -> float:
+            return otherwise if number is None else number * factor
+
+        lower = value(said.limits[0] if said.limits else None, joint.lower)
+        upper = value(said.limits[1] if said.limits else None, joint.upper)
+        speed = value(said.max_speed, joint.max_speed)
+        acceleration = value(said.max_acceleration, ACCELERATION_PER_SPEED * speed)
+        jerk = value(said.max_jerk, JERK_PER_ACCELERATION * acceleration)
+        home = value(said.home, 0.0 if lower <= 0.0 <= upper else (lower + upper) / 2)
+        columns.append((lower, upper, speed, acceleration, jerk, home))
+    lower_, upper_, speeds, accelerations, jerks, homes = map(_fixed, np.array(columns).T)
+    return Joints(
+        names=tuple(joint.name for joint in free),
+        types=tuple(joint.type for joint in free),
+        lower=lower_,
+        upper=upper_,
+        max_speed=speeds,
+        max_acceleration=accelerations,
+        max_jerk=jerks,
+        home=homes,
+    )
+
+
+def _fixed(array: FloatArray) -> FloatArray:
+    array = np.ascontiguousarray(array)
+    array.flags.writeable = False
+    return array
+
+
+def _constraints_of(description: RobotDescription, joints: Joints) -> tuple[Constraint, ...]:
+    types = dict(zip(joints.names, joints.types, strict=True))
     constraints = []
     for row in description.constraints:
-        members = [by_name[name] for name in row.joints]
-        factor = position_factor(members[0], description.units)
+        kind = types[next(iter(row.joints))]
+        factor = position_factor(kind, description.units)
         constraints.append(
             Constraint(
                 names=tuple(row.joints),
-                coefficients=np.array([row.joints.get(joint.name, 0.0) for joint in description.joints]),
+                coefficients=np.array([row.joints.get(name, 0.0) for name in joints.names]),
                 lower=row.limits[0] * factor,
                 upper=row.limits[1] * factor,
-                type=members[0].type,
+                type=kind,
             )
         )
     return tuple(constraints)
-
-
-def length_factor(units: Units) -> float:
-    """Metres in the file's unit of length."""
-    return 0.001 if units.length == "mm" else 1.0
-
-
-def angle_factor(units: Units) -> float:
-    """Radians in the file's unit of angle."""
-    return radians(1.0) if units.angle == "deg" else 1.0
-
-
-def position_factor(joint: Joint, units: Units) -> float:
-    """Radians or metres in the unit of a joint's position."""
-    return angle_factor(units) if joint.type is JointType.ROTARY else length_factor(units)
 
 
 def as_positions(joints: Joints, positions: ArrayLike) -> FloatArray:
@@ -179,6 +213,9 @@ def _limit_beyond(position: float, lower: float, upper: float, kind: JointType) 
 
 
 def _text(position: float, kind: JointType) -> str:
+    # From here on the places behind the point say nothing, and degrees may be more than a number holds.
+    if abs(position) >= 1e6:
+        return f"{position:.3g} {'rad' if kind is JointType.ROTARY else 'm'}"
     return f"{degrees(position):.2f}°" if kind is JointType.ROTARY else f"{position * 1000:.2f} mm"
 
 

@@ -1,14 +1,4 @@
-"""The kinematic model: where every link is, and how the tool moves. Pinocchio stays behind this module.
-
-How a standard D-H row becomes a Pinocchio joint and a link's frame:
-
-    joint i's placement = link frame of row i-1 (Trans(z, d) Trans(x, a) Rot(x, alpha)), then
-        rotary:     Rot(z, theta), and the variable turns about z
-        prismatic:  Rot(z, theta) Trans(z, d), and the variable moves along z
-    link i's frame      = joint i, then Trans(z, d) Trans(x, a) Rot(x, alpha)  (prismatic: without d)
-
-Source: Chen, Zhang, Xue 2001, section 3.2.
-"""
+"""The kinematic model: where every link is, and how the tool moves. Pinocchio stays behind this module."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -17,9 +7,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from robots.joints import FloatArray, Joints, angle_factor, as_positions, joints_of, length_factor
-from robots.poses import dh_fixed_part, pose_matrix, rpy_rotation
-from robots.schema import TOOL_FRAME, JointType, RobotDescription
+from robots.joints import FloatArray, Joints, as_positions, joints_of
+from robots.schema import JointType, RobotDescription
+from robots.tree import TreeJoint, named_frames, position_factors, tree_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +20,7 @@ class RobotModel:
         joints: Its joints, SI.
         link_names: Names of its links, base first.
         frame_names: Names of its other frames: "tool" first, then the description's named frames.
+        _followers: How the positions of all joints follow from the robot's own; None: they are the same.
     """
 
     joints: Joints
@@ -39,54 +30,56 @@ class RobotModel:
     _workspace: Any
     _link_ids: tuple[int, ...]
     _frame_ids: tuple[int, ...]
+    _followers: tuple[FloatArray, FloatArray] | None
 
 
 def build_model(description: RobotDescription) -> RobotModel:
     """The kinematic model of a description."""
+    tree = tree_of(description)
     model = pin.Model()
     model.name = description.name
-    joints = joints_of(description)
-    length, angle = length_factor(description.units), angle_factor(description.units)
-    parent = 0
-    before = np.eye(4)  # the parent joint's frame to its link's frame
-    on_link = {"base": (0, before)}
-    link_ids = [_add_frame(model, "base", 0, before)]
-    for index, row in enumerate(description.joints):
-        rotary = row.type is JointType.ROTARY
-        theta, d = row.theta * angle, row.d * length
-        turn = np.eye(4)
-        turn[:3, :3] = rpy_rotation(0.0, 0.0, theta)
-        fixed = dh_fixed_part(d if rotary else 0.0, row.a * length, row.alpha * angle)
-        placement = before @ turn if rotary else before @ turn @ dh_fixed_part(d, 0.0, 0.0)
-        parent = model.addJoint(
-            parent,
-            pin.JointModelRZ() if rotary else pin.JointModelPZ(),
-            pin.SE3(placement),
-            row.name,
+    for joint in tree.joints:
+        # Pinocchio counts joints from 1; its 0 is the base.
+        model.addJoint(
+            joint.parent + 1,
+            joint_motion(joint),
+            pin.SE3(joint.joint_to_parent),
+            joint.name,
             np.full(1, np.inf),
-            joints.max_speed[index : index + 1],
-            joints.lower[index : index + 1],
-            joints.upper[index : index + 1],
+            np.full(1, joint.max_speed),
+            np.full(1, joint.lower),
+            np.full(1, joint.upper),
         )
-        link_ids.append(_add_frame(model, row.link_name, parent, fixed))
-        on_link[row.link_name] = (parent, fixed)
-        before = fixed
-    frames = {TOOL_FRAME: (description.link_names[-1], pose_matrix(description.tool, description.units))}
-    frames |= {
-        frame.name: (frame.link, pose_matrix(frame, description.units)) for frame in description.frames
-    }
+    links = {link.name: link for link in tree.links}
+    link_ids = [_add_frame(model, link.name, link.joint + 1, link.link_to_joint) for link in tree.links]
     frame_ids = []
-    for name, (link, frame_to_link) in frames.items():
-        joint, link_to_joint = on_link[link]
-        frame_ids.append(_add_frame(model, name, joint, link_to_joint @ frame_to_link))
+    frames = named_frames(description)
+    for name, (on_link, frame_to_link) in frames.items():
+        link = links[on_link]
+        # A URDF may have a link of the tool's name: in Pinocchio each frame needs its own.
+        label = f"{name} of the arm" if name in links else name
+        frame_ids.append(_add_frame(model, label, link.joint + 1, link.link_to_joint @ frame_to_link))
     return RobotModel(
-        joints=joints,
-        link_names=description.link_names,
+        joints=joints_of(description),
+        link_names=tuple(links),
         frame_names=tuple(frames),
         _pinocchio=model,
         _workspace=model.createData(),
         _link_ids=tuple(link_ids),
         _frame_ids=tuple(frame_ids),
+        _followers=position_factors(tree) if len(tree.free) < len(tree.joints) else None,
+    )
+
+
+def joint_motion(joint: TreeJoint) -> Any:
+    """Pinocchio's kind of a joint; a continuous one too has one number for its position, as everywhere."""
+    rotary = joint.type is JointType.ROTARY
+    if joint.axis[2] == 1.0:
+        return pin.JointModelRZ() if rotary else pin.JointModelPZ()
+    return (
+        pin.JointModelRevoluteUnaligned(joint.axis)
+        if rotary
+        else pin.JointModelPrismaticUnaligned(joint.axis)
     )
 
 
@@ -101,7 +94,7 @@ def link_placements(model: RobotModel, joint_positions: ArrayLike) -> FloatArray
         joint_positions: (n,) joint positions [rad] or [m].
 
     Returns:
-        (n + 1, 4, 4) homogeneous transforms, link to base, base first.
+        (number of links, 4, 4) homogeneous transforms, link to base, base first.
 
     Raises:
         JointCountError: If the array does not have one value a joint.
@@ -148,7 +141,7 @@ def tool_jacobian(model: RobotModel, joint_positions: ArrayLike) -> FloatArray:
     Raises:
         JointCountError: If there is not one value a joint.
     """
-    positions = as_positions(model.joints, joint_positions)
+    positions = all_positions(model, joint_positions)
     jacobian = pin.computeFrameJacobian(
         model._pinocchio,
         model._workspace,
@@ -157,7 +150,8 @@ def tool_jacobian(model: RobotModel, joint_positions: ArrayLike) -> FloatArray:
         pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
     )
     # Pinocchio gives a 1-D array for a robot of one joint.
-    return np.array(jacobian, dtype=np.float64).reshape(6, len(model.joints))
+    each = np.array(jacobian, dtype=np.float64).reshape(6, len(positions))
+    return each if model._followers is None else each @ model._followers[0]
 
 
 def manipulability(model: RobotModel, joint_positions: ArrayLike) -> float:
@@ -168,8 +162,17 @@ def manipulability(model: RobotModel, joint_positions: ArrayLike) -> float:
     return float(np.prod(np.linalg.svd(tool_jacobian(model, joint_positions), compute_uv=False)))
 
 
-def _forward(model: RobotModel, joint_positions: ArrayLike) -> None:
+def all_positions(model: RobotModel, joint_positions: ArrayLike) -> FloatArray:
+    """Positions of the joints that follow others too."""
     positions = as_positions(model.joints, joint_positions)
+    if model._followers is None:
+        return positions
+    factors, offsets = model._followers
+    return factors @ positions + offsets
+
+
+def _forward(model: RobotModel, joint_positions: ArrayLike) -> None:
+    positions = all_positions(model, joint_positions)
     pin.framesForwardKinematics(model._pinocchio, model._workspace, positions)
 
 

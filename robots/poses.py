@@ -1,9 +1,12 @@
 """Placements as 4x4 matrices: translations, roll-pitch-yaw, D-H rows."""
 
 import numpy as np
+from numpy.typing import NDArray
 
-from robots.joints import FloatArray, angle_factor, length_factor
 from robots.schema import Pose, Units
+from robots.units import angle_factor, length_factor
+
+FloatArray = NDArray[np.float64]
 
 
 def pose_matrix(pose: Pose, units: Units) -> FloatArray:
@@ -33,6 +36,23 @@ def rpy_rotation(roll: float, pitch: float, yaw: float) -> FloatArray:
     )
 
 
+def axis_rotation(axes: FloatArray, angles: FloatArray | float) -> FloatArray:
+    """(..., 3, 3) of turns about (..., 3) axes of any length by (...) angles [rad]: Rodrigues' formula.
+
+    An axis of 0 turns nothing.
+    """
+    lengths = np.linalg.norm(axes, axis=-1, keepdims=True)
+    axes = np.divide(axes, lengths, out=np.zeros_like(axes), where=lengths > 0)
+    cross = np.zeros((*axes.shape[:-1], 3, 3))
+    for axis in range(3):
+        one, other = (axis + 1) % 3, (axis + 2) % 3
+        cross[..., other, one] = axes[..., axis]
+        cross[..., one, other] = -axes[..., axis]
+    by = np.asarray(angles)[..., None, None]
+    result: FloatArray = np.eye(3) + np.sin(by) * cross + (1 - np.cos(by)) * (cross @ cross)
+    return result
+
+
 def rotation_rpy(rotation: FloatArray) -> tuple[float, float, float]:
     """Roll, pitch and yaw [rad] of a (3, 3) rotation; at pitch ±90°, roll is zero."""
     pitch = float(np.arctan2(-rotation[2, 0], np.hypot(rotation[0, 0], rotation[1, 0])))
@@ -41,6 +61,14 @@ def rotation_rpy(rotation: FloatArray) -> tuple[float, float, float]:
         return 0.0, pitch, float(np.arctan2(-rotation[0, 1], rotation[1, 1]))
     roll = float(np.arctan2(rotation[2, 1], rotation[2, 2]))
     return roll, pitch, float(np.arctan2(rotation[1, 0], rotation[0, 0]))
+
+
+def inverse(placement: FloatArray) -> FloatArray:
+    """(4, 4) of a placement's inverse."""
+    back = np.eye(4)
+    back[:3, :3] = placement[:3, :3].T
+    back[:3, 3] = -placement[:3, :3].T @ placement[:3, 3]
+    return back
 
 
 def dh_fixed_part(d: float, a: float, alpha: float) -> FloatArray:

@@ -25,6 +25,7 @@ from pydantic_core import PydanticCustomError
 BASE_LINK = "base"
 TOOL_FRAME = "tool"
 
+ROBOT_NAME = r"^[a-z0-9][a-z0-9_-]*$"
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
 # Strict: "90" and true are no numbers.
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -151,15 +152,37 @@ class Collision(_Table):
     ignore: tuple[tuple[str, str], ...] = ()
 
 
-class RobotDescription(_Table):
-    """A robot's description file, in the file's own units."""
+class JointSettings(_Table):
+    """What a URDF cannot say about one of its joints, and limits tighter than its own."""
 
-    name: Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9_-]*$")]
+    name: Name
+    limits: Range | None = None
+    max_speed: Positive | None = None
+    max_acceleration: Positive | None = None
+    max_jerk: Positive | None = None
+    home: Number | None = None
+
+
+class LinkColor(_Table):
+    """The colour of a link of a URDF."""
+
+    name: Name
+    color: Color
+
+
+class UrdfTool(Pose):
+    """The tool's frame, on a link of a URDF: the one at its end unless named."""
+
+    link: Name | None = None
+
+
+class RobotDescription(_Table):
+    """A robot's description file, in the file's own units: what both of its forms hold."""
+
+    name: Annotated[str, StringConstraints(pattern=ROBOT_NAME)]
     title: str = ""
     provenance: str = ""
     units: Units = Units()
-    base: Body = Body()
-    joints: tuple[Joint, ...] = Field(alias="joint")
     tool: Pose = Pose()
     frames: tuple[Frame, ...] = Field((), alias="frame")
     constraints: tuple[Constraint, ...] = Field((), alias="constraint")
@@ -168,6 +191,7 @@ class RobotDescription(_Table):
 
     _source: Path = PrivateAttr(Path())
     _text: str = PrivateAttr("")
+    _within: Path | None = PrivateAttr(None)
 
     @property
     def source(self) -> Path:
@@ -180,6 +204,31 @@ class RobotDescription(_Table):
         return self._text
 
     @property
+    def within(self) -> Path | None:
+        """The only folder whose files may be read for it; None: any."""
+        return self._within
+
+    def confined_to(self, folder: Path) -> Self:
+        """The same description, for which only files below a folder are read."""
+        known = self.model_copy()
+        known._within = folder
+        return known
+
+    def read_from(self, source: Path, text: str) -> Self:
+        """The same description, knowing its file."""
+        known = self.model_copy()
+        known._source = source
+        known._text = text
+        return known
+
+
+class DhDescription(RobotDescription):
+    """A serial arm by its D-H rows."""
+
+    base: Body = Body()
+    joints: tuple[Joint, ...] = Field(alias="joint")
+
+    @property
     def link_names(self) -> tuple[str, ...]:
         """Names of the links, base first."""
         return (BASE_LINK, *(joint.link_name for joint in self.joints))
@@ -189,16 +238,37 @@ class RobotDescription(_Table):
         """How each link looks, by link name, base first."""
         return {BASE_LINK: self.base} | {joint.link_name: joint.link for joint in self.joints}
 
-    def read_from(self, source: Path, text: str) -> Self:
-        """The same description, knowing its file."""
-        known = self.model_copy()
-        known._source = source
-        known._text = text
-        return known
-
     def mesh_path(self, body: Body) -> Path | None:
         """Where a body's mesh file is; None without one."""
         return None if body.mesh is None else self._source.parent / body.mesh
+
+
+class UrdfDescription(RobotDescription):
+    """A robot by its URDF, and what a URDF cannot say.
+
+    Attributes:
+        urdf: The file, relative to the description's folder.
+        packages: Folders that hold what `package://` names, relative to the description's folder.
+    """
+
+    urdf: str
+    packages: tuple[str, ...] = ()
+    joints: tuple[JointSettings, ...] = Field((), alias="joint")
+    links: tuple[LinkColor, ...] = Field((), alias="link")
+    tool: UrdfTool = UrdfTool()
+
+    _robot: Any = PrivateAttr(None)
+
+    def with_robot(self, robot: Any) -> Self:
+        """The same description, knowing what its URDF holds (a `robots.urdf.read.UrdfRobot`)."""
+        known = self.model_copy()
+        known._robot = robot
+        return known
+
+    @property
+    def robot(self) -> Any:
+        """What its URDF holds: a `robots.urdf.read.UrdfRobot`."""
+        return self._robot
 
 
 def nearest(name: str, names: Iterable[str]) -> str:

@@ -1,10 +1,15 @@
 """A description for people and programs: what it says and what follows from it, in SI."""
 
+from pathlib import Path
 from typing import Any
 
+from robots.dh import dh_form
+from robots.errors import DescriptionError
 from robots.joints import joints_of
 from robots.meshes.mesh import Mesh, bounds
-from robots.schema import RobotDescription
+from robots.schema import DhDescription, RobotDescription, UrdfDescription
+from robots.tree import Shape, named_frames, tree_of
+from robots.units import angle_factor, length_factor
 from robots.views import reach, views_of
 
 
@@ -42,12 +47,51 @@ def description_summary(description: RobotDescription) -> dict[str, Any]:
             for constraint in joints.constraints
         ],
         "links": [
-            {"name": name, "mesh": body.mesh, "color": body.color}
-            for name, body in description.bodies.items()
+            {"name": link.name, "meshes": [_mesh_name(shape) for shape in link.shapes]}
+            for link in tree_of(description).links
         ],
-        "frames": [frame.name for frame in description.frames],
+        "dh": dh_summary(description),
+        "frames": [
+            {"name": name, "link": link, "frame_to_link": placement.tolist()}
+            for name, (link, placement) in named_frames(description).items()
+        ],
         "views": [view.name for view in views_of(description)],
     }
+
+
+def dh_summary(description: RobotDescription) -> dict[str, Any] | None:
+    """D-H rows in m and rad, of a URDF its chain to the tool; None where rows cannot say it.
+
+    Returns:
+        `rows` with joint, type, a, alpha, d, theta and link, and `notes` on how they were found.
+    """
+    notes: tuple[str, ...] = ()
+    if isinstance(description, UrdfDescription):
+        try:
+            form = dh_form(description)
+        except DescriptionError:
+            return None
+        notes = form.notes
+        description = DhDescription.model_validate(form.values)
+    assert isinstance(description, DhDescription)
+    length, angle = length_factor(description.units), angle_factor(description.units)
+    rows = [
+        {
+            "joint": row.name,
+            "type": str(row.type),
+            "a": row.a * length,
+            "alpha": row.alpha * angle,
+            "d": row.d * length,
+            "theta": row.theta * angle,
+            "link": row.link_name,
+        }
+        for row in description.joints
+    ]
+    return {"rows": rows, "notes": list(notes)}
+
+
+def _mesh_name(shape: Shape) -> str:
+    return shape.mesh.name if isinstance(shape.mesh, Path) else "made by the URDF"
 
 
 def mesh_summary(mesh: Mesh) -> dict[str, Any]:

@@ -4,8 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robots.joints import FloatArray, joints_of, length_factor
-from robots.schema import RobotDescription
+from robots.joints import FloatArray, joints_of
+from robots.schema import JointType, RobotDescription
+from robots.tree import chain_to, tool_frame, tree_of
+from robots.units import length_factor
+
+# A robot whose rows are all still zero reaches nowhere, and is looked at all the same.
+_LEAST_M = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +45,7 @@ def views_of(description: RobotDescription) -> tuple[View, ...]:
 
 def default_views(description: RobotDescription) -> dict[str, View]:
     """Orthographic top, front and left at a distance from which the whole arm's reach is in front."""
-    size = reach(description)
+    size = max(reach(description), _LEAST_M)
     target = np.array([0.0, 0.0, 0.45 * size])
     directions = {
         "top": ((0, 0, 1), (0, 1, 0)),
@@ -56,13 +61,19 @@ def default_views(description: RobotDescription) -> dict[str, View]:
 
 
 def reach(description: RobotDescription) -> float:
-    """How far from the base's origin any part of the tool frame's way can come [m]: an upper bound."""
-    metres = length_factor(description.units)
+    """How far from the base's origin any link's frame, or the tool's, can come [m]: an upper bound."""
+    tree = tree_of(description)
     joints = joints_of(description)
-    links = sum(np.hypot(joint.a, joint.d) for joint in description.joints) * metres
-    strokes = sum(
-        max(abs(lower), abs(upper))
-        for lower, upper, kind in zip(joints.lower, joints.upper, joints.types, strict=True)
-        if kind == "prismatic"
-    )
-    return float(links + strokes + np.linalg.norm(description.tool.xyz) * metres)
+    strokes = [0.0] * len(tree.joints)
+    for number, lower, upper in zip(tree.free, joints.lower, joints.upper, strict=True):
+        if tree.joints[number].type is JointType.PRISMATIC:
+            strokes[number] = max(abs(lower), abs(upper))
+    link, tool_to_link = tool_frame(description)
+    farthest = 0.0
+    for one in tree.links:
+        chain = chain_to(tree, one.joint)
+        length = sum(float(np.linalg.norm(tree.joints[n].joint_to_parent[:3, 3])) + strokes[n] for n in chain)
+        length += float(np.linalg.norm(one.link_to_joint[:3, 3]))
+        length += float(np.linalg.norm(tool_to_link[:3, 3])) if one.name == link else 0.0
+        farthest = max(farthest, length)
+    return farthest

@@ -3,42 +3,44 @@
 Degrees and millimetres in the file, SI in what is read from it.
 """
 
+import re
 import tomllib
+from collections.abc import Mapping
+from itertools import combinations, product
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, ValidationError, field_validator
+from pydantic import (
+    BaseModel,
+    Field,
+    StrictBool,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
 from bus import keys
-from bus.endpoints import Tls
+from bus.access import NOBODYS_ROBOT
 from bus.errors import KeyNameError
+from protocol_gateway.core.codes import code_table
+from protocol_gateway.drivers.registry import DRIVERS
+from protocol_gateway.errors import CodeTableError
 from robots import description
 from robots.description import Pose
+from robots.errors import DescriptionError
+from robots.schema import UrdfDescription
+from robots.tree import tree_of
 from services.errors import ListenError, SiteFileError
-from services.listen import split_address
+from services.listen import cannot_both_listen, check_page_reach, check_reach, same_address, split_address
+from services.site_console import Console
+from services.site_console import beside as console_beside
+from services.site_fixtures import Clearance, Fixture, fixture_problem, name_problem
+from services.site_legacy import LegacyClients, Quiet
+from services.site_pictures import ALWAYS_RENDERED, Recorder, Renderer
+from services.site_router import RoutedSite, beside
+from services.site_sentences import sentence
 
-Pixels = Annotated[int, Field(ge=64, le=4096, multiple_of=2)]
 Triple = tuple[float, float, float]
-Quiet = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class TlsFiles(BaseModel):
-    """Certificates of this end (PEM)."""
-
-    model_config = Quiet
-    ca: Path
-    certificate: Path
-    key: Path
-
-
-class Router(BaseModel):
-    """The site's router."""
-
-    model_config = Quiet
-    listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)
-    connect: tuple[str, ...] = ()
-    tls: TlsFiles | None = None
-    insecure: StrictBool = False
 
 
 class Robot(BaseModel):
@@ -50,24 +52,54 @@ class Robot(BaseModel):
     pose: Pose = Pose()
     cell: str = ""
     controller: str = "simulated"
-    protocol: Literal["unit"] = "unit"
+    protocol: str = "unit"
     codes: dict[int, str] = Field(default_factory=dict)
     accept_unknown: tuple[Literal["mode", "homed"], ...] = ()
+    check: Literal["require", "warn", "off"] = "warn"
+    clearance: Clearance = Clearance()
     # Whether somebody tried the stop unit on this controller; without that nothing is ever sent to it.
     stop_proven: StrictBool | None = None
     stale_after_s: Annotated[float, Field(gt=0.05, le=60)] = 1.0
     demo: StrictBool = False
+    legacy_clients: LegacyClients | None = None
 
     @field_validator("name")
     @classmethod
     def _name(cls, name: str) -> str:
+        if name.startswith("replay-"):
+            raise ValueError(
+                "replay-... is what recordings are played back as: call the robot something else"
+            )
+        if name == NOBODYS_ROBOT:
+            raise ValueError("rights are tried on this name: call the robot something else")
         return _checked_name(name, "robot")
+
+    @field_validator("protocol")
+    @classmethod
+    def _protocol(cls, protocol: str) -> str:
+        if protocol not in DRIVERS:
+            raise ValueError(f"should be {' or '.join(map(repr, DRIVERS))}")
+        return protocol
 
     @field_validator("codes", mode="before")
     @classmethod
     def _codes(cls, codes: Any) -> Any:
-        # TOML's keys are text.
-        return {int(k): v for k, v in codes.items()} if isinstance(codes, dict) else codes
+        if not isinstance(codes, dict):
+            return codes
+        try:
+            # TOML's keys are text.
+            return {int(code): meaning for code, meaning in codes.items()}
+        except ValueError:
+            raise ValueError('a code is a number, as in { 2 = "ABSOLUTE.DEG" }') from None
+
+    @field_validator("codes")
+    @classmethod
+    def _table(cls, codes: dict[int, str]) -> dict[int, str]:
+        try:
+            code_table(codes)
+        except CodeTableError as error:
+            raise ValueError(str(error)) from None
+        return codes
 
     @field_validator("controller")
     @classmethod
@@ -75,12 +107,12 @@ class Robot(BaseModel):
         if controller == "simulated":
             return controller
         scheme, _, address = controller.partition("://")
-        if scheme != "tcp":
-            raise ValueError("should be 'simulated' or tcp://HOST:PORT, as in tcp://10.0.0.7:5400")
         try:
-            split_address(address)
+            _, port = split_address(address)
         except ListenError:
-            raise ValueError("should be 'simulated' or tcp://HOST:PORT, as in tcp://10.0.0.7:5400") from None
+            port = 0
+        if scheme != "tcp" or not port:
+            raise ValueError("should be 'simulated' or tcp://HOST:PORT, as in tcp://10.0.0.7:5400")
         return controller
 
     @property
@@ -94,31 +126,11 @@ class Robot(BaseModel):
         return self.simulated if self.stop_proven is None else self.stop_proven
 
 
-class Recorder(BaseModel):
-    """Where recordings go."""
+class Define(BaseModel):
+    """Where robots that were defined on the page are saved."""
 
     model_config = Quiet
-    folder: Path = Path("recordings")
-
-
-class Renderer(BaseModel):
-    """Which views are rendered, and how large."""
-
-    model_config = Quiet
-    views: tuple[str, ...] = ("front", "top", "left", "free")
-    # H.264 halves the resolution of colour.
-    size: tuple[Pixels, Pixels] = (1280, 720)
-    fps: Annotated[float, Field(ge=1, le=120)] = 30
-
-
-class Console(BaseModel):
-    """Where the page is served."""
-
-    model_config = Quiet
-    listen: str = "127.0.0.1:8080"
-    # Names that people reach it by, beside addresses and localhost.
-    hosts: tuple[str, ...] = ()
-    insecure: StrictBool = False
+    folder: Path = Path("robots")
 
 
 class Audit(BaseModel):
@@ -126,24 +138,28 @@ class Audit(BaseModel):
 
     model_config = Quiet
     folder: Path = Path("audit")
+    # A file that has grown to this becomes an older part, and the log goes on in a new one.
+    rotate_mib: Annotated[float, Field(ge=0.01, le=1024)] = 16
 
 
-class Site(BaseModel):
-    """A whole site."""
+class Watch(BaseModel):
+    """Where the watch keeps alarms, so that a restart forgets no acknowledgement."""
 
     model_config = Quiet
-    site: str
-    router: Router = Router()
+    folder: Path = Path("watch")
+
+
+class Site(RoutedSite):
+    """A whole site."""
+
     robot: tuple[Robot, ...] = ()
+    fixture: tuple[Fixture, ...] = ()
     recorder: Recorder = Recorder()
     renderer: Renderer = Renderer()
     console: Console = Console()
+    define: Define = Define()
     audit: Audit = Audit()
-
-    @field_validator("site")
-    @classmethod
-    def _site(cls, name: str) -> str:
-        return _checked_name(name, "site")
+    watch: Watch = Watch()
 
     @field_validator("robot")
     @classmethod
@@ -154,11 +170,53 @@ class Site(BaseModel):
                 raise ValueError(f"two robots are named {name!r}: every robot needs a name of its own")
         return robots
 
+    @model_validator(mode="after")
+    def _cells(self) -> "Site":
+        if problem := name_problem(self.fixture, {robot.name: robot.cell for robot in self.robot}):
+            raise ValueError(problem)
+        return self
+
+    @model_validator(mode="after")
+    def _views(self) -> "Site":
+        rendered = (*self.renderer.views, *ALWAYS_RENDERED)
+        for view in self.recorder.views or ():
+            if view not in rendered:
+                raise ValueError(
+                    f"recorder views = {view!r}: the renderer has no such view; it has {', '.join(rendered)}"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _addresses(self) -> "Site":
+        """Every address is one thing's: two cannot listen on it, and two robots are not one controller."""
+        here = [("the router", address) for address in map(_tcp_address, self.router.listen) if address]
+        here.append(("the console", self.console.listen))
+        linked = (_tcp_address(each.rpartition("=")[2]) for each in self.router.connect)
+        there = [("another router", address) for address in linked if address]
+        for robot in self.robot:
+            if not robot.simulated:
+                there.append((f"robot {robot.name}'s controller", robot.controller.removeprefix("tcp://")))
+            if robot.legacy_clients is not None:
+                here.append((f"robot {robot.name}'s legacy_clients", robot.legacy_clients.listen))
+        tests = [
+            *((cannot_both_listen, *pair) for pair in combinations(here, 2)),
+            *((same_address, *pair) for pair in (*combinations(there, 2), *product(here, there))),
+        ]
+        for meet, (what, address), (other, another) in tests:
+            try:
+                met = meet(address, another)
+            except ListenError as error:
+                raise ValueError(str(error)) from None
+            if met:
+                raise ValueError(f"{another} is given twice, to {what} and to {other}: each needs its own")
+        return self
+
     @property
-    def tls(self) -> Tls | None:
-        """Certificates for the site's own sessions."""
-        files = self.router.tls
-        return None if files is None else Tls(ca=files.ca, certificate=files.certificate, key=files.key)
+    def recorded_views(self) -> tuple[str, ...]:
+        """Whose video is recorded unless one asks otherwise."""
+        if self.recorder.views is not None:
+            return self.recorder.views
+        return ("free",) if "free" in self.renderer.views else self.renderer.views[:1]
 
 
 def load(path: Path | None) -> Site:
@@ -168,7 +226,6 @@ def load(path: Path | None) -> Site:
 
     Raises:
         SiteFileError: A line a problem: file, key, value, and what would be right.
-        DescriptionError: If a robot's model is not right.
     """
     if path is None:
         return DEMO
@@ -184,13 +241,69 @@ def load(path: Path | None) -> Site:
         raise SiteFileError(f"{path}: not TOML: {error}") from None
     except ValidationError as error:
         raise SiteFileError(
-            "\n".join(_sentence(path, problem, values) for problem in error.errors())
+            "\n".join(sentence(path, problem, values, Site) for problem in error.errors())
         ) from None
     site = _beside(site, path.parent)
+    # What no service could run with is told before any starts.
+    try:
+        _check_reach(site)
+    except ListenError as error:
+        raise SiteFileError(f"{path}: {error}") from None
+    links: dict[str, dict[str, bool]] = {}
+    unseen: dict[str, str] = {}
     for robot in site.robot:
-        # What no service could run with is told before any starts.
-        description.load(robot.model)
+        try:
+            described = description.load(robot.model)
+            tree = tree_of(described)
+        except DescriptionError as error:
+            raise SiteFileError(f"{path}: robot {robot.name}: model = {robot.model!r}: {error}") from None
+        links[robot.name] = {link.name: bool(link.shapes) for link in tree.links}
+        missing = described.robot.missing if isinstance(described, UrdfDescription) else ()
+        if not any(links[robot.name].values()):
+            unseen[robot.name] = f"{robot.model} has no shapes that could be checked"
+        elif missing:
+            unseen[robot.name] = f"{robot.model}: no such mesh file: {', '.join(missing)}"
+    if problem := _unseen_problem(site.robot, unseen) or fixture_problem(site.fixture, links):
+        raise SiteFileError(f"{path}: {problem}")
     return site
+
+
+def _check_reach(site: Site) -> None:
+    """What others can reach is guarded, or the file takes the risk.
+
+    Raises:
+        ListenError: If not.
+    """
+    for endpoint in site.listened:
+        protocol, _, address = endpoint.partition("/")
+        host, _ = split_address(re.split("[?#]", address)[0])
+        secured = protocol in ("tls", "quic")
+        check_reach(f"the router ({endpoint})", host, secured=secured, insecure=site.router.insecure)
+    console = site.console
+    host, _ = split_address(console.listen)
+    check_page_reach(
+        host, accounts=console.accounts is not None, tls=console.tls is not None, insecure=console.insecure
+    )
+
+
+def _unseen_problem(robots: tuple[Robot, ...], unseen: Mapping[str, str]) -> str | None:
+    """Why motions of a robot that requires checks could not be checked, in words; None: they can.
+
+    Args:
+        unseen: Robots that no check covers whole, and why.
+    """
+    for robot in robots:
+        if robot.check != "require":
+            continue
+        for other in robots:
+            met = other is robot or (robot.cell and other.cell == robot.cell)
+            if met and other.name in unseen:
+                whose = "" if other is robot else f"robot {other.name} of its cell: "
+                return (
+                    f'robot {robot.name}: check = "require": {whose}{unseen[other.name]}; '
+                    '"warn" and "off" are possible'
+                )
+    return None
 
 
 def _beside(site: Site, folder: Path) -> Site:
@@ -200,31 +313,28 @@ def _beside(site: Site, folder: Path) -> Site:
         else robot
         for robot in site.robot
     )
+    fixtures = tuple(
+        fixture.model_copy(update={"mesh": folder / fixture.mesh}) if fixture.mesh is not None else fixture
+        for fixture in site.fixture
+    )
     return site.model_copy(
         update={
             "robot": robots,
+            "fixture": fixtures,
             "recorder": site.recorder.model_copy(update={"folder": folder / site.recorder.folder}),
+            "define": site.define.model_copy(update={"folder": folder / site.define.folder}),
             "audit": site.audit.model_copy(update={"folder": folder / site.audit.folder}),
+            "watch": site.watch.model_copy(update={"folder": folder / site.watch.folder}),
+            "console": console_beside(site.console, folder),
+            **beside(site.router, site.keys, folder),
         }
     )
 
 
-def _sentence(path: Path, problem: Any, values: dict[str, Any]) -> str:
-    """One of pydantic's problems as one line: file, key, value and what would be right."""
-    parts = list(problem["loc"])
-    if len(parts) > 1 and isinstance(parts[1], int):
-        row = values[parts[0]][parts[1]]
-        parts[1] = row.get("name", parts[1] + 1) if isinstance(row, dict) else parts[1] + 1
-    where = ".".join(map(str, parts))
-    if problem["type"] == "missing":
-        return f"{path}: {where} is missing"
-    if problem["type"] == "extra_forbidden":
-        later = _LATER.get(str(parts[-1]))
-        if later is not None:
-            return f"{path}: {where} would do nothing yet, take it out: {later}"
-        return f"{path}: {where} is not a key that a site file has"
-    message = problem["msg"].removeprefix("Value error, ")
-    return f"{path}: {where} = {problem['input']!r}: {message}"
+def _tcp_address(endpoint: str) -> str:
+    """The HOST:PORT of one of the router's endpoints; empty: it is no TCP port."""
+    protocol, _, rest = endpoint.partition("/")
+    return re.split("[?#]", rest)[0] if protocol in ("tcp", "tls") else ""
 
 
 def _checked_name(name: str, what: str) -> str:
@@ -234,12 +344,9 @@ def _checked_name(name: str, what: str) -> str:
         raise ValueError(str(error)) from None
 
 
-# Keys of the contract that nothing reads yet: whoever writes one must not believe that it works.
-_LATER = {
-    "check": "motions are checked against limits, not yet against collisions",
-    "fixture": "nothing checks collisions with what stands in a cell yet",
-    "legacy_clients": "old client programs cannot attach to the gateway yet",
-}
-
-# What runs without a file.
-DEMO = Site(site="demo", robot=(Robot(name="pt600", model="pt600", demo=True),))
+# What runs without a file. In a checkout the folder robots/ is the program's own.
+DEMO = Site(
+    site="demo",
+    robot=(Robot(name="pt600", model="pt600", demo=True),),
+    define=Define(folder=Path("my-robots")),
+)

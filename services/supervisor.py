@@ -1,7 +1,8 @@
 """The supervisor: a process a service, prefixed logs, restarts with back-off, all down in time.
 
 It holds no robot state and is on no data path: killed, it takes its processes with it; a killed
-process comes back, and the others do not notice.
+process comes back, and the others do not notice. What is added while it runs comes and goes beside
+the rest, in groups.
 """
 
 import asyncio
@@ -12,14 +13,14 @@ import random
 import signal
 import sys
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
 from services.errors import ServiceError
 
 # Together less than the 2 s in which a site must be down.
 _ASK_S = 1.3
-_SHORTEST_WAIT_S = 0.3
+_SHORTEST_WAIT_S = 0.1
 _LONGEST_WAIT_S = 10.0
 # What ran this long is taken for well: its next failure waits the shortest time again.
 _WELL_AFTER_S = 20.0
@@ -27,6 +28,11 @@ _COULD_NOT = 2
 _READ_BYTES = 1 << 16
 _LONGEST_LINE = 2000
 _PR_SET_PDEATHSIG = 1
+_FOLLOW_EACH_S = 0.4
+
+# Groups of programs that are to run beside the others, now: a key that is new starts its own, one that
+# is gone has them ended.
+Following = Callable[[], Mapping[Hashable, Callable[[], Sequence["Program"]]]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,24 +57,30 @@ async def supervise(
     *,
     ready: Callable[[], Awaitable[None]],
     write: Callable[[str], None],
+    following: Following = dict,
 ) -> None:
     """Run the programs, in order, until cancelled.
 
     Args:
         ready: Runs beside them; for whoever waits until the site is up.
         write: Takes a line of log.
+        following: Asked again and again for what is to run beside them.
 
     Raises:
         CouldNotStartError: If a needed one exits with status 2 before it ever ran well.
     """
     width = max(len(program.name) for program in programs)
     running: dict[str, asyncio.subprocess.Process] = {}
+
+    def keep(program: Program) -> Coroutine[None, None, None]:
+        return _keep(program, running, _prefixed(write, f"{program.name:<{width}} | "))
+
     try:
         async with asyncio.TaskGroup() as group:
             for program in programs:
-                prefix = f"{program.name:<{width}} | "
-                group.create_task(_keep(program, running, _prefixed(write, prefix)))
+                group.create_task(keep(program))
             group.create_task(_once(ready))
+            group.create_task(_follow(following, running, keep))
     except ExceptionGroup as errors:
         # Not `except*`: before Python 3.11.4 what it raises comes out in a group again.
         could_not, others = errors.split(ServiceError)
@@ -81,6 +93,27 @@ async def supervise(
 
 def _prefixed(write: Callable[[str], None], prefix: str) -> Callable[[str], None]:
     return lambda line: write(prefix + line)
+
+
+async def _follow(
+    following: Following,
+    running: dict[str, asyncio.subprocess.Process],
+    keep: Callable[[Program], Coroutine[None, None, None]],
+) -> None:
+    """Start what is wanted and does not run yet; end what runs and is not wanted any more."""
+    groups: dict[Hashable, list[tuple[Program, asyncio.Task[None]]]] = {}
+    async with asyncio.TaskGroup() as tasks:
+        while True:
+            wanted = await asyncio.to_thread(following)
+            gone = [each for key in list(groups) if key not in wanted for each in groups.pop(key)]
+            for _, task in gone:
+                task.cancel()
+            # A robot that changed must have let go of its name before it comes again.
+            await asyncio.gather(*(task for _, task in gone), return_exceptions=True)
+            await _end([running.pop(program.name) for program, _ in gone if program.name in running])
+            for key in wanted.keys() - groups.keys():
+                groups[key] = [(each, tasks.create_task(keep(each))) for each in wanted[key]()]
+            await asyncio.sleep(_FOLLOW_EACH_S)
 
 
 async def _once(ready: Callable[[], Awaitable[None]]) -> None:
@@ -144,8 +177,13 @@ async def _start(program: Program) -> asyncio.subprocess.Process:
         # A terminal's Ctrl-C is for the supervisor, which ends the others in order.
         start_new_session=True,
         preexec_fn=die_with_the_supervisor,
-        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        env={**_environment(), "PYTHONUNBUFFERED": "1"},
     )
+
+
+def _environment() -> dict[str, str]:
+    """Ours, but for the certificate of whoever started the site: services have their own."""
+    return {name: value for name, value in os.environ.items() if name != "ROBOMESH_KEYS"}
 
 
 async def _end(processes: Sequence[asyncio.subprocess.Process]) -> None:

@@ -13,6 +13,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SCHEMAS = ROOT / "bus" / "schemas"
 PACKAGE_LOCK = ROOT / "services" / "console" / "page" / "package-lock.json"
 LOCK = ROOT / "requirements.lock"
+EXAMPLE_ROBOTS_LOCK = ROOT / "example-robots.lock"
 
 
 def generated_modules() -> list[str]:
@@ -47,7 +48,7 @@ def addresses() -> list[str]:
     """Problems with lock files that would work behind one mirror only."""
     return [
         f"{path.relative_to(ROOT)}:{number}: an address: {line.strip()}"
-        for path in (LOCK, PACKAGE_LOCK)
+        for path in (LOCK, EXAMPLE_ROBOTS_LOCK, PACKAGE_LOCK)
         for number, line in enumerate(path.read_text().splitlines(), 1)
         if re.search(r'"resolved"|index-url|find-links|registry\.|https?://[^"\s]*\.(whl|tgz|gz)', line)
     ]

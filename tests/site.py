@@ -30,7 +30,7 @@ class RunningSite:
     @property
     def mesh(self) -> SessionSettings:
         """Session settings towards its router."""
-        return SessionSettings(connect=(self.router,), wait_s=5.0)
+        return SessionSettings(connect=(self.router,), wait_s=20.0)
 
     def children(self) -> dict[str, int]:
         """Process ids of its services, by name."""
@@ -142,7 +142,7 @@ def alive(pid: int) -> bool:
         return False
 
 
-def wait_until(condition, timeout_s: float = 20.0, what: str = "") -> None:
+def wait_until(condition, timeout_s: float = 40.0, what: str = "") -> None:
     """Wait for a condition.
 
     Raises:

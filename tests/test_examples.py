@@ -41,3 +41,31 @@ def test_home_goes_home_and_gives_control_back(site):
     )
     assert result.stdout.splitlines()[-1] == "home", result.stderr
     assert '"holder": ""' in site.command("list", "--json").stdout
+
+
+def test_check_says_what_a_program_would_do_on_the_mesh(site):
+    result = subprocess.run(
+        [sys.executable, "examples/check.py", "examples/square.program", "test/arm", site.router],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        cwd=EXAMPLES.parent,
+    )
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert result.stdout.endswith(" s, nothing wrong\n")
+
+
+@pytest.mark.parametrize(("place", "status", "words"), [("400", 0, " solutions, "), ("4000", 1, "reach")])
+def test_inverse_says_where_the_joints_must_be_or_why_they_cannot(site, place, status, words):
+    result = subprocess.run(
+        [sys.executable, "examples/inverse.py", place, "0", "300", "test/arm", site.router],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        cwd=EXAMPLES.parent,
+    )
+    assert result.returncode == status, result.stdout + result.stderr
+    *solutions, end = result.stdout.splitlines()
+    assert words in end
+    assert all(line.startswith("waist ") for line in solutions)
+    assert bool(solutions) is (status == 0)

@@ -12,7 +12,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class ControllerState(_message.Message):
-    __slots__ = ("timestamp", "link", "mode", "activity", "homed", "trace", "fault", "last_unit_age_s", "controller_time_s", "counters", "read_only", "stop", "link_text", "rate_hz")
+    __slots__ = ("timestamp", "link", "mode", "activity", "homed", "trace", "fault", "last_unit_age_s", "controller_time_s", "counters", "read_only", "stop", "link_text", "rate_hz", "health", "audit_head", "legacy_clients", "speed_percent", "check", "check_text")
     class Link(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         LINK_UNSPECIFIED: _ClassVar[ControllerState.Link]
@@ -61,6 +61,16 @@ class ControllerState(_message.Message):
     UNKNOWN: ControllerState.Known
     YES: ControllerState.Known
     NO: ControllerState.Known
+    class Check(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        CHECK_UNSPECIFIED: _ClassVar[ControllerState.Check]
+        OFF: _ClassVar[ControllerState.Check]
+        WARN: _ClassVar[ControllerState.Check]
+        REQUIRE: _ClassVar[ControllerState.Check]
+    CHECK_UNSPECIFIED: ControllerState.Check
+    OFF: ControllerState.Check
+    WARN: ControllerState.Check
+    REQUIRE: ControllerState.Check
     TIMESTAMP_FIELD_NUMBER: _ClassVar[int]
     LINK_FIELD_NUMBER: _ClassVar[int]
     MODE_FIELD_NUMBER: _ClassVar[int]
@@ -75,6 +85,12 @@ class ControllerState(_message.Message):
     STOP_FIELD_NUMBER: _ClassVar[int]
     LINK_TEXT_FIELD_NUMBER: _ClassVar[int]
     RATE_HZ_FIELD_NUMBER: _ClassVar[int]
+    HEALTH_FIELD_NUMBER: _ClassVar[int]
+    AUDIT_HEAD_FIELD_NUMBER: _ClassVar[int]
+    LEGACY_CLIENTS_FIELD_NUMBER: _ClassVar[int]
+    SPEED_PERCENT_FIELD_NUMBER: _ClassVar[int]
+    CHECK_FIELD_NUMBER: _ClassVar[int]
+    CHECK_TEXT_FIELD_NUMBER: _ClassVar[int]
     timestamp: _timestamp_pb2.Timestamp
     link: ControllerState.Link
     mode: ControllerState.Mode
@@ -89,10 +105,50 @@ class ControllerState(_message.Message):
     stop: StopState
     link_text: str
     rate_hz: float
-    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., link: _Optional[_Union[ControllerState.Link, str]] = ..., mode: _Optional[_Union[ControllerState.Mode, str]] = ..., activity: _Optional[_Union[ControllerState.Activity, str]] = ..., homed: _Optional[_Union[ControllerState.Known, str]] = ..., trace: _Optional[_Union[ControllerState.Known, str]] = ..., fault: _Optional[str] = ..., last_unit_age_s: _Optional[float] = ..., controller_time_s: _Optional[float] = ..., counters: _Optional[_Union[LinkCounters, _Mapping]] = ..., read_only: _Optional[bool] = ..., stop: _Optional[_Union[StopState, _Mapping]] = ..., link_text: _Optional[str] = ..., rate_hz: _Optional[float] = ...) -> None: ...
+    health: LinkHealth
+    audit_head: AuditHead
+    legacy_clients: LegacyClients
+    speed_percent: float
+    check: ControllerState.Check
+    check_text: str
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., link: _Optional[_Union[ControllerState.Link, str]] = ..., mode: _Optional[_Union[ControllerState.Mode, str]] = ..., activity: _Optional[_Union[ControllerState.Activity, str]] = ..., homed: _Optional[_Union[ControllerState.Known, str]] = ..., trace: _Optional[_Union[ControllerState.Known, str]] = ..., fault: _Optional[str] = ..., last_unit_age_s: _Optional[float] = ..., controller_time_s: _Optional[float] = ..., counters: _Optional[_Union[LinkCounters, _Mapping]] = ..., read_only: _Optional[bool] = ..., stop: _Optional[_Union[StopState, _Mapping]] = ..., link_text: _Optional[str] = ..., rate_hz: _Optional[float] = ..., health: _Optional[_Union[LinkHealth, _Mapping]] = ..., audit_head: _Optional[_Union[AuditHead, _Mapping]] = ..., legacy_clients: _Optional[_Union[LegacyClients, _Mapping]] = ..., speed_percent: _Optional[float] = ..., check: _Optional[_Union[ControllerState.Check, str]] = ..., check_text: _Optional[str] = ...) -> None: ...
+
+class LinkHealth(_message.Message):
+    __slots__ = ("jitter_s", "network_round_trip_s", "answer_s", "flooding")
+    JITTER_S_FIELD_NUMBER: _ClassVar[int]
+    NETWORK_ROUND_TRIP_S_FIELD_NUMBER: _ClassVar[int]
+    ANSWER_S_FIELD_NUMBER: _ClassVar[int]
+    FLOODING_FIELD_NUMBER: _ClassVar[int]
+    jitter_s: float
+    network_round_trip_s: float
+    answer_s: float
+    flooding: bool
+    def __init__(self, jitter_s: _Optional[float] = ..., network_round_trip_s: _Optional[float] = ..., answer_s: _Optional[float] = ..., flooding: _Optional[bool] = ...) -> None: ...
+
+class AuditHead(_message.Message):
+    __slots__ = ("number", "hash")
+    NUMBER_FIELD_NUMBER: _ClassVar[int]
+    HASH_FIELD_NUMBER: _ClassVar[int]
+    number: int
+    hash: bytes
+    def __init__(self, number: _Optional[int] = ..., hash: _Optional[bytes] = ...) -> None: ...
+
+class LegacyClients(_message.Message):
+    __slots__ = ("attached", "units_refused", "states_skipped", "turned_away", "closed")
+    ATTACHED_FIELD_NUMBER: _ClassVar[int]
+    UNITS_REFUSED_FIELD_NUMBER: _ClassVar[int]
+    STATES_SKIPPED_FIELD_NUMBER: _ClassVar[int]
+    TURNED_AWAY_FIELD_NUMBER: _ClassVar[int]
+    CLOSED_FIELD_NUMBER: _ClassVar[int]
+    attached: int
+    units_refused: int
+    states_skipped: int
+    turned_away: int
+    closed: int
+    def __init__(self, attached: _Optional[int] = ..., units_refused: _Optional[int] = ..., states_skipped: _Optional[int] = ..., turned_away: _Optional[int] = ..., closed: _Optional[int] = ...) -> None: ...
 
 class LinkCounters(_message.Message):
-    __slots__ = ("units_received", "units_malformed", "units_sent", "bytes_received", "bytes_sent", "records_unknown", "connections", "refusals")
+    __slots__ = ("units_received", "units_malformed", "units_sent", "bytes_received", "bytes_sent", "records_unknown", "connections", "refusals", "units_lost", "units_skipped")
     UNITS_RECEIVED_FIELD_NUMBER: _ClassVar[int]
     UNITS_MALFORMED_FIELD_NUMBER: _ClassVar[int]
     UNITS_SENT_FIELD_NUMBER: _ClassVar[int]
@@ -101,6 +157,8 @@ class LinkCounters(_message.Message):
     RECORDS_UNKNOWN_FIELD_NUMBER: _ClassVar[int]
     CONNECTIONS_FIELD_NUMBER: _ClassVar[int]
     REFUSALS_FIELD_NUMBER: _ClassVar[int]
+    UNITS_LOST_FIELD_NUMBER: _ClassVar[int]
+    UNITS_SKIPPED_FIELD_NUMBER: _ClassVar[int]
     units_received: int
     units_malformed: int
     units_sent: int
@@ -109,7 +167,9 @@ class LinkCounters(_message.Message):
     records_unknown: int
     connections: int
     refusals: int
-    def __init__(self, units_received: _Optional[int] = ..., units_malformed: _Optional[int] = ..., units_sent: _Optional[int] = ..., bytes_received: _Optional[int] = ..., bytes_sent: _Optional[int] = ..., records_unknown: _Optional[int] = ..., connections: _Optional[int] = ..., refusals: _Optional[int] = ...) -> None: ...
+    units_lost: int
+    units_skipped: int
+    def __init__(self, units_received: _Optional[int] = ..., units_malformed: _Optional[int] = ..., units_sent: _Optional[int] = ..., bytes_received: _Optional[int] = ..., bytes_sent: _Optional[int] = ..., records_unknown: _Optional[int] = ..., connections: _Optional[int] = ..., refusals: _Optional[int] = ..., units_lost: _Optional[int] = ..., units_skipped: _Optional[int] = ...) -> None: ...
 
 class StopState(_message.Message):
     __slots__ = ("id", "since", "by", "reason", "sent")
@@ -138,7 +198,7 @@ class RawRecord(_message.Message):
     def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., type: _Optional[str] = ..., items: _Optional[_Iterable[str]] = ..., data: _Optional[bytes] = ...) -> None: ...
 
 class KinematicState(_message.Message):
-    __slots__ = ("timestamp", "tool_to_base", "linear_velocity", "angular_velocity", "manipulability", "limit_margins", "clearance")
+    __slots__ = ("timestamp", "tool_to_base", "linear_velocity", "angular_velocity", "manipulability", "limit_margins", "clearance", "own_clearance", "singularity_margin", "not_counted")
     TIMESTAMP_FIELD_NUMBER: _ClassVar[int]
     TOOL_TO_BASE_FIELD_NUMBER: _ClassVar[int]
     LINEAR_VELOCITY_FIELD_NUMBER: _ClassVar[int]
@@ -146,6 +206,9 @@ class KinematicState(_message.Message):
     MANIPULABILITY_FIELD_NUMBER: _ClassVar[int]
     LIMIT_MARGINS_FIELD_NUMBER: _ClassVar[int]
     CLEARANCE_FIELD_NUMBER: _ClassVar[int]
+    OWN_CLEARANCE_FIELD_NUMBER: _ClassVar[int]
+    SINGULARITY_MARGIN_FIELD_NUMBER: _ClassVar[int]
+    NOT_COUNTED_FIELD_NUMBER: _ClassVar[int]
     timestamp: _timestamp_pb2.Timestamp
     tool_to_base: _containers.RepeatedScalarFieldContainer[float]
     linear_velocity: Vector3
@@ -153,7 +216,10 @@ class KinematicState(_message.Message):
     manipulability: float
     limit_margins: _containers.RepeatedCompositeFieldContainer[LimitMargin]
     clearance: Clearance
-    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., tool_to_base: _Optional[_Iterable[float]] = ..., linear_velocity: _Optional[_Union[Vector3, _Mapping]] = ..., angular_velocity: _Optional[_Union[Vector3, _Mapping]] = ..., manipulability: _Optional[float] = ..., limit_margins: _Optional[_Iterable[_Union[LimitMargin, _Mapping]]] = ..., clearance: _Optional[_Union[Clearance, _Mapping]] = ...) -> None: ...
+    own_clearance: Clearance
+    singularity_margin: float
+    not_counted: _containers.RepeatedScalarFieldContainer[str]
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., tool_to_base: _Optional[_Iterable[float]] = ..., linear_velocity: _Optional[_Union[Vector3, _Mapping]] = ..., angular_velocity: _Optional[_Union[Vector3, _Mapping]] = ..., manipulability: _Optional[float] = ..., limit_margins: _Optional[_Iterable[_Union[LimitMargin, _Mapping]]] = ..., clearance: _Optional[_Union[Clearance, _Mapping]] = ..., own_clearance: _Optional[_Union[Clearance, _Mapping]] = ..., singularity_margin: _Optional[float] = ..., not_counted: _Optional[_Iterable[str]] = ...) -> None: ...
 
 class Vector3(_message.Message):
     __slots__ = ("x", "y", "z")
@@ -190,23 +256,36 @@ class Clearance(_message.Message):
     def __init__(self, distance: _Optional[float] = ..., first: _Optional[str] = ..., second: _Optional[str] = ..., first_point: _Optional[_Union[Vector3, _Mapping]] = ..., second_point: _Optional[_Union[Vector3, _Mapping]] = ...) -> None: ...
 
 class Lease(_message.Message):
-    __slots__ = ("timestamp", "holder", "since", "until", "offered_to", "motion")
+    __slots__ = ("timestamp", "holder", "since", "until", "offered_to", "motion", "ended", "asked_by")
+    class Asker(_message.Message):
+        __slots__ = ("operator", "reason", "since")
+        OPERATOR_FIELD_NUMBER: _ClassVar[int]
+        REASON_FIELD_NUMBER: _ClassVar[int]
+        SINCE_FIELD_NUMBER: _ClassVar[int]
+        operator: str
+        reason: str
+        since: _timestamp_pb2.Timestamp
+        def __init__(self, operator: _Optional[str] = ..., reason: _Optional[str] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
     TIMESTAMP_FIELD_NUMBER: _ClassVar[int]
     HOLDER_FIELD_NUMBER: _ClassVar[int]
     SINCE_FIELD_NUMBER: _ClassVar[int]
     UNTIL_FIELD_NUMBER: _ClassVar[int]
     OFFERED_TO_FIELD_NUMBER: _ClassVar[int]
     MOTION_FIELD_NUMBER: _ClassVar[int]
+    ENDED_FIELD_NUMBER: _ClassVar[int]
+    ASKED_BY_FIELD_NUMBER: _ClassVar[int]
     timestamp: _timestamp_pb2.Timestamp
     holder: str
     since: _timestamp_pb2.Timestamp
     until: _timestamp_pb2.Timestamp
     offered_to: str
     motion: bool
-    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., holder: _Optional[str] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., until: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., offered_to: _Optional[str] = ..., motion: _Optional[bool] = ...) -> None: ...
+    ended: str
+    asked_by: _containers.RepeatedCompositeFieldContainer[Lease.Asker]
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., holder: _Optional[str] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., until: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., offered_to: _Optional[str] = ..., motion: _Optional[bool] = ..., ended: _Optional[str] = ..., asked_by: _Optional[_Iterable[_Union[Lease.Asker, _Mapping]]] = ...) -> None: ...
 
 class LeaseRequest(_message.Message):
-    __slots__ = ("action", "lease", "ttl_s", "to", "reason")
+    __slots__ = ("action", "lease", "ttl_s", "to", "reason", "session")
     class Action(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         ACTION_UNSPECIFIED: _ClassVar[LeaseRequest.Action]
@@ -216,6 +295,7 @@ class LeaseRequest(_message.Message):
         OFFER: _ClassVar[LeaseRequest.Action]
         ACCEPT: _ClassVar[LeaseRequest.Action]
         TAKE: _ClassVar[LeaseRequest.Action]
+        ASK: _ClassVar[LeaseRequest.Action]
     ACTION_UNSPECIFIED: LeaseRequest.Action
     ACQUIRE: LeaseRequest.Action
     RENEW: LeaseRequest.Action
@@ -223,17 +303,20 @@ class LeaseRequest(_message.Message):
     OFFER: LeaseRequest.Action
     ACCEPT: LeaseRequest.Action
     TAKE: LeaseRequest.Action
+    ASK: LeaseRequest.Action
     ACTION_FIELD_NUMBER: _ClassVar[int]
     LEASE_FIELD_NUMBER: _ClassVar[int]
     TTL_S_FIELD_NUMBER: _ClassVar[int]
     TO_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
+    SESSION_FIELD_NUMBER: _ClassVar[int]
     action: LeaseRequest.Action
     lease: str
     ttl_s: float
     to: str
     reason: str
-    def __init__(self, action: _Optional[_Union[LeaseRequest.Action, str]] = ..., lease: _Optional[str] = ..., ttl_s: _Optional[float] = ..., to: _Optional[str] = ..., reason: _Optional[str] = ...) -> None: ...
+    session: str
+    def __init__(self, action: _Optional[_Union[LeaseRequest.Action, str]] = ..., lease: _Optional[str] = ..., ttl_s: _Optional[float] = ..., to: _Optional[str] = ..., reason: _Optional[str] = ..., session: _Optional[str] = ...) -> None: ...
 
 class LeaseAnswer(_message.Message):
     __slots__ = ("lease", "holder", "since", "until", "now")
@@ -250,7 +333,7 @@ class LeaseAnswer(_message.Message):
     def __init__(self, lease: _Optional[str] = ..., holder: _Optional[str] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., until: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., now: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class CommandRequest(_message.Message):
-    __slots__ = ("lease", "id", "not_after", "command", "joint_positions", "speed_percent", "stop_id", "program")
+    __slots__ = ("lease", "id", "not_after", "command", "joint_positions", "speed_percent", "stop_id", "program", "program_name")
     class Command(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         COMMAND_UNSPECIFIED: _ClassVar[CommandRequest.Command]
@@ -283,6 +366,7 @@ class CommandRequest(_message.Message):
     SPEED_PERCENT_FIELD_NUMBER: _ClassVar[int]
     STOP_ID_FIELD_NUMBER: _ClassVar[int]
     PROGRAM_FIELD_NUMBER: _ClassVar[int]
+    PROGRAM_NAME_FIELD_NUMBER: _ClassVar[int]
     lease: str
     id: int
     not_after: _timestamp_pb2.Timestamp
@@ -291,7 +375,44 @@ class CommandRequest(_message.Message):
     speed_percent: float
     stop_id: int
     program: str
-    def __init__(self, lease: _Optional[str] = ..., id: _Optional[int] = ..., not_after: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., command: _Optional[_Union[CommandRequest.Command, str]] = ..., joint_positions: _Optional[_Iterable[float]] = ..., speed_percent: _Optional[float] = ..., stop_id: _Optional[int] = ..., program: _Optional[str] = ...) -> None: ...
+    program_name: str
+    def __init__(self, lease: _Optional[str] = ..., id: _Optional[int] = ..., not_after: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., command: _Optional[_Union[CommandRequest.Command, str]] = ..., joint_positions: _Optional[_Iterable[float]] = ..., speed_percent: _Optional[float] = ..., stop_id: _Optional[int] = ..., program: _Optional[str] = ..., program_name: _Optional[str] = ...) -> None: ...
+
+class ProgramState(_message.Message):
+    __slots__ = ("timestamp", "outcome", "name", "operator", "since", "line", "statement", "step", "steps", "duration_s", "text")
+    class Outcome(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        OUTCOME_UNSPECIFIED: _ClassVar[ProgramState.Outcome]
+        RUNNING: _ClassVar[ProgramState.Outcome]
+        DONE: _ClassVar[ProgramState.Outcome]
+        ENDED: _ClassVar[ProgramState.Outcome]
+    OUTCOME_UNSPECIFIED: ProgramState.Outcome
+    RUNNING: ProgramState.Outcome
+    DONE: ProgramState.Outcome
+    ENDED: ProgramState.Outcome
+    TIMESTAMP_FIELD_NUMBER: _ClassVar[int]
+    OUTCOME_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    OPERATOR_FIELD_NUMBER: _ClassVar[int]
+    SINCE_FIELD_NUMBER: _ClassVar[int]
+    LINE_FIELD_NUMBER: _ClassVar[int]
+    STATEMENT_FIELD_NUMBER: _ClassVar[int]
+    STEP_FIELD_NUMBER: _ClassVar[int]
+    STEPS_FIELD_NUMBER: _ClassVar[int]
+    DURATION_S_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    timestamp: _timestamp_pb2.Timestamp
+    outcome: ProgramState.Outcome
+    name: str
+    operator: str
+    since: _timestamp_pb2.Timestamp
+    line: int
+    statement: str
+    step: int
+    steps: int
+    duration_s: float
+    text: str
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., outcome: _Optional[_Union[ProgramState.Outcome, str]] = ..., name: _Optional[str] = ..., operator: _Optional[str] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., line: _Optional[int] = ..., statement: _Optional[str] = ..., step: _Optional[int] = ..., steps: _Optional[int] = ..., duration_s: _Optional[float] = ..., text: _Optional[str] = ...) -> None: ...
 
 class CommandAnswer(_message.Message):
     __slots__ = ("accepted", "text")
@@ -368,6 +489,22 @@ class AuditList(_message.Message):
     entries: _containers.RepeatedCompositeFieldContainer[AuditEntry]
     def __init__(self, entries: _Optional[_Iterable[_Union[AuditEntry, _Mapping]]] = ...) -> None: ...
 
+class AuditQuery(_message.Message):
+    __slots__ = ("operator", "request", "outcome", "since", "until", "most")
+    OPERATOR_FIELD_NUMBER: _ClassVar[int]
+    REQUEST_FIELD_NUMBER: _ClassVar[int]
+    OUTCOME_FIELD_NUMBER: _ClassVar[int]
+    SINCE_FIELD_NUMBER: _ClassVar[int]
+    UNTIL_FIELD_NUMBER: _ClassVar[int]
+    MOST_FIELD_NUMBER: _ClassVar[int]
+    operator: str
+    request: str
+    outcome: AuditEntry.Outcome
+    since: _timestamp_pb2.Timestamp
+    until: _timestamp_pb2.Timestamp
+    most: int
+    def __init__(self, operator: _Optional[str] = ..., request: _Optional[str] = ..., outcome: _Optional[_Union[AuditEntry.Outcome, str]] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., until: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., most: _Optional[int] = ...) -> None: ...
+
 class Event(_message.Message):
     __slots__ = ("timestamp", "severity", "code", "text", "source", "values")
     class Severity(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
@@ -412,7 +549,20 @@ class EventList(_message.Message):
     def __init__(self, events: _Optional[_Iterable[_Union[Event, _Mapping]]] = ...) -> None: ...
 
 class Description(_message.Message):
-    __slots__ = ("name", "title", "provenance", "robot_toml", "urdf", "joints", "links", "frames", "views", "constraints", "base_to_site", "cell", "simulated")
+    __slots__ = ("name", "title", "provenance", "robot_toml", "urdf", "joints", "links", "frames", "views", "constraints", "base_to_site", "cell", "simulated", "fixtures", "warning_distance", "stop_distance", "replay", "stale_after_s")
+    class Replay(_message.Message):
+        __slots__ = ("id", "site", "robot", "file", "start")
+        ID_FIELD_NUMBER: _ClassVar[int]
+        SITE_FIELD_NUMBER: _ClassVar[int]
+        ROBOT_FIELD_NUMBER: _ClassVar[int]
+        FILE_FIELD_NUMBER: _ClassVar[int]
+        START_FIELD_NUMBER: _ClassVar[int]
+        id: str
+        site: str
+        robot: str
+        file: str
+        start: _timestamp_pb2.Timestamp
+        def __init__(self, id: _Optional[str] = ..., site: _Optional[str] = ..., robot: _Optional[str] = ..., file: _Optional[str] = ..., start: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
     class Joint(_message.Message):
         __slots__ = ("name", "type", "lower", "upper", "max_speed", "home", "max_acceleration", "max_jerk")
         class Type(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
@@ -460,6 +610,19 @@ class Description(_message.Message):
         link: str
         frame_to_link: _containers.RepeatedScalarFieldContainer[float]
         def __init__(self, name: _Optional[str] = ..., link: _Optional[str] = ..., frame_to_link: _Optional[_Iterable[float]] = ...) -> None: ...
+    class Fixture(_message.Message):
+        __slots__ = ("name", "mesh", "mesh_sha256", "fixture_to_site", "color")
+        NAME_FIELD_NUMBER: _ClassVar[int]
+        MESH_FIELD_NUMBER: _ClassVar[int]
+        MESH_SHA256_FIELD_NUMBER: _ClassVar[int]
+        FIXTURE_TO_SITE_FIELD_NUMBER: _ClassVar[int]
+        COLOR_FIELD_NUMBER: _ClassVar[int]
+        name: str
+        mesh: str
+        mesh_sha256: str
+        fixture_to_site: _containers.RepeatedScalarFieldContainer[float]
+        color: str
+        def __init__(self, name: _Optional[str] = ..., mesh: _Optional[str] = ..., mesh_sha256: _Optional[str] = ..., fixture_to_site: _Optional[_Iterable[float]] = ..., color: _Optional[str] = ...) -> None: ...
     class Constraint(_message.Message):
         __slots__ = ("joints", "coefficients", "lower", "upper")
         JOINTS_FIELD_NUMBER: _ClassVar[int]
@@ -484,6 +647,11 @@ class Description(_message.Message):
     BASE_TO_SITE_FIELD_NUMBER: _ClassVar[int]
     CELL_FIELD_NUMBER: _ClassVar[int]
     SIMULATED_FIELD_NUMBER: _ClassVar[int]
+    FIXTURES_FIELD_NUMBER: _ClassVar[int]
+    WARNING_DISTANCE_FIELD_NUMBER: _ClassVar[int]
+    STOP_DISTANCE_FIELD_NUMBER: _ClassVar[int]
+    REPLAY_FIELD_NUMBER: _ClassVar[int]
+    STALE_AFTER_S_FIELD_NUMBER: _ClassVar[int]
     name: str
     title: str
     provenance: str
@@ -497,10 +665,15 @@ class Description(_message.Message):
     base_to_site: _containers.RepeatedScalarFieldContainer[float]
     cell: str
     simulated: bool
-    def __init__(self, name: _Optional[str] = ..., title: _Optional[str] = ..., provenance: _Optional[str] = ..., robot_toml: _Optional[str] = ..., urdf: _Optional[str] = ..., joints: _Optional[_Iterable[_Union[Description.Joint, _Mapping]]] = ..., links: _Optional[_Iterable[_Union[Description.Link, _Mapping]]] = ..., frames: _Optional[_Iterable[_Union[Description.NamedFrame, _Mapping]]] = ..., views: _Optional[_Iterable[_Union[View, _Mapping]]] = ..., constraints: _Optional[_Iterable[_Union[Description.Constraint, _Mapping]]] = ..., base_to_site: _Optional[_Iterable[float]] = ..., cell: _Optional[str] = ..., simulated: _Optional[bool] = ...) -> None: ...
+    fixtures: _containers.RepeatedCompositeFieldContainer[Description.Fixture]
+    warning_distance: float
+    stop_distance: float
+    replay: Description.Replay
+    stale_after_s: float
+    def __init__(self, name: _Optional[str] = ..., title: _Optional[str] = ..., provenance: _Optional[str] = ..., robot_toml: _Optional[str] = ..., urdf: _Optional[str] = ..., joints: _Optional[_Iterable[_Union[Description.Joint, _Mapping]]] = ..., links: _Optional[_Iterable[_Union[Description.Link, _Mapping]]] = ..., frames: _Optional[_Iterable[_Union[Description.NamedFrame, _Mapping]]] = ..., views: _Optional[_Iterable[_Union[View, _Mapping]]] = ..., constraints: _Optional[_Iterable[_Union[Description.Constraint, _Mapping]]] = ..., base_to_site: _Optional[_Iterable[float]] = ..., cell: _Optional[str] = ..., simulated: _Optional[bool] = ..., fixtures: _Optional[_Iterable[_Union[Description.Fixture, _Mapping]]] = ..., warning_distance: _Optional[float] = ..., stop_distance: _Optional[float] = ..., replay: _Optional[_Union[Description.Replay, _Mapping]] = ..., stale_after_s: _Optional[float] = ...) -> None: ...
 
 class View(_message.Message):
-    __slots__ = ("name", "eye", "target", "up", "projection")
+    __slots__ = ("name", "eye", "target", "up", "projection", "mount", "field_of_view", "height")
     class Projection(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         PROJECTION_UNSPECIFIED: _ClassVar[View.Projection]
@@ -514,12 +687,34 @@ class View(_message.Message):
     TARGET_FIELD_NUMBER: _ClassVar[int]
     UP_FIELD_NUMBER: _ClassVar[int]
     PROJECTION_FIELD_NUMBER: _ClassVar[int]
+    MOUNT_FIELD_NUMBER: _ClassVar[int]
+    FIELD_OF_VIEW_FIELD_NUMBER: _ClassVar[int]
+    HEIGHT_FIELD_NUMBER: _ClassVar[int]
     name: str
     eye: Vector3
     target: Vector3
     up: Vector3
     projection: View.Projection
-    def __init__(self, name: _Optional[str] = ..., eye: _Optional[_Union[Vector3, _Mapping]] = ..., target: _Optional[_Union[Vector3, _Mapping]] = ..., up: _Optional[_Union[Vector3, _Mapping]] = ..., projection: _Optional[_Union[View.Projection, str]] = ...) -> None: ...
+    mount: str
+    field_of_view: float
+    height: float
+    def __init__(self, name: _Optional[str] = ..., eye: _Optional[_Union[Vector3, _Mapping]] = ..., target: _Optional[_Union[Vector3, _Mapping]] = ..., up: _Optional[_Union[Vector3, _Mapping]] = ..., projection: _Optional[_Union[View.Projection, str]] = ..., mount: _Optional[str] = ..., field_of_view: _Optional[float] = ..., height: _Optional[float] = ...) -> None: ...
+
+class FaultRequest(_message.Message):
+    __slots__ = ("fault", "off")
+    FAULT_FIELD_NUMBER: _ClassVar[int]
+    OFF_FIELD_NUMBER: _ClassVar[int]
+    fault: str
+    off: bool
+    def __init__(self, fault: _Optional[str] = ..., off: _Optional[bool] = ...) -> None: ...
+
+class FaultAnswer(_message.Message):
+    __slots__ = ("active", "known")
+    ACTIVE_FIELD_NUMBER: _ClassVar[int]
+    KNOWN_FIELD_NUMBER: _ClassVar[int]
+    active: _containers.RepeatedScalarFieldContainer[str]
+    known: _containers.RepeatedScalarFieldContainer[str]
+    def __init__(self, active: _Optional[_Iterable[str]] = ..., known: _Optional[_Iterable[str]] = ...) -> None: ...
 
 class ForwardRequest(_message.Message):
     __slots__ = ("joint_positions",)
@@ -566,7 +761,7 @@ class InverseRequest(_message.Message):
     def __init__(self, pose: _Optional[_Iterable[float]] = ..., task: _Optional[_Union[InverseRequest.Task, str]] = ..., near: _Optional[_Iterable[float]] = ..., all_solutions: _Optional[bool] = ..., seed: _Optional[int] = ...) -> None: ...
 
 class InverseAnswer(_message.Message):
-    __slots__ = ("solutions", "residual_m", "residual_rad", "reason")
+    __slots__ = ("solutions", "residual_m", "residual_rad", "reason", "analytic")
     class Solution(_message.Message):
         __slots__ = ("joint_positions",)
         JOINT_POSITIONS_FIELD_NUMBER: _ClassVar[int]
@@ -576,44 +771,75 @@ class InverseAnswer(_message.Message):
     RESIDUAL_M_FIELD_NUMBER: _ClassVar[int]
     RESIDUAL_RAD_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
+    ANALYTIC_FIELD_NUMBER: _ClassVar[int]
     solutions: _containers.RepeatedCompositeFieldContainer[InverseAnswer.Solution]
     residual_m: float
     residual_rad: float
     reason: str
-    def __init__(self, solutions: _Optional[_Iterable[_Union[InverseAnswer.Solution, _Mapping]]] = ..., residual_m: _Optional[float] = ..., residual_rad: _Optional[float] = ..., reason: _Optional[str] = ...) -> None: ...
+    analytic: bool
+    def __init__(self, solutions: _Optional[_Iterable[_Union[InverseAnswer.Solution, _Mapping]]] = ..., residual_m: _Optional[float] = ..., residual_rad: _Optional[float] = ..., reason: _Optional[str] = ..., analytic: _Optional[bool] = ...) -> None: ...
 
 class CheckRequest(_message.Message):
-    __slots__ = ("program", "start")
+    __slots__ = ("program", "start", "exact", "path")
     PROGRAM_FIELD_NUMBER: _ClassVar[int]
     START_FIELD_NUMBER: _ClassVar[int]
+    EXACT_FIELD_NUMBER: _ClassVar[int]
+    PATH_FIELD_NUMBER: _ClassVar[int]
     program: str
     start: _containers.RepeatedScalarFieldContainer[float]
-    def __init__(self, program: _Optional[str] = ..., start: _Optional[_Iterable[float]] = ...) -> None: ...
+    exact: bool
+    path: bool
+    def __init__(self, program: _Optional[str] = ..., start: _Optional[_Iterable[float]] = ..., exact: _Optional[bool] = ..., path: _Optional[bool] = ...) -> None: ...
 
 class CheckAnswer(_message.Message):
-    __slots__ = ("ok", "duration_s", "violations")
+    __slots__ = ("ok", "duration_s", "violations", "interpolation", "notes", "path")
     class Violation(_message.Message):
-        __slots__ = ("line", "time_s", "kind", "pair", "points", "text")
+        __slots__ = ("line", "time_s", "kind", "pair", "points", "text", "until_s", "distance", "refuses")
         LINE_FIELD_NUMBER: _ClassVar[int]
         TIME_S_FIELD_NUMBER: _ClassVar[int]
         KIND_FIELD_NUMBER: _ClassVar[int]
         PAIR_FIELD_NUMBER: _ClassVar[int]
         POINTS_FIELD_NUMBER: _ClassVar[int]
         TEXT_FIELD_NUMBER: _ClassVar[int]
+        UNTIL_S_FIELD_NUMBER: _ClassVar[int]
+        DISTANCE_FIELD_NUMBER: _ClassVar[int]
+        REFUSES_FIELD_NUMBER: _ClassVar[int]
         line: int
         time_s: float
         kind: str
         pair: _containers.RepeatedScalarFieldContainer[str]
         points: _containers.RepeatedCompositeFieldContainer[Vector3]
         text: str
-        def __init__(self, line: _Optional[int] = ..., time_s: _Optional[float] = ..., kind: _Optional[str] = ..., pair: _Optional[_Iterable[str]] = ..., points: _Optional[_Iterable[_Union[Vector3, _Mapping]]] = ..., text: _Optional[str] = ...) -> None: ...
+        until_s: float
+        distance: float
+        refuses: bool
+        def __init__(self, line: _Optional[int] = ..., time_s: _Optional[float] = ..., kind: _Optional[str] = ..., pair: _Optional[_Iterable[str]] = ..., points: _Optional[_Iterable[_Union[Vector3, _Mapping]]] = ..., text: _Optional[str] = ..., until_s: _Optional[float] = ..., distance: _Optional[float] = ..., refuses: _Optional[bool] = ...) -> None: ...
+    class Path(_message.Message):
+        __slots__ = ("times_s", "joint_positions", "tool_positions", "clearances", "lines")
+        TIMES_S_FIELD_NUMBER: _ClassVar[int]
+        JOINT_POSITIONS_FIELD_NUMBER: _ClassVar[int]
+        TOOL_POSITIONS_FIELD_NUMBER: _ClassVar[int]
+        CLEARANCES_FIELD_NUMBER: _ClassVar[int]
+        LINES_FIELD_NUMBER: _ClassVar[int]
+        times_s: _containers.RepeatedScalarFieldContainer[float]
+        joint_positions: _containers.RepeatedScalarFieldContainer[float]
+        tool_positions: _containers.RepeatedScalarFieldContainer[float]
+        clearances: _containers.RepeatedScalarFieldContainer[float]
+        lines: _containers.RepeatedScalarFieldContainer[int]
+        def __init__(self, times_s: _Optional[_Iterable[float]] = ..., joint_positions: _Optional[_Iterable[float]] = ..., tool_positions: _Optional[_Iterable[float]] = ..., clearances: _Optional[_Iterable[float]] = ..., lines: _Optional[_Iterable[int]] = ...) -> None: ...
     OK_FIELD_NUMBER: _ClassVar[int]
     DURATION_S_FIELD_NUMBER: _ClassVar[int]
     VIOLATIONS_FIELD_NUMBER: _ClassVar[int]
+    INTERPOLATION_FIELD_NUMBER: _ClassVar[int]
+    NOTES_FIELD_NUMBER: _ClassVar[int]
+    PATH_FIELD_NUMBER: _ClassVar[int]
     ok: bool
     duration_s: float
     violations: _containers.RepeatedCompositeFieldContainer[CheckAnswer.Violation]
-    def __init__(self, ok: _Optional[bool] = ..., duration_s: _Optional[float] = ..., violations: _Optional[_Iterable[_Union[CheckAnswer.Violation, _Mapping]]] = ...) -> None: ...
+    interpolation: str
+    notes: _containers.RepeatedScalarFieldContainer[str]
+    path: CheckAnswer.Path
+    def __init__(self, ok: _Optional[bool] = ..., duration_s: _Optional[float] = ..., violations: _Optional[_Iterable[_Union[CheckAnswer.Violation, _Mapping]]] = ..., interpolation: _Optional[str] = ..., notes: _Optional[_Iterable[str]] = ..., path: _Optional[_Union[CheckAnswer.Path, _Mapping]] = ...) -> None: ...
 
 class VideoFrames(_message.Message):
     __slots__ = ("publisher", "frames")
@@ -643,41 +869,72 @@ class KeyFrameAnswer(_message.Message):
     def __init__(self, forced: _Optional[bool] = ...) -> None: ...
 
 class ViewRequest(_message.Message):
-    __slots__ = ("view", "width", "height", "fps")
+    __slots__ = ("view", "width", "height", "fps", "of", "most_bits_per_s", "show")
+    class Show(_message.Message):
+        __slots__ = ("trail", "frames", "no_text", "ghost", "path")
+        TRAIL_FIELD_NUMBER: _ClassVar[int]
+        FRAMES_FIELD_NUMBER: _ClassVar[int]
+        NO_TEXT_FIELD_NUMBER: _ClassVar[int]
+        GHOST_FIELD_NUMBER: _ClassVar[int]
+        PATH_FIELD_NUMBER: _ClassVar[int]
+        trail: bool
+        frames: bool
+        no_text: bool
+        ghost: _containers.RepeatedScalarFieldContainer[float]
+        path: _containers.RepeatedCompositeFieldContainer[Vector3]
+        def __init__(self, trail: _Optional[bool] = ..., frames: _Optional[bool] = ..., no_text: _Optional[bool] = ..., ghost: _Optional[_Iterable[float]] = ..., path: _Optional[_Iterable[_Union[Vector3, _Mapping]]] = ...) -> None: ...
     VIEW_FIELD_NUMBER: _ClassVar[int]
     WIDTH_FIELD_NUMBER: _ClassVar[int]
     HEIGHT_FIELD_NUMBER: _ClassVar[int]
     FPS_FIELD_NUMBER: _ClassVar[int]
+    OF_FIELD_NUMBER: _ClassVar[int]
+    MOST_BITS_PER_S_FIELD_NUMBER: _ClassVar[int]
+    SHOW_FIELD_NUMBER: _ClassVar[int]
     view: View
     width: int
     height: int
     fps: float
-    def __init__(self, view: _Optional[_Union[View, _Mapping]] = ..., width: _Optional[int] = ..., height: _Optional[int] = ..., fps: _Optional[float] = ...) -> None: ...
+    of: str
+    most_bits_per_s: float
+    show: ViewRequest.Show
+    def __init__(self, view: _Optional[_Union[View, _Mapping]] = ..., width: _Optional[int] = ..., height: _Optional[int] = ..., fps: _Optional[float] = ..., of: _Optional[str] = ..., most_bits_per_s: _Optional[float] = ..., show: _Optional[_Union[ViewRequest.Show, _Mapping]] = ...) -> None: ...
 
 class ViewAnswer(_message.Message):
-    __slots__ = ("topic",)
+    __slots__ = ("topic", "image", "width", "height", "fps")
     TOPIC_FIELD_NUMBER: _ClassVar[int]
+    IMAGE_FIELD_NUMBER: _ClassVar[int]
+    WIDTH_FIELD_NUMBER: _ClassVar[int]
+    HEIGHT_FIELD_NUMBER: _ClassVar[int]
+    FPS_FIELD_NUMBER: _ClassVar[int]
     topic: str
-    def __init__(self, topic: _Optional[str] = ...) -> None: ...
+    image: str
+    width: int
+    height: int
+    fps: float
+    def __init__(self, topic: _Optional[str] = ..., image: _Optional[str] = ..., width: _Optional[int] = ..., height: _Optional[int] = ..., fps: _Optional[float] = ...) -> None: ...
 
 class RecorderRequest(_message.Message):
-    __slots__ = ("action", "name")
+    __slots__ = ("action", "name", "views")
     class Action(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         ACTION_UNSPECIFIED: _ClassVar[RecorderRequest.Action]
         TRACE_ON: _ClassVar[RecorderRequest.Action]
         TRACE_OFF: _ClassVar[RecorderRequest.Action]
+        SAVE: _ClassVar[RecorderRequest.Action]
     ACTION_UNSPECIFIED: RecorderRequest.Action
     TRACE_ON: RecorderRequest.Action
     TRACE_OFF: RecorderRequest.Action
+    SAVE: RecorderRequest.Action
     ACTION_FIELD_NUMBER: _ClassVar[int]
     NAME_FIELD_NUMBER: _ClassVar[int]
+    VIEWS_FIELD_NUMBER: _ClassVar[int]
     action: RecorderRequest.Action
     name: str
-    def __init__(self, action: _Optional[_Union[RecorderRequest.Action, str]] = ..., name: _Optional[str] = ...) -> None: ...
+    views: _containers.RepeatedScalarFieldContainer[str]
+    def __init__(self, action: _Optional[_Union[RecorderRequest.Action, str]] = ..., name: _Optional[str] = ..., views: _Optional[_Iterable[str]] = ...) -> None: ...
 
 class Recording(_message.Message):
-    __slots__ = ("site", "robot", "name", "file", "start", "duration", "bytes", "open", "topics", "started_by", "problem")
+    __slots__ = ("site", "robot", "name", "file", "start", "duration", "bytes", "open", "topics", "started_by", "problem", "audit_head", "cause", "part", "attachments", "recovered", "indexing")
     class TopicCount(_message.Message):
         __slots__ = ("topic", "messages", "lost")
         TOPIC_FIELD_NUMBER: _ClassVar[int]
@@ -698,6 +955,12 @@ class Recording(_message.Message):
     TOPICS_FIELD_NUMBER: _ClassVar[int]
     STARTED_BY_FIELD_NUMBER: _ClassVar[int]
     PROBLEM_FIELD_NUMBER: _ClassVar[int]
+    AUDIT_HEAD_FIELD_NUMBER: _ClassVar[int]
+    CAUSE_FIELD_NUMBER: _ClassVar[int]
+    PART_FIELD_NUMBER: _ClassVar[int]
+    ATTACHMENTS_FIELD_NUMBER: _ClassVar[int]
+    RECOVERED_FIELD_NUMBER: _ClassVar[int]
+    INDEXING_FIELD_NUMBER: _ClassVar[int]
     site: str
     robot: str
     name: str
@@ -709,40 +972,455 @@ class Recording(_message.Message):
     topics: _containers.RepeatedCompositeFieldContainer[Recording.TopicCount]
     started_by: str
     problem: str
-    def __init__(self, site: _Optional[str] = ..., robot: _Optional[str] = ..., name: _Optional[str] = ..., file: _Optional[str] = ..., start: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., duration: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., bytes: _Optional[int] = ..., open: _Optional[bool] = ..., topics: _Optional[_Iterable[_Union[Recording.TopicCount, _Mapping]]] = ..., started_by: _Optional[str] = ..., problem: _Optional[str] = ...) -> None: ...
+    audit_head: AuditHead
+    cause: str
+    part: int
+    attachments: _containers.RepeatedScalarFieldContainer[str]
+    recovered: bool
+    indexing: float
+    def __init__(self, site: _Optional[str] = ..., robot: _Optional[str] = ..., name: _Optional[str] = ..., file: _Optional[str] = ..., start: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., duration: _Optional[_Union[datetime.timedelta, _duration_pb2.Duration, _Mapping]] = ..., bytes: _Optional[int] = ..., open: _Optional[bool] = ..., topics: _Optional[_Iterable[_Union[Recording.TopicCount, _Mapping]]] = ..., started_by: _Optional[str] = ..., problem: _Optional[str] = ..., audit_head: _Optional[_Union[AuditHead, _Mapping]] = ..., cause: _Optional[str] = ..., part: _Optional[int] = ..., attachments: _Optional[_Iterable[str]] = ..., recovered: _Optional[bool] = ..., indexing: _Optional[float] = ...) -> None: ...
 
 class RecordingList(_message.Message):
-    __slots__ = ("recordings",)
+    __slots__ = ("recordings", "free_bytes", "flight")
     RECORDINGS_FIELD_NUMBER: _ClassVar[int]
+    FREE_BYTES_FIELD_NUMBER: _ClassVar[int]
+    FLIGHT_FIELD_NUMBER: _ClassVar[int]
     recordings: _containers.RepeatedCompositeFieldContainer[Recording]
-    def __init__(self, recordings: _Optional[_Iterable[_Union[Recording, _Mapping]]] = ...) -> None: ...
+    free_bytes: int
+    flight: bool
+    def __init__(self, recordings: _Optional[_Iterable[_Union[Recording, _Mapping]]] = ..., free_bytes: _Optional[int] = ..., flight: _Optional[bool] = ...) -> None: ...
+
+class RecordingQuery(_message.Message):
+    __slots__ = ("file",)
+    FILE_FIELD_NUMBER: _ClassVar[int]
+    file: str
+    def __init__(self, file: _Optional[str] = ...) -> None: ...
+
+class RangeRequest(_message.Message):
+    __slots__ = ("file", "topic", "start", "end", "most", "from_key_frame", "skip")
+    FILE_FIELD_NUMBER: _ClassVar[int]
+    TOPIC_FIELD_NUMBER: _ClassVar[int]
+    START_FIELD_NUMBER: _ClassVar[int]
+    END_FIELD_NUMBER: _ClassVar[int]
+    MOST_FIELD_NUMBER: _ClassVar[int]
+    FROM_KEY_FRAME_FIELD_NUMBER: _ClassVar[int]
+    SKIP_FIELD_NUMBER: _ClassVar[int]
+    file: str
+    topic: str
+    start: _timestamp_pb2.Timestamp
+    end: _timestamp_pb2.Timestamp
+    most: int
+    from_key_frame: bool
+    skip: int
+    def __init__(self, file: _Optional[str] = ..., topic: _Optional[str] = ..., start: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., end: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., most: _Optional[int] = ..., from_key_frame: _Optional[bool] = ..., skip: _Optional[int] = ...) -> None: ...
+
+class RecordedMessages(_message.Message):
+    __slots__ = ("messages", "more", "schema")
+    class Message(_message.Message):
+        __slots__ = ("received", "source", "sequence", "data")
+        RECEIVED_FIELD_NUMBER: _ClassVar[int]
+        SOURCE_FIELD_NUMBER: _ClassVar[int]
+        SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+        DATA_FIELD_NUMBER: _ClassVar[int]
+        received: _timestamp_pb2.Timestamp
+        source: _timestamp_pb2.Timestamp
+        sequence: int
+        data: bytes
+        def __init__(self, received: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., source: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., sequence: _Optional[int] = ..., data: _Optional[bytes] = ...) -> None: ...
+    MESSAGES_FIELD_NUMBER: _ClassVar[int]
+    MORE_FIELD_NUMBER: _ClassVar[int]
+    SCHEMA_FIELD_NUMBER: _ClassVar[int]
+    messages: _containers.RepeatedCompositeFieldContainer[RecordedMessages.Message]
+    more: bool
+    schema: str
+    def __init__(self, messages: _Optional[_Iterable[_Union[RecordedMessages.Message, _Mapping]]] = ..., more: _Optional[bool] = ..., schema: _Optional[str] = ...) -> None: ...
+
+class SeriesRequest(_message.Message):
+    __slots__ = ("file", "values", "start", "end", "points")
+    FILE_FIELD_NUMBER: _ClassVar[int]
+    VALUES_FIELD_NUMBER: _ClassVar[int]
+    START_FIELD_NUMBER: _ClassVar[int]
+    END_FIELD_NUMBER: _ClassVar[int]
+    POINTS_FIELD_NUMBER: _ClassVar[int]
+    file: str
+    values: _containers.RepeatedScalarFieldContainer[str]
+    start: _timestamp_pb2.Timestamp
+    end: _timestamp_pb2.Timestamp
+    points: int
+    def __init__(self, file: _Optional[str] = ..., values: _Optional[_Iterable[str]] = ..., start: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., end: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., points: _Optional[int] = ...) -> None: ...
+
+class SeriesAnswer(_message.Message):
+    __slots__ = ("known", "series")
+    class Series(_message.Message):
+        __slots__ = ("name", "unit", "times_s", "lowest", "highest")
+        NAME_FIELD_NUMBER: _ClassVar[int]
+        UNIT_FIELD_NUMBER: _ClassVar[int]
+        TIMES_S_FIELD_NUMBER: _ClassVar[int]
+        LOWEST_FIELD_NUMBER: _ClassVar[int]
+        HIGHEST_FIELD_NUMBER: _ClassVar[int]
+        name: str
+        unit: str
+        times_s: _containers.RepeatedScalarFieldContainer[float]
+        lowest: _containers.RepeatedScalarFieldContainer[float]
+        highest: _containers.RepeatedScalarFieldContainer[float]
+        def __init__(self, name: _Optional[str] = ..., unit: _Optional[str] = ..., times_s: _Optional[_Iterable[float]] = ..., lowest: _Optional[_Iterable[float]] = ..., highest: _Optional[_Iterable[float]] = ...) -> None: ...
+    KNOWN_FIELD_NUMBER: _ClassVar[int]
+    SERIES_FIELD_NUMBER: _ClassVar[int]
+    known: _containers.RepeatedScalarFieldContainer[str]
+    series: _containers.RepeatedCompositeFieldContainer[SeriesAnswer.Series]
+    def __init__(self, known: _Optional[_Iterable[str]] = ..., series: _Optional[_Iterable[_Union[SeriesAnswer.Series, _Mapping]]] = ...) -> None: ...
+
+class PieceRequest(_message.Message):
+    __slots__ = ("file", "offset", "length", "attachment")
+    FILE_FIELD_NUMBER: _ClassVar[int]
+    OFFSET_FIELD_NUMBER: _ClassVar[int]
+    LENGTH_FIELD_NUMBER: _ClassVar[int]
+    ATTACHMENT_FIELD_NUMBER: _ClassVar[int]
+    file: str
+    offset: int
+    length: int
+    attachment: str
+    def __init__(self, file: _Optional[str] = ..., offset: _Optional[int] = ..., length: _Optional[int] = ..., attachment: _Optional[str] = ...) -> None: ...
+
+class Piece(_message.Message):
+    __slots__ = ("data", "total", "version", "media_type")
+    DATA_FIELD_NUMBER: _ClassVar[int]
+    TOTAL_FIELD_NUMBER: _ClassVar[int]
+    VERSION_FIELD_NUMBER: _ClassVar[int]
+    MEDIA_TYPE_FIELD_NUMBER: _ClassVar[int]
+    data: bytes
+    total: int
+    version: str
+    media_type: str
+    def __init__(self, data: _Optional[bytes] = ..., total: _Optional[int] = ..., version: _Optional[str] = ..., media_type: _Optional[str] = ...) -> None: ...
+
+class PlayRequest(_message.Message):
+    __slots__ = ("file", "position_s", "speed", "loop", "paused", "session")
+    FILE_FIELD_NUMBER: _ClassVar[int]
+    POSITION_S_FIELD_NUMBER: _ClassVar[int]
+    SPEED_FIELD_NUMBER: _ClassVar[int]
+    LOOP_FIELD_NUMBER: _ClassVar[int]
+    PAUSED_FIELD_NUMBER: _ClassVar[int]
+    SESSION_FIELD_NUMBER: _ClassVar[int]
+    file: str
+    position_s: float
+    speed: float
+    loop: bool
+    paused: bool
+    session: str
+    def __init__(self, file: _Optional[str] = ..., position_s: _Optional[float] = ..., speed: _Optional[float] = ..., loop: _Optional[bool] = ..., paused: _Optional[bool] = ..., session: _Optional[str] = ...) -> None: ...
+
+class ReplayRequest(_message.Message):
+    __slots__ = ("action", "position_s", "speed", "loop")
+    class Action(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        ACTION_UNSPECIFIED: _ClassVar[ReplayRequest.Action]
+        PLAY: _ClassVar[ReplayRequest.Action]
+        PAUSE: _ClassVar[ReplayRequest.Action]
+        SEEK: _ClassVar[ReplayRequest.Action]
+        SPEED: _ClassVar[ReplayRequest.Action]
+        LOOP: _ClassVar[ReplayRequest.Action]
+        CLOSE: _ClassVar[ReplayRequest.Action]
+    ACTION_UNSPECIFIED: ReplayRequest.Action
+    PLAY: ReplayRequest.Action
+    PAUSE: ReplayRequest.Action
+    SEEK: ReplayRequest.Action
+    SPEED: ReplayRequest.Action
+    LOOP: ReplayRequest.Action
+    CLOSE: ReplayRequest.Action
+    ACTION_FIELD_NUMBER: _ClassVar[int]
+    POSITION_S_FIELD_NUMBER: _ClassVar[int]
+    SPEED_FIELD_NUMBER: _ClassVar[int]
+    LOOP_FIELD_NUMBER: _ClassVar[int]
+    action: ReplayRequest.Action
+    position_s: float
+    speed: float
+    loop: bool
+    def __init__(self, action: _Optional[_Union[ReplayRequest.Action, str]] = ..., position_s: _Optional[float] = ..., speed: _Optional[float] = ..., loop: _Optional[bool] = ...) -> None: ...
+
+class ReplayState(_message.Message):
+    __slots__ = ("timestamp", "robot", "file", "of_site", "of_robot", "start", "duration_s", "position_s", "speed", "playing", "loop", "text")
+    TIMESTAMP_FIELD_NUMBER: _ClassVar[int]
+    ROBOT_FIELD_NUMBER: _ClassVar[int]
+    FILE_FIELD_NUMBER: _ClassVar[int]
+    OF_SITE_FIELD_NUMBER: _ClassVar[int]
+    OF_ROBOT_FIELD_NUMBER: _ClassVar[int]
+    START_FIELD_NUMBER: _ClassVar[int]
+    DURATION_S_FIELD_NUMBER: _ClassVar[int]
+    POSITION_S_FIELD_NUMBER: _ClassVar[int]
+    SPEED_FIELD_NUMBER: _ClassVar[int]
+    PLAYING_FIELD_NUMBER: _ClassVar[int]
+    LOOP_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    timestamp: _timestamp_pb2.Timestamp
+    robot: str
+    file: str
+    of_site: str
+    of_robot: str
+    start: _timestamp_pb2.Timestamp
+    duration_s: float
+    position_s: float
+    speed: float
+    playing: bool
+    loop: bool
+    text: str
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., robot: _Optional[str] = ..., file: _Optional[str] = ..., of_site: _Optional[str] = ..., of_robot: _Optional[str] = ..., start: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., duration_s: _Optional[float] = ..., position_s: _Optional[float] = ..., speed: _Optional[float] = ..., playing: _Optional[bool] = ..., loop: _Optional[bool] = ..., text: _Optional[str] = ...) -> None: ...
+
+class ServiceHealth(_message.Message):
+    __slots__ = ("timestamp", "service", "id", "version", "host", "pid", "started", "cpu", "memory_bytes", "open_files", "published", "received", "lost", "turned_away", "values", "robots", "zenoh_id")
+    class ValuesEntry(_message.Message):
+        __slots__ = ("key", "value")
+        KEY_FIELD_NUMBER: _ClassVar[int]
+        VALUE_FIELD_NUMBER: _ClassVar[int]
+        key: str
+        value: float
+        def __init__(self, key: _Optional[str] = ..., value: _Optional[float] = ...) -> None: ...
+    TIMESTAMP_FIELD_NUMBER: _ClassVar[int]
+    SERVICE_FIELD_NUMBER: _ClassVar[int]
+    ID_FIELD_NUMBER: _ClassVar[int]
+    VERSION_FIELD_NUMBER: _ClassVar[int]
+    HOST_FIELD_NUMBER: _ClassVar[int]
+    PID_FIELD_NUMBER: _ClassVar[int]
+    STARTED_FIELD_NUMBER: _ClassVar[int]
+    CPU_FIELD_NUMBER: _ClassVar[int]
+    MEMORY_BYTES_FIELD_NUMBER: _ClassVar[int]
+    OPEN_FILES_FIELD_NUMBER: _ClassVar[int]
+    PUBLISHED_FIELD_NUMBER: _ClassVar[int]
+    RECEIVED_FIELD_NUMBER: _ClassVar[int]
+    LOST_FIELD_NUMBER: _ClassVar[int]
+    TURNED_AWAY_FIELD_NUMBER: _ClassVar[int]
+    VALUES_FIELD_NUMBER: _ClassVar[int]
+    ROBOTS_FIELD_NUMBER: _ClassVar[int]
+    ZENOH_ID_FIELD_NUMBER: _ClassVar[int]
+    timestamp: _timestamp_pb2.Timestamp
+    service: str
+    id: str
+    version: str
+    host: str
+    pid: int
+    started: _timestamp_pb2.Timestamp
+    cpu: float
+    memory_bytes: int
+    open_files: int
+    published: int
+    received: int
+    lost: int
+    turned_away: int
+    values: _containers.ScalarMap[str, float]
+    robots: _containers.RepeatedScalarFieldContainer[str]
+    zenoh_id: str
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., service: _Optional[str] = ..., id: _Optional[str] = ..., version: _Optional[str] = ..., host: _Optional[str] = ..., pid: _Optional[int] = ..., started: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., cpu: _Optional[float] = ..., memory_bytes: _Optional[int] = ..., open_files: _Optional[int] = ..., published: _Optional[int] = ..., received: _Optional[int] = ..., lost: _Optional[int] = ..., turned_away: _Optional[int] = ..., values: _Optional[_Mapping[str, float]] = ..., robots: _Optional[_Iterable[str]] = ..., zenoh_id: _Optional[str] = ...) -> None: ...
+
+class ClockRequest(_message.Message):
+    __slots__ = ("asked",)
+    ASKED_FIELD_NUMBER: _ClassVar[int]
+    asked: _timestamp_pb2.Timestamp
+    def __init__(self, asked: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+
+class ClockAnswer(_message.Message):
+    __slots__ = ("received", "answered")
+    RECEIVED_FIELD_NUMBER: _ClassVar[int]
+    ANSWERED_FIELD_NUMBER: _ClassVar[int]
+    received: _timestamp_pb2.Timestamp
+    answered: _timestamp_pb2.Timestamp
+    def __init__(self, received: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., answered: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+
+class MeshState(_message.Message):
+    __slots__ = ("timestamp", "site", "services", "hops")
+    class Seen(_message.Message):
+        __slots__ = ("site", "service", "id", "host", "version", "age_s", "round_trip_s", "clock_offset_s", "lost", "received", "robots", "cpu", "memory_bytes", "started", "values")
+        class ValuesEntry(_message.Message):
+            __slots__ = ("key", "value")
+            KEY_FIELD_NUMBER: _ClassVar[int]
+            VALUE_FIELD_NUMBER: _ClassVar[int]
+            key: str
+            value: float
+            def __init__(self, key: _Optional[str] = ..., value: _Optional[float] = ...) -> None: ...
+        SITE_FIELD_NUMBER: _ClassVar[int]
+        SERVICE_FIELD_NUMBER: _ClassVar[int]
+        ID_FIELD_NUMBER: _ClassVar[int]
+        HOST_FIELD_NUMBER: _ClassVar[int]
+        VERSION_FIELD_NUMBER: _ClassVar[int]
+        AGE_S_FIELD_NUMBER: _ClassVar[int]
+        ROUND_TRIP_S_FIELD_NUMBER: _ClassVar[int]
+        CLOCK_OFFSET_S_FIELD_NUMBER: _ClassVar[int]
+        LOST_FIELD_NUMBER: _ClassVar[int]
+        RECEIVED_FIELD_NUMBER: _ClassVar[int]
+        ROBOTS_FIELD_NUMBER: _ClassVar[int]
+        CPU_FIELD_NUMBER: _ClassVar[int]
+        MEMORY_BYTES_FIELD_NUMBER: _ClassVar[int]
+        STARTED_FIELD_NUMBER: _ClassVar[int]
+        VALUES_FIELD_NUMBER: _ClassVar[int]
+        site: str
+        service: str
+        id: str
+        host: str
+        version: str
+        age_s: float
+        round_trip_s: float
+        clock_offset_s: float
+        lost: int
+        received: int
+        robots: _containers.RepeatedScalarFieldContainer[str]
+        cpu: float
+        memory_bytes: int
+        started: _timestamp_pb2.Timestamp
+        values: _containers.ScalarMap[str, float]
+        def __init__(self, site: _Optional[str] = ..., service: _Optional[str] = ..., id: _Optional[str] = ..., host: _Optional[str] = ..., version: _Optional[str] = ..., age_s: _Optional[float] = ..., round_trip_s: _Optional[float] = ..., clock_offset_s: _Optional[float] = ..., lost: _Optional[int] = ..., received: _Optional[int] = ..., robots: _Optional[_Iterable[str]] = ..., cpu: _Optional[float] = ..., memory_bytes: _Optional[int] = ..., started: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., values: _Optional[_Mapping[str, float]] = ...) -> None: ...
+    class Hop(_message.Message):
+        __slots__ = ("key", "sender", "receiver", "p50_s", "p99_s")
+        KEY_FIELD_NUMBER: _ClassVar[int]
+        SENDER_FIELD_NUMBER: _ClassVar[int]
+        RECEIVER_FIELD_NUMBER: _ClassVar[int]
+        P50_S_FIELD_NUMBER: _ClassVar[int]
+        P99_S_FIELD_NUMBER: _ClassVar[int]
+        key: str
+        sender: str
+        receiver: str
+        p50_s: float
+        p99_s: float
+        def __init__(self, key: _Optional[str] = ..., sender: _Optional[str] = ..., receiver: _Optional[str] = ..., p50_s: _Optional[float] = ..., p99_s: _Optional[float] = ...) -> None: ...
+    TIMESTAMP_FIELD_NUMBER: _ClassVar[int]
+    SITE_FIELD_NUMBER: _ClassVar[int]
+    SERVICES_FIELD_NUMBER: _ClassVar[int]
+    HOPS_FIELD_NUMBER: _ClassVar[int]
+    timestamp: _timestamp_pb2.Timestamp
+    site: str
+    services: _containers.RepeatedCompositeFieldContainer[MeshState.Seen]
+    hops: _containers.RepeatedCompositeFieldContainer[MeshState.Hop]
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., site: _Optional[str] = ..., services: _Optional[_Iterable[_Union[MeshState.Seen, _Mapping]]] = ..., hops: _Optional[_Iterable[_Union[MeshState.Hop, _Mapping]]] = ...) -> None: ...
+
+class Alarm(_message.Message):
+    __slots__ = ("id", "site", "robot", "source", "code", "text", "priority", "state", "since", "last", "count", "returned", "by", "at", "shelved_until", "reason", "advice", "values")
+    class Priority(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        PRIORITY_UNSPECIFIED: _ClassVar[Alarm.Priority]
+        LOW: _ClassVar[Alarm.Priority]
+        MEDIUM: _ClassVar[Alarm.Priority]
+        HIGH: _ClassVar[Alarm.Priority]
+        CRITICAL: _ClassVar[Alarm.Priority]
+    PRIORITY_UNSPECIFIED: Alarm.Priority
+    LOW: Alarm.Priority
+    MEDIUM: Alarm.Priority
+    HIGH: Alarm.Priority
+    CRITICAL: Alarm.Priority
+    class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        STATE_UNSPECIFIED: _ClassVar[Alarm.State]
+        UNACKNOWLEDGED: _ClassVar[Alarm.State]
+        ACKNOWLEDGED: _ClassVar[Alarm.State]
+        RETURNED: _ClassVar[Alarm.State]
+        SHELVED: _ClassVar[Alarm.State]
+    STATE_UNSPECIFIED: Alarm.State
+    UNACKNOWLEDGED: Alarm.State
+    ACKNOWLEDGED: Alarm.State
+    RETURNED: Alarm.State
+    SHELVED: Alarm.State
+    class ValuesEntry(_message.Message):
+        __slots__ = ("key", "value")
+        KEY_FIELD_NUMBER: _ClassVar[int]
+        VALUE_FIELD_NUMBER: _ClassVar[int]
+        key: str
+        value: str
+        def __init__(self, key: _Optional[str] = ..., value: _Optional[str] = ...) -> None: ...
+    ID_FIELD_NUMBER: _ClassVar[int]
+    SITE_FIELD_NUMBER: _ClassVar[int]
+    ROBOT_FIELD_NUMBER: _ClassVar[int]
+    SOURCE_FIELD_NUMBER: _ClassVar[int]
+    CODE_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    PRIORITY_FIELD_NUMBER: _ClassVar[int]
+    STATE_FIELD_NUMBER: _ClassVar[int]
+    SINCE_FIELD_NUMBER: _ClassVar[int]
+    LAST_FIELD_NUMBER: _ClassVar[int]
+    COUNT_FIELD_NUMBER: _ClassVar[int]
+    RETURNED_FIELD_NUMBER: _ClassVar[int]
+    BY_FIELD_NUMBER: _ClassVar[int]
+    AT_FIELD_NUMBER: _ClassVar[int]
+    SHELVED_UNTIL_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    ADVICE_FIELD_NUMBER: _ClassVar[int]
+    VALUES_FIELD_NUMBER: _ClassVar[int]
+    id: str
+    site: str
+    robot: str
+    source: str
+    code: str
+    text: str
+    priority: Alarm.Priority
+    state: Alarm.State
+    since: _timestamp_pb2.Timestamp
+    last: _timestamp_pb2.Timestamp
+    count: int
+    returned: _timestamp_pb2.Timestamp
+    by: str
+    at: _timestamp_pb2.Timestamp
+    shelved_until: _timestamp_pb2.Timestamp
+    reason: str
+    advice: str
+    values: _containers.ScalarMap[str, str]
+    def __init__(self, id: _Optional[str] = ..., site: _Optional[str] = ..., robot: _Optional[str] = ..., source: _Optional[str] = ..., code: _Optional[str] = ..., text: _Optional[str] = ..., priority: _Optional[_Union[Alarm.Priority, str]] = ..., state: _Optional[_Union[Alarm.State, str]] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., last: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., count: _Optional[int] = ..., returned: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., by: _Optional[str] = ..., at: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., shelved_until: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., reason: _Optional[str] = ..., advice: _Optional[str] = ..., values: _Optional[_Mapping[str, str]] = ...) -> None: ...
+
+class AlarmList(_message.Message):
+    __slots__ = ("alarms", "site")
+    ALARMS_FIELD_NUMBER: _ClassVar[int]
+    SITE_FIELD_NUMBER: _ClassVar[int]
+    alarms: _containers.RepeatedCompositeFieldContainer[Alarm]
+    site: str
+    def __init__(self, alarms: _Optional[_Iterable[_Union[Alarm, _Mapping]]] = ..., site: _Optional[str] = ...) -> None: ...
+
+class AlarmRequest(_message.Message):
+    __slots__ = ("action", "ids", "reason", "shelve_s")
+    class Action(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        ACTION_UNSPECIFIED: _ClassVar[AlarmRequest.Action]
+        ACKNOWLEDGE: _ClassVar[AlarmRequest.Action]
+        SHELVE: _ClassVar[AlarmRequest.Action]
+        UNSHELVE: _ClassVar[AlarmRequest.Action]
+    ACTION_UNSPECIFIED: AlarmRequest.Action
+    ACKNOWLEDGE: AlarmRequest.Action
+    SHELVE: AlarmRequest.Action
+    UNSHELVE: AlarmRequest.Action
+    ACTION_FIELD_NUMBER: _ClassVar[int]
+    IDS_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    SHELVE_S_FIELD_NUMBER: _ClassVar[int]
+    action: AlarmRequest.Action
+    ids: _containers.RepeatedScalarFieldContainer[str]
+    reason: str
+    shelve_s: float
+    def __init__(self, action: _Optional[_Union[AlarmRequest.Action, str]] = ..., ids: _Optional[_Iterable[str]] = ..., reason: _Optional[str] = ..., shelve_s: _Optional[float] = ...) -> None: ...
 
 class ToPage(_message.Message):
     __slots__ = ("sample", "answer", "presence", "hello")
     class Sample(_message.Message):
-        __slots__ = ("key", "attachment", "payload", "live", "age_s")
+        __slots__ = ("key", "attachment", "payload", "live", "age_s", "step")
         KEY_FIELD_NUMBER: _ClassVar[int]
         ATTACHMENT_FIELD_NUMBER: _ClassVar[int]
         PAYLOAD_FIELD_NUMBER: _ClassVar[int]
         LIVE_FIELD_NUMBER: _ClassVar[int]
         AGE_S_FIELD_NUMBER: _ClassVar[int]
+        STEP_FIELD_NUMBER: _ClassVar[int]
         key: str
         attachment: bytes
         payload: bytes
         live: bool
         age_s: float
-        def __init__(self, key: _Optional[str] = ..., attachment: _Optional[bytes] = ..., payload: _Optional[bytes] = ..., live: _Optional[bool] = ..., age_s: _Optional[float] = ...) -> None: ...
+        step: int
+        def __init__(self, key: _Optional[str] = ..., attachment: _Optional[bytes] = ..., payload: _Optional[bytes] = ..., live: _Optional[bool] = ..., age_s: _Optional[float] = ..., step: _Optional[int] = ...) -> None: ...
     class Answer(_message.Message):
-        __slots__ = ("id", "ok", "payload", "error")
+        __slots__ = ("id", "ok", "payload", "error", "no_answer")
         ID_FIELD_NUMBER: _ClassVar[int]
         OK_FIELD_NUMBER: _ClassVar[int]
         PAYLOAD_FIELD_NUMBER: _ClassVar[int]
         ERROR_FIELD_NUMBER: _ClassVar[int]
+        NO_ANSWER_FIELD_NUMBER: _ClassVar[int]
         id: int
         ok: bool
         payload: bytes
         error: str
-        def __init__(self, id: _Optional[int] = ..., ok: _Optional[bool] = ..., payload: _Optional[bytes] = ..., error: _Optional[str] = ...) -> None: ...
+        no_answer: bool
+        def __init__(self, id: _Optional[int] = ..., ok: _Optional[bool] = ..., payload: _Optional[bytes] = ..., error: _Optional[str] = ..., no_answer: _Optional[bool] = ...) -> None: ...
     class Presence(_message.Message):
         __slots__ = ("key", "alive")
         KEY_FIELD_NUMBER: _ClassVar[int]
@@ -751,7 +1429,7 @@ class ToPage(_message.Message):
         alive: bool
         def __init__(self, key: _Optional[str] = ..., alive: _Optional[bool] = ...) -> None: ...
     class Hello(_message.Message):
-        __slots__ = ("version", "site", "insecure", "stale", "connected")
+        __slots__ = ("version", "site", "insecure", "stale", "connected", "session", "account", "operator", "may_command")
         class Stale(_message.Message):
             __slots__ = ("topic", "after_s")
             TOPIC_FIELD_NUMBER: _ClassVar[int]
@@ -764,12 +1442,20 @@ class ToPage(_message.Message):
         INSECURE_FIELD_NUMBER: _ClassVar[int]
         STALE_FIELD_NUMBER: _ClassVar[int]
         CONNECTED_FIELD_NUMBER: _ClassVar[int]
+        SESSION_FIELD_NUMBER: _ClassVar[int]
+        ACCOUNT_FIELD_NUMBER: _ClassVar[int]
+        OPERATOR_FIELD_NUMBER: _ClassVar[int]
+        MAY_COMMAND_FIELD_NUMBER: _ClassVar[int]
         version: str
         site: str
         insecure: bool
         stale: _containers.RepeatedCompositeFieldContainer[ToPage.Hello.Stale]
         connected: bool
-        def __init__(self, version: _Optional[str] = ..., site: _Optional[str] = ..., insecure: _Optional[bool] = ..., stale: _Optional[_Iterable[_Union[ToPage.Hello.Stale, _Mapping]]] = ..., connected: _Optional[bool] = ...) -> None: ...
+        session: str
+        account: str
+        operator: str
+        may_command: bool
+        def __init__(self, version: _Optional[str] = ..., site: _Optional[str] = ..., insecure: _Optional[bool] = ..., stale: _Optional[_Iterable[_Union[ToPage.Hello.Stale, _Mapping]]] = ..., connected: _Optional[bool] = ..., session: _Optional[str] = ..., account: _Optional[str] = ..., operator: _Optional[str] = ..., may_command: _Optional[bool] = ...) -> None: ...
     SAMPLE_FIELD_NUMBER: _ClassVar[int]
     ANSWER_FIELD_NUMBER: _ClassVar[int]
     PRESENCE_FIELD_NUMBER: _ClassVar[int]

@@ -12,6 +12,7 @@ from typing import TypeAlias
 from protocol_gateway.core import codes
 from protocol_gateway.core.codes import CodeTable
 from protocol_gateway.core.grammar import TERMINATOR
+from protocol_gateway.core.plain import plain_readers, read_plain
 from protocol_gateway.core.records import Record, read_records
 from protocol_gateway.errors import UnitError
 
@@ -59,25 +60,30 @@ class UnitStream:
 
     def __init__(self, table: CodeTable = codes.NAMES) -> None:
         self._table = table
+        self._plain = plain_readers(table)
         self._buffer = bytearray()
         self._offset = 0  # of the buffer's first byte
         self._lost = False  # past 64 KiB: skipping to the next "@"
 
-    def receive(self, data: bytes) -> list[StreamEvent]:
-        """Events of the next bytes; the same however they are cut."""
+    def receive(self, data: bytes, holding: bytes = b"") -> list[StreamEvent]:
+        """Events of the next bytes; the same however they are cut.
+
+        Args:
+            holding: Units without these bytes are passed over unread, which costs next to nothing.
+        """
+        *ends, rest = data.split(TERMINATOR)
         events: list[StreamEvent] = []
-        # Only the new bytes can hold an "@": pieces of one byte each stay linear.
-        searched = len(self._buffer)
-        self._buffer += data
-        begin = 0
-        while (end := self._buffer.find(TERMINATOR, max(begin, searched))) >= 0:
+        for end in ends:
+            unit = end
+            if self._buffer:
+                unit = bytes(self._buffer) + end
+                self._buffer.clear()
             if self._lost:
                 self._lost = False
-            else:
-                events.append(self._unit(bytes(self._buffer[begin:end]), self._offset + begin))
-            begin = end + 1
-        self._offset += begin
-        del self._buffer[:begin]
+            elif holding in unit:
+                events.append(self._unit(unit, self._offset))
+            self._offset += len(unit) + 1
+        self._buffer += rest
         if len(self._buffer) >= LONGEST_UNIT_BYTES:
             if not self._lost:
                 events.append(self._too_long(bytes(self._buffer), self._offset))
@@ -90,12 +96,13 @@ class UnitStream:
         if len(data) >= LONGEST_UNIT_BYTES:
             return self._too_long(data, offset)
         try:
-            return Unit(read_records(data, self._table), data, offset)
+            records = read_plain(data, self._plain) or read_records(data, self._table)
+            return Unit(records, data, offset)
         except UnitError as error:
             return Malformed(offset, printable(data), str(error))
 
     def _too_long(self, data: bytes, offset: int) -> Malformed:
-        return Malformed(offset, printable(data), f"no '@' within {LONGEST_UNIT_BYTES} bytes")
+        return Malformed(offset, printable(data), f"not ended within {LONGEST_UNIT_BYTES} bytes")
 
 
 def printable(data: bytes) -> str:

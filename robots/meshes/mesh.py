@@ -1,6 +1,10 @@
-"""What a mesh file holds, whatever its format: painted triangles in the file's own units and axes."""
+"""What a mesh file holds, whatever its format: painted triangles, lines and points.
+
+All in the file's own units and axes.
+"""
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +14,8 @@ IndexArray = NDArray[np.int64]
 Color = tuple[float, float, float]
 
 PAINT = "paint"
+_MIXERS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
+_STILL = np.eye(3)
 
 
 @dataclass(frozen=True)
@@ -19,6 +25,7 @@ class Material:
     Attributes:
         name: In the file; "paint" is what a description's colour replaces.
         transparency: 0 opaque, 1 not to be seen.
+        texture: Name of the image that the file puts on it; kept by name, not drawn.
     """
 
     name: str = ""
@@ -27,6 +34,7 @@ class Material:
     emissive: Color = (0.0, 0.0, 0.0)
     shininess: float = 0.2
     transparency: float = 0.0
+    texture: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +46,7 @@ class Part:
         normals: (v, 3) unit vectors, outwards.
         triangles: (t, 3) vertex numbers, counter-clockwise seen from outside.
         two_sided: Both faces are to be drawn.
+        colors: (v, 4) sRGB and opacity, 0 to 1, instead of the material's; none: the material's.
     """
 
     name: str
@@ -46,6 +55,39 @@ class Part:
     normals: FloatArray
     triangles: IndexArray
     two_sided: bool = False
+    colors: FloatArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Wire:
+    """Lines or points of one material.
+
+    Attributes:
+        vertices: (v, 3).
+        segments: (s, 2) vertex numbers; (0, 2) for points.
+        colors: (v, 4) sRGB and opacity, 0 to 1, instead of the material's; none: the material's.
+    """
+
+    name: str
+    material: Material
+    vertices: FloatArray
+    segments: IndexArray
+    colors: FloatArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """A place in a file's hierarchy that parts turn about; the parts themselves stand where they are drawn.
+
+    Attributes:
+        name: Its own; parts of this name move with it.
+        parent: Number of the node that carries it; -1 for none.
+        node_to_file: (4, 4); its origin is the pivot.
+    """
+
+    name: str
+    parent: int
+    node_to_file: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,18 +95,41 @@ class Mesh:
     """A mesh file's whole content.
 
     Attributes:
+        wires: Its lines and points; they count as no triangles and in no bounds.
         warnings: What the reader found odd but could read, a sentence each.
-        self_contained: Nothing of it came from another file.
+        missing: Files that it names and that are not there, as it names them; drawn without.
+        files: The other files that its reader looked for, there or not: its content is theirs too.
+        nodes: Its hierarchy, where the format has one that says more than the parts do (3DS).
+        unit_m: Length of its unit [m] as the file, or its format, states it; none: it does not.
+        up: Its upward axis as the file, or its format, states it, "y" or "z"; empty: it does not.
     """
 
     parts: tuple[Part, ...] = ()
+    wires: tuple[Wire, ...] = ()
     warnings: tuple[str, ...] = field(default=())
-    self_contained: bool = True
+    missing: tuple[str, ...] = ()
+    files: tuple[Path, ...] = ()
+    nodes: tuple[Node, ...] = ()
+    unit_m: float | None = None
+    up: str = ""
 
     @property
     def triangle_count(self) -> int:
         """Number of triangles of all parts."""
         return sum(len(part.triangles) for part in self.parts)
+
+
+def welded(vertices: FloatArray, triangles: IndexArray) -> tuple[FloatArray, IndexArray]:
+    """Vertices at one place made one, as smoothing needs it; every triangle is kept."""
+    places = np.ascontiguousarray(vertices + 0.0)  # -0 is 0
+    bits = places.view(np.uint64)
+    # Sorting one number a vertex takes a tenth of sorting three; two places may share it.
+    keys = (bits * _MIXERS[: bits.shape[1]]).sum(axis=1)
+    keys ^= keys >> np.uint64(29)
+    _, kept, number = np.unique(keys, return_index=True, return_inverse=True)
+    if not np.array_equal(places[kept][number], places):
+        _, kept, number = np.unique(places, axis=0, return_index=True, return_inverse=True)
+    return places[kept], number.reshape(-1)[triangles].astype(np.int64)
 
 
 def bounds(mesh: Mesh) -> tuple[FloatArray, FloatArray]:
@@ -76,9 +141,16 @@ def bounds(mesh: Mesh) -> tuple[FloatArray, FloatArray]:
     return vertices.min(axis=0), vertices.max(axis=0)
 
 
+def placed(wire: Wire, placement: FloatArray) -> Wire:
+    """A wire moved by a (4, 4) affine transform."""
+    return replace(wire, vertices=wire.vertices @ placement[:3, :3].T + placement[:3, 3])
+
+
 def transformed(part: Part, placement: FloatArray) -> Part:
     """A part moved by a (4, 4) affine transform; a mirroring one turns the triangles over."""
     linear = placement[:3, :3]
+    if (linear == _STILL).all():  # many of many thousands of parts are only shifted
+        return replace(part, vertices=part.vertices + placement[:3, 3])
     triangles = part.triangles[:, ::-1] if np.linalg.det(linear) < 0 else part.triangles
     return replace(
         part,
@@ -88,15 +160,28 @@ def transformed(part: Part, placement: FloatArray) -> Part:
     )
 
 
+def transformed_mesh(mesh: Mesh, placement: FloatArray) -> Mesh:
+    """A whole mesh, wires and nodes too, moved by a (4, 4) affine transform."""
+    return replace(
+        mesh,
+        parts=tuple(transformed(part, placement) for part in mesh.parts),
+        wires=tuple(placed(wire, placement) for wire in mesh.wires),
+        nodes=tuple(replace(node, node_to_file=placement @ node.node_to_file) for node in mesh.nodes),
+    )
+
+
 def _normal_transform(linear: FloatArray) -> FloatArray:
     """The cofactors: as the inverse transpose, but for its length, and there for singular matrices too."""
-    rows = linear
-    cofactors = np.array([np.cross(rows[1], rows[2]), np.cross(rows[2], rows[0]), np.cross(rows[0], rows[1])])
+    one, other = linear[[1, 2, 0]], linear[[2, 0, 1]]
+    # Rows crossed with rows, without numpy.cross: it is slow for files of thousands of parts.
+    cofactors = one[:, [1, 2, 0]] * other[:, [2, 0, 1]] - one[:, [2, 0, 1]] * other[:, [1, 2, 0]]
     return cofactors if np.linalg.det(linear) >= 0 else -cofactors
 
 
 def unit(vectors: FloatArray) -> FloatArray:
-    """(n, 3) vectors at length one; zero stays zero."""
-    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    result: FloatArray = np.divide(vectors, lengths, out=np.zeros_like(vectors), where=lengths > 0)
+    """(n, 3) vectors at length one; zero, and what is too long to measure, becomes zero."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    measured = (lengths > 0) & np.isfinite(lengths)
+    result: FloatArray = np.divide(vectors, lengths, out=np.zeros_like(vectors), where=measured)
     return result

@@ -1,14 +1,23 @@
 """Normals where a file gives none: smooth over gentle edges, sharp at creases."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.meshes.mesh import FloatArray, IndexArray, unit
+from robots.meshes.polygons import area_vectors
 
 Split = tuple[FloatArray, FloatArray, IndexArray]
 _Flags = NDArray[np.bool_]
+# Whether face `one[k]` and face `other[k]` are smooth together, for each k.
+_Smooth = Callable[[IndexArray, IndexArray], _Flags]
+
+# Pairs of corners looked at together: some tens of MB.
+_PAIRS = 200_000
+# A vertex of more faces, such as the tip of a fine cone, stays faceted: its pairs would be millions.
+_MOST_AT_ONE_VERTEX = 700
 
 
 def creased(vertices: FloatArray, triangles: IndexArray, crease_angle: float) -> Split:
@@ -22,14 +31,9 @@ def creased(vertices: FloatArray, triangles: IndexArray, crease_angle: float) ->
     Returns:
         Vertices (w, 3), normals (w, 3) and triangles (t, 3), the same surface.
     """
-    facing = unit(_face_normals(vertices, triangles))
-    limit = np.cos(crease_angle)
-
-    def smooth(one: IndexArray, other: IndexArray) -> _Flags:
-        alike: _Flags = np.einsum("ij,ij->i", facing[one], facing[other]) > limit
-        return alike
-
-    return _split(vertices, triangles, smooth)
+    areas = _areas(vertices, triangles)
+    normals = crease_normals(triangles.ravel(), np.repeat(np.arange(len(triangles)), 3), areas, crease_angle)
+    return joined(vertices, triangles, normals)
 
 
 def grouped(vertices: FloatArray, triangles: IndexArray, groups: IndexArray) -> Split:
@@ -39,39 +43,99 @@ def grouped(vertices: FloatArray, triangles: IndexArray, groups: IndexArray) -> 
         share: _Flags = (groups[one] & groups[other]) != 0
         return share
 
-    return _split(vertices, triangles, smooth)
+    owners = np.repeat(np.arange(len(triangles)), 3)
+    normals = _corner_normals(triangles.ravel(), owners, _areas(vertices, triangles), smooth)
+    return joined(vertices, triangles, normals)
 
 
-def _face_normals(vertices: FloatArray, triangles: IndexArray) -> FloatArray:
-    a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
-    return np.asarray(np.cross(b - a, c - a), dtype=np.float64)
+def crease_normals(
+    corners: IndexArray, owners: IndexArray, areas: FloatArray, crease_angle: float
+) -> FloatArray:
+    """(c, 3) normal at each corner of each face, of the faces there that meet at less than the angle.
+
+    Args:
+        corners: (c,) number of the vertex at each corner.
+        owners: (c,) number of the face that each corner is of.
+        areas: (f, 3) normals of the faces, as long as their area.
+        crease_angle: [rad].
+    """
+    sums = [np.bincount(corners, weights=areas[owners, axis]) for axis in range(3)]
+    normals = unit(np.column_stack(sums).astype(np.float64))[corners]
+    if crease_angle >= np.pi:
+        return normals
+    facing = unit(areas)
+    # Faces that all lie within half the angle of one direction meet at less than the angle: most do.
+    far = np.einsum("ij,ij->i", facing[owners], normals) <= np.cos(crease_angle / 2)
+    rough = (np.bincount(corners, weights=far) > 0)[corners]
+    limit = np.cos(crease_angle)
+
+    def smooth(one: IndexArray, other: IndexArray) -> _Flags:
+        alike: _Flags = np.einsum("ij,ij->i", facing[one], facing[other]) > limit
+        return alike
+
+    normals[rough] = _corner_normals(corners[rough], owners[rough], areas, smooth)
+    return normals
 
 
-def _split(
-    vertices: FloatArray, triangles: IndexArray, smooth: Callable[[IndexArray, IndexArray], _Flags]
-) -> Split:
+def joined(points: FloatArray, corners: IndexArray, normals: FloatArray) -> Split:
+    """Corners of one point and (nearly) one normal become one vertex.
+
+    Args:
+        corners: (t, 3) point at each corner of each triangle.
+        normals: (3 t, 3) normal there.
+    """
+    keys = corner_keys(corners.ravel(), normals)
+    _, kept, vertex = np.unique(keys, return_index=True, return_inverse=True)
+    return points[corners.ravel()[kept]], normals[kept], vertex.reshape(-1, 3).astype(np.int64)
+
+
+def corner_keys(corners: IndexArray, normals: FloatArray) -> IndexArray:
+    """(c,) a number of the point and the normal of each corner, to tell corners that are one vertex.
+
+    Normals are told apart to 1/1024; points up to 2**30.
+    """
+    rounded = np.round(normals * 1023).astype(np.int64) + 1023
+    keys: IndexArray = (corners << 33) | (rounded[:, 0] << 22) | (rounded[:, 1] << 11) | rounded[:, 2]
+    return keys
+
+
+def _areas(vertices: FloatArray, triangles: IndexArray) -> FloatArray:
+    return area_vectors(vertices, triangles.ravel(), np.full(len(triangles), 3))
+
+
+def _corner_normals(
+    corners: IndexArray, owners: IndexArray, areas: FloatArray, smooth: _Smooth
+) -> FloatArray:
     """Each corner's normal from the faces at its vertex that are smooth with its own."""
-    if not len(triangles):
-        return vertices, np.zeros_like(vertices), triangles
-    areas = _face_normals(vertices, triangles)
-    first, second = _corners_at_one_vertex(triangles.ravel())
-    together = smooth(first // 3, second // 3) | (first == second)
-    normals = np.zeros((triangles.size, 3))
     # Weighted by area: the small triangles of a fillet must not tilt the plane beside it.
-    np.add.at(normals, first[together], areas[second[together] // 3])
-    normals = unit(normals)
-    corners = np.column_stack([triangles.ravel(), np.round(normals * 2048)]).astype(np.int64)
-    _, kept, corner_vertex = np.unique(corners, axis=0, return_index=True, return_inverse=True)
-    return vertices[corners[kept, 0]], normals[kept], corner_vertex.reshape(-1, 3).astype(np.int64)
+    sums = areas[owners]
+    for first, second in _pairs(corners):
+        kept = smooth(owners[first], owners[second])
+        ones, others = first[kept], owners[second[kept]]
+        for axis in range(3):
+            sums[:, axis] += np.bincount(ones, weights=areas[others, axis], minlength=len(corners))
+    return unit(sums)
 
 
-def _corners_at_one_vertex(corner_vertices: IndexArray) -> tuple[IndexArray, IndexArray]:
-    """All ordered pairs of triangle corners that share a vertex, each corner with itself too."""
-    order = np.argsort(corner_vertices, kind="stable")
-    _, starts, counts = np.unique(corner_vertices[order], return_index=True, return_counts=True)
+def _pairs(corners: IndexArray) -> Iterator[tuple[IndexArray, IndexArray]]:
+    """All ordered pairs of different corners that share a vertex, in pieces."""
+    order = np.argsort(corners, kind="stable")
+    ranked = corners[order]
+    starts = np.flatnonzero(np.diff(ranked, prepend=-1))
+    counts = np.diff(starts, append=len(ranked))
+    few = counts <= _MOST_AT_ONE_VERTEX
+    starts, counts = starts[few], counts[few]
+    piece = np.cumsum(counts**2) // _PAIRS
+    edges = [0, *(np.flatnonzero(np.diff(piece)) + 1).tolist(), len(piece)]
+    for low, high in pairwise(edges):
+        first, second = _pairs_of(order, starts[low:high], counts[low:high])
+        different = first != second
+        yield first[different], second[different]
+
+
+def _pairs_of(order: IndexArray, starts: IndexArray, counts: IndexArray) -> tuple[IndexArray, IndexArray]:
     # Corner k of a vertex with c corners is repeated c times, beside the c corners in turn.
-    per_corner = np.repeat(counts, counts)
-    first = np.repeat(order, per_corner)
-    run_starts = np.repeat(np.repeat(starts, counts), per_corner)
-    position = np.arange(len(first)) - np.repeat(np.cumsum(per_corner) - per_corner, per_corner)
-    return first, order[run_starts + position]
+    per_vertex = counts**2
+    run = np.repeat(np.arange(len(counts)), per_vertex)
+    within = np.arange(len(run)) - np.repeat(np.cumsum(per_vertex) - per_vertex, per_vertex)
+    return order[starts[run] + within // counts[run]], order[starts[run] + within % counts[run]]

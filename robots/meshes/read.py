@@ -1,23 +1,97 @@
-"""Mesh files by their ending."""
+"""Mesh files by their ending, and by what they hold where the ending is wrong."""
 
+import inspect
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from robots.errors import MeshError
+from robots.meshes.dxf import read_dxf
 from robots.meshes.mesh import Mesh
-from robots.meshes.three_ds import read_3ds
-from robots.meshes.vrml import read_vrml
+from robots.meshes.step import read_step
+from robots.meshes.three_ds.read import read_3ds
+from robots.meshes.trimesh_formats import read_trimesh
+from robots.meshes.vrml.read import read_vrml
 
-READERS: Mapping[str, Callable[[Path], Mesh]] = {".wrl": read_vrml, ".vrml": read_vrml, ".3ds": read_3ds}
+Progress = Callable[[float], None]
+
+READERS: Mapping[str, Callable[..., Mesh]] = {
+    ".wrl": read_vrml,
+    ".vrml": read_vrml,
+    ".wrz": read_vrml,
+    ".3ds": read_3ds,
+    ".dxf": read_dxf,
+    ".stl": read_trimesh,
+    ".obj": read_trimesh,
+    ".ply": read_trimesh,
+    ".dae": read_trimesh,
+    ".glb": read_trimesh,
+    ".gltf": read_trimesh,
+    ".step": read_step,
+    ".stp": read_step,
+}
+_IGES = {".igs", ".iges"}
+# Who says what they are; OBJ and VRML without a header do not.
+_BEGINNINGS = (
+    (b"#VRML", ".wrl"),
+    (b"glTF", ".glb"),
+    (b"ply\n", ".ply"),
+    (b"ply\r", ".ply"),
+    (b"ISO-10303-21", ".step"),
+    (b"AutoCAD Binary DXF", ".dxf"),
+)
 
 
-def read_mesh(path: Path) -> Mesh:
+def read_mesh(path: Path, progress: Progress | None = None, *, within: Path | None = None) -> Mesh:
     """A mesh file's content, in its own units and axes.
 
+    Args:
+        progress: Called now and then with how much is done, 0 to 1, by readers that can tell.
+        within: Only files below this folder are read beside it; others count as missing.
+
     Raises:
-        MeshError: If its ending is not one that is read, or the file is not what its ending says.
+        MeshError: If its ending is not one that is read, or the file is not what it says it is.
     """
-    reader = READERS.get(path.suffix.lower())
+    ending = path.suffix.lower()
+    if ending in _IGES:
+        raise MeshError(path, "IGES is not read: export STEP (.step), which every CAD program writes too")
+    held = _held(path)
+    kind = held or ending
+    if kind == "iges":
+        raise MeshError(path, "holds IGES, which is not read: export STEP (.step)")
+    reader = READERS.get(kind)
     if reader is None:
         raise MeshError(path, f"ending {path.suffix!r} is not read; {', '.join(READERS)} are")
-    return reader(path)
+    options: dict[str, Any] = {"progress": progress, "within": within, "kind": kind.lstrip(".")}
+    taken = inspect.signature(reader).parameters
+    mesh = reader(path, **{name: value for name, value in options.items() if name in taken})
+    if READERS.get(ending) is reader and (kind == ending or reader is not read_trimesh):
+        return mesh
+    return replace(
+        mesh, warnings=(f"ends in {ending!r} but holds {kind[1:].upper()}; read as that", *mesh.warnings)
+    )
+
+
+def _held(path: Path) -> str:
+    """The ending that a file's first bytes ask for; empty where they do not tell."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(1024)
+    except OSError as error:
+        raise MeshError(path, f"cannot be read: {error.strerror}") from error
+    for beginning, ending in _BEGINNINGS:
+        if head.startswith(beginning):
+            return ending
+    text = head.lstrip()
+    if head[:2] == b"MM" and len(head) >= 6:
+        return ".3ds" if path.suffix.lower() not in (".wrl", ".obj") or b"\0" in head else ""
+    if text.startswith((b"<?xml", b"<COLLADA")) and b"<COLLADA" in head:
+        return ".dae"
+    if text.startswith(b"solid") and b"facet" in head:
+        return ".stl"
+    if text[:1] == b"0" and b"SECTION" in head[:40]:
+        return ".dxf"
+    if len(head) > 80 and head[72:73] == b"S" and head[73:80].strip() == b"1":
+        return "iges"
+    return ""

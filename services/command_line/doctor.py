@@ -17,6 +17,7 @@ _ROLES = {
     "simulator": ("ruckig",),
     "recorder": ("mcap", "mcap_protobuf"),
     "renderer": ("moderngl", "av", "cv2"),
+    "keys": ("cryptography",),
     "console": ("starlette", "uvicorn", "websockets"),
 }
 _FREE_BYTES = 1 << 30

@@ -8,8 +8,11 @@ from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
 from typing import Any, NamedTuple, TypeVar
 
+from bus.errors import SessionError
 from bus.keys import WHOLE_SITE
-from bus.session import Session, SessionSettings, open_session
+from bus.session import Session, open_session
+from services.command_line.alarm_lists import gone_sites, lists
+from services.command_line.attaching import attachment, own_identity
 from services.errors import ServiceError
 
 T = TypeVar("T")
@@ -36,8 +39,18 @@ def run(main: Coroutine[Any, Any, T]) -> T:
 
 @asynccontextmanager
 async def attached(router: str) -> AsyncIterator[Session]:
-    """A session for one command: it does not wait for a router."""
-    async with open_session(SessionSettings(connect=(router,), wait_s=0.0)) as session:
+    """A session for one command: it does not wait for a router.
+
+    Raises:
+        SessionError: If none is there, or it shows nothing to the certificate that was given.
+    """
+    async with open_session(attachment(router, wait_s=0.0)) as session:
+        # A router that was told of no such name lets it in and keeps everything from it, itself too.
+        if session.principal is not None and not await session.present():
+            raise SessionError(
+                f"the router shows {session.principal.name} nothing: its certificate was revoked, or the "
+                "router does not follow this site's list yet (robomesh keys list)"
+            )
         yield session
 
 
@@ -54,7 +67,9 @@ async def find(session: Session, text: str) -> Robot:
         return found[0]
     there = ", ".join(map(str, robots)) or "none"
     if not found:
-        raise NoSuchRobotError(f"no robot {text!r} on the mesh; there are: {there}")
+        gone = sorted(gone_sites(await lists(session)).keys() - {key.site for key in alive})
+        lost = f"; gone, with all of its robots: site {', site '.join(gone)}" if gone else ""
+        raise NoSuchRobotError(f"no robot {text!r} on the mesh; there are: {there}{lost}")
     raise NoSuchRobotError(f"{text!r} is at several sites; say which: {', '.join(map(str, found))}")
 
 
@@ -64,7 +79,10 @@ def print_json(value: Any) -> None:
 
 
 def own_name() -> str:
-    """The name under which this person asks: the account's, as a key can hold it."""
+    """The name under which this person asks: the certificate's, or the account's as a key can hold it."""
+    identity = own_identity()
+    if identity is not None:
+        return identity.name
     try:
         account = getpass.getuser()
     except (KeyError, OSError):

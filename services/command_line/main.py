@@ -13,6 +13,15 @@ import typer
 from typer.main import get_command
 
 from bus.endpoints import DEFAULT_ROUTER
+from services.command_line import attach, running
+from services.command_line.accounts_app import accounts_app
+from services.command_line.alarms_app import alarms_app
+from services.command_line.attaching import offer_keys
+from services.command_line.descriptions import mesh_app, robot_app
+from services.command_line.kept import audit_app, recordings_app
+from services.command_line.keys import keys_app
+from services.command_line.options import Connect, Height, Json, Robot, Width
+from services.command_line.programs import program_app
 
 app = typer.Typer(
     name="robomesh",
@@ -22,123 +31,34 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-robot_app = typer.Typer(help="Robot descriptions: check, show, export.", no_args_is_help=True)
-mesh_app = typer.Typer(help="Mesh files: what is in one.", no_args_is_help=True)
-recordings_app = typer.Typer(help="What is recorded.", no_args_is_help=True)
-audit_app = typer.Typer(help="The gateway's audit log.", no_args_is_help=True)
 for name, part in (
     ("robot", robot_app),
     ("mesh", mesh_app),
+    ("program", program_app),
     ("recordings", recordings_app),
     ("audit", audit_app),
+    ("alarms", alarms_app),
+    ("keys", keys_app),
+    ("accounts", accounts_app),
 ):
     app.add_typer(part, name=name)
 
-SiteFile = Annotated[Path | None, typer.Option("--site", metavar="SITE.toml", help="The site file.")]
-Connect = Annotated[str, typer.Option(metavar="tcp/HOST:PORT", help="The router to attach to.")]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.")]
-Robot = Annotated[str, typer.Argument(metavar="ROBOT", help="robot, or site/robot")]
-
-
-# ------------------------------------------------------------------ what runs
-
-
-@app.command()
-def up(
-    site: Annotated[Path | None, typer.Argument(metavar="[SITE.toml]", help="The site file.")] = None,
-) -> None:
-    """Run a whole site; without a file, the built-in one with a simulated arm."""
-    from services.command_line import up as command
-
-    command.run(site)
-
-
-@app.command()
-def router(site: SiteFile = None) -> None:
-    """Run a site's router."""
-    from services.command_line import roles
-
-    roles.router(site)
-
-
-@app.command()
-def gateway(
-    site: SiteFile = None,
-    connect: Connect = DEFAULT_ROUTER,
-    controller: Annotated[
-        list[str] | None,
-        typer.Option(metavar="ROBOT=tcp://HOST:PORT", help="Where a robot's controller is, instead."),
-    ] = None,
-) -> None:
-    """Put the site's controllers on the mesh."""
-    from services.command_line import roles
-
-    roles.gateway(site, connect, controller or [])
-
-
-@app.command()
-def kinematics(site: SiteFile = None, connect: Connect = DEFAULT_ROUTER) -> None:
-    """Tell what the robots are and where their parts are."""
-    from services.command_line import roles
-
-    roles.kinematics(site, connect)
-
-
-@app.command()
-def recorder(site: SiteFile = None, connect: Connect = DEFAULT_ROUTER) -> None:
-    """Record what is asked for."""
-    from services.command_line import roles
-
-    roles.recorder(site, connect)
-
-
-@app.command()
-def renderer(site: SiteFile = None, connect: Connect = DEFAULT_ROUTER) -> None:
-    """Draw the robots off screen and publish video."""
-    from services.command_line import roles
-
-    roles.renderer(site, connect)
-
-
-@app.command()
-def console(site: SiteFile = None, connect: Connect = DEFAULT_ROUTER) -> None:
-    """Serve the page."""
-    from services.command_line import roles
-
-    roles.console(site, connect)
-
-
-@app.command()
-def simulate(
-    robot: Annotated[str, typer.Option(metavar="R", help="A library robot or a description.")] = "pt600",
-    listen: Annotated[str, typer.Option(metavar="HOST:PORT")] = "127.0.0.1:5400",
-    rate: Annotated[float, typer.Option(metavar="HZ", min=1, max=1000)] = 100.0,
-    max_clients: Annotated[int, typer.Option(metavar="N", min=1)] = 8,
-    demo: Annotated[bool, typer.Option(help="Move until the first command.")] = False,
-    fault: Annotated[
-        list[str] | None, typer.Option(metavar="NAME[@SECONDS]", help="freeze, garbage; when it begins.")
-    ] = None,
-    code: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NUMBER=TYPE", help="A type code of the site file: 2=ABSOLUTE.DEG"),
-    ] = None,
-    insecure: Annotated[bool, typer.Option(help="Listen beyond loopback, without any protection.")] = False,
-) -> None:
-    """Run a controller of the old kind that simulates its arm."""
-    from services.command_line import roles
-
-    roles.simulate(robot, listen, rate, max_clients, demo, tuple(fault or ()), code or [], insecure)
-
+running.add(app)
+attach.add(app)
 
 # ------------------------------------------------------------- what is there
 
 
 @app.command("list")
-def list_(connect: Connect = DEFAULT_ROUTER, as_json: Json = False) -> None:
-    """Sites, robots, services, who controls, how old."""
+def list_(
+    connect: Connect = DEFAULT_ROUTER,
+    as_json: Json = False,
+    watch: Annotated[bool, typer.Option("--watch", help="Again and again, until Ctrl-C.")] = False,
+) -> None:
+    """Sites, robots, services, who watches, who controls, how old, how far away."""
     from services.command_line import listing
 
-    listing.run(connect, as_json)
+    listing.run(connect, as_json, watch)
 
 
 @app.command()
@@ -161,17 +81,41 @@ def send(
         list[str],
         typer.Argument(
             metavar="COMMAND",
-            help="home, stop, hold, resume, reset, trace on, trace off, speed N, move Q... (degrees, mm)",
+            help="home, stop, hold, resume, reset, trace on, trace off, speed N, move Q... (degrees, mm), "
+            "run FILE (a teach program)",
         ),
     ],
     connect: Connect = DEFAULT_ROUTER,
     operator: Annotated[str, typer.Option(help="In whose name.")] = "",
     as_json: Json = False,
 ) -> None:
-    """Command a robot: takes control, holds it until the motion ends, gives it back; Ctrl-C stops."""
+    """Command a robot: takes control, holds it until the motion ends, gives it back; Ctrl-C stops.
+
+    Only who moves a robot can hold it and resume: what one send moves, another cannot hold. Ctrl-C there
+    ends it, and so does stop from anywhere, which needs no control.
+    """
     from services.command_line import send as command
 
     command.run(robot, words, connect, operator, as_json)
+
+
+@app.command()
+def fault(
+    robot: Robot,
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="[NAME[@BEGIN][+LENGTH]]", help="Without one: which there are, and what each does."
+        ),
+    ] = "",
+    off: Annotated[bool, typer.Option("--off", help="End it.")] = False,
+    connect: Connect = DEFAULT_ROUTER,
+    as_json: Json = False,
+) -> None:
+    """Let a simulated controller misbehave: freeze, flood, jump, ..."""
+    from services.command_line import fault as command
+
+    command.run(robot, name, off, connect, as_json)
 
 
 @app.command()
@@ -179,101 +123,88 @@ def snapshot(
     robot: Robot,
     view: Annotated[str, typer.Argument(metavar="VIEW", help="front, top, left, free, ...")],
     out: Annotated[Path, typer.Argument(metavar="OUT.png")],
+    width: Width = 0,
+    height: Height = 0,
     connect: Connect = DEFAULT_ROUTER,
 ) -> None:
     """Save a rendered picture of a robot."""
     from services.command_line import snapshot as command
 
-    command.run(robot, view, out, connect)
+    command.run(robot, view, out, (width, height), connect)
+
+
+@app.command()
+def video(
+    robot: Robot,
+    view: Annotated[str, typer.Argument(metavar="VIEW", help="front, top, left, free, ...")],
+    out: Annotated[Path, typer.Argument(metavar="OUT.mp4")],
+    seconds: Annotated[float, typer.Option(metavar="N", help="Of video; 0: until Ctrl-C.")] = 0.0,
+    width: Width = 0,
+    height: Height = 0,
+    fps: Annotated[float, typer.Option(help="Highest rate; 0: the renderer's own.")] = 0.0,
+    connect: Connect = DEFAULT_ROUTER,
+    as_json: Json = False,
+) -> None:
+    """Save rendered video of a robot, playable while it is written."""
+    from services.command_line import video as command
+
+    command.run(robot, view, out, command.Wanted(seconds, width, height, fps), connect, as_json)
 
 
 @app.command()
 def record(
     robot: Robot,
     name: Annotated[str, typer.Option(help="Of the capture.")] = "",
+    view: Annotated[
+        list[str] | None,
+        typer.Option(metavar="VIEW", help="Whose video too; more by repeating it; -: none."),
+    ] = None,
     connect: Connect = DEFAULT_ROUTER,
     as_json: Json = False,
 ) -> None:
     """Record a robot until Ctrl-C."""
-    from services.command_line import recordings
+    from services.command_line.recordings import record as command
 
-    recordings.record(robot, name, connect, as_json)
-
-
-@recordings_app.command("list")
-def recordings_list(connect: Connect = DEFAULT_ROUTER, as_json: Json = False) -> None:
-    """Every recording of every site, the newest first."""
-    from services.command_line import recordings
-
-    recordings.list_all(connect, as_json)
-
-
-@recordings_app.command("info")
-def recordings_info(
-    file: Annotated[Path, typer.Argument(metavar="FILE.mcap")], as_json: Json = False
-) -> None:
-    """What a recording holds: topics, counts, losses."""
-    from services.command_line import recordings
-
-    recordings.info(file, as_json)
-
-
-@audit_app.command("verify")
-def audit_verify(
-    file: Annotated[Path, typer.Argument(metavar="FILE")],
-    head: Annotated[str, typer.Option(metavar="HASH", help="The last entry's hash, where you have it.")] = "",
-    as_json: Json = False,
-) -> None:
-    """Whether an audit log is whole and unchanged."""
-    from services.command_line import audit
-
-    audit.verify(file, head, as_json)
+    command.record(robot, name, view or (), connect, as_json)
 
 
 @app.command()
-def doctor() -> None:
+def alive(
+    service: Annotated[
+        str, typer.Argument(metavar="[SITE/]SERVICE", help="As in list: router, gateway, ...")
+    ],
+    connect: Connect = DEFAULT_ROUTER,
+) -> int:
+    """Whether a service answers now: exit status 0 or 1, for health checks."""
+    from services.command_line import alive as command
+
+    return command.run(service, connect)
+
+
+@app.command()
+def doctor(
+    security: Annotated[
+        bool, typer.Option("--security", help="Try every role against every key, on the live mesh.")
+    ] = False,
+    folder: Annotated[Path, typer.Option(metavar="DIR", help="Where the site's keys lie.")] = Path("keys"),
+    routers: Annotated[
+        str, typer.Option("--connect", metavar="tls/HOST:PORT", help="A router; the list's unless given.")
+    ] = "",
+    as_json: Json = False,
+) -> int | None:
     """What is missing on this machine, and how to mend it."""
+    if security:
+        from services.command_line import security as check
+        from services.command_line.attaching import addresses
+
+        return check.run(folder, addresses(routers), as_json)
     from services.command_line import doctor as command
 
     command.run()
+    return None
 
 
 # ------------------------------------------------------- what a robot is
-
-
-@robot_app.command("check")
-def robot_check(robot: Annotated[str, typer.Argument(metavar="ROBOT")], as_json: Json = False) -> None:
-    """Whether a description is right; a line a problem."""
-    from services.command_line import robots
-
-    robots.check(robot, as_json)
-
-
-@robot_app.command("show")
-def robot_show(robot: Annotated[str, typer.Argument(metavar="ROBOT")], as_json: Json = False) -> None:
-    """A robot's joints, limits and reach."""
-    from services.command_line import robots
-
-    robots.show(robot, as_json)
-
-
-@robot_app.command("export")
-def robot_export(
-    robot: Annotated[str, typer.Argument(metavar="ROBOT")],
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER")],
-) -> None:
-    """Write a robot as URDF with GLB meshes."""
-    from services.command_line import robots
-
-    robots.export(robot, folder)
-
-
-@mesh_app.command("info")
-def mesh_info(file: Annotated[Path, typer.Argument(metavar="FILE")], as_json: Json = False) -> None:
-    """Triangles, bounds and materials of a mesh file, in its own units and axes."""
-    from services.command_line import robots
-
-    robots.mesh_info(file, as_json)
 
 
 @app.command()
@@ -287,6 +218,27 @@ def fk(
     robots.forward(robot, requests)
 
 
+@app.command(context_settings={"ignore_unknown_options": True})
+def ik(
+    pose: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="X Y Z [ROLL PITCH YAW]",
+            help="The tool's pose in the base frame, mm and degrees; - for JSON requests on standard input.",
+        ),
+    ],
+    robot: Annotated[str, typer.Option(metavar="R")] = "pt600",
+    task: Annotated[
+        str, typer.Option(metavar="6d|5d|3d", help="The whole pose, position and tool axis, or position.")
+    ] = "",
+    all_: Annotated[bool, typer.Option("--all", help="All solutions, not the nearest to home.")] = False,
+) -> None:
+    """Inverse kinematics: joint positions; JSON: {"pose", "task", "near", "all", "seed"} a line in."""
+    from services.command_line import inverse
+
+    inverse.inverse(robot, pose, task, all_)
+
+
 # --------------------------------------------------------------------- the end
 
 
@@ -298,7 +250,8 @@ def main() -> None:
 def run(arguments: list[str]) -> int:
     """Run one command; the exit status."""
     try:
-        outcome: Any = get_command(app).main(arguments, prog_name="robomesh", standalone_mode=False)
+        command = offer_keys(get_command(app))
+        outcome: Any = command.main(arguments, prog_name="robomesh", standalone_mode=False)
         return outcome if isinstance(outcome, int) else 0
     except typer.TyperException as error:
         return _could_not(
@@ -328,12 +281,13 @@ def _could_not(text: str) -> int:
 
 def _known_errors() -> tuple[type[Exception], ...]:
     from bus.errors import BusError
+    from mcap_files.errors import RecordingsError
     from protocol_gateway.errors import ProtocolGatewayError
     from renderer.errors import RendererError
     from robots.errors import RobotError
     from services.errors import ServiceError
 
-    return (BusError, ProtocolGatewayError, RendererError, RobotError, ServiceError)
+    return (BusError, ProtocolGatewayError, RecordingsError, RendererError, RobotError, ServiceError)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""`robomesh robot`, `mesh`, `fk`: what a robot is, asked on the command line."""
+"""`robomesh robot`, `fk`: what a robot is, asked on the command line."""
 
 import json
 import sys
@@ -19,22 +19,40 @@ class RequestError(ServiceError):
 
 
 def check(robot: str, as_json: bool) -> None:
-    """Print every problem of a description; exit status 1 when there is one."""
+    """Print every problem of a description and its meshes; exit status 1 when there is one."""
+    from robots.inspect_meshes import mesh_findings
+
+    name = robot
+    problems: list[dict[str, Any]] = []
+    warnings: list[dict[str, Any]] = []
     try:
         description = load(robot)
-        problems: tuple[str, ...] = ()
+        name = description.name
+        found, odd = mesh_findings(description)
+        problems += [{"file": each.file, "path": [], "text": each.text} for each in found]
+        warnings = [{"file": each.file, "text": each.text} for each in odd]
     except DescriptionError as error:
-        problems = error.problems
+        if not Path(error.source).is_file():
+            raise  # nothing was checked
+        problems = [
+            {"file": error.source, "path": list(path), "text": text}
+            for path, text in zip(error.paths, error.problems, strict=True)
+        ]
     if as_json:
-        print_json({"ok": not problems, "problems": problems})
+        print_json({"ok": not problems, "problems": problems, "warnings": warnings})
     else:
-        print("\n".join(problems) if problems else f"{description.name}: a right description")
+        for problem in problems:
+            print(f"{problem['file']}: {problem['text']}")
+        for warning in warnings:
+            print(f"{warning['file']}: warning: {warning['text']}")
+        if not problems:
+            print(f"{name}: a right description")
     if problems:
         raise typer.Exit(1)
 
 
-def show(robot: str, as_json: bool) -> None:
-    """Print a robot's joints and derived values."""
+def show(robot: str, as_json: bool, png: Path | None) -> None:
+    """Print a robot's D-H table, limits and derived values; draw its four views."""
     from robots.model import build_model, tool_placement
     from robots.summary import description_summary
 
@@ -42,59 +60,100 @@ def show(robot: str, as_json: bool) -> None:
     model = build_model(description)
     tool = tool_placement(model, model.joints.home)
     summary = {**description_summary(description), "tool_at_home": tool.tolist()}
+    if png is not None:
+        from services.command_line.draw_robot import draw_four_views
+
+        draw_four_views(description, png)
     if as_json:
         print_json(summary)
         return
+    _print_summary(summary, tool[:3, 3].tolist())
+    if png is not None:
+        print(png)
+
+
+def _print_summary(summary: dict[str, Any], tool: list[float]) -> None:
     joints = summary["joints"]
     print(
         f"{summary['title'] or summary['name']}: {len(joints)} joints, "
         f"reach {summary['reach_m'] * 1000:.0f} mm"
     )
-    if description.provenance:
-        print(description.provenance)
+    if summary["provenance"]:
+        print(summary["provenance"])
+    wide = max(len(joint["name"]) for joint in joints)
+    if summary["dh"] is not None:
+        print(f"  {'D-H rows':<{wide}} {'a mm':>10} {'alpha °':>10} {'d mm':>10} {'theta °':>10}  link")
+        for row in summary["dh"]["rows"]:
+            variable = "theta" if row["type"] == "rotary" else "d"
+            cells = {
+                "a": row["a"] * 1000,
+                "alpha": degrees(row["alpha"]),
+                "d": row["d"] * 1000,
+                "theta": degrees(row["theta"]),
+            }
+            # The star: what the joint adds to.
+            text = " ".join(
+                f"{_cell(value)}{'*' if key == variable else ' '}" for key, value in cells.items()
+            )
+            print(f"  {row['joint']:<{wide}} {text}  {row['link']}")
+        for note in summary["dh"]["notes"]:
+            print(f"  note: {note}")
+    print(f"  {'joints':<{wide}} {'type':<10} {'limits':>20} {'home':>9}  most: speed, /s, /s")
     for joint in joints:
         factor, unit = (degrees(1.0), "°") if joint["type"] == "rotary" else (1000.0, " mm")
+        limits = f"{joint['lower'] * factor:.1f} .. {joint['upper'] * factor:.1f}{unit}"
+        rates = [joint[key] * factor for key in ("max_speed", "max_acceleration", "max_jerk")]
         print(
-            f"  {joint['name']:<12} {joint['type']:<10} "
-            f"{joint['lower'] * factor:8.1f} .. {joint['upper'] * factor:.1f}{unit}, "
-            f"up to {joint['max_speed'] * factor:.0f}{unit}/s, home {joint['home'] * factor:.1f}{unit}"
+            f"  {joint['name']:<{wide}} {joint['type']:<10} {limits:>20} {joint['home'] * factor:8.1f}{unit}"
+            f"  {', '.join(f'{rate:.0f}' for rate in rates)}{unit}"
         )
-    x, y, z = tool[:3, 3] * 1000
-    print(f"  tool at home: {x:.1f} {y:.1f} {z:.1f} mm")
+    for frame in summary["frames"]:
+        place = [1000 * row[3] for row in frame["frame_to_link"][:3]]
+        print(f"  {frame['name']} on {frame['link']} at {' '.join(f'{x:.1f}' for x in place)} mm")
+    print(f"  tool at home: {' '.join(f'{1000 * x:.1f}' for x in tool)} mm")
+
+
+def _cell(value: float) -> str:
+    return f"{round(value, 3) + 0.0:9.3f}"
 
 
 def export(robot: str, folder: Path) -> None:
     """Write URDF and GLB meshes into a folder."""
     from robots.glb import link_meshes
-    from robots.urdf import to_urdf
+    from robots.urdf.write import to_urdf
 
     description = load(robot)
+    urdf = folder / f"{description.name}.urdf"
+    others = [path for path in folder.glob("*.urdf") if path != urdf]
+    if others or (not urdf.exists() and (folder / "meshes").exists()):
+        there = others[0].name if others else "meshes"
+        raise RequestError(
+            f"{folder}: holds another robot ({there}); its meshes would be lost: name a new folder"
+        )
     meshes = link_meshes(description)
     try:
         (folder / "meshes").mkdir(parents=True, exist_ok=True)
         for link, glb in meshes.items():
             (folder / "meshes" / f"{link}.glb").write_bytes(glb)
-        urdf = folder / f"{description.name}.urdf"
         urdf.write_text(to_urdf(description), encoding="utf-8")
     except OSError as error:
         raise RequestError(f"{folder}: cannot be written: {error.strerror}") from None
     print(urdf)
 
 
-def mesh_info(file: Path, as_json: bool) -> None:
-    """Print what a mesh file holds."""
-    from robots.meshes.read import read_mesh
-    from robots.summary import mesh_summary
+def import_(source: str, folder: Path, packages: list[Path], as_dh: bool) -> None:
+    """Write a robot from elsewhere as robot.toml and meshes: the whole folder, or nothing."""
+    from robots.importing import imported
+    from robots.save import write_folder
 
-    summary = mesh_summary(read_mesh(file))
-    if as_json:
-        print_json(summary)
-        return
-    print(f"{file.name}: {summary['triangles']} triangles")
-    print(f"  from {_triple(summary['min'])} to {_triple(summary['max'])}, in the file's own units")
-    print(f"  materials: {', '.join(filter(None, summary['materials'])) or 'none named'}")
-    for warning in summary["warnings"]:
-        print(f"  warning: {warning}")
+    robot = imported(source, packages=packages, as_dh=as_dh)
+    for note in robot.notes:
+        print(f"note: {note}", file=sys.stderr)
+    for name in robot.missing:
+        print(f"missing: {name}: that shape is left out", file=sys.stderr)
+    print(write_folder(robot.values, robot.files, folder.absolute()).path)
+    if robot.missing:
+        raise typer.Exit(1)
 
 
 def forward(robot: str, requests: str) -> None:
@@ -135,7 +194,3 @@ def _joint_positions(line: str) -> list[float]:
 
 def _refuse(constant: str) -> float:
     raise ValueError(constant)
-
-
-def _triple(values: Any) -> str:
-    return "({:.6g}, {:.6g}, {:.6g})".format(*values)

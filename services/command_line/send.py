@@ -1,27 +1,24 @@
 """`robomesh send`: one command to a robot, under a lease that lives as long as its motion."""
 
 import asyncio
-import contextlib
-import signal
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+import re
+import sys
 from math import radians
+from pathlib import Path
 
 import typer
 
-from bus.errors import BusError, NoAnswerError, RefusedError
+from bus.errors import RefusedError
 from bus.keys import check_chunk, robot_key
+from bus.lease import control
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
 from services.command_line import find
+from services.command_line.following import Interrupted, answered, interrupt, stop, until_done, warning_of
 from services.errors import ServiceError
 
 _Command = schema.CommandRequest
-_Lease = schema.LeaseRequest
-_TTL_S = 2.0
 _LATEST_NS = 3_000_000_000
-# `lease` beats each second: without it the gateway is gone.
-_SILENCE_S = 5.0
 _MOTIONS = (_Command.HOME, _Command.MOVE_ABSOLUTE, _Command.MOVE_RELATIVE, _Command.RESUME)
 _WORDS = {
     ("home",): _Command.HOME,
@@ -31,7 +28,10 @@ _WORDS = {
     ("trace", "on"): _Command.TRACE_ON,
     ("trace", "off"): _Command.TRACE_OFF,
 }
-_USAGE = "home, stop, hold, resume, reset, trace on, trace off, speed N, or move Q... (degrees, mm)"
+_USAGE = "home, stop, hold, resume, reset, trace on, trace off, speed N, move Q... (degrees, mm), or run FILE"
+# The gateway plans and checks a whole program before it begins.
+_PROGRAM_S = 60.0
+_RECORDER_S = 0.5
 
 
 class WordsError(ServiceError):
@@ -55,113 +55,80 @@ async def _send(name: str, words: list[str], router: str, operator: str) -> tupl
     async with find.attached(router) as session:
         robot = await find.find(session, name)
         if words == ["stop"]:
-            return await _stop(session, robot, operator)
+            return await stop(session, robot, operator, "robomesh send stop")
         description = await session.last(robot_key(*robot, "description"))
-        request = _parse(words, description if isinstance(description, schema.Description) else None)
+        known = description if isinstance(description, schema.Description) else None
+        if known is None and words[0] == "move":
+            return (
+                False,
+                f"nobody tells what {robot} is, so degrees and mm mean nothing: start its kinematics",
+            )
+        request = _parse(words, known)
         try:
-            async with _control(session, robot, operator) as lease:
-                request.lease = lease.lease
+            async with control(session, *robot, operator) as own:
+                request.lease = own.lease
                 request.id = 1
                 # By the gateway's clock: what is held up on the way must not move an arm later.
-                request.not_after.FromNanoseconds(lease.now.ToNanoseconds() + _LATEST_NS)
+                request.not_after.FromNanoseconds(own.now_ns + _LATEST_NS)
                 if request.command == _Command.RESET:
                     request.stop_id = await _latched_stop(session, robot)
-                answer = await session.ask(robot_key(*robot, f"command/{operator}"), request)
-                assert isinstance(answer, schema.CommandAnswer)
-                if answer.accepted and request.command in _MOTIONS:
-                    return await _until_done(session, robot, operator)
-                return answer.accepted, answer.text
+                accepted, text = await _to_its_end(session, robot, operator, request, own.renewing)
+                if accepted and request.command == _Command.TRACE_ON:
+                    text += await joined(session, robot)
         except RefusedError as error:
-            return False, str(error)
+            accepted, text = False, str(error)
+        return accepted, text if accepted else in_words_of_the_command_line(text, robot)
 
 
-async def _stop(session: Session, robot: find.Robot, operator: str) -> tuple[bool, str]:
-    answer = await session.ask(robot_key(*robot, "stop"), schema.StopRequest(by=operator))
-    assert isinstance(answer, schema.StopAnswer)
-    return answer.sent, answer.text
+async def _to_its_end(
+    session: Session,
+    robot: find.Robot,
+    operator: str,
+    request: schema.CommandRequest,
+    renewing: asyncio.Task[str],
+) -> tuple[bool, str]:
+    """Send a command, and stay until what it began has ended; Ctrl-C stops the robot, at any time."""
+    runs = request.command == _Command.RUN_PROGRAM
+    with interrupt() as interrupted:
+        try:
+            key = robot_key(*robot, f"command/{operator}")
+            timeout_s = _PROGRAM_S if runs else 2.0
+            answer = await answered(session, key, request, interrupted, timeout_s=timeout_s)
+            if not answer.accepted or not (runs or request.command in _MOTIONS):
+                return answer.accepted, answer.text
+            warning = warning_of(answer)
+            if warning:
+                print(f"mind: {warning}", file=sys.stderr, flush=True)
+            done, text = await until_done(session, robot, operator, renewing, interrupted, runs=runs)
+            return done, f"{text}; mind: {warning}" if warning else text
+        except Interrupted:
+            _, said = await stop(session, robot, operator, "Ctrl-C in robomesh send")
+            return False, f"interrupted: {said}"
+
+
+async def joined(session: Session, robot: find.Robot) -> str:
+    """Into whose recording a trace goes that began while one ran: it gets none of its own."""
+    last = await session.last(robot_key(*robot, "recording"), timeout_s=_RECORDER_S)
+    if isinstance(last, schema.Recording) and last.open and last.started_by == "request":
+        return f"; recorded in {last.name!r}, which is being recorded already"
+    return ""
+
+
+def in_words_of_the_command_line(text: str, robot: find.Robot) -> str:
+    """A refusal, with what to do next as a command to type."""
+    text = re.sub(r"send RESET with stop_id \d+", f"`robomesh send {robot} reset`", text)
+    if "with another lease" in text:
+        text = (
+            f"{text.rstrip('.')}. Only that window or program can hold what it moves; "
+            f"Ctrl-C there, or `robomesh send {robot} stop`, ends it"
+        )
+    return text
 
 
 async def _latched_stop(session: Session, robot: find.Robot) -> int:
     """The stop that a RESET is to name; 0 where none is latched, and the controller itself is stopped."""
     state = await session.last(robot_key(*robot, "controller"))
     return state.stop.id if isinstance(state, schema.ControllerState) else 0
-
-
-async def _until_done(session: Session, robot: find.Robot, operator: str) -> tuple[bool, str]:
-    """Wait until the gateway says that the holder's motion has ended; Ctrl-C stops the robot."""
-    interrupted = asyncio.Event()
-    asyncio.get_running_loop().add_signal_handler(signal.SIGINT, interrupted.set)
-    ended = asyncio.create_task(_motion_ended(session, robot, operator))
-    pressed = asyncio.create_task(interrupted.wait())
-    try:
-        await asyncio.wait((ended, pressed), return_when=asyncio.FIRST_COMPLETED)
-        if interrupted.is_set():
-            _, said = await _stop(session, robot, operator)
-            return False, f"interrupted: {said}"
-        return await ended or (True, "done")
-    finally:
-        asyncio.get_running_loop().remove_signal_handler(signal.SIGINT)
-        ended.cancel()
-        pressed.cancel()
-
-
-async def _motion_ended(session: Session, robot: find.Robot, operator: str) -> tuple[bool, str] | None:
-    """None: ended well; otherwise what ended it."""
-    leases = session.subscribe(robot_key(*robot, "lease"), newest=20)
-    while True:
-        try:
-            async with asyncio.timeout(_SILENCE_S):
-                sample = await anext(leases)
-        except TimeoutError:
-            return (
-                False,
-                f"the gateway fell silent: nobody knows what {robot} does; the dead-man stop is its own",
-            )
-        lease = sample.message()
-        assert isinstance(lease, schema.Lease)
-        if not sample.live:
-            continue
-        if lease.holder != operator:
-            return False, f"control went to {lease.holder or 'nobody'} before the motion ended"
-        if not lease.motion:
-            return await _how_it_ended(session, robot)
-
-
-async def _how_it_ended(session: Session, robot: find.Robot) -> tuple[bool, str] | None:
-    state = await session.last(robot_key(*robot, "controller"))
-    if isinstance(state, schema.ControllerState):
-        if state.HasField("stop"):
-            return False, f"stopped: {state.stop.reason or 'stop request'} by {state.stop.by}"
-        if state.fault:
-            return False, f"the controller has a fault: {state.fault}"
-    return None
-
-
-@asynccontextmanager
-async def _control(session: Session, robot: find.Robot, operator: str) -> AsyncIterator[schema.LeaseAnswer]:
-    """The lease, renewed until the block ends, then given back."""
-    key = robot_key(*robot, f"lease/request/{operator}")
-    answer = await session.ask(key, _Lease(action=_Lease.ACQUIRE, ttl_s=_TTL_S))
-    assert isinstance(answer, schema.LeaseAnswer)
-
-    async def renew() -> None:
-        while True:
-            await asyncio.sleep(_TTL_S / 4)
-            # One late answer is no reason to let go; the lease outlives three of them.
-            with contextlib.suppress(NoAnswerError):
-                await session.ask(
-                    key, _Lease(action=_Lease.RENEW, lease=answer.lease, ttl_s=_TTL_S), timeout_s=0.5
-                )
-
-    renewing = asyncio.create_task(renew())
-    try:
-        yield answer
-    finally:
-        renewing.cancel()
-        with contextlib.suppress(BusError, asyncio.CancelledError):
-            await renewing
-        with contextlib.suppress(BusError):
-            await session.ask(key, _Lease(action=_Lease.RELEASE, lease=answer.lease), timeout_s=1.0)
 
 
 def _parse(words: list[str], description: schema.Description | None) -> schema.CommandRequest:
@@ -176,6 +143,10 @@ def _parse(words: list[str], description: schema.Description | None) -> schema.C
     match words:
         case ["speed", percent]:
             return _Command(command=_Command.SPEED, speed_percent=_number(percent))
+        case ["run", file]:
+            return _Command(
+                command=_Command.RUN_PROGRAM, program=_program(Path(file)), program_name=Path(file).stem
+            )
         case ["move", *values] if values:
             positions = [_number(value) for value in values]
             if description is not None:
@@ -190,6 +161,14 @@ def _parse(words: list[str], description: schema.Description | None) -> schema.C
                 ]
             return _Command(command=_Command.MOVE_ABSOLUTE, joint_positions=positions)
     raise WordsError(f"{' '.join(words)!r} is no command: {_USAGE}")
+
+
+def _program(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
+        raise WordsError(f"{path}: cannot be read: {reason}") from None
 
 
 def _number(text: str) -> float:

@@ -4,19 +4,25 @@ from pathlib import Path
 
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 
-from bus.keys import check_chunk, robot_key
 from services.command_line import find
+from services.command_line.views import view_of
 from services.errors import ServiceError
+
+# A robot of many parts, first drawn on a busy machine, takes a while.
+_TIMEOUT_S = 15.0
 
 
 class NoPictureError(ServiceError):
-    """Nobody draws the view."""
+    """There is no picture, or no file for it."""
 
 
-def run(robot: str, view: str, out: Path, router: str) -> None:
-    """Save the picture; PNG, JPEG or whatever else the file's name says."""
-    check_chunk(view, "view")
-    picture = find.run(_picture(robot, view, router))
+def run(robot: str, view: str, out: Path, size: tuple[int, int], router: str) -> None:
+    """Save the picture; PNG, JPEG or whatever else the file's name says.
+
+    Args:
+        size: Width and height [px]; 0: the renderer's own.
+    """
+    picture = find.run(_picture(robot, view, size, router))
     if out.suffix.lower() in (".jpg", ".jpeg"):
         data = picture
     else:
@@ -40,12 +46,13 @@ def run(robot: str, view: str, out: Path, router: str) -> None:
     print(out)
 
 
-async def _picture(name: str, view: str, router: str) -> bytes:
+async def _picture(name: str, view: str, size: tuple[int, int], router: str) -> bytes:
     async with find.attached(router) as session:
         robot = await find.find(session, name)
-        message = await session.last(robot_key(*robot, f"image/{view}"), timeout_s=5.0)
+        keys = await view_of(session, robot, view, width=size[0], height=size[1])
+        message = await session.last(keys.image, timeout_s=_TIMEOUT_S)
         if not isinstance(message, CompressedImage):
             raise NoPictureError(
-                f"no picture of {robot} from {view!r}: is the renderer running, and has it that view?"
+                f"no picture of {robot} from {view!r} came within {_TIMEOUT_S:g} s: the renderer's log tells"
             )
         return bytes(message.data)

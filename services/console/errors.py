@@ -1,11 +1,23 @@
 """Errors of the console.
 
 services.errors.ServiceError
+├── AccountsError           an accounts file, or a change of it, that cannot be
+├── SignInBusyError         too many passwords wait to be looked at
 ├── PageNotBuiltError       there is no page to serve
+├── PictureError            a picture that cannot be given, with HTTP's status
+├── RecordingChangedError   a recording that was written again while it was sent
 └── WatchError              a browser asked for a key that it cannot watch
 """
 
 from services.errors import ServiceError
+
+
+class AccountsError(ServiceError):
+    """An accounts file that says something wrong, or a change of it that cannot be."""
+
+
+class SignInBusyError(ServiceError):
+    """Too many passwords wait to be looked at."""
 
 
 class PageNotBuiltError(ServiceError):
@@ -14,3 +26,19 @@ class PageNotBuiltError(ServiceError):
 
 class WatchError(ServiceError):
     """A browser asked for a key that it cannot watch; the text says what it can."""
+
+
+class RecordingChangedError(ServiceError):
+    """A recording that was written again while it was sent."""
+
+
+class PictureError(ServiceError):
+    """A picture that cannot be given; the text says why and what can.
+
+    Attributes:
+        status: HTTP's.
+    """
+
+    def __init__(self, status: int, text: str) -> None:
+        super().__init__(text)
+        self.status = status

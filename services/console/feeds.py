@@ -122,12 +122,15 @@ def check_expression(expression: str) -> topics.Topic:
         for name, what in ((key.site, "site"), (key.robot, "robot")):
             if name not in ("*", keys.WHOLE_SITE):
                 keys.check_name(name, what)
-        if "*" in key.topic:
+        row = topics.topic(key.topic)
+        all_of_it = key.topic == row.name and row.history is History.LAST_100  # events/*: whoever's
+        if "*" in key.topic and not all_of_it:
             raise WatchError(
                 f"{expression!r} cannot be watched: name the view, '*' stands for site and robot only"
             )
-        row = topics.topic(key.topic)
-        if row.name.endswith("/*"):
+        if row.history is History.KEY_FRAME and "*" in expression:
+            raise WatchError(f"{expression!r} cannot be watched: name the site and the robot of a video")
+        if row.name.endswith("/*") and not all_of_it:
             keys.check_chunk(key.topic.split("/", 1)[1], "view")
     except BusError as error:
         raise WatchError(f"{expression!r} cannot be watched: {error}") from None

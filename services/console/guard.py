@@ -1,8 +1,8 @@
 """Who may talk to the console, and what a browser may do with its page.
 
 A page elsewhere must not reach a robot through an operator's browser: the Host must be a name
-of ours (else a foreign name could be pointed at us: DNS rebinding), and a WebSocket's Origin
-must be the page's own.
+of ours (else a foreign name could be pointed at us: DNS rebinding), and the Origin of a WebSocket
+and of whatever changes something must be the page's own.
 """
 
 import ipaddress
@@ -14,6 +14,12 @@ from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 _OWN_NAMES = frozenset({"localhost"})
+
+_READING = ("GET", "HEAD", "OPTIONS")
+
+# Bytes, by the beginning of the path; the same are counted where a body is read.
+_MOST_BODY = (("/account/", 16 * 1024), ("/define/", 200 * 1000**2))
+_HSTS = "max-age=31536000"
 
 SECURITY_HEADERS = {
     "Content-Security-Policy": (
@@ -47,39 +53,79 @@ def refused_host(host: str, names: Collection[str]) -> str | None:
     return None
 
 
-def refused_origin(origin: str, host: str) -> str | None:
-    """Why a WebSocket's Origin is refused; None: it is the page's own."""
-    if origin and urlsplit(origin).netloc.lower() == host.lower():
+def refused_origin(origin: str, host: str, *, secure: bool = False) -> str | None:
+    """Why an Origin is refused; None: it is the page's own.
+
+    Args:
+        secure: The page is served over TLS: one of this name without is somebody else's.
+    """
+    parts = urlsplit(origin)
+    if origin and parts.netloc.lower() == host.lower() and (parts.scheme == "https" or not secure):
         return None
     return f"origin {origin!r} is not this page's: {host}"
 
 
-class Guard:
-    """ASGI middleware: Host and Origin checked, security headers on every answer."""
+def refused_body(scope: Scope, headers: Headers) -> tuple[int, str] | None:
+    """HTTP's status and why, where a body is too large by its own account, or there should be none.
 
-    def __init__(self, app: ASGIApp, names: Collection[str] = ()) -> None:
+    What comes in pieces of unknown number is counted by those who read it.
+    """
+    lengths, pieces = headers.getlist("content-length"), headers.getlist("transfer-encoding")
+    if lengths and pieces:
+        # Who stands before us may have ended the request elsewhere (RFC 9112, 6.1).
+        return 400, "a request has a content-length or a transfer-encoding, not both"
+    if scope["method"] in _READING:
+        return (400, f"a {scope['method']} has no body") if pieces or lengths not in ([], ["0"]) else None
+    most = next((most for path, most in _MOST_BODY if scope["path"].startswith(path)), 0)
+    if lengths and (not lengths[0].isdecimal() or int(lengths[0]) > most):
+        return 413, f"the request is larger than {most} bytes"
+    return None
+
+
+class Guard:
+    """ASGI middleware: Host and Origin checked, bodies bounded, security headers on every answer.
+
+    Args:
+        secure: Served over TLS.
+    """
+
+    def __init__(self, app: ASGIApp, names: Collection[str] = (), *, secure: bool = False) -> None:
         self._app = app
         self._names = names
+        self._secure = secure
+        self._headers = SECURITY_HEADERS | ({"Strict-Transport-Security": _HSTS} if secure else {})
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Passes on what is allowed."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-        headers = Headers(scope=scope)
-        host = headers.get("host", "")
-        problem = refused_host(host, self._names)
-        if problem is None and scope["type"] == "websocket":
-            problem = refused_origin(headers.get("origin", ""), host)
+        refused = self._refused(scope, Headers(scope=scope))
 
         async def send_guarded(message: Message) -> None:
             if message["type"] == "http.response.start":
-                MutableHeaders(scope=message).update(SECURITY_HEADERS)
+                MutableHeaders(scope=message).update(self._headers)
             await send(message)
 
-        if problem is None:
+        if refused is None:
             await self._app(scope, receive, send_guarded)
         elif scope["type"] == "http":
-            await PlainTextResponse(problem, status_code=421)(scope, receive, send_guarded)
+            # What else comes over this connection may be the rest of what was refused.
+            answer = PlainTextResponse(refused[1], status_code=refused[0], headers={"Connection": "close"})
+            await answer(scope, receive, send_guarded)
         else:
-            await send({"type": "websocket.close", "code": 1008, "reason": problem})
+            await send({"type": "websocket.close", "code": 1008, "reason": refused[1]})
+
+    def _refused(self, scope: Scope, headers: Headers) -> tuple[int, str] | None:
+        host = headers.get("host", "")
+        if (problem := refused_host(host, self._names)) is not None:
+            return 421, problem
+        changing = scope["type"] == "websocket" or scope["method"] not in _READING
+        if changing:
+            # A browser says so itself (of WebSockets not all say the same); whoever is none need not.
+            site = headers.get("sec-fetch-site", "same-origin")
+            if scope["type"] == "http" and site != "same-origin":
+                return 403, "asked from another page than this one's"
+            if problem := refused_origin(headers.get("origin", ""), host, secure=self._secure):
+                return 403, problem
+        return refused_body(scope, headers) if scope["type"] == "http" else None

@@ -1,9 +1,10 @@
 """What waits for one browser, or is held for those still to come: per key, and never a queue.
 
-State: the newest value. Lists (events, audit): the last few, in order. Video: the frames since
-a key frame; who falls behind goes on at the next key frame.
+State: the newest value, and what came just before it. Lists (events, audit): the last few, in order.
+Video: the frames since a key frame; who falls behind goes on at the next key frame.
 """
 
+import time
 from collections import deque
 from typing import Protocol
 
@@ -17,6 +18,9 @@ LIST_LENGTH = 200
 _MOST_FRAMES = 75
 # A key frame lets a browser that is this far behind skip what it has not been sent.
 _SKIP_FROM = 6
+
+# A stall of the machine, not a slow line: at 100 Hz five states.
+_RECENT_S, _MOST_RECENT = 0.05, 8
 
 _NAL_IDR, _NAL_SPS = 5, 7
 
@@ -54,6 +58,28 @@ class NewestLane:
         return () if self._sample is None else (self._sample,)
 
 
+class RecentLane:
+    """State, on its way: all of the last moment, so that a burst passes whole; of older ones the newest."""
+
+    def __init__(self) -> None:
+        self._samples: deque[Sample] = deque(maxlen=_MOST_RECENT)
+
+    def push(self, sample: Sample) -> None:
+        """Takes the newest."""
+        self._samples.append(sample)
+
+    def pop(self) -> Sample | None:
+        """The oldest of the last moment, or the newest."""
+        since = time.monotonic() - _RECENT_S
+        while len(self._samples) > 1 and self._samples[0].received < since:
+            self._samples.popleft()
+        return self._samples.popleft() if self._samples else None
+
+    def held(self) -> tuple[Sample, ...]:
+        """What waits."""
+        return tuple(self._samples)
+
+
 class ListLane:
     """Entries in order. The list that a publisher answered with stands for all before it."""
 
@@ -83,7 +109,7 @@ class VideoLane:
     """
 
     def __init__(self) -> None:
-        self._samples: deque[Sample] = deque()
+        self._samples: deque[tuple[float, Sample]] = deque()
         self._gap = True
         self.starved = False
 
@@ -96,18 +122,27 @@ class VideoLane:
         elif self._gap:
             self.starved = True
             return
-        self._samples.append(sample)
+        self._samples.append((time.monotonic(), sample))
         if len(self._samples) > _MOST_FRAMES:
-            self._samples.clear()
-            self._gap = self.starved = True
+            self.skip()
+            self.starved = True
 
     def pop(self) -> Sample | None:
         """The oldest frame."""
-        return self._samples.popleft() if self._samples else None
+        return self._samples.popleft()[1] if self._samples else None
 
     def held(self) -> tuple[Sample, ...]:
         """Frames since the last key frame."""
-        return tuple(self._samples)
+        return tuple(sample for _, sample in self._samples)
+
+    def waited_s(self) -> float:
+        """How long the oldest frame has been waiting here [s]."""
+        return time.monotonic() - self._samples[0][0] if self._samples else 0.0
+
+    def skip(self) -> None:
+        """Throws away what waits: it goes on at the next key frame."""
+        self._samples.clear()
+        self._gap = True
 
 
 class HeldVideo(VideoLane):
@@ -132,7 +167,7 @@ def lane_for(topic: Topic, *, hold: bool = False) -> Lane:
         case History.KEY_FRAME:
             return HeldVideo() if hold else VideoLane()
         case _:
-            return NewestLane()
+            return NewestLane() if hold else RecentLane()
 
 
 def begins_video(sample: Sample) -> bool:

@@ -1,14 +1,15 @@
 """A robot's `description` message: everything that renderer, page and monitors know of it."""
 
 import hashlib
-from collections.abc import Mapping
-
-import numpy as np
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from bus.schemas import robomesh_pb2 as schema
+from robots.cells import CellDescription, CellRobot, Fixture
 from robots.description import RobotDescription
+from robots.glb import shapes_glb
 from robots.joints import FloatArray, JointType, joints_of
-from robots.model import RobotModel, frame_placements, link_placements
+from robots.tree import color_text, named_frames, tree_of
 from robots.views import views_of
 
 _TYPES = {
@@ -17,9 +18,30 @@ _TYPES = {
 }
 
 
+@dataclass(frozen=True, eq=False)
+class FixtureMesh:
+    """A fixture, and its shape as GLB."""
+
+    fixture: Fixture
+    glb: bytes
+
+    @property
+    def name(self) -> str:
+        """In `mesh/<name>`; a link may be named as the fixture is."""
+        return f"fixture.{self.fixture.name}"
+
+
+def fixture_meshes(cell: CellDescription) -> tuple[FixtureMesh, ...]:
+    """What stands in a cell, as it is drawn.
+
+    Raises:
+        MeshError: If a mesh file cannot be read.
+    """
+    return tuple(FixtureMesh(fixture, shapes_glb(fixture.shapes)) for fixture in cell.fixtures)
+
+
 def describe(
     description: RobotDescription,
-    model: RobotModel,
     *,
     urdf: str,
     meshes: Mapping[str, bytes],
@@ -43,6 +65,32 @@ def describe(
         cell=cell,
         simulated=simulated,
     )
+    _add_joints(message, description)
+    _add_links(message, description, meshes)
+    _add_frames(message, description)
+    _add_views(message, description)
+    return message
+
+
+def add_surroundings(
+    message: schema.Description, robot: CellRobot, cell: CellDescription, fixtures: Sequence[FixtureMesh]
+) -> None:
+    """What stands around a robot, and how near it may come."""
+    for each in fixtures:
+        color = each.fixture.color
+        message.fixtures.add(
+            name=each.fixture.name,
+            mesh=each.name,
+            mesh_sha256=hashlib.sha256(each.glb).hexdigest(),
+            fixture_to_site=each.fixture.fixture_to_site.ravel().tolist(),
+            color=color_text(color) if color is not None else "",
+        )
+    if len(cell.robots) > 1 or fixtures:
+        message.warning_distance, message.stop_distance = robot.warning_m, robot.stop_m
+
+
+def _add_joints(message: schema.Description, description: RobotDescription) -> None:
+    """Joints, and the constraints between them."""
     joints = joints_of(description)
     for index, name in enumerate(joints.names):
         message.joints.add(
@@ -55,16 +103,30 @@ def describe(
             max_acceleration=joints.max_acceleration[index],
             max_jerk=joints.max_jerk[index],
         )
-    bodies = (description.base, *(joint.link for joint in description.joints))
-    for name, body in zip(description.link_names, bodies, strict=True):
-        glb = meshes.get(name)
-        message.links.add(
-            name=name,
-            mesh=name if glb is not None else "",
-            mesh_sha256=hashlib.sha256(glb).hexdigest() if glb is not None else "",
-            color=body.color or "",
+    for constraint in joints.constraints:
+        message.constraints.add(
+            joints=constraint.names,
+            coefficients=[constraint.coefficients[joints.names.index(name)] for name in constraint.names],
+            lower=constraint.lower,
+            upper=constraint.upper,
         )
-    _add_frames(message, description, model)
+
+
+def _add_links(
+    message: schema.Description, description: RobotDescription, meshes: Mapping[str, bytes]
+) -> None:
+    for link in tree_of(description).links:
+        glb = meshes.get(link.name)
+        colors = {shape.color for shape in link.shapes if shape.color is not None}
+        message.links.add(
+            name=link.name,
+            mesh=link.name if glb is not None else "",
+            mesh_sha256=hashlib.sha256(glb).hexdigest() if glb is not None else "",
+            color=color_text(colors.pop()) if len(colors) == 1 else "",
+        )
+
+
+def _add_views(message: schema.Description, description: RobotDescription) -> None:
     for view in views_of(description):
         projection = schema.View.ORTHOGRAPHIC if view.orthographic else schema.View.PERSPECTIVE
         message.views.add(
@@ -74,23 +136,10 @@ def describe(
             up=_vector(view.up),
             projection=projection,
         )
-    for constraint in joints.constraints:
-        message.constraints.add(
-            joints=constraint.names,
-            coefficients=[constraint.coefficients[joints.names.index(name)] for name in constraint.names],
-            lower=constraint.lower,
-            upper=constraint.upper,
-        )
-    return message
 
 
-def _add_frames(message: schema.Description, description: RobotDescription, model: RobotModel) -> None:
-    links = {frame.name: frame.link for frame in description.frames}
-    home = model.joints.home
-    placements = dict(zip(model.link_names, link_placements(model, home), strict=True))
-    for name, frame_to_base in frame_placements(model, home).items():
-        link = links.get(name, model.link_names[-1])
-        frame_to_link = np.linalg.inv(placements[link]) @ frame_to_base
+def _add_frames(message: schema.Description, description: RobotDescription) -> None:
+    for name, (link, frame_to_link) in named_frames(description).items():
         message.frames.add(name=name, link=link, frame_to_link=frame_to_link.ravel().tolist())
 
 

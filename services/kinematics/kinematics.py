@@ -1,60 +1,31 @@
-"""The kinematics service: `description`, `mesh/*`, `frames`, `kinematics`, `kinematics/forward`."""
+"""The kinematics service: what the arms of a site are, where their parts are, and how near to things."""
 
 import asyncio
+import gc
 import logging
-from dataclasses import dataclass, field
-from pathlib import Path
+import time
+from collections.abc import Sequence
 
-import numpy as np
-from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
-
-from bus.errors import MessageError, RefusedError
-from bus.keys import robot_key
-from bus.requests import Request
-from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
+from bus.worker import Worker
+from robots.cells import CellDescription
+from robots.collision import Cell, build_cell
 from robots.description import load
 from robots.glb import link_meshes
-from robots.joints import FloatArray
-from robots.model import RobotModel, build_model
-from robots.urdf import to_urdf
-from services.kinematics.describe import describe
-from services.kinematics.states import (
-    forward_answer,
-    frames_message,
-    kinematic_state,
-    positions_by_name,
-    velocities_by_name,
-)
+from robots.model import build_model
+from robots.singularity import reach_of
+from robots.urdf.write import to_urdf
+from services.kinematics.answers import Workers, answer_about
+from services.kinematics.describe import FixtureMesh, add_surroundings, describe, fixture_meshes
+from services.kinematics.follow import Followed, follow
+from services.kinematics.place import Place
+from services.kinematics.settings import RobotSettings, Settings
 
 log = logging.getLogger(__name__)
 
-# Older than this, the last state tells nothing of the speed.
-_LONGEST_DIFFERENCE_S = 0.5
-
-
-@dataclass(frozen=True, kw_only=True)
-class RobotSettings:
-    """A robot of the site.
-
-    Attributes:
-        model: A library robot, or the path of a description.
-        base_to_site: (4, 4).
-    """
-
-    name: str
-    model: str | Path
-    base_to_site: FloatArray = field(default_factory=lambda: np.eye(4))
-    cell: str = ""
-    simulated: bool = False
-
-
-@dataclass(frozen=True, kw_only=True)
-class Settings:
-    """The robots of a site."""
-
-    site: str
-    robots: tuple[RobotSettings, ...]
+_WORKER = "services.kinematics.worker"
+# Live states come first on a busy machine.
+_NICE = 5
 
 
 async def serve(session: Session, settings: Settings) -> None:
@@ -63,124 +34,73 @@ async def serve(session: Session, settings: Settings) -> None:
     Raises:
         RobotError: If a description or a mesh is wrong.
     """
+    cells = tuple({id(robot.place): robot.place for robot in settings.robots}.values())
+    workers = Workers(Worker(_WORKER, cells, nice=_NICE), Worker(_WORKER, cells, nice=_NICE))
+    try:
+        async with asyncio.TaskGroup() as group:
+            for cell in cells:
+                robots = [robot for robot in settings.robots if robot.place is cell]
+                group.create_task(_serve_cell(session, settings.site, cell, robots, workers))
+    finally:
+        gc.unfreeze()
+        await workers.close()
+
+
+async def _serve_cell(
+    session: Session, site: str, cell: CellDescription, robots: Sequence[RobotSettings], workers: Workers
+) -> None:
+    place = Place({robot.name: robot.stale_after_s for robot in robots}, time.monotonic)
+    fixtures = await asyncio.to_thread(fixture_meshes, cell)
     async with asyncio.TaskGroup() as group:
-        for robot in settings.robots:
-            group.create_task(_serve_robot(session, settings.site, robot))
+        # Hulls take their time: what a robot is, and where, does not wait for them.
+        built = group.create_task(asyncio.to_thread(build_cell, cell))
+        for robot in robots:
+            group.create_task(_serve_robot(session, site, robot, place, built, fixtures, workers))
+        await built
+        # What lives as long as the service is no garbage to search: a fifth of a second, now and then.
+        gc.freeze()
 
 
-async def _serve_robot(session: Session, site: str, settings: RobotSettings) -> None:
-    description = load(settings.model)
+async def _serve_robot(
+    session: Session,
+    site: str,
+    settings: RobotSettings,
+    place: Place,
+    built: asyncio.Task[Cell],
+    fixtures: Sequence[FixtureMesh],
+    workers: Workers,
+) -> None:
+    (robot,) = (each for each in settings.place.robots if each.name == settings.name)
+    description = load(robot.model, confined=robot.confined)
     model = build_model(description)
     meshes = await asyncio.to_thread(link_meshes, description)
-
-    async def answer_mesh(request: Request) -> bytes:
-        if request.chunk not in meshes:
-            raise RefusedError(
-                f"no mesh {request.chunk!r}; {settings.name} has {', '.join(meshes) or 'none'}"
-            )
-        return meshes[request.chunk]
-
-    async def answer_forward(request: Request) -> schema.ForwardAnswer:
-        asked = request.message
-        assert isinstance(asked, schema.ForwardRequest)
-        if len(asked.joint_positions) != len(model.joints):
-            raise RefusedError(
-                f"joint_positions: {len(asked.joint_positions)} given, {settings.name} has "
-                f"{len(model.joints)} joints ({', '.join(model.joints.names)})"
-            )
-        return forward_answer(model, np.array(asked.joint_positions))
-
-    session.answer(site, settings.name, "mesh/*", answer_mesh)
-    session.answer(site, settings.name, "kinematics/forward", answer_forward)
-    session.declare_publisher(site, settings.name, "description").put(
-        describe(
-            description,
-            model,
-            urdf=to_urdf(description),
-            meshes=meshes,
-            base_to_site=settings.base_to_site,
-            cell=settings.cell,
-            simulated=settings.simulated,
-        )
+    answer_about(
+        session,
+        site,
+        robot.name,
+        model=model,
+        meshes=meshes | {each.name: each.glb for each in fixtures},
+        place=place,
+        workers=workers,
     )
-    log.info("%s/%s: %s, %d joints", site, settings.name, description.title, len(model.joints))
-    await _follow(session, site, settings, model)
-
-
-async def _follow(session: Session, site: str, settings: RobotSettings, model: RobotModel) -> None:
-    """Publish frames and kinematics from the newest joint states; nothing when none come."""
-    frames = session.declare_publisher(site, settings.name, "frames")
-    kinematics = session.declare_publisher(site, settings.name, "kinematics")
-    states = session.subscribe(robot_key(site, settings.name, "joints"))
-    frames_pace, kinematics_pace = _Pace(frames.topic.rate_hz), _Pace(kinematics.topic.rate_hz)
-    before: tuple[int, FloatArray] | None = None
-    told = False
-    async for sample in states:
-        try:
-            message = sample.message()
-        except MessageError:
-            continue
-        assert isinstance(message, JointStates)
-        positions = positions_by_name(model.joints, message)
-        if positions is None:
-            if not told:
-                log.warning(
-                    "%s/%s: joint states that do not fit its description (%s): no frames until they do",
-                    site,
-                    settings.name,
-                    ", ".join(joint.name for joint in message.joints),
-                )
-                told = True
-            continue
-        told = False
-        time_ns = sample.header.source_time_ns
-        if frames_pace.due(time_ns):
-            transforms = frames_message(
-                model,
-                positions,
-                prefix=f"{site}/{settings.name}",
-                base_to_site=settings.base_to_site,
-                timestamp=message.timestamp,
-            )
-            if not sample.live:
-                # Where the arm was last; published, it would look as if it came from the arm now.
-                frames.remember(transforms, source_time_ns=time_ns)
-                continue
-            frames.put(transforms, source_time_ns=time_ns)
-        if sample.live and kinematics_pace.due(time_ns):
-            velocities = velocities_by_name(model.joints, message)
-            if velocities is None:
-                velocities = _difference(before, time_ns, positions)
-            kinematics.put(
-                kinematic_state(model, positions, velocities, timestamp=message.timestamp),
-                source_time_ns=time_ns,
-            )
-            before = time_ns, positions
-
-
-def _difference(
-    before: tuple[int, FloatArray] | None, time_ns: int, positions: FloatArray
-) -> FloatArray | None:
-    """Joint velocities from two states (n,); None: there is no state, or none young enough."""
-    if before is None:
-        return None
-    seconds = (time_ns - before[0]) * 1e-9
-    if not 0 < seconds <= _LONGEST_DIFFERENCE_S:
-        return None
-    difference: FloatArray = (positions - before[1]) / seconds
-    return difference
-
-
-class _Pace:
-    """Lets pass what keeps a topic within its rate, by source time."""
-
-    def __init__(self, rate_hz: float | None) -> None:
-        # A state a hair early is as good: without the tenth, 100 Hz would thin to 33 instead of 50.
-        self._interval_ns = int(0.9e9 / rate_hz) if rate_hz else 0
-        self._last_ns = -self._interval_ns
-
-    def due(self, time_ns: int) -> bool:
-        if 0 <= time_ns - self._last_ns < self._interval_ns:
-            return False
-        self._last_ns = time_ns
-        return True
+    message = describe(
+        description,
+        urdf=to_urdf(description),
+        meshes=meshes,
+        base_to_site=robot.base_to_site,
+        cell=settings.cell,
+        simulated=settings.simulated,
+    )
+    add_surroundings(message, robot, settings.place, fixtures)
+    message.stale_after_s = settings.stale_after_s
+    session.declare_publisher(site, robot.name, "description").put(message)
+    log.info("%s/%s: %s, %d joints", site, robot.name, description.title, len(model.joints))
+    arm = Followed(
+        site=site,
+        name=robot.name,
+        model=model,
+        reach=reach_of(description),
+        base_to_site=robot.base_to_site,
+        fixtures={each.fixture.name: each.fixture.fixture_to_site for each in fixtures},
+    )
+    await follow(session, arm, place, built)

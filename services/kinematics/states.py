@@ -1,6 +1,6 @@
 """Joint states to the messages of `frames` and `kinematics`: pure functions."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
@@ -10,6 +10,8 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from bus.schemas import robomesh_pb2 as schema
 from robots.joints import FloatArray, Joints, constraint_values
 from robots.model import RobotModel, frame_placements, link_placements, manipulability, tool_jacobian
+from robots.singularity import singularity_margin
+from services.kinematics.place import Near
 
 
 def positions_by_name(joints: Joints, states: JointStates) -> FloatArray | None:
@@ -33,6 +35,7 @@ def frames_message(
     prefix: str,
     base_to_site: FloatArray,
     timestamp: Timestamp,
+    fixtures: Mapping[str, FloatArray] | None = None,
 ) -> FrameTransforms:
     """Every link, the tool and every named frame, each placed in the site's frame.
 
@@ -40,15 +43,21 @@ def frames_message(
         positions: (n,) joint positions [rad] or [m].
         prefix: `<site>/<robot>`; the site's frame is its first part.
         base_to_site: (4, 4).
+        fixtures: What to place beside them, (4, 4) in the site's frame, by name.
     """
-    frames = frame_placements(model, positions)
-    names = (*model.link_names, *frames)
-    placements = base_to_site @ np.concatenate([link_placements(model, positions), [*frames.values()]])
-    rotations = quaternions(placements[:, :3, :3])
+    frames = dict(zip(model.link_names, link_placements(model, positions), strict=True))
+    # A URDF's link named "tool" is where the tool is: one frame.
+    frames |= frame_placements(model, positions)
+    placements = base_to_site @ np.array([*frames.values()])
     site = prefix.partition("/")[0]
+    ids = [f"{prefix}/{name}" for name in frames]
+    if fixtures:
+        placements = np.concatenate([placements, [*fixtures.values()]])
+        ids += [f"{site}/{name}" for name in fixtures]
+    rotations = quaternions(placements[:, :3, :3])
     message = FrameTransforms()
-    for name, placement, (x, y, z, w) in zip(names, placements, rotations.tolist(), strict=True):
-        transform = message.transforms.add(parent_frame_id=site, child_frame_id=f"{prefix}/{name}")
+    for frame_id, placement, (x, y, z, w) in zip(ids, placements, rotations.tolist(), strict=True):
+        transform = message.transforms.add(parent_frame_id=site, child_frame_id=frame_id)
         transform.timestamp.CopyFrom(timestamp)
         transform.translation.x, transform.translation.y, transform.translation.z = placement[:3, 3].tolist()
         transform.rotation.x, transform.rotation.y = x, y
@@ -79,15 +88,25 @@ def quaternions(rotations: FloatArray) -> FloatArray:
 
 
 def kinematic_state(
-    model: RobotModel, positions: FloatArray, velocities: FloatArray | None, *, timestamp: Timestamp
+    model: RobotModel,
+    positions: FloatArray,
+    velocities: FloatArray | None,
+    *,
+    reach: float,
+    timestamp: Timestamp,
 ) -> schema.KinematicState:
-    """Tool pose and twist in the base frame, manipulability, margins to every limit.
+    """Tool pose and twist in the base frame, manipulability, margins to singular positions and every limit.
 
     Args:
         positions: (n,) [rad] or [m].
         velocities: (n,) [rad/s] or [m/s]; None: not known, and no twist is told.
+        reach: As `robots.singularity.reach_of` has it [m].
     """
-    message = schema.KinematicState(timestamp=timestamp, manipulability=manipulability(model, positions))
+    message = schema.KinematicState(
+        timestamp=timestamp,
+        manipulability=manipulability(model, positions),
+        singularity_margin=singularity_margin(model, positions, reach=reach),
+    )
     message.tool_to_base.extend(frame_placements(model, positions)["tool"].ravel().tolist())
     if velocities is not None:
         twist = (tool_jacobian(model, positions) @ velocities).tolist()
@@ -107,12 +126,23 @@ def kinematic_state(
     return message
 
 
+def add_near(message: schema.KinematicState, near: Near, *, site: str) -> None:
+    """How near the arm is to things; frame ids of their pairs begin with the site."""
+    for field, nearest in ((message.clearance, near.outside), (message.own_clearance, near.own)):
+        if nearest is not None:
+            field.distance = nearest.distance_m
+            field.first, field.second = (f"{site}/{name}" for name in nearest.pair)
+            field.first_point.CopyFrom(_vector(nearest.points[0].tolist()))
+            field.second_point.CopyFrom(_vector(nearest.points[1].tolist()))
+    message.not_counted.extend(near.not_counted)
+
+
 def forward_answer(model: RobotModel, positions: FloatArray) -> schema.ForwardAnswer:
     """Tool, links and named frames in the base frame for joint positions (n,) [rad] or [m]."""
-    frames = frame_placements(model, positions)
-    answer = schema.ForwardAnswer(tool_to_base=frames["tool"].ravel().tolist())
-    placed = [*zip(model.link_names, link_placements(model, positions), strict=True), *frames.items()]
-    for name, placement in placed:
+    placed = dict(zip(model.link_names, link_placements(model, positions), strict=True))
+    placed |= frame_placements(model, positions)
+    answer = schema.ForwardAnswer(tool_to_base=placed["tool"].ravel().tolist())
+    for name, placement in placed.items():
         answer.links.add(name=name, placement_to_base=placement.ravel().tolist())
     return answer
 

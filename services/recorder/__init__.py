@@ -1,5 +1,7 @@
 """Captures of what a robot publishes, as MCAP files that explain themselves."""
 
-from services.recorder.recorder import Settings, serve
+from services.recorder.explain import without_secrets
+from services.recorder.recorder import serve
+from services.recorder.settings import Settings, Split, flight_of, marks_of
 
-__all__ = ["Settings", "serve"]
+__all__ = ["Settings", "Split", "flight_of", "marks_of", "serve", "without_secrets"]

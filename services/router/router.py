@@ -1,35 +1,215 @@
-"""The embedded router: a Zenoh session in router mode."""
+"""The embedded router: a Zenoh session in router mode, opened anew when its rules or keys change.
+
+Zenoh takes no new rules while it runs. What opens a router anew takes milliseconds, and clients come back
+by themselves; whoever was revoked comes back to nothing.
+"""
 
 import asyncio
+import json
 import logging
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 import zenoh
 
-from bus.endpoints import Tls, first_line, router_config
-from services.errors import ListenError
-from services.listen import check_reach, split_address
+from bus.endpoints import Link, Tls, first_line, router_config, router_values
+from bus.errors import BusError
+from bus.identity import read_identity
+from bus.schemas.robomesh_pb2 import Event
+from bus.session import SessionSettings
+from services.errors import ListenError, ServiceError
+from services.listen import check_reach, reachable, split_address
+from services.router.shown import imposters, to_other_sites, without_rights
+from services.router.telling import Telling
+from services.router.turn import neighbours, our_turn
 
 log = logging.getLogger(__name__)
+
+_LOOK_S = 0.5
+_AGAIN_S = 0.2
+_REVOKED = "its certificate was revoked, or the rules do not name it"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What a router listens on, and the other sites' routers that it links to."""
+    """What a router listens on, whom it links to, and who may do what.
 
+    Attributes:
+        site: Whose router it is, which its health is told for; empty: it tells nobody.
+        access: Sections of Zenoh's configuration that `robomesh keys` wrote; None: everybody may everything.
+        metrics: Host and port at which Prometheus may ask; None: nowhere.
+    """
+
+    site: str = ""
     listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)
-    connect: tuple[str, ...] = ()
+    connect: tuple[str | Link, ...] = ()
     tls: Tls | None = None
+    access: Path | None = None
     insecure: bool = False
+    metrics: tuple[str, int] | None = None
+
+
+class AccessError(ServiceError):
+    """Rules for a router that cannot be read, or that Zenoh does not take."""
 
 
 async def serve(settings: Settings, *, ready: Callable[[str], None] | None = None) -> None:
-    """Route until cancelled. The router itself is no client: it takes no session.
+    """Route until cancelled, by the rules and keys as they are in their files now.
 
     Raises:
         ListenError: If an address is taken, or beyond loopback without TLS and `insecure`.
         SessionError: If an endpoint is not one of Zenoh's.
+        AccessError: If the rules cannot be read.
+    """
+    check_listen(settings)
+    seen = _stamps(settings)
+    rules, site = read_access(settings.access), _own_site(settings)
+    router = await _open(settings, rules)
+    told = Telling()
+    tasks = []
+    if settings.site:
+        mesh = SessionSettings(connect=tuple(map(reachable, settings.listen)), tls=settings.tls)
+        tasks.append(
+            asyncio.create_task(
+                told.tell(
+                    settings.site,
+                    mesh,
+                    metrics=settings.metrics,
+                    router=lambda: router,
+                    links=len(settings.connect),
+                )
+            )
+        )
+    strangers: set[str] = set()
+    try:
+        if ready is not None:
+            ready("routing on " + ", ".join(settings.listen))
+        while True:
+            await asyncio.sleep(_LOOK_S)
+            unknown = await asyncio.to_thread(without_rights, router, rules)
+            for name in sorted(unknown - strangers):
+                told.say(
+                    Event.WARNING, "without_rights", f"{name} is attached, and has no right here: {_REVOKED}"
+                )
+            strangers = unknown
+            false = await asyncio.to_thread(imposters, router, settings.listen, settings.connect, site)
+            if false:
+                told.say(Event.ERROR, "imposter", _cut(false, settings))
+                own = tuple(link for link in settings.connect if not to_other_sites(link))
+                settings = replace(settings, connect=own)
+                await asyncio.to_thread(router.close)
+                router, rules = await _open_again(settings, rules, rules)
+            if (stamps := _stamps(settings)) == seen:
+                continue
+            seen = stamps
+            try:
+                wanted = read_access(settings.access)
+                router_config(settings.listen, settings.connect, settings.tls, wanted)
+            except (AccessError, BusError) as error:
+                told.say(Event.ERROR, "rules", f"{error}; the router goes on with the rules that it has")
+                continue
+            others = await asyncio.to_thread(neighbours, router, settings.tls)
+            await our_turn(router, settings.tls, others)
+            await asyncio.to_thread(router.close)
+            router, rules = await _open_again(settings, wanted, rules)
+            told.say(Event.INFO, "rules", "the router follows the new rules and keys")
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        await asyncio.to_thread(router.close)
+
+
+def read_access(path: Path | None) -> Mapping[str, Any]:
+    """The sections of a router's configuration that a file of rules holds.
+
+    Raises:
+        AccessError: If it cannot be read, or holds something else.
+    """
+    if path is None:
+        return MappingProxyType({})
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+        sections = json.loads("\n".join(line for line in lines if not line.lstrip().startswith("//")))
+    except OSError as error:
+        raise AccessError(
+            f"{path}: cannot be read: {error.strerror}; robomesh keys init SITE.toml writes it"
+        ) from None
+    except ValueError as error:
+        raise AccessError(f"{path}: not JSON: {error}; robomesh keys writes it anew") from None
+    control = sections.get("access_control") if isinstance(sections, dict) else None
+    if not isinstance(control, dict) or control.get("default_permission") != "deny":
+        raise AccessError(
+            f'{path}: access_control with default_permission "deny" is missing: robomesh keys writes it anew'
+        )
+    if control.get("enabled") is not True:
+        raise AccessError(
+            f"{path}: access_control is not enabled, so it keeps no rule: robomesh keys writes it anew"
+        )
+    subjects = control.get("subjects")
+    # Zenoh takes a subject without names for everybody.
+    if not isinstance(subjects, list) or not subjects or not all(map(_has_names, subjects)):
+        raise AccessError(
+            f"{path}: access_control needs subjects with cert_common_names: robomesh keys writes it anew"
+        )
+    return sections  # type: ignore[no-any-return]
+
+
+def _has_names(subject: Any) -> bool:
+    return isinstance(subject, dict) and bool(subject.get("cert_common_names"))
+
+
+def write_config(settings: Settings, out: Path) -> str:
+    """Write what this router runs with as a configuration for zenohd.
+
+    Returns:
+        What zenohd does otherwise, for people.
+
+    Raises:
+        AccessError: If the rules cannot be read, or the file not written.
+    """
+    values = router_values(settings.listen, settings.connect, settings.tls, read_access(settings.access))
+    tree: dict[str, Any] = {}
+    for key, value in values.items():
+        *parents, last = key.split("/")
+        node = tree
+        for parent in parents:
+            node = node.setdefault(parent, {})
+        node[last] = value
+    tree["adminspace"] = {"enabled": False}
+    try:
+        out.write_text(json.dumps(tree, indent=1) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise AccessError(f"{out}: cannot be written: {error.strerror}") from None
+    return (
+        f"{out}: zenohd --config {out} routes as robomesh router does, but reads its rules and certificates "
+        "at its start only: write this file anew and restart it after robomesh keys issue, renew or revoke"
+    )
+
+
+def _cut(names: list[str], settings: Settings) -> str:
+    sites = sorted({each.site for each in settings.connect if isinstance(each, Link)})
+    return (
+        f"where a router of site {' or '.join(sites)} should be, somebody shows a certificate of "
+        f"{', '.join(names)}: all links to other sites are cut until this router is started again"
+    )
+
+
+def _own_site(settings: Settings) -> str:
+    if settings.site or settings.tls is None:
+        return settings.site
+    identity = read_identity(settings.tls.certificate)
+    return "" if identity is None else identity.site
+
+
+def check_listen(settings: Settings) -> None:
+    """Warn of what anybody can reach.
+
+    Raises:
+        ListenError: If that is beyond loopback without TLS and `insecure`.
     """
     for endpoint in settings.listen:
         protocol, _, address = endpoint.partition("/")
@@ -39,17 +219,44 @@ async def serve(settings: Settings, *, ready: Callable[[str], None] | None = Non
         )
         if warning:
             log.warning(warning)
-    config = router_config(settings.listen, settings.connect, settings.tls)
+
+
+async def _open(settings: Settings, rules: Mapping[str, Any]) -> zenoh.Session:
+    config = router_config(settings.listen, settings.connect, settings.tls, rules)
     try:
-        router = await asyncio.to_thread(zenoh.open, config)
+        return await asyncio.to_thread(zenoh.open, config)
     except zenoh.ZError as error:
         raise ListenError(
             f"the router cannot listen on {', '.join(settings.listen)}: {first_line(error)}; "
             "is another one running there? Name another under [router] listen"
         ) from None
+
+
+async def _open_again(
+    settings: Settings, wanted: Mapping[str, Any], before: Mapping[str, Any]
+) -> tuple[zenoh.Session, Mapping[str, Any]]:
+    """With the new rules; with those before where Zenoh takes no new ones, until it opens."""
+    while True:
+        for rules in (wanted, before):
+            try:
+                return await _open(settings, rules), rules
+            except ListenError as error:
+                log.error("%s", error)
+        await asyncio.sleep(_AGAIN_S)
+
+
+def _stamps(settings: Settings) -> list[tuple[int, int]]:
+    """When the files that the router was opened with were written."""
+    files = [settings.access] if settings.access is not None else []
+    for tls in (settings.tls, *(link.tls for link in settings.connect if isinstance(link, Link))):
+        if tls is not None:
+            files += [tls.ca, tls.certificate, tls.key]
+    return [_stamp(file) for file in dict.fromkeys(files)]
+
+
+def _stamp(file: Path) -> tuple[int, int]:
     try:
-        if ready is not None:
-            ready("routing on " + ", ".join(settings.listen))
-        await asyncio.Event().wait()
-    finally:
-        await asyncio.to_thread(router.close)
+        stat = file.stat()
+    except OSError:
+        return 0, 0
+    return stat.st_ino, stat.st_mtime_ns

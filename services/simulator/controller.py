@@ -9,8 +9,9 @@
     stopped   refused      -         -        -         idle      -
 
 *A new unit's motions take the place of the running one, smoothly; only homing is first brought to
-its end. The motions of one unit are done one after the other. While the arm brakes it is told as
-moving: "stopped" and "holding" are said of an arm that stands.
+its end. The motions of one unit are done one after the other. What began at rest keeps to its straight
+line, whatever its speed becomes, when it is held, goes on or is stopped. While the arm brakes it is told
+as moving: "stopped" and "holding" are said of an arm that stands.
 """
 
 from collections import deque
@@ -26,11 +27,10 @@ from protocol_gateway.core.records import (
     Status,
     Time,
     Velocities,
-    write_unit,
 )
 from protocol_gateway.core.scales import si_scales
 from robots.joints import FloatArray, Joints
-from services.simulator.motion import Motion
+from robots.motion import HOMING_REST_S, HOMING_SPEED, Motion
 from services.simulator.orders import (
     Move,
     Order,
@@ -41,9 +41,6 @@ from services.simulator.orders import (
     orders_of,
 )
 
-# Homing is slow, because nothing is known yet; at its end the marks are looked for.
-_HOMING_SPEED = 0.5
-_MARKS_S = 0.5
 _DEMO_SPEED = 0.6
 _DEMO_REST_S = 0.4
 # An encoder's resolution, in degrees or millimetres.
@@ -104,19 +101,16 @@ class Controller:
         elif self._task is None and self._demo is not None:
             self._begin(Move(next(self._demo)), now_s)
 
-    def told(self, now_s: float) -> bytes:
-        """The unit that tells the controller's state."""
+    def told(self, now_s: float) -> tuple[Record, ...]:
+        """The records that tell the controller's state."""
         state = self._motion.state(now_s)
         positions = (state.positions / self._scales).round(_DECIMALS) + 0.0  # no "-0.00"
         velocities = (state.velocities / self._scales).round(_DECIMALS) + 0.0
-        return write_unit(
-            (
-                AbsolutePositions(tuple(positions.tolist())),
-                Velocities(tuple(velocities.tolist())),
-                Status(self._words(now_s)),
-                Time(round(now_s - self._boot_s, _DECIMALS)),
-            ),
-            self.table,
+        return (
+            AbsolutePositions(tuple(positions.tolist())),
+            Velocities(tuple(velocities.tolist())),
+            Status(self._words(now_s)),
+            Time(round(now_s - self._boot_s, _DECIMALS)),
         )
 
     # ------------------------------------------------------------------------ orders
@@ -168,7 +162,7 @@ class Controller:
 
     def _begin(self, task: Move, now_s: float) -> None:
         self._task = task
-        slower = _HOMING_SPEED if task.homing else _DEMO_SPEED if self._demo is not None else 1.0
+        slower = HOMING_SPEED if task.homing else _DEMO_SPEED if self._demo is not None else 1.0
         self._motion.move(task.target, now_s, speed=self._speed * slower)
 
     def _forget(self) -> None:
@@ -183,7 +177,7 @@ class Controller:
     def _pause_s(self) -> float:
         """How long the arm rests at the end of the running task."""
         if self._homing():
-            return _MARKS_S
+            return HOMING_REST_S
         return _DEMO_REST_S if self._demo is not None else 0.0
 
     def _words(self, now_s: float) -> tuple[str, ...]:

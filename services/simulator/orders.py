@@ -23,7 +23,7 @@ from protocol_gateway.core.scales import si_scales
 from protocol_gateway.errors import UnitError
 from robots.joints import FloatArray, Joints, violations
 
-MALFORMED, UNKNOWN_WORD, JOINT_COUNT, LIMIT, STOPPED = 2, 3, 4, 5, 8
+MALFORMED, UNKNOWN_WORD, JOINT_COUNT, LIMIT, LOCAL, STOPPED, FAULT = 2, 3, 4, 5, 6, 8, 9
 
 _WORDS = ("trace", "untrace", "home", "stop", "hold", "resume", "reset")
 

@@ -10,17 +10,30 @@ import pytest
 import zenoh
 
 from bus.endpoints import router_config
+from bus.keys import WHOLE_SITE
+from bus.schemas.robomesh_pb2 import Event
 from bus.session import Session, SessionSettings, open_session
 from protocol_gateway import gateway
-from protocol_gateway.robot import RobotSettings
+from protocol_gateway.legacy.settings import LegacySettings
+from protocol_gateway.settings import RobotSettings
+from robots.cells import Fixture
 from services.console import build_page, console
 from services.kinematics import kinematics
 from services.simulator import simulator
+from services.simulator.fault_requests import Mesh
+from services.watch import watch
+from tests.cells import arm_alone
 from tests.conftest import free_port
 
 CHROMIUM = Path("/usr/bin/chromium")
 ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 STARTED_S = 60.0
+NO_WEBGL = """
+const getContext = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+  return kind.startsWith("webgl") ? null : getContext.call(this, kind, ...rest);
+};
+"""
 
 
 @dataclass
@@ -28,13 +41,21 @@ class Plant:
     """A running site.
 
     Attributes:
+        fixtures: What stands around each arm.
+        console: Settings of the console beyond where it listens.
         address: Of the console.
+        endpoint: Of the router.
+        legacy_port: Where old client programs attach to `pt600`; to `arm` none may.
         session: A session of the tests' own on the mesh; use it in the plant's thread, by `call`.
     """
 
     audit: Path
+    fixtures: tuple[Fixture, ...] = ()
     robots: tuple[str, ...] = ("arm", "pt600")
+    console: dict = field(default_factory=dict)
     address: str = ""
+    endpoint: str = field(default_factory=lambda: f"tcp/127.0.0.1:{free_port()}")
+    legacy_port: int = field(default_factory=free_port)
     loop: asyncio.AbstractEventLoop = field(default_factory=asyncio.new_event_loop)
     session: Session | None = None
     controllers: dict = field(default_factory=dict)
@@ -62,10 +83,9 @@ class Plant:
         return port
 
     async def _run(self):
-        endpoint = f"tcp/127.0.0.1:{free_port()}"
-        mesh = SessionSettings(connect=(endpoint,), wait_s=5.0)
-        with zenoh.open(router_config((endpoint,))):
-            await self.start_controller("arm")
+        mesh = SessionSettings(connect=(self.endpoint,), wait_s=5.0)
+        with zenoh.open(router_config((self.endpoint,))):
+            await self.start_controller("arm", mesh=Mesh(site="hall", robot="arm", session=mesh))
             await self.start_controller("pt600", demo=True)
             async with (
                 open_session(mesh) as self.session,
@@ -91,6 +111,9 @@ class Plant:
                                         host="127.0.0.1",
                                         port=self.controllers[name][1],
                                         stop_proven=True,
+                                        legacy_clients=LegacySettings(host="127.0.0.1", port=self.legacy_port)
+                                        if name == "pt600"
+                                        else None,
                                     )
                                     for name in self.robots
                                 ),
@@ -101,14 +124,14 @@ class Plant:
                             kinematics.Settings(
                                 site="hall",
                                 robots=tuple(
-                                    kinematics.RobotSettings(name=name, model="pt600", simulated=True)
+                                    arm_alone(name, simulated=True, fixtures=self.fixtures)
                                     for name in self.robots
                                 ),
                             ),
                         ),
                         console.serve(
                             for_console,
-                            console.Settings(site="hall", listen="127.0.0.1:0"),
+                            console.Settings(site="hall", listen="127.0.0.1:0", **self.console),
                             on_ready=ready.set_result,
                         ),
                     )
@@ -142,12 +165,17 @@ class Plant:
 
 
 @pytest.fixture(scope="module")
-def plant(tmp_path_factory) -> Iterator[Plant]:
-    """A site `hall` with two arms: `arm` rests, `pt600` moves by itself."""
+def plant(request, tmp_path_factory) -> Iterator[Plant]:
+    """A site `hall` of two arms, a module's FIXTURES around them: `arm` rests, `pt600` moves by itself."""
+    fixtures = getattr(request.module, "FIXTURES", ())
+    yield from run_plant(Plant(audit=tmp_path_factory.mktemp("audit"), fixtures=fixtures))
+
+
+def run_plant(running: Plant) -> Iterator[Plant]:
+    """Runs a plant for as long as a fixture lasts."""
     if not CHROMIUM.exists():
         pytest.skip(f"no {CHROMIUM}: the page is not driven here")
     build_page.build()
-    running = Plant(audit=tmp_path_factory.mktemp("audit"))
     thread = threading.Thread(target=running.run, name="plant")
     thread.start()
     try:
@@ -162,8 +190,9 @@ def plant(tmp_path_factory) -> Iterator[Plant]:
 @pytest.fixture(scope="module")
 def chromium(plant):
     """A headless Chromium that draws 3-D in software."""
-    from playwright.sync_api import sync_playwright
+    from playwright.sync_api import expect, sync_playwright
 
+    expect.set_options(timeout=40_000)  # 5 s are not enough on a busy machine
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS)
         yield browser
@@ -172,19 +201,28 @@ def chromium(plant):
 
 @pytest.fixture
 def open_page(chromium, plant):
-    """Opens the page at a robot (or the fleet), and at the end checks that nothing went wrong in it."""
+    """Opens the page at a robot (or the fleet), and at the end checks that nothing went wrong in it.
+
+    `drawn=False`: without 3-D, which the processor draws here, so that several pages at once have time
+    to renew their leases.
+    """
     contexts, wrong = [], []
 
-    def open_one(path="", width=1440, height=900, **settings):
+    def open_one(path="", width=1440, height=900, drawn=True, **settings):
         context = chromium.new_context(
             viewport={"width": width, "height": height}, locale="en-GB", color_scheme="dark", **settings
         )
-        context.set_default_timeout(20_000)
+        context.set_default_timeout(60_000)  # a click waits until nothing moves below it
         page = context.new_page()
         page.on("pageerror", lambda error: wrong.append(f"error: {error}"))
         page.on(
             "console",
-            lambda line: wrong.append(f"{line.type}: {line.text}") if line.type == "error" else None,
+            # 504: a service that is starting or busy did not answer yet; the page asks it again.
+            lambda line: (
+                wrong.append(f"{line.type}: {line.text}")
+                if line.type == "error" and "status of 504" not in line.text
+                else None
+            ),
         )
         page.on(
             "request",
@@ -194,6 +232,8 @@ def open_page(chromium, plant):
                 else wrong.append(f"asked elsewhere: {request.url}")
             ),
         )
+        if not drawn:
+            page.add_init_script(NO_WEBGL)
         page.goto(f"{plant.address}/{path}")
         contexts.append(context)
         return page
@@ -202,3 +242,27 @@ def open_page(chromium, plant):
     for context in contexts:
         context.close()
     assert wrong == []
+
+
+@pytest.fixture(scope="module")
+def raised(plant, tmp_path_factory):
+    """Publishes an event of the arm that a watch of the plant hears."""
+    folder = tmp_path_factory.mktemp("watch")
+
+    async def start():
+        task = plant.loop.create_task(watch.serve(plant.session, watch.Settings(site="hall", folder=folder)))
+        assert await plant.session.last(f"robomesh/hall/{WHOLE_SITE}/alarms", timeout_s=15) is not None
+        return task, plant.session.declare_publisher("hall", "arm", "events/recorder")
+
+    async def end(task):
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+    async def publish(publisher, code, text, severity):
+        event = Event(code=code, text=text, severity=severity, source="recorder")
+        event.timestamp.GetCurrentTime()
+        publisher.put(event)
+
+    task, publisher = plant.call(start())
+    yield lambda code, text, severity=Event.WARNING: plant.call(publish(publisher, code, text, severity))
+    plant.call(end(task))

@@ -1,13 +1,15 @@
 """From unit to pixel through real processes: `robomesh up`, and its page in a real Chromium."""
 
 import json
+import re
+import signal
 
 import pytest
 from playwright.sync_api import expect, sync_playwright
 
-from tests.browser.conftest import ARGUMENTS, CHROMIUM
-from tests.browser.test_robot_page import button, degrees, drag, take
-from tests.site import robomesh, running_site, wait_until
+from tests.browser.conftest import ARGUMENTS, CHROMIUM, NO_WEBGL
+from tests.browser.robot_page import button, degrees, drag, take
+from tests.site import kill, robomesh, running_site, wait_until
 
 pytestmark = [pytest.mark.browser, pytest.mark.processes]
 
@@ -55,7 +57,31 @@ def test_home_trace_move_and_stop_from_the_page_reach_the_controller_and_the_rec
     assert counts["joints"]["messages"] > 100
     assert counts["joints"]["lost"] == 0
     assert counts["audit"]["messages"] >= 3
-    assert counts["video/top"]["messages"] > 0
+    assert counts["video/free"]["messages"] > 0
+
+
+def test_a_gateway_that_answers_no_more_is_told_as_what_it_may_be(site):
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS)
+        page = browser.new_page(viewport={"width": 1024, "height": 768})
+        page.add_init_script(NO_WEBGL)
+        page.goto(f"{site.console}#/test/arm")
+        take(page)
+        gateway = site.children()["gateway"]
+        kill(gateway, signal.SIGSTOP)
+        try:
+            notice = page.locator(".control .notice.lost")
+            expect(notice).to_contain_text(
+                re.compile(r"Control lost: the gateway has not answered for \d s\."), timeout=20_000
+            )
+            expect(notice).to_contain_text("the arm may still be moving")
+            expect(button(page, "Home")).to_be_disabled()
+            expect(page.locator(".holder")).to_have_text("Who is in control is not known", timeout=20_000)
+        finally:
+            kill(gateway, signal.SIGCONT)
+        expect(notice).to_contain_text(re.compile(r"not renewed within \d s"), timeout=20_000)
+        expect(page.locator(".holder")).to_have_text("Nobody is in control")
+        browser.close()
 
 
 def recordings(site):

@@ -1,6 +1,5 @@
-"""The picture of the page in the README: the page itself, before a real site with a renderer."""
+"""The pictures of the page in the README: the page itself, before a real site."""
 
-import asyncio
 import os
 import time
 from pathlib import Path
@@ -10,12 +9,38 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
-from renderer import service
-from renderer.errors import NoEncoderError, NoOpenGLError
+from robots.cells import Fixture
+from robots.schema import Pose
+from services.site_fixtures import Fixture as FixtureRow
+from services.site_fixtures import fixture_shape, fixture_to_site
+from tests.browser.crowd import crowd
+from tests.browser.rendering import rendering
+from tests.browser.robot_page import take
 
 pytestmark = pytest.mark.browser
 
-PICTURE = Path(__file__).resolve().parents[2] / "docs" / "robot-page.png"
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+PICTURE = DOCS / "robot-page.png"
+# What stands around an arm, out of its demonstration's way.
+FIXTURES = tuple(
+    Fixture(row.name, (fixture_shape(row),), fixture_to_site(row))
+    for row in (
+        FixtureRow(
+            cell="",
+            name="bench",
+            box=(300.0, 500.0, 120.0),
+            pose=Pose(xyz=(600.0, 0.0, 60.0)),
+            color="#8a8f94",
+        ),
+        FixtureRow(
+            cell="",
+            name="post",
+            cylinder=(25.0, 1000.0),
+            pose=Pose(xyz=(-450.0, 450.0, 500.0)),
+            color="#8a8f94",
+        ),
+    )
+)
 LARGEST_BYTES = 400_000
 # A picture worth printing has a whole minute of curves in it.
 CURVES_S = 62.0
@@ -25,25 +50,8 @@ WANTED = os.environ.get("ROBOMESH_PICTURES") == "1"
 @pytest.fixture
 def rendered(plant, tmp_path):
     """The plant's moving arm, rendered."""
-
-    async def start():
-        settings = service.Settings(site="hall", robots=("pt600",), folder=tmp_path)
-        task = plant.loop.create_task(service.serve(plant.session, settings))
-        await asyncio.wait([task], timeout=1.0)
-        if task.done():
-            task.result()
-        return task
-
-    async def end(task):
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
-
-    try:
-        task = plant.call(start())
-    except (NoOpenGLError, NoEncoderError) as error:
-        pytest.skip(f"nothing is rendered here: {error}")
-    yield
-    plant.call(end(task))
+    with rendering(plant, tmp_path):
+        yield
 
 
 def orange(png):
@@ -56,14 +64,12 @@ def orange(png):
 
 def test_the_page_shows_the_arm_moving_in_3d_and_as_video(open_page, rendered):
     page = open_page("#/hall/pt600")
-    page.wait_for_selector('canvas[data-loaded="true"]')
+    page.wait_for_selector('canvas[data-loaded="true"][data-fixtures="2"]')
     page.get_by_role("button", name="Trail").click()
     expect(page.locator(".camera .picture-word")).to_have_count(0, timeout=30_000)
-    page.get_by_label("Your name").fill("li")
-    page.get_by_role("button", name="Take control").click()
-    expect(page.locator(".holder")).to_have_text("You are in control")
     if WANTED:
         time.sleep(CURVES_S)
+    take(page)
     # A move has just begun, so that it is still going on when the picture is taken; nothing is late.
     slow, fast = (
         "() => { const speed = Number.parseFloat(document.querySelectorAll('.tool dd')[6].textContent);"
@@ -77,3 +83,43 @@ def test_the_page_shows_the_arm_moving_in_3d_and_as_video(open_page, rendered):
         assert PICTURE.stat().st_size < LARGEST_BYTES
     assert orange(page.locator(".canvas-place").screenshot()) > 4000
     assert orange(page.locator(".camera .picture").screenshot()) > 1000
+
+
+COLLIDING = """# Down to the bench, and too far
+speed 60
+point above = pose 420 0 500 180 0 0
+move_joints above
+move_line 420 0 350 180 0 0
+wait 0.5
+move_line 520 80 -20 180 0 0
+move_joints 60 70 -80 0 0
+"""
+
+
+@pytest.mark.skipif(not WANTED, reason="makes the picture of the Program page, with ROBOMESH_PICTURES=1")
+def test_the_program_page_shows_where_a_program_collides(open_page):
+    page = open_page("#/program/hall/pt600")
+    expect(page.locator("textarea")).not_to_have_value("", timeout=30_000)  # the example stands there first
+    page.locator("textarea").fill(COLLIDING)
+    row = page.get_by_role("button", name="touches bench").first
+    row.click(timeout=30_000)
+    time.sleep(4.0)
+    page.screenshot(path=DOCS / "program-page.png")
+    assert (DOCS / "program-page.png").stat().st_size < LARGEST_BYTES
+
+
+@pytest.mark.skipif(not WANTED, reason="makes the picture of the Fleet page, with ROBOMESH_PICTURES=1")
+def test_the_fleet_page_shows_two_sites_and_what_needs_a_look(open_page, plant, raised):
+    raised("joints.gone", "no positions come from it")
+    with crowd(plant.endpoint, ("yard",), 3) as yard:
+        page = open_page(height=1024)
+        tiles = page.locator(".tile")
+        expect(page.locator(".tile canvas[data-drawn]")).to_have_count(5, timeout=120_000)
+        expect(page.locator(".tile-alarms").first).to_be_visible()
+        yard.mark("faulty", ["yard/r001"])
+        yard.mark("silent", ["yard/r002"])
+        expect(tiles.filter(has_text="following error")).to_have_count(1)
+        expect(tiles.filter(has_text="stale")).to_have_count(1)
+        page.wait_for_timeout(2000)
+        page.screenshot(path=DOCS / "fleet-page.png")
+    assert (DOCS / "fleet-page.png").stat().st_size < 300_000

@@ -38,8 +38,9 @@ def test_with_certificates_of_one_authority_data_flows_and_without_one_nobody_ge
                 publisher.put(schema.Description(name="pt600"))
                 message = await other.last("robomesh/site/arm/description")
                 assert message.name == "pt600"
-            for tls in (None, certificates(trustme.CA(), strangers, "stranger")):
-                with pytest.raises(SessionError, match="no router"):
+            stranger = certificates(trustme.CA(), strangers, "stranger")
+            for tls, why in ((None, "it needs one"), (stranger, "does not vouch for")):
+                with pytest.raises(SessionError, match=why):
                     async with open_session(SessionSettings(connect=(endpoint,), tls=tls, wait_s=0.0)):
                         pass
 

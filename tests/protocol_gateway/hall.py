@@ -18,7 +18,7 @@ A = schema.LeaseRequest.Action
 STATE = schema.ControllerState
 
 
-async def until(condition, timeout_s=8.0):
+async def until(condition, timeout_s=30.0):
     async with asyncio.timeout(timeout_s):
         while not condition():
             await asyncio.sleep(0.01)
@@ -35,6 +35,8 @@ class Plant:
     seen: dict = field(default_factory=dict)
     secret: str = ""
     id: int = 0
+    own: object = None  # the gateway's session
+    others: list = field(default_factory=list)  # the same for each further robot
 
     def key(self, topic):
         return f"robomesh/hall/{self.robot}/{topic}"
@@ -49,6 +51,11 @@ class Plant:
 
     def events(self, code):
         return [event for event in self.seen["events"] if event.code == code]
+
+    async def event(self, code, number):
+        """One of that code, as soon as there is one: topics come each in their own time."""
+        await until(lambda: self.events(code))
+        return self.events(code)[number]
 
     async def stop(self, **fields):
         return await self.session.ask(self.key("stop"), schema.StopRequest(**fields))
@@ -92,8 +99,11 @@ async def simulator(**settings):
 
 
 @contextlib.asynccontextmanager
-async def gateway(mesh, folder, *ports, up=True, **robot):
-    """A gateway of one robot a port, and a monitor that has seen the first one's link up."""
+async def gateway(mesh, folder, *ports, up=True, each=(), **robot):
+    """A gateway of one robot a port, and a monitor that has seen the first one's link up.
+
+    `each`: settings of each robot alone; then every robot is watched.
+    """
     names = ["arm", *(f"arm-{number}" for number in range(2, len(ports) + 1))]
     settings = Settings(
         site="hall",
@@ -107,22 +117,29 @@ async def gateway(mesh, folder, *ports, up=True, **robot):
                     "port": port,
                     "stop_proven": True,
                     **robot,
+                    **alone,
                 }
             )
-            for name, port in zip(names, ports, strict=True)
+            for name, port, alone in zip(names, ports, each or [{}] * len(ports), strict=True)
         ),
     )
     async with open_session(mesh) as own, open_session(mesh) as monitor:
         task = asyncio.create_task(serve(own, settings))
-        plant = Plant(monitor, folder / "hall" / "arm.jsonl")
+        plant = Plant(monitor, folder / "hall" / "arm.jsonl", own=own)
+        plant.others = [Plant(monitor, folder / "hall" / f"{name}.jsonl", name) for name in names[1:] if each]
+        topics = ("joints", "joints/slow", "controller", "lease", "events", "audit", "raw", "program")
         watching = [
-            asyncio.create_task(watch(monitor, plant, topic))
-            for topic in ("joints", "joints/slow", "controller", "lease", "events", "audit", "raw")
+            asyncio.create_task(watch(monitor, one, topic))
+            for one in (plant, *plant.others)
+            for topic in topics
         ]
         try:
             await until(lambda: task.done() or plant.seen.get("controller"))
             if up:
                 await until(lambda: task.done() or plant.controller.link == STATE.UP)
+                for other in plant.others:
+                    await until(lambda other=other: other.seen.get("controller"))
+                    await until(lambda other=other: other.controller.link == STATE.UP)
             if task.done():
                 await task
             yield plant

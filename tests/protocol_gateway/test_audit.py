@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from protocol_gateway.audit import AuditLog, Entry, Outcome, read_entries, verify
+from protocol_gateway.audit.log import AuditLog, Entry, Outcome, read_entries, verify
+from protocol_gateway.audit.restart import remembered
 from protocol_gateway.errors import AuditError
-from protocol_gateway.restart import remembered
 from tests.conftest import run
 
 HOUSE = Path(__file__).resolve().parents[2]
@@ -150,7 +150,7 @@ def test_what_a_full_disk_refused_is_not_in_the_log_and_what_is_owed_comes_later
         with pytest.raises(AuditError, match="No space left on device"):
             await log.append(entry(id="refused"))
         with pytest.raises(AuditError):
-            await log.append_or_owe(entry("STOP", id="owed"))
+            await log.note(entry("STOP", id="owed"))
         os.dup2(kept, log._file)
         await log.append(entry(id="2"))
         await log.close()
@@ -189,7 +189,7 @@ def test_a_text_that_is_no_text_is_written_all_the_same(tmp_path):
 WRITER = """
 import asyncio, sys
 from pathlib import Path
-from protocol_gateway.audit import AuditLog, Entry, Outcome
+from protocol_gateway.audit.log import AuditLog, Entry, Outcome
 
 async def main():
     log = AuditLog(Path(sys.argv[1]))

@@ -7,17 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
-from protocol_gateway.admission import admit, delay, remember
-from protocol_gateway.authority import (
+from protocol_gateway.authority.admission import admit, delay, remember
+from protocol_gateway.authority.holders_motion import command_sent, observe, refused
+from protocol_gateway.authority.rules import (
     Answer,
     Authority,
     Now,
-    command_sent,
     end_lease,
     expire,
     holds,
-    observe,
-    refused,
     request_lease,
     stop,
     stop_sent,
@@ -170,7 +168,7 @@ def test_a_refusal_of_something_else_does_not_end_the_holders_motion():
 
 
 def test_what_is_resumed_goes_where_it_was_sent():
-    state = command_sent(held(), command(C.MOVE_ABSOLUTE), at(0), target=(1.0,))
+    state = command_sent(held(), command(C.MOVE_ABSOLUTE), at(0), way=((1.0,),))
     state = command_sent(state, command(C.HOLD), at(1))
     assert command_sent(state, command(C.RESUME), at(2)).lease.motion.target == (1.0,)
 
@@ -212,6 +210,15 @@ def test_a_robot_slowing_down_from_a_stop_is_not_moved_by_somebody_else():
     assert state.foreign_s is None
 
 
+def test_a_motion_that_is_seen_only_behind_its_stop_is_not_somebody_elses():
+    state, latched = stop(moving(), by="li", reason="", now=at(0.1))
+    state, foreign = see(stop_sent(state, latched.id, 1000.1), True, 0.2)
+    assert not foreign
+    state, _ = see(state, False, 0.5)
+    _, foreign = see(state, True, 2.2)
+    assert foreign
+
+
 def test_every_stop_has_a_number_and_only_its_own_reset_clears_it():
     state, first = stop(held(), by="wang", reason="", now=at(0))
     state, second = stop(state, by="zhao", reason="smoke", now=at(1))
@@ -225,7 +232,7 @@ def test_every_stop_has_a_number_and_only_its_own_reset_clears_it():
     reset = command(C.RESET, stop_id=2)
     assert admit(state, reset, operator="li", now=at(2)).answer.accepted
     assert command_sent(state, reset, at(2)).stop is None
-    assert stop_sent(state, 1, at(3)) == state
+    assert stop_sent(state, 1, 1003.0) == state
     assert "nothing is" in admit(held(), reset, operator="li", now=at(2)).answer.text
 
 
@@ -267,8 +274,8 @@ def test_what_was_delayed_on_the_way_is_refused():
 
 
 def test_what_waited_over_a_second_in_the_gateway_is_not_sent():
-    assert delay(at(0).monotonic_s, at(0.9)) == ""
-    assert delay(at(0).monotonic_s, at(6)).startswith("Not sent: it waited 6.0 s in the gateway")
+    assert delay(at(0).monotonic_s, at(0.9)) is None
+    assert delay(at(0).monotonic_s, at(6)).text.startswith("Not sent: it waited 6.0 s in the gateway")
 
 
 def test_the_secret_is_not_in_the_leases_own_text():

@@ -6,10 +6,10 @@ from math import radians
 import pytest
 
 from bus.schemas.robomesh_pb2 import CommandRequest
-from protocol_gateway.driver import Activity, Mode, MoveAbsolute, Speed, StatusReceived, Trace
-from protocol_gateway.link import LinkState, LinkStatus
+from protocol_gateway.authority.obstacles import Controller, controller_command, obstacle
+from protocol_gateway.drivers.driver import Activity, Mode, MoveAbsolute, Speed, StatusReceived, Trace
+from protocol_gateway.link.link import LinkState, LinkStatus
 from protocol_gateway.motion import PositionWatch, has_arrived, is_moving, motion_may_be_held
-from protocol_gateway.obstacles import Controller, controller_command, obstacle
 from robots.description import load
 from robots.joints import JointType, joints_of
 
@@ -69,25 +69,26 @@ ALL = [
     "MOVE_ABSOLUTE",
     "MOVE_RELATIVE",
 ]
+AT_REST = [name for name in ALL if name != "RESUME"]
 
 
 @pytest.mark.parametrize(
     ("situation", "allowed"),
     [
-        ("ready", ALL),
+        ("ready", AT_REST),
         ("link down", []),
         ("silent", []),
         ("read only", []),
         ("local", []),
         ("mode unknown", ["HOLD"]),
-        ("mode unknown, accepted", ALL),
+        ("mode unknown, accepted", AT_REST),
         ("stopped", ["HOLD", "RESET", "TRACE_ON", "TRACE_OFF", "SPEED"]),
         ("fault", ["HOLD", "RESET", "TRACE_ON", "TRACE_OFF", "SPEED"]),
         ("holding", ["HOLD", "RESUME", "RESET", "TRACE_ON", "TRACE_OFF", "SPEED"]),
         ("moving", ALL),
         ("not homed", ["HOME", "HOLD", "RESET", "TRACE_ON", "TRACE_OFF", "SPEED"]),
         ("homed unknown", ["HOME", "HOLD", "RESET", "TRACE_ON", "TRACE_OFF", "SPEED"]),
-        ("homed unknown, accepted", ALL),
+        ("homed unknown, accepted", AT_REST),
         ("not homed, unknown accepted", ["HOME", "HOLD", "RESET", "TRACE_ON", "TRACE_OFF", "SPEED"]),
     ],
 )
@@ -113,25 +114,27 @@ def test_what_may_be_sent_in_each_state_of_the_controller(situation, allowed):
             "shoulder + elbow at 180.00° is beyond its limit 160.00°",
         ),
         (command(C.MOVE_RELATIVE, joint_positions=[0, radians(41), 0, 0, 0]), "joint shoulder at 131.00°"),
-        (command(C.RUN_PROGRAM), "programs cannot be run yet"),
+        (
+            command(C.MOVE_ABSOLUTE, joint_positions=[1e308, 0, 0, 0, 0]),
+            "joint waist at 1e+308 rad is beyond its limit 150.00°",
+        ),
     ],
 )
 def test_a_refused_value_is_named_with_what_would_be_allowed(asked, words):
-    assert words in obstacle(asked, READY, JOINTS)
+    assert words in obstacle(asked, READY, JOINTS).text
 
 
 def test_a_robot_that_never_told_where_it_is_is_homed_but_not_moved():
     untold = replace(READY, positions=None)
     for kind in (C.MOVE_RELATIVE, C.MOVE_ABSOLUTE, C.RESUME):
-        assert "has not told where the joints are" in obstacle(command(kind), untold, JOINTS)
+        assert "has not told where the joints are" in obstacle(command(kind), untold, JOINTS).text
     assert not obstacle(command(C.HOME), untold, JOINTS)
 
 
 def test_a_robot_that_tells_no_more_where_it_is_is_not_even_homed():
     gone = replace(READY, positions=None, positions_gone="joint positions have not come for 1 s")
     for kind in (C.MOVE_RELATIVE, C.MOVE_ABSOLUTE, C.RESUME, C.HOME):
-        text = obstacle(command(kind), gone, JOINTS)
-        assert text == (
+        assert obstacle(command(kind), gone, JOINTS).text == (
             "Not sent: where the robot is now is not known (joint positions have not come for 1 s)."
         )
 

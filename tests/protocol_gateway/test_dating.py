@@ -1,6 +1,6 @@
 import pytest
 
-from protocol_gateway.dating import Dating, Received
+from protocol_gateway.link.dating import Dating, Received
 
 
 def at(seconds):

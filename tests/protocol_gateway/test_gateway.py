@@ -6,7 +6,7 @@ import time
 import pytest
 
 from bus.schemas import robomesh_pb2 as schema
-from protocol_gateway.audit import read_entries, verify
+from protocol_gateway.audit.log import read_entries, verify
 from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.gateway import RobotSettings, Settings, check
 from tests.conftest import run
@@ -24,7 +24,9 @@ def test_a_controllers_units_come_out_as_joint_states(mesh, tmp_path):
             assert [joint.name for joint in last.joints] == ["waist", "shoulder", "elbow", "wrist", "roll"]
             assert all(joint.HasField("velocity") for joint in last.joints)
             assert first != last
-            assert 8 <= len(plant.seen["joints"]) / len(plant.seen["joints/slow"]) <= 12
+            # Ten a second, however few the simulated controller got to send.
+            took_s = (last.timestamp.ToNanoseconds() - first.timestamp.ToNanoseconds()) * 1e-9
+            assert 0.5 * 10.0 * took_s < len(plant.seen["joints/slow"]) < 1.2 * 10.0 * took_s + 3
             assert plant.controller.mode == STATE.REMOTE
             assert plant.controller.last_unit_age_s < 0.5
             assert 0 <= time.time() - last.timestamp.ToNanoseconds() * 1e-9 < 1.0
@@ -63,7 +65,7 @@ def test_an_operator_takes_over_an_arm_that_moves_by_itself_and_keeps_control(me
             await plant.lease(A.ACQUIRE, ttl_s=5)
             await plant.command(C.MOVE_ABSOLUTE, joint_positions=TARGET)
             await until(lambda: plant.joints == pytest.approx(TARGET, abs=1e-6))
-            assert len(plant.events("motion.foreign")) == 1
+            await until(lambda: len(plant.events("motion.foreign")) >= 1)
             assert not plant.events("lease.ended")
 
     run(main())
@@ -85,7 +87,7 @@ def test_stop_needs_no_lease_and_latches_until_the_holder_resets_that_stop(mesh,
                 "Not sent: stop 1 is latched (wang: somebody in the cell): "
                 "see to it, then send RESET with stop_id 1."
             )
-            again = await plant.stop(by="wang", reason="really")
+            again = await plant.stop(by="zhao", reason="really")
             text = await refusal(plant.command(C.RESET, stop_id=stop.stop_id))
             assert "RESET names stop 1, but stop 2 is latched" in text
             await plant.command(C.RESET, stop_id=again.stop_id)
@@ -107,7 +109,7 @@ def test_operators_texts_are_cut_and_on_one_line_wherever_they_are_shown(mesh, t
             stop = plant.controller.stop
             assert stop.by == "wang ERROR arm: forged"
             assert (len(stop.reason), stop.reason[:5]) == (200 - 1, "[2Jrr")
-            await until(lambda: len(plant.seen["audit"]) == 2)
+            await until(lambda: len(plant.seen["audit"]) >= 2)
             assert max(map(len, plant.audit.read_text().splitlines())) < 1000
         assert all(len(line) < 1000 and line.isprintable() for line in caplog.messages)
 
@@ -139,7 +141,7 @@ def test_a_lease_that_is_not_renewed_stops_its_holders_motion(mesh, tmp_path):
                 "control ended: li's lease was not renewed within 0.5 s, its motion was stopped"
             )
             assert plant.controller.stop.by == "gateway"
-            assert plant.seen["lease"][-1].holder == ""
+            await until(lambda: plant.seen["lease"][-1].holder == "")
 
     run(main())
 
@@ -201,10 +203,9 @@ def test_what_is_refused_says_why_and_sends_nothing(mesh, tmp_path):
             assert "joint elbow at" in text
             text = await refusal(plant.command(C.MOVE_ABSOLUTE, joint_positions=[0, 0]))
             assert "2 joint positions, but the robot has 5 joints" in text
-            assert "programs cannot be run yet" in await refusal(plant.command(C.RUN_PROGRAM, program="x"))
             assert plant.controller.counters.units_sent == 0
-            await until(lambda: len(plant.seen["audit"]) == 6)
-            assert [entry.outcome for entry in plant.seen["audit"]].count(schema.AuditEntry.REFUSED) == 5
+            await until(lambda: len(plant.seen["audit"]) >= 5)
+            assert [entry.outcome for entry in plant.seen["audit"]].count(schema.AuditEntry.REFUSED) == 4
 
     run(main())
 
@@ -216,7 +217,7 @@ def test_every_request_is_in_an_audit_log_whose_chain_holds(mesh, tmp_path):
             await plant.command(C.TRACE_ON)
             await plant.stop(by="wang")
             await plant.lease(A.RELEASE)
-            await until(lambda: len(plant.seen["audit"]) == 5)
+            await until(lambda: len(plant.seen["audit"]) >= 5)
         entries = list(read_entries(plant.audit))
         assert [entry.request for entry in entries] == ["ACQUIRE", "HOME", "TRACE_ON", "STOP", "RELEASE"]
         assert [entry.operator for entry in entries] == ["li", "li", "li", "wang", "li"]
@@ -236,9 +237,12 @@ def test_a_gateway_that_ends_stops_the_motion_and_one_that_begins_remembers_the_
                 await until(lambda: plant.controller.activity == STATE.MOVING)
             async with gateway(mesh, tmp_path, port) as plant:
                 await until(lambda: plant.controller.activity == STATE.STOPPED)
-                before = [entry.hash for entry in read_entries(plant.audit)]
+                # The stop was sent again, and that is the log's last entry.
+                await until(lambda: [e.request for e in read_entries(plant.audit)][-1] == "STOP_AGAIN")
+                await until(lambda: plant.seen["audit"] and plant.seen["audit"][-1].request == "STOP_AGAIN")
                 told = await plant.session.last(plant.key("audit"))
-                assert [entry.hash.hex() for entry in told.entries] == before
+                written = [entry.hash for entry in read_entries(plant.audit)]
+                assert [entry.hash.hex() for entry in told.entries] == written
                 assert plant.joints[0] < 2.0
                 assert plant.controller.stop.id == 1
                 await plant.lease(A.ACQUIRE)
@@ -300,5 +304,20 @@ def test_two_operators_racing_for_control_are_never_both_given_it(mesh, tmp_path
                 answers = await asyncio.gather(*asked, return_exceptions=True)
                 (won,) = [each for each in answers if isinstance(each, schema.LeaseAnswer)]
                 await plant.lease(A.RELEASE, operator=won.holder, lease=won.lease)
+
+    run(main())
+
+
+def test_everybody_sees_the_speed_that_was_set_until_a_controller_may_have_forgotten_it(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            assert not plant.controller.HasField("speed_percent")
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            await plant.command(C.SPEED, speed_percent=30)
+            await until(lambda: plant.controller.speed_percent == 30)
+            assert "outside 1 to 100 %" in await refusal(plant.command(C.SPEED, speed_percent=0))
+            assert plant.controller.speed_percent == 30
+        async with gateway(mesh, tmp_path, port, up=False) as plant:
+            assert not plant.controller.HasField("speed_percent")
 
     run(main())

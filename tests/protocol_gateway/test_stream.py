@@ -62,7 +62,7 @@ def test_64_kib_without_a_terminator_are_one_event_and_reading_goes_on_behind_th
     data = HOME + b"x" * 200_000 + b"@" + HOME
     first, bad, last = read(*[data[i : i + size] for i in range(0, len(data), size)])
     assert isinstance(first, Unit)
-    assert bad == Malformed(len(HOME), "x" * 256 + "…", "no '@' within 65536 bytes")
+    assert bad == Malformed(len(HOME), "x" * 256 + "…", "not ended within 65536 bytes")
     assert isinstance(last, Unit)
     assert last.offset == len(data) - len(HOME)
 
@@ -112,6 +112,6 @@ SLOW_TO_READ = {
 
 @pytest.mark.parametrize("data", SLOW_TO_READ.values(), ids=SLOW_TO_READ)
 def test_no_unit_of_64_kib_takes_long_to_read(data):
-    begin = time.perf_counter()
+    begin_s = time.process_time()
     assert read(data + HOME)[-1].data == HOME[:-1]
-    assert time.perf_counter() - begin < 1.0
+    assert time.process_time() - begin_s < 3.0  # what is not linear takes far longer

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol_gateway.driver import (
+from protocol_gateway.drivers.driver import (
     Activity,
     Driver,
     Hold,
@@ -23,8 +23,8 @@ from protocol_gateway.driver import (
     Trace,
     UnknownReceived,
 )
+from protocol_gateway.drivers.unit import UnitDriver
 from protocol_gateway.errors import CommandError
-from protocol_gateway.unit_driver import UnitDriver
 from robots.joints import JointType
 
 R, P = JointType.ROTARY, JointType.PRISMATIC
@@ -96,6 +96,23 @@ def test_a_status_without_a_word_of_activity_or_mode_leaves_them_unknown():
     assert driver().receive(b"1#STATUS*trace@") == [StatusReceived(None, None, False, True, None)]
 
 
+@pytest.mark.parametrize(
+    ("words", "activity", "mode"),
+    [
+        ("idle;local;remote", Activity.IDLE, Mode.LOCAL),
+        ("idle;remote;local", Activity.IDLE, Mode.LOCAL),
+        ("idle;remote;remote;idle", Activity.IDLE, Mode.REMOTE),
+        ("idle;moving", None, None),
+        ("stopped;idle", Activity.STOPPED, None),
+        ("idle;stopped", Activity.STOPPED, None),
+        ("fault;stopped;moving", Activity.FAULT, None),
+    ],
+)
+def test_of_words_that_contradict_each_other_the_one_that_forbids_motion_holds(words, activity, mode):
+    (status,) = driver().receive(f"1#STATUS*{words}@".encode())
+    assert (status.activity, status.mode) == (activity, mode)
+
+
 def test_unknown_words_types_and_a_clients_records_are_handed_over_raw_and_not_acted_on():
     unit = b"4#STATUS*idle;sleepy&FORCE*1;2&COMMAND*home&RELATIVE.DEG*1.00;2.00"
     events = driver().receive(unit + b"@")
@@ -128,7 +145,8 @@ def test_a_unit_of_another_joint_count_is_refused_whole(unit):
     (event,) = fresh.receive(b"1#TIME*1.00@" + unit)[1:]
     assert isinstance(event, MalformedReceived)
     assert event.offset == 12
-    assert "for 2 joints" in event.reason
+    assert "the description has 2" in event.reason
+    assert event.joint_count
     assert fresh.units_received == 1
 
 

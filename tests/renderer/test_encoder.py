@@ -5,6 +5,7 @@ import cv2
 import numpy as np
 import pytest
 
+from renderer import encoder as encoders
 from renderer.encoder import H264Encoder, jpeg, open_encoder
 from renderer.errors import NoEncoderError
 from renderer.key_frames import KeyFrameClock
@@ -103,3 +104,35 @@ def test_however_many_join_one_key_frame_a_second_is_forced():
             clock.made(now)
             made.append(tick)
     assert made == [0, 30, 60]
+
+
+def test_a_stream_of_few_bits_keeps_to_them_whatever_it_shows():
+    size, fps, most = (640, 360), 15, 250e3
+    noise = np.random.default_rng(0)
+    encoder = open_encoder(size, fps, most_bits_per_s=most)
+    bits = []
+    for number in range(10 * fps):
+        # A picture that changes all over, all the time.
+        picture = cv2.resize(noise.integers(0, 256, (18, 32, 3), dtype=np.uint8), size)
+        bits.append(8 * len(encoder.encode(picture, key_frame=number % (2 * fps) == 0).data))
+    seconds = [sum(bits[at : at + fps]) for at in range(fps, len(bits), fps)]
+    assert sum(seconds) / len(seconds) < 1.1 * most
+    assert max(seconds) < 1.6 * most
+    # A key frame fills the line for half a second at most.
+    assert max(bits) < 0.5 * most
+
+
+def test_an_encoder_that_has_gone_since_is_replaced():
+    encoder = open_encoder(SIZE, 30, codec="h264_that_there_is_not")
+    assert encoder.name in ("h264_nvenc", "libx264")
+
+
+def test_why_the_better_encoder_is_not_used_is_told(monkeypatch, caplog):
+    monkeypatch.setattr(encoders, "_CODECS", {"h264_none": {}, "libx264": encoders._CODECS["libx264"]})
+    with caplog.at_level("INFO"):
+        assert encoders.best_codec(SIZE, 30) == "libx264"
+    assert "h264_none cannot be opened" in caplog.text
+    assert "libx264 is used instead" in caplog.text
+    monkeypatch.setattr(encoders, "_CODECS", {"h264_none": {}})
+    with pytest.raises(NoEncoderError, match=r"no H\.264 encoder here: h264_none cannot be opened"):
+        encoders.best_codec(SIZE, 30)

@@ -7,10 +7,11 @@ from bus.schemas.robomesh_pb2 import Description, Vector3, View
 from renderer.cameras import pixels
 from renderer.chain import placements, reach, read_chain
 from renderer.errors import ChainError, UnknownViewError
-from renderer.look import camera_of, home_placements, look_of
+from renderer.look import home_placements, look_of
+from renderer.views import camera_of
 from robots.description import load
 from robots.model import build_model, frame_placements, link_placements
-from robots.urdf import to_urdf
+from robots.urdf.write import to_urdf
 from services.kinematics.describe import describe
 
 SIZE = (640, 360)
@@ -22,7 +23,6 @@ def described(name, base_to_site=None):
     model = build_model(description)
     message = describe(
         description,
-        model,
         urdf=to_urdf(description),
         meshes={},
         base_to_site=np.eye(4) if base_to_site is None else base_to_site,
@@ -48,7 +48,7 @@ def test_the_chain_places_links_as_the_robot_model_does(robot):
 @pytest.mark.parametrize("view", ["front", "top", "left", "free"])
 def test_a_view_shows_the_arm_wherever_it_may_go_and_not_much_more(robot, view):
     message, model = described(robot)
-    camera = camera_of(look_of(message, aspect=16 / 9), view)
+    camera = camera_of(look_of(message), view)
     assert camera.orthographic == (view != "free")
     random = np.random.default_rng(4)
     tools = [
@@ -63,7 +63,7 @@ def test_a_view_shows_the_arm_wherever_it_may_go_and_not_much_more(robot, view):
 
 def test_a_robot_that_stands_elsewhere_takes_its_cameras_along():
     base_to_site = np.array([[0.0, -1, 0, 5], [1, 0, 0, -2], [0, 0, 1, 0.4], [0, 0, 0, 1]])
-    here, there = (look_of(described("pt600", at)[0], aspect=16 / 9) for at in (None, base_to_site))
+    here, there = (look_of(described("pt600", at)[0]) for at in (None, base_to_site))
     home_here, home_there = home_placements(here), home_placements(there)
     for view in ("front", "top", "left", "free"):
         points = [
@@ -78,10 +78,10 @@ def test_a_view_of_the_description_keeps_its_eye_and_a_free_one_of_its_own_count
     message, _ = described("pt600")
     eye, target = Vector3(x=1.0, y=2.0, z=1.5), Vector3(z=0.4)
     message.views.add(name="free", eye=eye, target=target, up=Vector3(z=1.0), projection=View.PERSPECTIVE)
-    camera = camera_of(look_of(message, aspect=16 / 9), "free")
+    camera = camera_of(look_of(message), "free")
     assert camera.eye == pytest.approx([1.0, 2.0, 1.5])
     with pytest.raises(UnknownViewError, match="no view 'behind'; there are close, free, front, left, top"):
-        camera_of(look_of(message, aspect=16 / 9), "behind")
+        camera_of(look_of(message), "behind")
 
 
 def test_a_moving_axis_reaches_to_its_limits():
@@ -104,4 +104,18 @@ def test_a_moving_axis_reaches_to_its_limits():
 )
 def test_a_urdf_that_is_no_chain_is_refused_in_words(urdf, says):
     with pytest.raises(ChainError, match=says):
-        look_of(Description(urdf=urdf), aspect=1.0)
+        look_of(Description(urdf=urdf))
+
+
+def test_a_robot_whose_rows_are_all_zero_has_room_in_every_picture(tmp_path):
+    """As Define begins: one such robot ended the renderer of them all."""
+    (tmp_path / "robot.toml").write_text(
+        'name = "new"\n[[joint]]\nname = "j"\na = 0.0\nalpha = 0.0\nd = 0.0\nlimits = [-180.0, 180.0]\n'
+        "max_speed = 90.0\nmax_acceleration = 360.0\nmax_jerk = 3600.0\n"
+    )
+    message, _ = described(tmp_path / "robot.toml")
+    look = look_of(message)
+    assert look.radius >= 0.1
+    for name in ("front", "top", "left", "free"):
+        camera = camera_of(look, name)
+        assert np.linalg.norm(camera.eye - camera.target) >= 0.1

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from renderer.overlay import AMBER, Overlay, Row, text_width, write_over
+from renderer.overlay import AMBER, Overlay, Row, inside, text_width, write_over
 
 ROWS = (Row("waist", "−12.34", "°", 0.4), Row("lift", "1204.5", "mm", 1.0))
 LIVE = Overlay(title="pt600", view="free", time="14:02:11.3 UTC", state="moving", rows=ROWS)
@@ -32,7 +32,9 @@ def test_a_live_picture_has_no_badge_and_a_stale_one_has():
 
 @pytest.mark.parametrize("size", [(64, 64), (320, 180), (854, 480), (1920, 1080)])
 def test_any_size_is_written_without_harm(size):
-    picture = written(Overlay(**{**LIVE.__dict__, "stale": "STALE 3 s", "mark": "simulated"}), size)
+    picture = written(
+        Overlay(**{**LIVE.__dict__, "stale": "STALE 3 s", "marks": ("simulated", "replay")}), size
+    )
     assert (picture != 150).any()
 
 
@@ -46,3 +48,14 @@ def test_other_values_leave_everything_else_where_it_was():
     rows, columns = np.nonzero(changed)
     assert rows.max() - rows.min() < 20
     assert columns.max() - columns.min() < text_width("−98.76", 19)
+
+
+def test_a_camera_inside_a_body_is_told():
+    assert inside(LIVE, "forearm").marks == ("inside forearm",)
+    assert inside(LIVE, "") is LIVE
+
+
+def test_what_a_square_of_the_floor_is_stands_in_the_lower_right_corner():
+    changed = (written(Overlay(**{**LIVE.__dict__, "scale": "100 mm"})) != written(LIVE)).any(axis=2)
+    rows, columns = np.nonzero(changed)
+    assert (rows.min() > 640, columns.min() > 1080) == (True, True)

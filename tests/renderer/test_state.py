@@ -53,12 +53,12 @@ def test_what_nobody_saw_fresh_is_never_shown_as_fresh():
 
 def test_only_what_would_change_the_picture_counts_as_a_change():
     state = RobotState("hall", "arm")
-    state.take_frames(frames(0.1), 1)
+    state.take_frames(frames(0.1), 1, 1)
     first = state.version
-    state.take_frames(frames(0.1), 2)
+    state.take_frames(frames(0.1), 2, 1)
     assert (state.version, state.source_time_ns) == (first, 2)
     for step in range(10):  # each step is below a pixel, all together are not
-        state.take_frames(frames(0.1 + step * 1e-5), 3)
+        state.take_frames(frames(0.1 + step * 1e-5), 3, 1)
     assert state.version > first
     before = state.version
     state.take_controller(ControllerState(link=UP, activity=ControllerState.IDLE))
@@ -70,7 +70,7 @@ def test_another_robots_frames_are_left_alone():
     state = RobotState("hall", "arm")
     message = frames(0.1)
     message.transforms.extend(frames(0.2, robot="arm-2").transforms)
-    state.take_frames(message, 1)
+    state.take_frames(message, 1, 1)
     assert list(state.link_placements) == ["column"]
 
 
@@ -80,21 +80,21 @@ def test_another_robots_frames_are_left_alone():
 def test_the_overlay_tells_values_in_degrees_and_the_age(age, says):
     description, _ = described("pt600")
     state = RobotState("hall", "arm")
-    state.take_frames(frames(0.1), 1_000_000_000)
+    state.take_frames(frames(0.1), 1_000_000_000, 1)
     joints = JointStates()
     joints.joints.add(name="waist", position=math.radians(-30.456))
     state.take_joints(joints)
-    overlay = overlay_of(state, look_of(description, aspect=1.6), "free", age=age)
+    overlay = overlay_of(state, look_of(description), "free", age=age)
     (row,) = overlay.rows
     assert (row.name, row.value, row.unit) == ("waist", "−30.46", "°")
     assert row.share == pytest.approx((150 - 30.456) / 300)
     assert overlay.stale == says
-    assert overlay.mark == "simulated"
+    assert overlay.marks == ("simulated",)
 
 
 def test_a_robot_that_nobody_told_of_says_so():
     description, _ = described("pt600")
-    overlay = overlay_of(RobotState("hall", "arm"), look_of(description, aspect=1.6), "free", age=math.inf)
+    overlay = overlay_of(RobotState("hall", "arm"), look_of(description), "free", age=math.inf)
     assert overlay.stale == "NO DATA, drawn at home"
     assert overlay.rows == ()
 
@@ -122,4 +122,4 @@ def test_the_controllers_state_is_told_in_words(controller, says):
     description, _ = described("pt600")
     state = RobotState("hall", "arm")
     state.take_controller(controller)
-    assert overlay_of(state, look_of(description, aspect=1.6), "free", age=0.1).state == says
+    assert overlay_of(state, look_of(description), "free", age=0.1).state == says

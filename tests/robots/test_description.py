@@ -189,10 +189,8 @@ def test_missing_file_is_told(tmp_path: Path) -> None:
         load(tmp_path / "arm.toml")
 
 
-def test_urdf_is_refused_in_words() -> None:
-    with pytest.raises(DescriptionError, match="URDF is not read yet"):
-        load("arm.urdf")
-    with pytest.raises(DescriptionError, match=r"urdf = 'arm\.urdf': not read yet"):
+def test_urdf_that_is_not_there_is_told() -> None:
+    with pytest.raises(DescriptionError, match=r"urdf = 'arm\.urdf': no such file beside the description"):
         parse('name = "arm"\nurdf = "arm.urdf"', FOLDER)
 
 

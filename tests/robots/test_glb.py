@@ -4,6 +4,7 @@ import json
 import struct
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,10 @@ import pytest
 
 from robots.description import load, parse
 from robots.errors import MeshError
-from robots.glb import cache_folder, link_meshes
-from robots.meshes.mesh import bounds
+from robots.glb import _cached_glb, cache_folder, link_meshes
+from robots.meshes.mesh import Material, Mesh, Part, bounds
 from robots.meshes.read import read_mesh
+from robots.tree import Shape
 
 BOX = """#VRML V2.0 utf8
 Shape { appearance Appearance { material DEF %s Material { diffuseColor 1 0 0 transparency 0.5 } }
@@ -116,7 +118,81 @@ def test_inlined_file_that_changes_is_noticed(tmp_path: Path) -> None:
     assert sizes == pytest.approx([0.01, 0.02])
 
 
-def test_warm_cache_needs_no_trimesh(tmp_path: Path) -> None:
+EXTERN = """#VRML V2.0 utf8
+EXTERNPROTO P [ ] "part.wrl#P"
+P { }
+Inline { url [ "first.wrl" "second.wrl" ] }
+Shape { geometry Box { size 1 1 1 } }
+"""
+
+
+def test_file_that_was_missing_is_noticed_when_it_comes_and_when_it_goes(tmp_path: Path) -> None:
+    (tmp_path / "box.wrl").write_text(EXTERN)
+    description = parse(ROBOT, tmp_path / "robot.toml")
+
+    def width() -> float:
+        low, high = corners(link_meshes(description, cache=tmp_path / "cache")["base"])
+        return float((high - low)[0])
+
+    def write(name: str, content: str) -> None:
+        (tmp_path / name).write_text(f"#VRML V2.0 utf8\n{content}")
+
+    assert width() == pytest.approx(0.001)
+    write("part.wrl", "PROTO P [ ] { Shape { geometry Box { size 20 20 20 } } }")
+    assert width() == pytest.approx(0.02)
+    write("second.wrl", "Shape { geometry Box { size 30 30 30 } }")
+    assert width() == pytest.approx(0.03)
+    write("first.wrl", "Shape { geometry Box { size 40 40 40 } }")
+    assert width() == pytest.approx(0.04)
+    (tmp_path / "first.wrl").unlink()
+    assert width() == pytest.approx(0.03)
+
+
+def test_link_of_several_files_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "box.wrl").write_text('#VRML V2.0 utf8\nInline { url "part.wrl" }')
+    (tmp_path / "part.wrl").write_text("#VRML V2.0 utf8\nShape { geometry Box { } }")
+    description = parse(ROBOT, tmp_path / "robot.toml")
+    first = link_meshes(description, cache=tmp_path / "cache")
+    monkeypatch.setattr("robots.glb.read_mesh", None)
+    assert link_meshes(description, cache=tmp_path / "cache") == first
+
+
+def test_same_file_elsewhere_has_the_files_beside_it_there(tmp_path: Path) -> None:
+    found = []
+    for folder, size in (("a", "10 10 10"), ("b", "20 20 20")):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "box.wrl").write_text('#VRML V2.0 utf8\nInline { url "part.wrl" }')
+        (tmp_path / folder / "part.wrl").write_text(
+            f"#VRML V2.0 utf8\nShape {{ geometry Box {{ size {size} }} }}"
+        )
+        description = parse(ROBOT, tmp_path / folder / "robot.toml")
+        found.append(link_meshes(description, cache=tmp_path / "cache")["base"])
+    low, high = corners(found[1])
+    assert (high - low)[0] == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"colors": np.array([[1.0, 0, 0, 1]] * 3)},
+        {"normals": np.array([[0.0, 1, 0]] * 3)},
+        {"two_sided": True},
+        {"name": "other"},
+    ],
+    ids=["colors", "normals", "two_sided", "name"],
+)
+def test_mesh_that_is_made_has_another_glb_when_anything_of_it_changes(
+    tmp_path: Path, change: dict[str, Any]
+) -> None:
+    def glb(part: Part) -> bytes:
+        shape = Shape(Mesh((part,)), np.eye(4))
+        return _cached_glb((shape,), tmp_path)
+
+    part = Part("a", Material(), np.eye(3), np.array([[0.0, 0, 1]] * 3), np.array([[0, 1, 2]]))
+    assert glb(part) != glb(replace(part, **change))
+
+
+def test_librarys_meshes_need_no_trimesh(tmp_path: Path) -> None:
     code = (
         "import sys; from robots.description import load; from robots.glb import link_meshes; "
         "meshes = link_meshes(load('pt600')); print(len(meshes), 'trimesh' in sys.modules)"
@@ -131,7 +207,7 @@ def test_warm_cache_needs_no_trimesh(tmp_path: Path) -> None:
         ).stdout.split()
         for _ in range(2)
     ]
-    assert answers == [["6", "True"], ["6", "False"]]
+    assert answers == [["6", "False"], ["6", "False"]]
 
 
 def test_cache_that_cannot_be_written_falls_back(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -10,8 +10,8 @@ from robots.description import LIBRARY, library_names, load
 from robots.library.build_meshes import ROBOTS, mesh_file
 from robots.meshes.mesh import Mesh, bounds
 from robots.meshes.read import read_mesh
-from robots.meshes.vrml import read_vrml
-from robots.meshes.write_vrml import write_vrml
+from robots.meshes.vrml.read import read_vrml
+from robots.meshes.vrml.write import write_vrml
 from robots.model import build_model, link_placements, tool_placement
 
 FILES = [(robot, name) for robot, files in ROBOTS.items() for name in files]

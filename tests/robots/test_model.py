@@ -17,6 +17,7 @@ from robots.model import (
     tool_jacobian,
     tool_placement,
 )
+from tests.robots.arms import allowed_positions, telescope
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"
 
@@ -107,8 +108,8 @@ def test_placements_equal_the_dh_product_at_1000_random_positions(name: str, tex
     for _ in range(1000):
         positions = generator.uniform(model.joints.lower, model.joints.upper)
         links, tool = dh_product(text, positions)
-        np.testing.assert_allclose(link_placements(model, positions), links, atol=1e-9, rtol=0)
-        np.testing.assert_allclose(tool_placement(model, positions), tool, atol=1e-9, rtol=0)
+        np.testing.assert_allclose(link_placements(model, positions), links, atol=1e-12, rtol=0)
+        np.testing.assert_allclose(tool_placement(model, positions), tool, atol=1e-12, rtol=0)
 
 
 @pytest.mark.parametrize(
@@ -154,6 +155,37 @@ def test_jacobian_is_the_derivative_of_the_tools_placement(name: str, text: str)
         turn = (there[:3, :3] @ here[:3, :3].T - np.eye(3)) / step
         angular = [turn[2, 1], turn[0, 2], turn[1, 0]]
         np.testing.assert_allclose(jacobian[3:, index], angular, atol=1e-5)
+
+
+def test_jacobian_counts_what_follows_a_joint_and_not_what_moves_no_tool(tmp_path: Path) -> None:
+    model = build_model(telescope(tmp_path))
+    step = 1e-6
+    for positions in allowed_positions(model, 10):
+        jacobian = tool_jacobian(model, positions)
+        for index in range(len(positions)):
+            sides = []
+            for side in (-step, step):
+                moved = positions.copy()
+                moved[index] += side
+                sides.append(tool_placement(model, moved))
+            linear = (sides[1] - sides[0])[:3, 3] / (2 * step)
+            turn = (sides[1][:3, :3] @ sides[0][:3, :3].T - np.eye(3)) / (2 * step)
+            angular = [turn[2, 1], turn[0, 2], turn[1, 0]]
+            np.testing.assert_allclose(jacobian[:, index], [*linear, *angular], atol=3e-6)
+        # The second stage goes half as far as the first, along the same line.
+        lift = model.joints.names.index("lift")
+        assert np.linalg.norm(jacobian[:3, lift]) == pytest.approx(1.5)
+        assert not jacobian[:, model.joints.names.index("grip")].any()
+
+
+@pytest.mark.parametrize("name", ["pt500", "puma560"])
+def test_manipulability_is_the_root_of_the_jacobians_gram_determinant(name: str) -> None:
+    model = build_model(load(name))
+    for positions in allowed_positions(model, 20):
+        jacobian = tool_jacobian(model, positions)
+        gram = jacobian @ jacobian.T if len(positions) >= 6 else jacobian.T @ jacobian
+        expected = np.sqrt(max(np.linalg.det(gram), 0.0))
+        assert manipulability(model, positions) == pytest.approx(expected, abs=1e-9)
 
 
 def test_named_frames_hang_on_their_link() -> None:

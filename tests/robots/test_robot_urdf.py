@@ -1,14 +1,18 @@
 """URDF export, read back by Pinocchio."""
 
+from pathlib import Path
 from xml.etree import ElementTree as Xml
 
 import numpy as np
 import pinocchio
 import pytest
 
-from robots.description import library_names, load
+from robots.description import library_names, load, parse
+from robots.dh import dh_form
 from robots.model import build_model, link_placements, tool_placement
-from robots.urdf import to_urdf
+from robots.schema import UrdfDescription
+from robots.urdf.read import read_urdf
+from robots.urdf.write import to_urdf
 
 
 @pytest.mark.parametrize("robot", library_names())
@@ -32,6 +36,47 @@ def test_exported_robot_stands_where_the_described_one_does(robot: str) -> None:
         for name, expected in zip(model.link_names, link_placements(model, positions), strict=True):
             np.testing.assert_allclose(placement(name), expected, atol=1e-9)
         np.testing.assert_allclose(placement("tool"), tool_placement(model, positions), atol=1e-9)
+
+
+CLASHING = """
+name = "clash"
+{joints}
+[[frame]]
+name = "a_axis"
+link = "{link}"
+xyz = [1.0, 2.0, 3.0]
+"""
+JOINT = """[[joint]]
+name = "{name}"
+a = 100.0
+alpha = 0.0
+d = 50.0
+limits = [-90.0, 90.0]
+max_speed = 1.0
+max_acceleration = 1.0
+max_jerk = 1.0
+link = {{ name = "{link}" }}
+"""
+
+
+def test_frames_and_joints_keep_their_names_where_the_export_would_take_them(tmp_path: Path) -> None:
+    joints = JOINT.format(name="a", link="one") + JOINT.format(name="one_fixed", link="two")
+    description = parse(CLASHING.format(joints=joints, link="one"), tmp_path / "robot.toml")
+    exported = to_urdf(description)
+    read = read_urdf(exported, tmp_path / "clash.urdf", resolve=lambda address: None)
+    assert [joint.name for joint in read.tree.joints] == ["a", "one_fixed"]
+    links = {link.name: link for link in read.tree.links}
+    # Behind a's axis: the link at d 50 mm and a 100 mm, and from there the frame.
+    np.testing.assert_allclose(links["one"].link_to_joint[:3, 3], [0.1, 0.0, 0.05])
+    np.testing.assert_allclose(links["a_axis"].link_to_joint[:3, 3], [0.101, 0.002, 0.053])
+    assert links["a_axis"].joint == 0
+    # And back to rows the frame is there, and no frame more.
+    (tmp_path / "clash.urdf").write_text(exported)
+    by_urdf = parse('name = "clash"\nurdf = "clash.urdf"\n', tmp_path / "robot.toml")
+    assert isinstance(by_urdf, UrdfDescription)
+    assert dh_form(by_urdf).values["frame"] == [
+        {"name": "a_axis", "link": "one", "xyz": [1.0, 2.0, 3.0], "rpy": [0.0, 0.0, 0.0]}
+    ]
 
 
 def test_every_link_names_its_glb() -> None:

@@ -1,6 +1,7 @@
 """The console's server over a real router: what goes down to a browser, and what comes up."""
 
 import asyncio
+import contextlib
 import hashlib
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
@@ -64,7 +65,7 @@ class Page:
     async def watch(self, key):
         await self.send(watch={"key": key})
 
-    async def until(self, condition, timeout_s=5.0):
+    async def until(self, condition, timeout_s=30.0):
         """Reads until the condition holds."""
         async with asyncio.timeout(timeout_s):
             while not condition():
@@ -74,7 +75,7 @@ class Page:
                 else:
                     self.other.append(message)
 
-    async def ask(self, number, key, request=b"", timeout_s=2.0):
+    async def ask(self, number, key, request=b"", timeout_s=10.0):
         await self.send(ask={"id": number, "key": key, "payload": request, "timeout_s": timeout_s})
         await self.until(lambda: any(m.answer.id == number for m in self.other))
         return next(m.answer for m in self.other if m.answer.id == number)
@@ -86,17 +87,18 @@ async def browse(address):
         yield Page(socket)
 
 
-async def get(address, path, **headers):
-    """Status, headers and body of a GET."""
+async def get(address, path, *, method="GET", body=b"", **headers):
+    """Status, headers and body of the answer to a request."""
     host, port = address.split(":")
     reader, writer = await asyncio.open_connection(host, int(port))
     lines = {"Host": address, "Connection": "close", **headers}
-    text = f"GET {path} HTTP/1.1\r\n" + "".join(f"{k}: {v}\r\n" for k, v in lines.items()) + "\r\n"
-    writer.write(text.encode())
+    text = f"{method} {path} HTTP/1.1\r\n" + "".join(f"{k}: {v}\r\n" for k, v in lines.items()) + "\r\n"
+    writer.write(text.encode() + body)
     head, _, body = (await reader.read()).partition(b"\r\n\r\n")
     writer.close()
     status, *rest = head.decode().split("\r\n")
-    return int(status.split()[1]), dict(line.lower().split(": ", 1) for line in rest), body
+    pairs = (line.split(": ", 1) for line in rest)
+    return int(status.split()[1]), {name.lower(): value for name, value in pairs}, body
 
 
 def joints(value):
@@ -120,7 +122,7 @@ def test_payload_and_attachment_reach_the_page_as_they_were(mesh, page):
     async def main():
         async with console(mesh, page) as (address, other), browse(address) as browser:
             publisher = other.declare_publisher("s", "r", "joints")
-            publisher.put(joints(1.0), source_time_ns=5)
+            publisher.remember(joints(1.0), source_time_ns=5)  # nothing on its way when the page comes
             await browser.watch("robomesh/*/*/joints")
             await browser.until(lambda: browser.samples)
             first = browser.samples[0]
@@ -157,6 +159,12 @@ def test_a_later_page_gets_the_held_value_with_its_age(mesh, page):
     run(main())
 
 
+def shown(browser, number):
+    return (
+        browser.samples and JointStates.FromString(browser.samples[-1].payload).joints[0].position == number
+    )
+
+
 def test_a_page_that_reads_nothing_gets_the_newest_then_and_delays_no_other(mesh, page):
     async def main():
         async with console(mesh, page) as (address, other), browse(address) as slow, browse(address) as quick:
@@ -169,20 +177,12 @@ def test_a_page_that_reads_nothing_gets_the_newest_then_and_delays_no_other(mesh
             big.joints[0].name = "x" * 100_000
             for number in range(1, 201):
                 big.joints[0].position = number
-                publisher.put(big)
-                await quick.until(
-                    lambda n=number: (
-                        quick.samples
-                        and JointStates.FromString(quick.samples[-1].payload).joints[0].position == n
-                    )
-                )
+                while not shown(quick, number):
+                    publisher.put(big)  # on a full link it is dropped
+                    with contextlib.suppress(TimeoutError):
+                        await quick.until(lambda n=number: shown(quick, n), timeout_s=1.0)
                 quick.samples.clear()
-            await slow.until(
-                lambda: (
-                    slow.samples
-                    and JointStates.FromString(slow.samples[-1].payload).joints[0].position == 200
-                )
-            )
+            await slow.until(lambda: shown(slow, 200))
             assert len(slow.samples) < 150  # 20 MB were published: it was spared most of it
 
     run(main())
@@ -200,13 +200,13 @@ def test_video_is_subscribed_to_only_while_a_page_watches_it(mesh, page):
             history = schema.VideoFrames.FromString(first.samples[0].payload)
             assert [f.sequence for f in history.frames] == [1, 2]
             publisher.put(CompressedVideo(data=DELTA))
-            await first.until(lambda: len(first.samples) == 2)
+            await first.until(lambda: len(first.samples) >= 2)
             async with browse(address) as second:
                 await second.watch("robomesh/s/r/video/top")
-                await second.until(lambda: len(second.samples) == 2)
+                await second.until(lambda: len(second.samples) >= 2)
                 assert [each.live for each in second.samples] == [False, True]
             await first.send(unwatch={"key": "robomesh/s/r/video/top"})
-            async with asyncio.timeout(5):
+            async with asyncio.timeout(40):
                 while publisher.watched:
                     await asyncio.sleep(0.01)
 
@@ -224,7 +224,7 @@ def test_events_come_as_a_list_and_then_one_by_one(mesh, page):
             listed = schema.EventList.FromString(browser.samples[0].payload)
             assert [event.text for event in listed.events] == ["event 0", "event 1", "event 2"]
             publisher.put(schema.Event(text="event 3"))
-            await browser.until(lambda: len(browser.samples) == 2)
+            await browser.until(lambda: len(browser.samples) >= 2)
             assert schema.Event.FromString(browser.samples[1].payload).text == "event 3"
 
     run(main())

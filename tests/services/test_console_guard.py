@@ -34,7 +34,10 @@ def test_only_the_pages_own_origin_may_open_the_websocket():
         assert refused_origin(origin, "127.0.0.1:8080")
 
 
-@pytest.mark.parametrize("key", ["robomesh/*/*/controller", "robomesh/s/r/video/top", "robomesh/s/*/events"])
+@pytest.mark.parametrize(
+    "key",
+    ["robomesh/*/*/controller", "robomesh/s/r/video/top", "robomesh/s/*/events", "robomesh/s/r/events/*"],
+)
 def test_topics_of_the_table_can_be_watched(key):
     check_expression(key)
 
@@ -45,6 +48,7 @@ def test_topics_of_the_table_can_be_watched(key):
         "robomesh/**",
         "**",
         "robomesh/s/r/video/*",
+        "robomesh/s/r/events/k*",
         "robomesh/s/r/nonsense",
         "robomesh/s/R$/joints",
         "other/s/r/joints",

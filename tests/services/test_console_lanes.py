@@ -1,5 +1,8 @@
 """What a slow browser is sent, and what one that joins late is given."""
 
+import time
+from dataclasses import replace
+
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
 from bus import topics
@@ -32,6 +35,17 @@ def test_of_state_only_the_newest_waits():
     for number in range(1, 100):
         lane.push(sample(number))
     assert numbers(lane) == [99]
+
+
+def test_of_state_that_came_in_one_burst_all_is_passed_on():
+    lane, now = lane_for(topics.topic("joints")), time.monotonic() + 3600.0
+    lane.push(sample(1))
+    for number in range(2, 6):
+        lane.push(replace(sample(number), received=now))
+    assert numbers(lane) == [2, 3, 4, 5]
+    for number in range(1000):
+        lane.push(replace(sample(number), received=now))
+    assert len(lane.held()) < 10
 
 
 def test_events_keep_their_order_and_are_bounded():

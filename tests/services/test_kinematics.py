@@ -18,6 +18,7 @@ from robots.model import build_model, tool_placement
 from robots.poses import rpy_rotation
 from services import kinematics
 from services.kinematics.states import frames_message, kinematic_state, quaternions
+from tests.cells import arm_alone
 from tests.conftest import run
 
 angles = st.floats(-np.pi, np.pi)
@@ -100,7 +101,7 @@ def test_the_twist_is_how_the_tool_moves(name):
     random = np.random.default_rng(3)
     positions = random.uniform(model.joints.lower, model.joints.upper)
     velocities = random.uniform(-1, 1, len(model.joints))
-    state = kinematic_state(model, positions, velocities, timestamp=Timestamp())
+    state = kinematic_state(model, positions, velocities, reach=1.0, timestamp=Timestamp())
     dt = 1e-6
     after, before = (tool_placement(model, positions + sign * dt * velocities) for sign in (0.5, -0.5))
     linear = (after[:3, 3] - before[:3, 3]) / dt
@@ -115,9 +116,7 @@ def test_the_twist_is_how_the_tool_moves(name):
 async def served(mesh):
     """The service, and a session beside it."""
     async with open_session(mesh) as own, open_session(mesh) as other:
-        settings = kinematics.Settings(
-            site="hall", robots=(kinematics.RobotSettings(name="arm", model="pt600"),)
-        )
+        settings = kinematics.Settings(site="hall", robots=(arm_alone(),))
         own.declare_presence("hall", "arm", "kinematics")
         task = asyncio.create_task(kinematics.serve(own, settings))
         while await other.last("robomesh/hall/arm/description", timeout_s=0.2) is None:

@@ -1,37 +1,21 @@
-"""The simulated controller over real sockets, its motion as a function of time."""
+"""The simulated controller over real sockets."""
 
 import asyncio
 import contextlib
-import itertools
+import math
 import socket
 import time
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from protocol_gateway.core.records import (
-    AbsolutePositions,
-    Command,
-    Error,
-    RelativePositions,
-    Status,
-    Time,
-    Velocities,
-    read_records,
-    write_unit,
-)
+from protocol_gateway.core.records import Error
 from protocol_gateway.core.stream import Malformed, Unit, UnitStream
 from robots.description import load
-from robots.joints import joints_of, violations
-from robots.model import build_model, tool_placement
+from robots.joints import joints_of
 from services.errors import ListenError
-from services.simulator.controller import Controller
-from services.simulator.demo import demo_tour
 from services.simulator.errors import SimulatorError
-from services.simulator.faults import parse_faults
-from services.simulator.motion import Motion
+from services.simulator.faults import Span, parse_fault
 from services.simulator.simulator import Settings, serve
 from tests.conftest import run
 
@@ -40,284 +24,6 @@ JOINTS = joints_of(PT600)
 DEGREES = 180.0 / np.pi
 TARGET = (20.0, 60.0, -40.0, 10.0, 90.0)
 HOME = tuple(np.round(JOINTS.home * DEGREES, 6).tolist())
-
-# ------------------------------------------------------------------ the controller, time as an argument
-
-
-class Bench:
-    """A controller with a clock that the test turns."""
-
-    def __init__(self, **options):
-        self.now_s = 100.0
-        self.controller = Controller(JOINTS, **{"codes": {}, "demo": None, "now_s": self.now_s, **options})
-
-    def obey(self, *records):
-        return self.controller.obey(records, self.now_s)
-
-    def word(self, *words):
-        return self.obey(Command(words))
-
-    def pass_s(self, seconds):
-        told = []
-        for _ in range(round(seconds * 100)):
-            self.now_s += 0.01
-            self.controller.tick(self.now_s)
-            told.append(self.told())
-        return told
-
-    def told(self):
-        return read_records(self.controller.told(self.now_s)[:-1])
-
-    @property
-    def positions(self):
-        return self.told()[0].values
-
-    @property
-    def words(self):
-        return self.told()[2].words
-
-
-def test_a_controller_boots_at_rest_and_does_not_claim_to_be_homed():
-    bench = Bench()
-    positions, velocities, status, clock = bench.told()
-    assert positions == AbsolutePositions(HOME)
-    assert velocities == Velocities((0.0,) * 5)
-    assert status == Status(("idle", "remote"))
-    assert clock == Time(0.0)
-
-
-def test_homing_is_told_and_ends_homed():
-    bench = Bench()
-    bench.obey(AbsolutePositions(TARGET))
-    bench.pass_s(4.0)
-    bench.word("home")
-    bench.pass_s(0.1)
-    assert bench.words == ("homing", "remote")
-    bench.pass_s(5.0)
-    assert bench.words == ("idle", "remote", "homed")
-    assert bench.positions == HOME
-
-
-def test_the_papers_unit_traces_homes_and_then_moves_in_this_order():
-    bench = Bench()
-    assert bench.obey(Command(("trace", "home")), AbsolutePositions(TARGET)) is None
-    bench.pass_s(0.3)
-    assert bench.words == ("homing", "remote", "trace")
-    bench.pass_s(5.0)
-    assert bench.words == ("idle", "remote", "homed", "trace")
-    assert bench.positions == TARGET
-
-
-def test_a_relative_target_is_added_to_where_the_arm_is():
-    bench = Bench()
-    bench.obey(RelativePositions((10.0, 0.0, 0.0, 0.0, -10.0)), RelativePositions((1.0, 0.0, 0.0, 0.0, 0.0)))
-    bench.pass_s(3.0)
-    assert bench.positions == (HOME[0] + 11.0, *HOME[1:4], HOME[4] - 10.0)
-
-
-def test_stop_brakes_hard_latches_and_forgets_what_was_to_come():
-    bench = Bench()
-    bench.obey(AbsolutePositions(TARGET), AbsolutePositions(HOME))
-    bench.pass_s(0.5)
-    bench.word("stop")
-    assert bench.words[0] == "moving"
-    bench.pass_s(0.4)
-    assert bench.words == ("stopped", "remote")
-    rest = bench.positions
-    assert bench.obey(AbsolutePositions(TARGET)) == Error(8, "stopped, reset first")
-    assert bench.word("home") == Error(8, "stopped, reset first")
-    bench.word("resume")
-    bench.pass_s(1.0)
-    assert bench.positions == rest
-    bench.word("reset")
-    bench.pass_s(1.0)
-    assert bench.words == ("idle", "remote")
-    assert bench.positions == rest
-
-
-def test_hold_comes_to_rest_and_resume_goes_on_to_the_target():
-    bench = Bench()
-    bench.obey(AbsolutePositions(TARGET))
-    bench.pass_s(0.3)
-    bench.word("hold")
-    bench.pass_s(0.5)
-    assert bench.words[0] == "holding"
-    held = bench.positions
-    assert bench.obey(AbsolutePositions(HOME)) == Error(8, "holding, resume or reset first")
-    bench.pass_s(1.0)
-    assert bench.positions == held
-    bench.word("resume")
-    bench.pass_s(3.0)
-    assert bench.positions == TARGET
-    assert bench.words[0] == "idle"
-
-
-def test_reset_after_hold_forgets_the_motion():
-    bench = Bench()
-    bench.obey(AbsolutePositions(TARGET))
-    bench.pass_s(0.3)
-    bench.word("hold")
-    bench.pass_s(0.5)
-    held = bench.positions
-    bench.word("reset")
-    bench.pass_s(1.0)
-    assert bench.positions == held
-    assert bench.words[0] == "idle"
-
-
-def test_speed_slows_a_motion_that_runs():
-    fast, slow = Bench(), Bench()
-    for bench in (fast, slow):
-        bench.obey(AbsolutePositions(TARGET))
-        bench.pass_s(0.2)
-    slow.word("speed=10")
-    slow.pass_s(0.5)
-    top = max(abs(v) for told in slow.pass_s(0.5) for v in told[1].values)
-    assert top <= 0.1 * JOINTS.max_speed.max() * DEGREES + 1e-6
-    fast.pass_s(1.0)
-    assert fast.positions == TARGET
-    slow.pass_s(20.0)
-    assert slow.positions == TARGET
-
-
-def test_a_new_target_takes_the_place_of_the_old_one_without_a_jump():
-    bench = Bench()
-    bench.obey(AbsolutePositions(TARGET))
-    before = bench.pass_s(0.4)[-1]
-    bench.obey(AbsolutePositions(HOME))
-    after = bench.told()
-    assert after[0].values == pytest.approx(before[0].values, abs=1e-5)
-    assert after[1].values == pytest.approx(before[1].values, abs=1e-4)
-    bench.pass_s(4.0)
-    assert bench.positions == HOME
-
-
-REFUSED = [
-    ((AbsolutePositions((1.0, 2.0)),), 4, "2 values for 5 joints"),
-    (
-        (AbsolutePositions((500.0, *TARGET[1:])),),
-        5,
-        "joint waist at 500.00 deg is beyond its limit 150.00 deg",
-    ),
-    ((AbsolutePositions((0.0, -29.0, -109.0, 0.0, 0.0)),), 5, "shoulder + elbow"),
-    ((RelativePositions((200.0, 0.0, 0.0, 0.0, 0.0)),), 5, "waist"),
-    ((Command(("dance",)),), 3, "unknown word dance"),
-    ((Command(("speed=0",)),), 5, "outside 1-100"),
-    ((Command(("speed=101",)),), 5, "outside 1-100"),
-    ((Command(("speed=fast",)),), 2, "not a finite number"),
-]
-
-
-@pytest.mark.parametrize(("records", "number", "text"), REFUSED)
-def test_a_unit_that_cannot_be_done_is_answered_and_nothing_in_it_is_done(records, number, text):
-    bench = Bench()
-    refusal = bench.obey(Command(("trace",)), AbsolutePositions(TARGET), *records)
-    assert refusal.number == number
-    assert text in refusal.text
-    assert write_unit((refusal,))
-    bench.pass_s(1.0)
-    assert bench.positions == HOME
-    assert bench.words == ("idle", "remote")
-
-
-def test_a_reset_allows_the_motion_behind_it_in_the_same_unit():
-    bench = Bench()
-    bench.word("stop")
-    assert bench.obey(Command(("reset",)), AbsolutePositions(TARGET)) is None
-    bench.pass_s(3.0)
-    assert bench.positions == TARGET
-
-
-def test_a_stop_is_done_even_when_the_rest_of_its_unit_is_refused():
-    bench = Bench()
-    bench.obey(AbsolutePositions(TARGET))
-    bench.pass_s(0.2)
-    assert bench.word("stop", "dance").number == 3
-    bench.pass_s(0.5)
-    assert bench.words[0] == "stopped"
-
-
-def test_states_and_answers_of_others_are_not_commands():
-    bench = Bench()
-    told = bench.told()
-    assert bench.obey(told[1], told[2], told[3], Error(9, "x")) is None
-    bench.pass_s(0.5)
-    assert bench.positions == HOME
-
-
-positions = st.lists(st.floats(0.0, 1.0), min_size=5, max_size=5).map(
-    lambda parts: JOINTS.lower + np.array(parts) * (JOINTS.upper - JOINTS.lower)
-)
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.lists(st.tuples(positions, st.floats(0.02, 2.0), st.floats(0.01, 1.0)), min_size=1, max_size=5))
-def test_motion_keeps_limits_speeds_and_accelerations_however_it_is_interrupted(legs):
-    motion, now_s = Motion(JOINTS, JOINTS.home.copy()), 0.0
-    top = 0.0
-    for target, after_s, speed in legs:
-        motion.move(target, now_s, speed=speed)
-        # A motion that is slowed first brakes down to its new speed.
-        top = max(top, speed)
-        for at_s in np.linspace(now_s, now_s + after_s, 25):
-            state = motion.state(at_s)
-            assert np.all(state.positions >= JOINTS.lower - 1e-6)
-            assert np.all(state.positions <= JOINTS.upper + 1e-6)
-            assert np.all(np.abs(state.velocities) <= JOINTS.max_speed * top + 1e-6)
-            assert np.all(np.abs(state.accelerations) <= JOINTS.max_acceleration + 1e-6)
-        now_s += after_s
-    motion.brake(now_s)
-    assert motion.end_s - now_s < 1.0
-    assert np.all(motion.state(motion.end_s).velocities == 0.0)
-
-
-# ------------------------------------------------------------------------------------------ demo
-
-
-@pytest.mark.parametrize("robot", ["pt500", "pt600", "puma560"])
-def test_the_demo_tours_several_poses_within_limits_and_above_the_floor(robot):
-    description = load(robot)
-    joints, model = joints_of(description), build_model(description)
-    tour = list(itertools.islice(demo_tour(description), 30))
-    assert len({tuple(pose) for pose in tour}) >= 6
-    motion, now_s = Motion(joints, joints.home.copy()), 0.0
-    for pose in tour[:10]:
-        motion.move(pose, now_s, speed=1.0)
-        for at_s in np.linspace(now_s, motion.end_s, 20):
-            positions = motion.state(at_s).positions
-            assert not violations(joints, positions)
-            assert tool_placement(model, positions)[2, 3] > 0.1
-        now_s = motion.end_s
-
-
-def test_the_demo_moves_until_the_first_motion_command_and_begins_homed():
-    bench = Bench(demo=demo_tour(PT600))
-    bench.pass_s(2.0)
-    assert bench.words == ("moving", "remote", "homed")
-    bench.word("trace")
-    assert bench.word("dance").number == 3
-    before = bench.positions
-    bench.pass_s(6.0)
-    assert bench.positions != before
-    bench.obey(AbsolutePositions(TARGET))
-    bench.pass_s(20.0)
-    assert bench.positions == TARGET
-    assert bench.words == ("idle", "remote", "homed", "trace")
-
-
-def test_a_stop_ends_the_demo_for_good():
-    bench = Bench(demo=demo_tour(PT600))
-    bench.pass_s(1.0)
-    bench.word("stop")
-    bench.pass_s(1.0)
-    assert bench.words[0] == "stopped"
-    bench.word("reset")
-    rest = bench.positions
-    bench.pass_s(5.0)
-    assert bench.positions == rest
-
-
-# ---------------------------------------------------------------------------------- over sockets
 
 
 @contextlib.asynccontextmanager
@@ -474,6 +180,25 @@ def test_a_client_that_does_not_read_delays_nobody_gets_the_newest_state_and_is_
     run(main())
 
 
+def test_clients_that_go_while_they_are_told_much_leave_no_fault_behind(caplog):
+    def come_and_go(port):
+        for number in range(25):
+            with socket.create_connection(("127.0.0.1", port), timeout=5) as one:
+                end = time.monotonic() + 0.05 + number % 7 * 0.01
+                while time.monotonic() < end:
+                    assert one.recv(65536)
+
+    async def main():
+        async with simulator(demo=True, faults=("deluge",)) as port:
+            await asyncio.to_thread(come_and_go, port)
+            # Whatever was left of the last one is done by now.
+            async with client(port) as last:
+                await last.state(lambda *records: True)
+
+    run(main())
+    assert not [record for record in caplog.records if record.name == "asyncio"]
+
+
 def test_frozen_the_socket_stays_open_and_nothing_comes():
     async def main():
         async with simulator(faults=("freeze@0.3",)) as port, client(port) as one:
@@ -500,7 +225,7 @@ def test_garbage_comes_between_good_units_and_harms_none():
     [
         ({"listen": "here"}, ListenError, "HOST:PORT"),
         ({"listen": "0.0.0.0:0"}, ListenError, "insecure = true"),
-        ({"faults": ("melt",)}, SimulatorError, "freeze or garbage"),
+        ({"faults": ("melt",)}, SimulatorError, "'melt' is unknown; there are freeze, garbage"),
         ({"faults": ("freeze@soon",)}, SimulatorError, "freeze@soon"),
         ({"rate_hz": 0.0}, SimulatorError, "rate 0 Hz"),
         ({"max_clients": 0}, SimulatorError, "1 or more"),
@@ -525,5 +250,15 @@ def test_a_port_in_use_is_told_in_one_line():
     run(main())
 
 
-def test_a_fault_says_when_it_begins():
-    assert parse_faults(("freeze@2.5", "garbage")) == {"freeze": 2.5, "garbage": 0.0}
+@pytest.mark.parametrize(
+    ("text", "span"),
+    [
+        ("freeze", Span("freeze", 5.0, math.inf)),
+        ("freeze@2.5", Span("freeze", 2.5, math.inf)),
+        ("garbage@1+3", Span("garbage", 1.0, 3.0)),
+        ("restart", Span("restart", 0.0, 1.5)),
+        ("drop+2", Span("drop", 0.0, 2.0)),
+    ],
+)
+def test_a_fault_says_when_it_begins_and_how_long_it_lasts(text, span):
+    assert parse_fault(text) == span

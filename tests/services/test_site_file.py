@@ -4,10 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from robots.errors import DescriptionError
 from services import site
 from services.errors import ListenError, SiteFileError
 from services.listen import check_reach, split_address
+from services.site_router import OF_OTHERS, RoutedSite, read_routed
+from services.started import read_started, robot_to_start, write_started
 
 ROBOT = '[[robot]]\nname = "arm"\nmodel = "pt600"\n'
 
@@ -31,6 +32,12 @@ def test_paths_are_taken_from_the_files_own_folder(tmp_path):
     assert found.audit.folder == tmp_path / "audit"
 
 
+def test_what_is_recorded_unless_one_asks_is_a_view_that_is_rendered(tmp_path):
+    assert load(tmp_path, 'site = "hall"\n').recorded_views == ("free",)
+    assert load(tmp_path, 'site = "hall"\n[renderer]\nviews = ["top"]\n').recorded_views == ("top",)
+    assert load(tmp_path, 'site = "hall"\n[recorder]\nviews = ["far"]\n').recorded_views == ("far",)
+
+
 def test_a_controller_of_the_plant_is_read_only_until_its_stop_is_proven(tmp_path):
     text = f'site = "hall"\n{ROBOT}controller = "tcp://10.0.0.7:5400"\n'
     assert not load(tmp_path, text).robot[0].can_be_stopped
@@ -47,16 +54,44 @@ def test_codes_are_numbers(tmp_path):
     [
         ("", "site is missing"),
         ('site = "Hall"', "site = 'Hall': site 'Hall' cannot be used: lower-case"),
+        ('site = "define"', "the console has a page of that name, #/define"),
         ('site = "hall"\nrobots = 1', "robots is not a key"),
         (f'site = "hall"\n{ROBOT}{ROBOT}', "two robots are named 'arm'"),
+        (
+            'site = "hall"\n[[robot]]\nname = "matrix-probe"\nmodel = "pt600"',
+            "rights are tried on this name",
+        ),
+        (
+            'site = "hall"\n[[robot]]\nname = "replay-1"\nmodel = "pt600"',
+            "replay-... is what recordings are played back as",
+        ),
+        (
+            'site = "hall"\n[recorder]\nviews = ["side"]',
+            "views = 'side': the renderer has no such view; it has front, top, left, free, close, far",
+        ),
+        (
+            f'site = "hall"\n{ROBOT}modell = "pt600"',
+            "robot.arm.modell is not a key that a site file has: is model meant?",
+        ),
+        (
+            'site = "hall"\n[console]\nlisten = 8080',
+            'console.listen = 8080: should be text in quotes, as in "8080"',
+        ),
+        (
+            'site = "hall"\n[[robot]]\nname = "arm"\nmodel = "pt9"',
+            "robot arm: model = 'pt9': pt9: no such robot",
+        ),
         (f'site = "hall"\n{ROBOT}controller = "10.0.0.7"', "robot.arm.controller = '10.0.0.7': should be"),
+        (f'site = "hall"\n{ROBOT}controller = "tcp://10.0.0.7:0"', "should be 'simulated' or tcp://"),
+        (f'site = "hall"\n{ROBOT}codes = {{ x = "TIME" }}', "a code is a number"),
+        (f'site = "hall"\n{ROBOT}codes = {{ 1 = "COMMAND:dance" }}', "stands for nothing"),
+        ('site = "hall"\n[router]\nlisten = []', "router.listen = []"),
         (f'site = "hall"\n{ROBOT}stale_after_s = 0', "robot.arm.stale_after_s = 0"),
-        (f'site = "hall"\n{ROBOT}check = "require"', "would do nothing yet"),
         (f'site = "hall"\n{ROBOT}stop_proven = "yes"', "robot.arm.stop_proven = 'yes'"),
         (f'site = "hall"\n{ROBOT}accept_unknown = ["link"]', "robot.arm.accept_unknown"),
         (
             'site = "hall"\n[renderer]\nsize = [333, 200]',
-            "renderer.size.0 = 333: Input should be a multiple of 2",
+            "renderer.size.0 = 333: should be a multiple of 2",
         ),
         ('site = "hall"\n[renderer]\nfps = nan', "renderer.fps"),
         ("site = ", "not TOML"),
@@ -69,8 +104,110 @@ def test_what_is_wrong_is_named_with_what_would_be_right(tmp_path, text, words):
     assert str(tmp_path / "site.toml") in str(raised.value)
 
 
+LEGACY = 'legacy_clients = {{ listen = "127.0.0.1:5401"{} }}\n'
+
+
+def test_old_client_programs_attach_where_the_file_says(tmp_path):
+    commanders = ', commanders = ["10.0.0.8", { address = "::ffff:10.0.0.9", operator = "li" }], most = 64'
+    found = load(tmp_path, f'site = "hall"\n{ROBOT}{LEGACY.format(commanders)}').robot[0].legacy_clients
+    assert (found.listen, found.most) == ("127.0.0.1:5401", 64)
+    assert {each.address: each.name for each in found.commanders} == {
+        "10.0.0.8": "10.0.0.8",
+        "10.0.0.9": "li",
+    }
+    assert load(tmp_path, f'site = "hall"\n{ROBOT}').robot[0].legacy_clients is None
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (", most = 0", "legacy_clients.most = 0: should be greater than or equal to 1"),
+        (", most = 5000", "legacy_clients.most = 5000: should be less than or equal to 1000"),
+        (', commanders = ["li"]', "'li': should be an IP address, as in 10.0.0.9"),
+        (', commanders = [{ address = "10.0.0.9", operator = "a/b" }]', "operator = 'a/b'"),
+        (
+            ', commanders = [{ address = "10.0.0.9", operator = "li" }, "10.0.0.9"]',
+            "10.0.0.9 commands as li and as 10.0.0.9: one name is right",
+        ),
+        (", port = 5401", "legacy_clients.port is not a key"),
+    ],
+)
+def test_wrong_settings_of_old_client_programs_are_named(tmp_path, more, words):
+    with pytest.raises(SiteFileError) as raised:
+        load(tmp_path, f'site = "hall"\n{ROBOT}{LEGACY.format(more)}')
+    assert words in str(raised.value)
+    assert "robot.arm.legacy_clients" in str(raised.value)
+
+
+def test_old_client_programs_come_from_elsewhere_only_where_the_file_takes_the_risk(tmp_path):
+    text = f'site = "hall"\n{ROBOT}legacy_clients = {{ listen = "0.0.0.0:5401"'
+    with pytest.raises(SiteFileError, match="insecure = true"):
+        load(tmp_path, text + " }\n")
+    found = load(tmp_path, text + ", insecure = true }\n").robot[0].legacy_clients
+    assert "anybody who can reach it" in (found.warning("robot arm: legacy_clients") or "")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('[console]\nlisten = "0.0.0.0:8080"\n', "the console would listen on 0.0.0.0"),
+        (
+            '[console]\nlisten = "0.0.0.0:8080"\ntls = { certificate = "a", key = "b" }\n',
+            "without accounts: give",
+        ),
+        ('[router]\nlisten = ["tcp/0.0.0.0:7447"]\n', "the router (tcp/0.0.0.0:7447) would listen on"),
+    ],
+)
+def test_what_others_could_reach_is_refused_before_anything_starts(tmp_path, text, words):
+    with pytest.raises(SiteFileError, match="insecure = true") as raised:
+        load(tmp_path, f'site = "hall"\n{text}')
+    assert str(raised.value).startswith(f"{tmp_path / 'site.toml'}: ")
+    assert words in str(raised.value)
+    assert "\n" not in str(raised.value)
+    assert load(tmp_path, f'site = "hall"\n{text}insecure = true\n').site == "hall"
+
+
+ARM_2 = ROBOT.replace("arm", "arm-2")
+ATTACH = LEGACY.format("")
+PLANT = 'controller = "tcp://10.0.0.7:5400"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (ROBOT + ATTACH + ARM_2 + ATTACH, "robot arm's legacy_clients and to robot arm-2's legacy_clients"),
+        (ROBOT + PLANT + ARM_2 + PLANT, "robot arm's controller and to robot arm-2's controller"),
+        (ROBOT + ATTACH + ARM_2 + 'controller = "tcp://localhost:5401"\n', "robot arm-2's controller"),
+        (ROBOT + ATTACH + '[console]\nlisten = "0.0.0.0:5401"\n', "the console and to robot arm's"),
+        (ROBOT + ATTACH + '[router]\nlisten = ["tcp/127.0.0.1:5401#so_sndbuf=1"]\n', "the router and to"),
+        ('[console]\nlisten = "127.0.0.1:7447"\n', "the router and to the console"),
+        ('[console]\nlisten = "8080"\n', "'8080' is not an address"),
+    ],
+)
+def test_an_address_that_is_given_twice_is_refused(tmp_path, text, words):
+    with pytest.raises(SiteFileError) as raised:
+        load(tmp_path, f'site = "hall"\n{text}')
+    assert words in str(raised.value)
+    assert str(raised.value).startswith(f"{tmp_path / 'site.toml'}: ")
+
+
+def test_addresses_that_only_look_alike_are_taken(tmp_path):
+    text = f"""site = "hall"
+{ROBOT}controller = "tcp://10.0.0.7:5401"
+{ATTACH}
+{ARM_2}legacy_clients = {{ listen = "127.0.0.1:0" }}
+[[robot]]
+name = "arm-3"
+model = "pt600"
+legacy_clients = {{ listen = "127.0.0.1:0" }}
+[router]
+listen = ["tcp/127.0.0.1:7447", "tcp/[::1]:7447", "quic/127.0.0.1:5401"]
+"""
+    assert len(load(tmp_path, text).robot) == 3
+
+
 def test_an_unknown_model_is_refused_before_anything_starts(tmp_path):
-    with pytest.raises(DescriptionError, match=r"pt60.*did you mean"):
+    with pytest.raises(SiteFileError, match=r"robot arm: model = .pt60.*did you mean"):
         load(tmp_path, 'site = "hall"\n[[robot]]\nname = "arm"\nmodel = "pt60"\n')
 
 
@@ -93,3 +230,82 @@ def test_beyond_loopback_needs_tls_or_a_word_taken_for_it():
     for host in ("0.0.0.0", "10.0.0.7", "plant.example"):
         with pytest.raises(ListenError, match="insecure = true"):
             check_reach("it", host, secured=False, insecure=False)
+
+
+# ------------------------------------------------------------------- what was started from the page
+
+
+def started(folder: Path, text: str) -> tuple[site.Robot, ...]:
+    found = load(folder, f'site = "hall"\n{ROBOT}')
+    (folder / "robots").mkdir(exist_ok=True)
+    (folder / "robots" / "started.toml").write_text(text, encoding="utf-8")
+    return read_started(found)
+
+
+def test_robots_that_were_started_are_read_with_paths_from_their_own_folder(tmp_path):
+    text = 'site = "hall"\n[[robot]]\nname = "mine"\nmodel = "mine/robot.toml"\n'
+    (robot,) = started(tmp_path, text)
+    assert (robot.name, robot.model) == ("mine", f"{tmp_path}/robots/mine/robot.toml")
+    assert robot.simulated
+
+
+def test_what_is_written_down_is_read_back(tmp_path):
+    hall = load(tmp_path, f'site = "hall"\n{ROBOT}')
+    assert read_started(hall) == ()
+    saved = tmp_path / "robots" / "mine"
+    saved.mkdir(parents=True)
+    (saved / "robot.toml").write_text("")
+    both = (robot_to_start(hall, "mine"), robot_to_start(hall, "pt500"))
+    write_started(hall, both)
+    found = read_started(hall)
+    assert [(robot.name, robot.model) for robot in found] == [
+        ("mine", f"{saved}/robot.toml"),
+        ("pt500", "pt500"),
+    ]
+    write_started(hall, found)
+    assert read_started(hall) == found
+    write_started(hall, ())
+    assert read_started(hall) == ()
+    assert sorted(path.name for path in (tmp_path / "robots").iterdir()) == ["mine", "started.toml"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("site = [", "not TOML"),
+        ("", "site: Field required"),
+        ('site = "other"', "it is the site 'hall' that starts these"),
+        ('site = "hall"\n[[robot]]\nname = "arm"\nmodel = "pt500"', "the site file has one of that name"),
+        ('site = "hall"\n[[robot]]\nname = "b"', "robot.0.model: Field required"),
+        (
+            'site = "hall"\n[[robot]]\nname = "b"\nmodel = "pt500"\ncontroller = "tcp://10.0.0.7:5400"',
+            "only simulated ones",
+        ),
+    ],
+)
+def test_a_wrong_list_of_started_robots_is_told_in_words(tmp_path, text, words):
+    with pytest.raises(SiteFileError, match=r"started\.toml") as told:
+        started(tmp_path, text)
+    assert words in str(told.value)
+
+
+def test_a_router_reads_of_its_site_what_everybody_reads_of_it(tmp_path):
+    path = tmp_path / "site.toml"
+    path.write_text(
+        'site = "plant"\n[router]\nlisten = ["tcp/127.0.0.1:7450"]\naccess = "rules.json5"\n'
+        'connect = ["tcp/127.0.0.2:7447"]\n[keys]\nfolder = "keys"\n'
+        '[[robot]]\nname = "arm"\nmodel = "pt600"\n'
+    )
+    read, whole = read_routed(path), site.load(path)
+    assert read is not None
+    assert (read.site, read.router, read.keys) == (whole.site, whole.router, whole.keys)
+    assert set(site.Site.model_fields) == set(RoutedSite.model_fields) | OF_OTHERS
+
+
+@pytest.mark.parametrize("more", ['[rooter]\nlisten = ["tcp/127.0.0.1:7450"]', "[router]\nlisten = 3", "[[["])
+def test_what_is_wrong_in_a_routers_part_is_left_to_who_says_it_in_words(tmp_path, more):
+    path = tmp_path / "site.toml"
+    path.write_text(f'site = "plant"\n{more}\n')
+    assert read_routed(path) is None
+    with pytest.raises(SiteFileError):
+        site.load(path)

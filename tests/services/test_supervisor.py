@@ -35,9 +35,59 @@ def test_a_needed_program_that_cannot_start_ends_all_and_another_does_not():
     with pytest.raises(CouldNotStartError, match="wrong could not start"):
         run(main(needed=True))
     assert "wrong | robomesh: nobody: no such robot" in log[0]
-    with pytest.raises(TimeoutError):
-        run(main(needed=False), timeout_s=3.0)
-    assert log[-1] == "wrong | could not start; everything else runs without it"
+    log.clear()
+
+    async def without_it():
+        task = asyncio.create_task(main(needed=False))
+        while "wrong | could not start; everything else runs without it" not in log:
+            await asyncio.sleep(0.02)
+        assert not task.done()
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+    run(without_it())
+
+
+def test_what_is_wanted_comes_what_is_not_any_more_goes_and_the_rest_stays():
+    wanted, log = {}, []
+
+    def group(name):
+        arguments = ("simulate", "--listen", "127.0.0.1:0")
+        return lambda: [Program(name=name, arguments=arguments, needed=False)]
+
+    async def until(condition):
+        while not condition():
+            await asyncio.sleep(0.02)
+
+    def told(name, words):
+        return sum(line.startswith(name) and words in line for line in list(log))
+
+    async def steps():
+        wanted["one"] = group("one")
+        await until(lambda: told("one", "listening"))
+        wanted["two"] = group("two")
+        await until(lambda: told("two", "listening"))
+        del wanted["one"]
+        wanted["one anew"] = group("one")
+        await until(lambda: told("one", "listening") == 2)
+        assert told("two", "listening") == 1
+        assert not told("one", "ended"), "it was ended, it did not end"
+
+    async def main():
+        supervising = asyncio.create_task(
+            supervise(
+                [Program(name="rest", arguments=("simulate", "--listen", "127.0.0.1:0"))],
+                ready=lambda: asyncio.Event().wait(),
+                write=log.append,
+                following=lambda: dict(wanted),
+            )
+        )
+        await steps()
+        supervising.cancel()
+        await asyncio.gather(supervising, return_exceptions=True)
+        assert told("rest", "listening") == 1
+
+    run(main())
 
 
 def test_a_held_terminal_holds_no_service():

@@ -2,31 +2,69 @@
 
 import { signal } from "@preact/signals";
 import type { ComponentType } from "preact";
-import { useEffect } from "preact/hooks";
-import { held, release, stop, stopNotice } from "./control";
-import { Fleet, fleetRobots } from "./fleet";
+import { useEffect, useRef } from "preact/hooks";
+import { mustSignIn } from "./account/account";
+import { AccountMenu } from "./account/menu";
+import { SignIn } from "./account/sign-in";
+import { a } from "./account/texts";
+import { held, release } from "./control";
+import { AlarmBadge } from "./events/badge";
+import { Fleet } from "./fleet/fleet";
+import { fleetRobots } from "./fleet/known";
 import { timeOfDay } from "./format";
 import { hello, lostAt } from "./mesh";
 import { NoticeLine } from "./parts";
-import { route } from "./route";
-import type { RobotName } from "./route";
+import { defined, isReplay, plain, programming, recorded, robotLink, route, walled } from "./route";
+import { stop, stopNotice } from "./stop";
 import { language, switchLanguage, t } from "./texts";
 import { switchTheme, theme } from "./theme";
 
-// The robot's page brings three.js: the fleet does not wait for it.
-const robotPage = signal<ComponentType<RobotName> | null>(null);
+/** A page that is loaded when it is first shown. */
+function onDemand<Props>(load: () => Promise<ComponentType<Props>>) {
+  const loaded = signal<ComponentType<Props> | null>(null);
+  return function OnDemand(props: Props & object) {
+    useEffect(() => {
+      if (!loaded.value) void load().then((page) => (loaded.value = page));
+    }, []);
+    const Page = loaded.value;
+    return Page && <Page {...props} />;
+  };
+}
+
+// The robot's page brings three.js: the fleet's words do not wait for it.
+const Robot = onDemand(async () => (await import("./robot")).Robot);
+const Program = onDemand(async () => (await import("./program/program")).Program);
+const Define = onDemand(async () => (await import("./define/define")).Define);
+const Wall = onDemand(async () => (await import("./wall/wall")).Wall);
+const Recordings = onDemand(async () => (await import("./recordings/recordings")).Recordings);
+const Events = onDemand(async () => (await import("./events/events")).Events);
+const Settings = onDemand(async () => (await import("./settings/settings")).Settings);
+
+const PAGES = ["fleet", "wall", "recordings", "define", "events", "settings"] as const;
+type Place = (typeof PAGES)[number] | "program" | "robot";
+
+function place(): Place {
+  if (programming.value && !(route.value && isReplay(route.value.robot))) return "program";
+  if (route.value) return "robot";
+  if (plain.value) return plain.value;
+  if (defined.value !== null) return "define";
+  if (walled.value) return "wall";
+  return recorded.value ? "recordings" : "fleet";
+}
 
 export function App() {
   const shown = route.value;
   const key = shown ? `robomesh/${shown.site}/${shown.robot}` : null;
-  useEffect(() => {
-    document.title = shown ? `${shown.robot} · robomesh` : "robomesh";
-    if (shown && !robotPage.value) void import("./robot").then((module) => (robotPage.value = module.Robot));
-    return () => void release(); // control does not outlive the page it was taken on
-  }, [key]);
+  const replay = shown !== null && isReplay(shown.robot);
+  const at = place();
+  // Control does not outlive the robot's pages; between them it stays.
+  useEffect(() => () => void release(), [key]);
+  const page = at === "fleet" || at === "robot" ? "" : t(at);
+  const what = [shown?.robot, page].filter(Boolean).join(" · ");
+  useEffect(() => void (document.title = what ? `${what} · robomesh` : "robomesh"), [what]);
   useStopKey();
-  const Robot = robotPage.value;
-  const robots = key ? [key] : fleetRobots.value;
+  // Nothing of a replay is live: STOP stays that of the robots that are.
+  const robots = key && !replay ? [key] : fleetRobots.value;
   return (
     <>
       <header class="bar">
@@ -34,44 +72,100 @@ export function App() {
           <Mark />
           <span>robomesh</span>
         </a>
-        <nav class="crumbs" aria-label={t("site")}>
-          {shown ? (
-            <>
-              <a href="#/">{t("fleet")}</a>
-              <span aria-hidden="true">/</span>
-              <span class="dim">{shown.site}</span>
-              <span aria-hidden="true">/</span>
-              <strong>{shown.robot}</strong>
-            </>
-          ) : (
-            <strong>{t("fleet")}</strong>
-          )}
+        <nav class="crumbs" aria-label={t("pages")}>
+          {mustSignIn.value ? null : shown ? <Crumbs at={at} {...shown} /> : <PageLinks at={at} />}
         </nav>
         <div class="bar-end">
-          <button class="quiet" onClick={switchLanguage} title={t("language_hint")}>
+          {mustSignIn.value || <AlarmBadge />}
+          <AccountMenu />
+          <button class="quiet in-settings" onClick={switchLanguage} title={t("language_hint")}>
             {t("language")}
           </button>
           <button
-            class="quiet"
+            class="quiet in-settings"
             onClick={switchTheme}
             title={t("theme_hint", { theme: t(theme.value === "dark" ? "theme_dark" : "theme_light") })}
           >
             {t(theme.value === "dark" ? "theme_light" : "theme_dark")}
           </button>
         </div>
-        <StopButton robots={robots} />
+        <StopButton robots={mustSignIn.value ? [] : robots} />
       </header>
       <Banners />
       <main lang={language.value === "zh" ? "zh-Hans" : "en"}>
-        {shown ? Robot && <Robot key={key ?? ""} {...shown} /> : <Fleet />}
+        {mustSignIn.value ? (
+          <SignIn />
+        ) : at === "program" ? (
+          <Program shown={shown} />
+        ) : shown ? (
+          <Robot key={key ?? ""} {...shown} />
+        ) : at === "define" ? (
+          <Define name={defined.value ?? ""} />
+        ) : at === "wall" ? (
+          <Wall chosen={walled.value ?? []} />
+        ) : at === "recordings" ? (
+          <Recordings shown={recorded.value ?? []} />
+        ) : at === "events" ? (
+          <Events />
+        ) : at === "settings" ? (
+          <Settings />
+        ) : (
+          <Fleet />
+        )}
       </main>
     </>
   );
 }
 
+function Crumbs({ at, site, robot }: { at: Place; site: string; robot: string }) {
+  return (
+    <>
+      <a href="#/">{t("fleet")}</a>
+      <span aria-hidden="true">/</span>
+      <span class="dim">{site}</span>
+      <span aria-hidden="true">/</span>
+      {at === "program" ? (
+        <>
+          <a href={robotLink(site, robot)}>{robot}</a>
+          <span aria-hidden="true">/</span>
+          <strong>{t("program")}</strong>
+        </>
+      ) : (
+        <strong>{robot}</strong>
+      )}
+    </>
+  );
+}
+
+/** The pages, in a row; where that has no place, in a menu that names the one that is shown. */
+function PageLinks({ at }: { at: Place }) {
+  const menu = useRef<HTMLDetailsElement>(null);
+  const close = () => menu.current?.removeAttribute("open");
+  const links = () =>
+    PAGES.map((page) => (
+      <a
+        key={page}
+        href={page === "fleet" ? "#/" : `#/${page}`}
+        aria-current={page === at ? "page" : undefined}
+        onClick={close}
+      >
+        {t(page)}
+      </a>
+    ));
+  return (
+    <>
+      <span class="page-links">{links()}</span>
+      <details ref={menu} class="page-menu" onKeyDown={(event) => event.key === "Escape" && close()}>
+        <summary>{t(at === "robot" ? "fleet" : at)}</summary>
+        <div>{links()}</div>
+      </details>
+    </>
+  );
+}
+
 function StopButton({ robots }: { robots: readonly string[] }) {
-  const one = route.value !== null;
-  const robot = route.value?.robot ?? "";
+  const robot = route.value && !isReplay(route.value.robot) ? route.value.robot : "";
+  const one = robot !== "";
   return (
     <div class="stop-place">
       {stopNotice.value && (
@@ -86,7 +180,7 @@ function StopButton({ robots }: { robots: readonly string[] }) {
         class="stop"
         disabled={robots.length === 0}
         onClick={() => void stop(robots)}
-        title={one ? t("stop_hint", { robot }) : t("stop_all_hint")}
+        title={mustSignIn.value ? a("no_stop") : one ? t("stop_hint", { robot }) : t("stop_all_hint")}
       >
         <span class="stop-shape" aria-hidden="true" />
         <span>{t(one ? "stop" : "stop_all")}</span>
@@ -100,7 +194,8 @@ function StopButton({ robots }: { robots: readonly string[] }) {
 function useStopKey(): void {
   useEffect(() => {
     const isTyping = (target: EventTarget | null) =>
-      target instanceof HTMLInputElement && ["text", "search"].includes(target.type);
+      target instanceof HTMLTextAreaElement ||
+      (target instanceof HTMLInputElement && ["text", "search", "password"].includes(target.type));
     const onKey = (event: KeyboardEvent) => {
       const mine = held.value;
       if (event.code !== "Space" || !mine || isTyping(event.target)) return;
@@ -119,6 +214,7 @@ function useStopKey(): void {
 
 function Banners() {
   const lost = lostAt.value;
+  if (mustSignIn.value) return null; // what there is to say stands there
   return (
     <div class="banners">
       {lost === 0 && <div class="banner connecting">{t("connecting")}</div>}
@@ -137,7 +233,7 @@ function Banners() {
       {hello.value?.insecure && (
         <div class="banner warning">
           <span class="shape warning" aria-hidden="true" />
-          {t("insecure")}
+          {hello.value.account ? a("insecure_signed_in") : t("insecure")}
         </div>
       )}
     </div>

@@ -1,82 +1,136 @@
-// The renderer's picture of the robot: video where the browser decodes it, stills where not.
+// The renderer's picture of the robot: a view of the description's, or what the 3-D view shows.
 
-import { fromBinary } from "@bufbuild/protobuf";
 import { useEffect, useRef, useState } from "preact/hooks";
-import { CompressedImageSchema } from "./gen/foxglove/CompressedImage_pb";
-import type { Description } from "./gen/robomesh_pb";
-import { watch } from "./mesh";
-import { Age, Choice, Panel, Toggle } from "./parts";
-import { viewsOf, viewText } from "./scene-view";
-import { t } from "./texts";
-import { isStale, now } from "./topics";
-import { decodesVideo, playVideo } from "./video";
+import { clock } from "./format";
+import type { Description, View } from "./gen/robomesh_pb";
+import { useLive } from "./live";
+import { standing } from "./own-view";
+import type { Wanted } from "./own-view";
+import { Age, Panel } from "./parts";
+import { viewsOf } from "./scene-view";
+import { isFar, reachOf } from "./reach";
+import { saveBlob, saveStill, useRecording } from "./take-away";
+import { t, viewText } from "./texts";
+
+/** Where the video stands: beside the 3-D view, in its corner, or in its place. */
+export type VideoPlace = "beside" | "inset" | "large";
+const PLACES: readonly VideoPlace[] = ["beside", "inset", "large"];
+
+/** The renderer has it of every robot: it follows the arm. */
+const CLOSE = "close";
+const OWN = "own";
+/** Small, and few bits: for slow links. */
+const FAR = "far";
+const OWN_SIZE = { width: 960, height: 540, fps: 30 };
+const LOOK_EACH_MS = 300;
 
 export function Camera(props: {
   robotKey: string;
   description: Description | undefined;
-  /** Whether it has the large place, and the 3-D view the small one. */
-  large: boolean;
-  setLarge: (large: boolean) => void;
+  place: VideoPlace;
+  setPlace: (place: VideoPlace) => void;
+  /** What the 3-D view shows now; null: there is none. */
+  sceneView: () => View | null;
 }) {
   const { robotKey, description } = props;
-  const [view, setView] = useState("front");
-  const names = viewsOf(description).map((each) => each.name);
+  const far = reachOf(robotKey) === "slow";
+  const [chosen, setView] = useState("");
+  const view = chosen || (far ? FAR : "front");
+  const names = [...new Set([...viewsOf(description).map((each) => each.name), CLOSE, ...(isFar(robotKey) ? [FAR] : []), OWN])];
   const shown = names.includes(view) ? view : (names[0] ?? "free");
-  const [video, setVideo] = useState(decodesVideo);
+  const own = useOwnView(shown === OWN, props.sceneView);
+  const wanted: Wanted | null = shown !== OWN ? standing(shown) : own && { of: OWN, view: own, ...OWN_SIZE };
+  const live = useLive(robotKey, wanted, viewText(shown));
+  const picture = useRef<HTMLDivElement>(null);
+  const [, site = "", robot = ""] = robotKey.split("/");
+  const name = `${robot}-${shown}`;
+  const recording = useRecording(`/video/${site}/${robot}/${shown}.mp4`, `${name}.mp4`);
   const [problem, setProblem] = useState("");
-  // undefined: no picture yet.
-  const [drawn] = useState<{ newAt: number | null | undefined }>({ newAt: undefined });
-  const [any, setAny] = useState(false);
-  const canvas = useRef<HTMLCanvasElement>(null);
-  const [still, setStill] = useState<string | null>(null);
-
-  useEffect(() => {
-    drawn.newAt = undefined;
-    setAny(false);
-    setProblem("");
-    const saw = (newAt: number | null) => {
-      drawn.newAt = newAt;
-      setAny(true);
-    };
-    if (video && canvas.current) {
-      return playVideo(`${robotKey}/video/${shown}`, canvas.current, {
-        drawn: saw,
-        failed: (text) => {
-          setProblem(t("camera_failed", { text }));
-          setVideo(false);
-        },
-      });
-    }
-    return watch(`${robotKey}/image/${shown}`, (sample) => {
-      const { data, format } = fromBinary(CompressedImageSchema, sample.payload);
-      const blob = new Blob([data as Uint8Array<ArrayBuffer>], { type: `image/${format || "jpeg"}` });
-      setStill((old) => (old && URL.revokeObjectURL(old), URL.createObjectURL(blob)));
-      saw(sample.newAt);
-    });
-  }, [robotKey, shown, video]);
-
-  const at = now.value; // read in any case: it is what draws this panel again
-  const age = drawn.newAt == null ? null : Math.max(0, (at - drawn.newAt) / 1000);
-  const stale = any && isStale("video/*", age);
+  const keep = () =>
+    saveStill(live.place.current).then(
+      (blob) => (setProblem(""), saveBlob(blob, `${name}.png`)),
+      (error: Error) => setProblem(t("record_failed", { text: error.message })),
+    );
+  const words = problem || recording.problem || live.problem || (live.video ? "" : t("camera_still"));
   return (
     <Panel
       name="camera"
       title={t("camera")}
       end={
         <>
-          <Age stale={stale} age={age} />
-          <Choice label={t("view")} values={names} chosen={shown} text={viewText} choose={setView} />
-          <Toggle on={props.large} set={props.setLarge}>
-            {t("enlarge")}
-          </Toggle>
+          {live.step > 0 && (
+            <span class="reduced" title={t("reduced_hint")}>
+              {t("reduced")}
+            </span>
+          )}
+          <Age stale={live.stale} age={live.age} />
+          <select aria-label={t("view")} value={shown} onChange={(event) => setView(event.currentTarget.value)}>
+            {names.map((each) => (
+              <option key={each} value={each}>
+                {viewText(each)}
+              </option>
+            ))}
+          </select>
+          <select
+            class="video-place"
+            aria-label={t("video_place")}
+            value={props.place}
+            onChange={(event) => props.setPlace(event.currentTarget.value as VideoPlace)}
+          >
+            {PLACES.map((each) => (
+              <option key={each} value={each}>
+                {t(`video_${each}`)}
+              </option>
+            ))}
+          </select>
         </>
       }
     >
-      <div class={`picture ${stale ? "stale" : ""}`}>
-        {video ? <canvas ref={canvas} data-drawn={any} /> : still && <img src={still} alt={viewText(shown)} />}
-        {!any && <p class="picture-word dim">{t("camera_waiting", { view: viewText(shown) })}</p>}
+      <div ref={picture} class={`picture ${live.stale ? "stale" : ""}`}>
+        {live.picture}
+        {!live.any && <p class="picture-word dim">{t("camera_waiting", { view: viewText(shown) })}</p>}
+        <div class="picture-tools">
+          <button class="quiet" disabled={!live.any} onClick={() => void keep()}>
+            {t("save_still")}
+          </button>
+          {shown !== OWN && (
+            <button class="quiet" aria-pressed={recording.on} disabled={!live.any} onClick={recording.toggle}>
+              {recording.on ? t("recording_video", { time: clock(recording.seconds) }) : t("record_video")}
+            </button>
+          )}
+          <button class="quiet" onClick={() => void toggleFull(picture.current)}>
+            {t("full_screen")}
+          </button>
+        </div>
       </div>
-      {!video && <p class="footnote dim">{problem || t("camera_still")}</p>}
+      {words && <p class="footnote dim">{words}</p>}
     </Panel>
   );
+}
+
+function toggleFull(element: HTMLElement | null): Promise<void> | undefined {
+  return document.fullscreenElement ? document.exitFullscreen() : element?.requestFullscreen();
+}
+
+/** What the 3-D view shows, once it has come to rest: each new view is a new stream of the renderer's. */
+function useOwnView(on: boolean, sceneView: () => View | null): View | null {
+  const [view, setView] = useState<View | null>(null);
+  const look = useRef(sceneView);
+  look.current = sceneView;
+  useEffect(() => {
+    if (!on) return;
+    let before = "";
+    let settled = "";
+    const timer = setInterval(() => {
+      const next = look.current();
+      const identity = next ? [next.eye, next.target].flatMap((p) => [p?.x, p?.y, p?.z].map((v) => v?.toFixed(3))).join() : "";
+      if (next && identity === before && identity !== settled) {
+        settled = identity;
+        setView(next);
+      }
+      before = identity;
+    }, LOOK_EACH_MS);
+    return () => clearInterval(timer);
+  }, [on]);
+  return view;
 }

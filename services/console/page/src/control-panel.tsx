@@ -1,15 +1,21 @@
 // Who controls the robot, and the commands of whoever does.
 
-import { useState } from "preact/hooks";
-import { Command, command, controlNotice, holds, operator, release, setOperator, take } from "./control";
-import type { CommandValues } from "./control";
-import { fixed, stampFull } from "./format";
-import { stopText } from "./robot-state";
+import { onlyWatches } from "./account/account";
+import { mayNotCommand } from "./account/no-control";
+import { Command, command } from "./command";
+import type { CommandValues } from "./command";
+import { controlNotice, holds } from "./control";
 import { ControllerState_Activity as Activity, ControllerState_Known as Known } from "./gen/robomesh_pb";
-import type { ControllerState, Lease } from "./gen/robomesh_pb";
+import type { ControllerState, Description, Lease } from "./gen/robomesh_pb";
+import { useNoticeEnd } from "./notice-end";
+import type { Motion } from "./notice-end";
 import { NoticeLine, Panel } from "./parts";
+import { stoppedByItself, whyNoMotion } from "./robot-state";
+import { Speed } from "./speed";
+import { Stopped } from "./stopped";
 import { t } from "./texts";
 import type { Latest } from "./topics";
+import { Holder, WhoControls } from "./who-controls";
 
 export function ControlPanel(props: {
   robotKey: string;
@@ -17,152 +23,70 @@ export function ControlPanel(props: {
   /** Who is in control, empty: nobody, null: not known. */
   holder: string | null;
   lease: Lease | undefined;
+  description: Description | undefined;
+  motion: Motion;
+  disobeyed: boolean;
 }) {
   const { robotKey, holder } = props;
   const state = props.controller?.message;
   const mine = holds(robotKey);
-  const stopped = state?.stop;
-  const can = mine && !stopped && !state?.readOnly;
-  const send = (name: Command, what: string, values?: CommandValues) => void command(robotKey, name, what, values);
+  const why = whyNoMotion(state);
+  const canMove = mine && !why;
+  const canSend = mine && !state?.stop && !state?.readOnly;
+  const send = (name: Command, what: string, values?: CommandValues, positions?: number[]) =>
+    void command(robotKey, name, what, values, undefined, positions);
+  const home = () => send(Command.HOME, t("home"), {}, props.description?.joints.map((joint) => joint.home));
+  useNoticeEnd(controlNotice.value, (notice) => (controlNotice.value = notice), props.motion);
   const holding = state?.activity === Activity.HOLDING;
   const tracing = state?.trace === Known.YES;
   return (
     <Panel
       name={`control ${mine ? "mine" : ""}`}
       title={t("control")}
-      end={<Holder mine={mine} holder={holder} lease={props.lease} />}
+      end={<Holder robotKey={robotKey} holder={holder} lease={props.lease} />}
     >
-      <div class="take-row">
-        <label class="operator">
-          <span class="dim">{t("operator")}</span>
-          <input
-            type="text"
-            name="operator"
-            autocomplete="username"
-            spellcheck={false}
-            maxLength={40}
-            placeholder={t("operator")}
-            title={t("operator_hint")}
-            value={operator.value}
-            disabled={mine}
-            onInput={(event) => setOperator(event.currentTarget.value)}
-            onKeyDown={(event) => event.key === "Enter" && void take(robotKey)}
-          />
-        </label>
-        {mine ? (
-          <button class="action wide" onClick={() => void release()}>
-            {t("release")}
+      <WhoControls robotKey={robotKey} holder={holder} lease={props.lease} readOnly={state?.readOnly ?? false} />
+      {onlyWatches.value || (
+        <div class="command-row">
+          <button class="action" disabled={!canMove} title={mine ? why : ""} onClick={home}>
+            {t("home")}
           </button>
-        ) : (
-          <button class="action primary wide" onClick={() => void take(robotKey)} disabled={state?.readOnly ?? false}>
-            {t("take")}
-          </button>
-        )}
-      </div>
-      <div class="command-row">
-        <button class="action" disabled={!can} onClick={() => send(Command.HOME, t("home"))}>
-          {t("home")}
-        </button>
-        {holding ? (
-          <button class="action primary" disabled={!can} onClick={() => send(Command.RESUME, t("resume"))}>
-            {t("resume")}
-          </button>
-        ) : (
-          <button class="action" disabled={!can} onClick={() => send(Command.HOLD, t("hold"))}>
-            {t("hold")}
-          </button>
-        )}
-        <button
-          class="action"
-          disabled={!mine || state?.readOnly}
-          aria-pressed={tracing}
-          onClick={() =>
-            tracing ? send(Command.TRACE_OFF, t("trace_off")) : send(Command.TRACE_ON, t("trace_on"))
-          }
-        >
-          {t(tracing ? "trace_off" : "trace_on")}
-        </button>
-      </div>
-      {stopped ? (
-        <div class="stopped">
-          <div>
-            <strong>
-              <span class="shape alarm" aria-hidden="true" />
-              <span title={stampFull(stopped.since)}>
-                {stopText(stopped)}
-              </span>
-            </strong>
-            <p>
-              {!stopped.sent && `${t("stopped_unsent")} `}
-              {stopped.reason && stopped.reason !== "console" && `${stopped.reason}. `}
-              {t("reset_needs")}
-            </p>
-          </div>
+          {holding ? (
+            <button class="action primary" disabled={!canMove} onClick={() => send(Command.RESUME, t("resume"))}>
+              {t("resume")}
+            </button>
+          ) : (
+            <button class="action" disabled={!canSend} onClick={() => send(Command.HOLD, t("hold"))}>
+              {t("hold")}
+            </button>
+          )}
           <button
             class="action"
-            disabled={!mine}
-            title={mine ? "" : t("reset_take")}
-            onClick={() => send(Command.RESET, t("reset", { id: String(stopped.id) }), { stopId: stopped.id })}
+            disabled={!mine || state?.readOnly}
+            aria-pressed={tracing}
+            onClick={() =>
+              tracing ? send(Command.TRACE_OFF, t("trace_off")) : send(Command.TRACE_ON, t("trace_on"))
+            }
           >
-            {t("reset", { id: String(stopped.id) })}
+            {t(tracing ? "trace_off" : "trace_on")}
           </button>
         </div>
-      ) : (
-        <Speed
-          enabled={can}
-          send={(value) => command(robotKey, Command.SPEED, t("what_speed", { value }), { speedPercent: value })}
-        />
       )}
-      <NoticeLine notice={controlNotice.value} idle={state?.readOnly ? t("read_only_text") : mine ? "" : t("take_first")} />
-    </Panel>
-  );
-}
-
-function Holder({ mine, holder, lease }: { mine: boolean; holder: string | null; lease: Lease | undefined }) {
-  if (mine) {
-    return (
-      <span class="holder mine">
-        <span class="shape mine" aria-hidden="true" />
-        {t("in_control")}
-      </span>
-    );
-  }
-  if (holder === null) return <span class="holder dim">{t("holder_unknown")}</span>;
-  return (
-    <span class="holder" title={holder ? stampFull(lease?.since) : ""}>
-      {holder ? t("somebody", { name: holder }) : t("nobody")}
-    </span>
-  );
-}
-
-/** The speed to ask for; a range sends on release, by pointer or by Enter. The controller does not tell its own. */
-function Speed({ enabled, send }: { enabled: boolean; send: (percent: number) => Promise<boolean> }) {
-  const [sent, setSent] = useState<number | null>(null);
-  const [unsent, setUnsent] = useState<number | null>(null);
-  const percent = unsent ?? sent;
-  const release = () => {
-    setUnsent(null);
-    if (unsent !== null && enabled) void send(unsent).then((accepted) => accepted && setSent(unsent));
-  };
-  return (
-    <label class={`speed ${percent === null ? "unset" : ""}`}>
-      <span class="dim">{t("speed")}</span>
-      <input
-        type="range"
-        min={1}
-        max={100}
-        step={1}
-        value={percent ?? 100}
-        disabled={!enabled}
-        title={t("speed_hint")}
-        aria-valuetext={percent === null ? t("speed_unset") : `${percent} %`}
-        onInput={(event) => setUnsent(Number(event.currentTarget.value))}
-        onPointerUp={release}
-        onPointerCancel={() => setUnsent(null)}
-        onBlur={() => setUnsent(null)}
-        onKeyDown={(event) => event.key === "Enter" && release()}
+      {state && (state.stop || stoppedByItself(state)) ? (
+        <Stopped state={state} mine={mine} disobeyed={props.disobeyed} send={send} />
+      ) : (
+        onlyWatches.value || (
+          <Speed
+            percent={state?.speedPercent}
+            enabled={canSend}
+            send={(value) => command(robotKey, Command.SPEED, t("what_speed", { value }), { speedPercent: value })}
+          />
+        )
+      )}
+      <NoticeLine
+        notice={controlNotice.value}
+        idle={state?.readOnly ? why : !mine ? (mayNotCommand() ? "" : t("take_first")) : state?.stop ? "" : why || t("taken")}
       />
-      <span class="value">{percent === null ? t("speed_unset") : `${fixed(percent, 0)}\u202f%`}</span>
-    </label>
+    </Panel>
   );
 }

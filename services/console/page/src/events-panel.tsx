@@ -1,32 +1,40 @@
-// What happened to the robot, and who asked what of it, newest first.
+// What happened to the robot, who asked what of it, newest first, and how its link does.
 
 import { useState } from "preact/hooks";
-import { stampFull, stampTime } from "./format";
+import { count, stampFull, stampTime } from "./format";
 import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "./gen/robomesh_pb";
-import type { AuditEntry, Event } from "./gen/robomesh_pb";
+import type { AuditEntry, ControllerState, Event } from "./gen/robomesh_pb";
+import { LinkFacts } from "./link-facts";
 import { Choice, Panel } from "./parts";
 import { t } from "./texts";
 import type { TextName } from "./texts";
-import { useAudit, useEvents } from "./topics";
+import { useAudit } from "./topics";
+import type { Latest } from "./topics";
 
-const SEVERITIES: Partial<Record<Severity, [TextName, string]>> = {
+export const SEVERITIES: Partial<Record<Severity, [TextName, string]>> = {
   [Severity.DEBUG]: ["severity_debug", "normal"],
   [Severity.INFO]: ["severity_info", "normal"],
   [Severity.WARNING]: ["severity_warning", "warning"],
   [Severity.ERROR]: ["severity_error", "alarm"],
   [Severity.CRITICAL]: ["severity_critical", "alarm"],
 };
-const OUTCOMES: Partial<Record<Outcome, [TextName, string]>> = {
+export const OUTCOMES: Partial<Record<Outcome, [TextName, string]>> = {
   [Outcome.ACCEPTED]: ["outcome_accepted", "normal"],
   [Outcome.REFUSED]: ["outcome_refused", "warning"],
   [Outcome.FAILED]: ["outcome_failed", "alarm"],
 };
 
-export function EventsPanel({ robotKey }: { robotKey: string }) {
-  const [shown, setShown] = useState<"events" | "requests">("events");
-  const events = useEvents(`${robotKey}/events`);
-  const audit = useAudit(`${robotKey}/audit`);
-  const list = shown === "events" ? events : audit;
+const SHOWN = ["events", "requests", "link"] as const;
+
+export function EventsPanel(props: {
+  robotKey: string;
+  events: readonly Event[];
+  controller: Latest<ControllerState> | undefined;
+}) {
+  const { robotKey, events } = props;
+  const [shown, setShown] = useState<(typeof SHOWN)[number]>("events");
+  const audit = useAudit(robotKey);
+  const empty = (shown === "events" ? events : audit).length === 0;
   return (
     <Panel
       name="events"
@@ -34,23 +42,27 @@ export function EventsPanel({ robotKey }: { robotKey: string }) {
       end={
         <Choice
           label={t("events")}
-          values={["events", "requests"] as const}
+          values={SHOWN}
           chosen={shown}
           text={(each) => t(each)}
           choose={setShown}
         />
       }
     >
-      <ol class="event-list" tabIndex={0} aria-label={t(shown)}>
-        {list.length === 0 && <li class="dim">{t("no_events")}</li>}
-        {shown === "events" ? events.map(EventLine) : audit.map(AuditLine)}
-      </ol>
+      {shown === "link" ? (
+        <LinkFacts controller={props.controller} />
+      ) : (
+        <ol class="event-list" tabIndex={0} aria-label={t(shown)}>
+          {empty && <li class="dim">{t("no_events")}</li>}
+          {shown === "events" ? events.map(EventLine) : audit.map(AuditLine)}
+        </ol>
+      )}
     </Panel>
   );
 }
 
 /** A word that asks to be looked at; what is as it should be has no shape. */
-function Mark({ word, level }: { word: TextName; level: string }) {
+export function Mark({ word, level }: { word: TextName; level: string }) {
   return (
     <span class={`mark state ${level}`}>
       {level !== "normal" && <span class={`shape ${level}`} aria-hidden="true" />}
@@ -66,10 +78,28 @@ function EventLine(event: Event) {
       <time>{stampTime(event.timestamp)}</time>
       <span class="event-text">
         {level !== "normal" && <Mark word={word} level={level} />}
-        {event.text}
+        <span lang="en">{eventText(event)}</span>
       </span>
     </li>
   );
+}
+
+/** The page's own words for what people meet most; the gateway's for the rest. */
+export function eventText({ code, text, values }: Event): string {
+  const by = values["by"] ?? "";
+  const reason = values["reason"];
+  switch (code) {
+    case "stop.latched": {
+      const said = t(values["sent"] === "True" ? "event_stop" : "event_stop_unsent", { by });
+      return reason && reason !== "console" ? `${said} ${reason}` : said;
+    }
+    case "stop.sent":
+      return t("event_stop_sent");
+    case "stop.reset":
+      return t("event_stop_reset");
+    default:
+      return text;
+  }
 }
 
 function AuditLine(entry: AuditEntry) {
@@ -80,8 +110,12 @@ function AuditLine(entry: AuditEntry) {
       <span class="event-text">
         <Mark word={word} level={level} />
         <strong>{entry.operator || entry.source}</strong> {entry.request}
-        {entry.text && `: ${entry.text}`}
-        {entry.repeatedCount > 0n && ` (${t("repeated", { count: String(entry.repeatedCount) })})`}
+        {entry.repeatedCount > 0n && (
+          <strong class="repeated" title={t("repeated", { count: count(entry.repeatedCount) })}>
+            {` × ${count(entry.repeatedCount)}`}
+          </strong>
+        )}
+        {entry.text && <span lang="en">{`: ${entry.text}`}</span>}
       </span>
     </li>
   );

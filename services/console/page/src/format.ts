@@ -7,6 +7,7 @@ import type { Description_Joint } from "./gen/robomesh_pb";
 import { t } from "./texts";
 
 const DEGREES = 180 / Math.PI;
+const UPRIGHT = 1e-6; // the cosine of a pitch so near to 90 degrees is noise
 export const DASH = "–";
 
 /** A number with fixed decimals; a figure-wide minus. */
@@ -14,6 +15,11 @@ export function fixed(value: number | undefined, decimals: number): string {
   if (value === undefined || !Number.isFinite(value)) return DASH;
   const text = value.toFixed(decimals);
   return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
+}
+
+/** A whole number with its thousands apart: 4,312. */
+export function count(value: number | bigint): string {
+  return value.toLocaleString("en-GB");
 }
 
 export const toDegrees = (radians: number): number => radians * DEGREES;
@@ -49,6 +55,12 @@ export function staleText(age: number | null): string {
   return age === null ? t("stale_unknown") : t("stale_for", { age: ageText(age) });
 }
 
+/** A duration as a clock shows it: 00:12, 61:03. */
+export function clock(seconds: number): string {
+  const whole = Math.floor(seconds);
+  return [Math.floor(whole / 60), whole % 60].map((part) => String(part).padStart(2, "0")).join(":");
+}
+
 /** Local time of day, to the second. */
 export function timeOfDay(ms: number): string {
   return new Date(ms).toLocaleTimeString("en-GB", { hour12: false });
@@ -67,9 +79,13 @@ export function stampFull(stamp: Timestamp | undefined): string {
   return stamp ? fullTime(timestampMs(stamp)) : "";
 }
 
-/** Roll, pitch, yaw [rad] (about fixed x, y, z) of a 4x4 placement, by rows. */
+/** Roll, pitch, yaw [rad] (about fixed x, y, z) of a 4x4 placement, by rows.
+ *
+ * Straight up or down only roll and yaw together are known: then yaw is 0. */
 export function rollPitchYaw(m: readonly number[]): [number, number, number] {
-  const [r11, , , , r21, , , , r31, r32, r33] = m as unknown as number[] & { length: 16 };
-  const pitch = Math.atan2(-(r31 ?? 0), Math.hypot(r11 ?? 1, r21 ?? 0));
-  return [Math.atan2(r32 ?? 0, r33 ?? 1), pitch, Math.atan2(r21 ?? 0, r11 ?? 1)];
+  const [r11 = 1, , , , r21 = 0, r22 = 1, r23 = 0, , r31 = 0, r32 = 0, r33 = 1] = m;
+  const level = Math.hypot(r11, r21);
+  const pitch = Math.atan2(-r31, level);
+  if (level < UPRIGHT) return [Math.atan2(-r23, r22), pitch, 0];
+  return [Math.atan2(r32, r33), pitch, Math.atan2(r21, r11)];
 }

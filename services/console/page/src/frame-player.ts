@@ -14,11 +14,13 @@ interface Keyed {
 
 const BEHIND_MS = 60;
 const KEPT = 12;
+const GAP_MS = 1000; // of source time as it passes here
 
 /** Frames as they come, placements as they are drawn. */
 export class FramePlayer {
   private readonly frames: Keyed[] = [];
-  private skew = Number.POSITIVE_INFINITY; // page's clock minus source clock, of the least delayed frame, ms
+  private skew = Number.POSITIVE_INFINITY; // page's clock minus source clock as it passes here, of the least delayed frame, ms
+  private rate = 1;
   private readonly placements = new Map<string, THREE.Matrix4>();
   private settled = false;
   private shownTime = Number.NEGATIVE_INFINITY; // source time of what was told last, ms
@@ -26,16 +28,37 @@ export class FramePlayer {
 
   add(message: FrameTransforms, sourceTime: number, arrived: number): void {
     const newest = this.frames.at(-1);
-    if (newest && (sourceTime <= newest.time || sourceTime - newest.time > 1000)) {
-      this.frames.length = 0; // a new publisher, or a long gap: no motion is made up between
-      this.skew = Number.POSITIVE_INFINITY;
-      this.passedTime = Number.NEGATIVE_INFINITY;
+    const early = arrived - sourceTime / this.rate;
+    if (newest && (sourceTime <= newest.time || sourceTime - newest.time > GAP_MS * Math.max(1, this.rate))) {
+      this.begin(); // a new publisher, a replay that goes elsewhere, or a long gap: no motion is made up between
     }
+    // A replay that stood still: from now on, its frames are as much later.
+    if (early - this.skew > GAP_MS) this.skew = early;
     this.frames.push({ time: sourceTime, poses: inSite(message) });
     if (this.frames.length > KEPT) this.frames.shift();
     // Forgets slowly, so that clocks that drift apart do not matter.
-    this.skew = Math.min(this.skew + 0.05, arrived - sourceTime);
+    this.skew = Math.min(this.skew + 0.05, early);
     this.settled = false;
+  }
+
+  /** How much faster than here time passes at the source: other than 1 in replays only. */
+  setRate(rate: number): void {
+    if (rate === this.rate) return;
+    this.rate = rate;
+    const newest = this.frames.at(-1);
+    this.begin();
+    if (newest) this.frames.push(newest);
+  }
+
+  private begin(): void {
+    this.frames.length = 0;
+    this.skew = Number.POSITIVE_INFINITY;
+    this.passedTime = Number.NEGATIVE_INFINITY;
+  }
+
+  /** Source time [ms] of what was told last. */
+  get shown(): number {
+    return this.shownTime;
   }
 
   /** Has the placements told again although nothing moved. */
@@ -56,7 +79,7 @@ export class FramePlayer {
   at(time: number): ReadonlyMap<string, THREE.Matrix4> | null {
     const newest = this.frames.at(-1);
     if (!newest || this.settled) return null;
-    const wanted = time - this.skew - BEHIND_MS;
+    const wanted = (time - this.skew - BEHIND_MS) * this.rate;
     const after = this.frames.find((frame) => frame.time >= wanted) ?? newest;
     const before = this.frames[this.frames.indexOf(after) - 1] ?? after;
     this.shownTime = Math.min(wanted, newest.time);

@@ -5,9 +5,9 @@ import { watch } from "./mesh";
 import { now } from "./topics";
 
 /** Age [s] of the newest frames; null: not known, or none yet. */
-export function useFramesAge(robotKey: string): number | null {
+export function useFramesAge(robotKey: string, topic: string): number | null {
   const [last] = useState<{ newAt: number | null }>({ newAt: null });
-  useEffect(() => watch(`${robotKey}/frames`, (sample) => (last.newAt = sample.newAt)), [robotKey]);
+  useEffect(() => watch(`${robotKey}/${topic}`, (sample) => (last.newAt = sample.newAt)), [robotKey, topic]);
   const at = now.value; // read in any case: it is what draws the view again
   return last.newAt === null ? null : Math.max(0, (at - last.newAt) / 1000);
 }

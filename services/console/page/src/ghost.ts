@@ -1,35 +1,25 @@
-// Where the arm would stand at a target that is being set: asked of the mesh, shown as a ghost.
+// What the 3-D view shows beside what is: where the arm would stand, the way of its tool, what would touch.
+//
+// Whoever sets one of these takes it away again when its page or panel goes.
 
 import { signal } from "@preact/signals";
-import { ForwardAnswerSchema, ForwardRequestSchema } from "./gen/robomesh_pb";
-import { ask } from "./mesh";
 
-/** Placements of the links in the base frame (16 numbers, by rows) at the target; null: no target. */
-export const ghost = signal<ReadonlyMap<string, readonly number[]> | null>(null);
-
-let wanted: { robotKey: string; positions: readonly number[] } | null = null;
-let asking = false;
-
-/** Shows the ghost at joint positions; null takes it away. One question at a time, the newest next. */
-export function showGhost(robotKey: string, positions: readonly number[] | null): void {
-  wanted = positions && { robotKey, positions };
-  if (!wanted) ghost.value = null;
-  else if (!asking) void askNext();
+/** A robot at joint positions [rad] or [m], in the description's order. */
+export interface Ghost {
+  robotKey: string;
+  positions: readonly number[];
 }
 
-async function askNext(): Promise<void> {
-  asking = true;
-  while (wanted) {
-    const { robotKey, positions } = wanted;
-    try {
-      const key = `${robotKey}/kinematics/forward`;
-      const request = { jointPositions: [...positions] };
-      const answer = await ask(key, ForwardRequestSchema, request, ForwardAnswerSchema, 1);
-      if (wanted) ghost.value = new Map(answer.links.map((link) => [link.name, link.placementToBase]));
-    } catch {
-      ghost.value = null; // without kinematics a target is set as well, unseen
-    }
-    if (wanted?.positions === positions) break;
-  }
-  asking = false;
+/** Where an arm would stand; null: nowhere. The view that shows that robot draws it. */
+export const ghost = signal<Ghost | null>(null);
+/** What is drawn red, as pairs of a check name it: `<robot>/<link>`, or a fixture of the cell.
+ *
+ * A link is red at its ghost; at the robot itself where both stand in the same place. */
+export const redLinks = signal<ReadonlySet<string>>(new Set());
+/** Points x, y, z of the tool's way in the robot's base frame [m]; null: none is shown. */
+export const toolPath = signal<readonly (readonly [number, number, number])[] | null>(null);
+
+/** Shows the arm's ghost at joint positions; null takes it away. */
+export function ghostAt(robotKey: string, positions: readonly number[] | null): void {
+  ghost.value = positions && { robotKey, positions };
 }

@@ -9,6 +9,7 @@ import { jointUnit } from "./format";
 import type { Description } from "./gen/robomesh_pb";
 import { watch } from "./mesh";
 import { Panel, Toggle } from "./parts";
+import { jointsTopic } from "./reach";
 import { t } from "./texts";
 import { theme } from "./theme";
 
@@ -26,6 +27,7 @@ export function History({ robotKey, description }: { robotKey: string; descripti
   const [rows] = useState<{ time: number[]; values: (number | null)[][] }>({ time: [], values: [] });
   const joints = description?.joints ?? [];
   const names = joints.map((joint) => joint.name).join(" ");
+  const topic = jointsTopic(robotKey);
   // Angles to the left, lengths, where there are any, to the right, each at its own scale.
   const units = [...new Set(joints.map((joint) => jointUnit(joint).unit))].sort().reverse();
 
@@ -34,7 +36,7 @@ export function History({ robotKey, description }: { robotKey: string; descripti
     rows.values = joints.map(() => []);
     const factors = joints.map((joint) => jointUnit(joint).factor);
     let ahead = Infinity; // this page's clock before the source's, less the quickest way here, in ms
-    return watch(`${robotKey}/joints`, (sample) => {
+    return watch(`${robotKey}/${topic}`, (sample) => {
       if (!sample.live) return;
       const early = sample.arrived - sample.sourceTime;
       if (early < ahead || early - ahead > CLOCK_SET_MS) ahead = early;
@@ -61,7 +63,7 @@ export function History({ robotKey, description }: { robotKey: string; descripti
         for (const column of rows.values) column.shift();
       }
     }
-  }, [robotKey, names]);
+  }, [robotKey, names, topic]);
 
   useEffect(() => {
     const element = place.current;

@@ -1,15 +1,20 @@
 import "@preact/signals";
 import { render } from "preact";
+import { followPerson, signedOut, whoAmI } from "./account/account";
 import { App } from "./app";
-import { releaseWhenHidden } from "./control";
-import { connect } from "./mesh";
+import { followThisTab } from "./control";
+import { keepConnected } from "./mesh";
 import { language } from "./texts";
 import { applyTheme } from "./theme";
 import "./style.css";
 
 applyTheme();
 document.documentElement.lang = language.value === "zh" ? "zh-Hans" : "en";
-releaseWhenHidden();
-connect();
+followThisTab();
+const maySee = async () => {
+  const who = await whoAmI();
+  return who && (!who.accounts || who.account !== "");
+};
+followPerson(keepConnected(maySee, signedOut));
 const root = document.getElementById("app");
 if (root) render(<App />, root);

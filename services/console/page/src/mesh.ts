@@ -5,6 +5,7 @@ import type { DescMessage, MessageInitShape, MessageShape } from "@bufbuild/prot
 import { signal } from "@preact/signals";
 import { FromPageSchema, ToPageSchema } from "./gen/robomesh_pb";
 import type { ToPage_Hello } from "./gen/robomesh_pb";
+import { lateness } from "./lateness";
 import { t } from "./texts";
 
 /** A publication as it came. Times are on this page's monotonic clock, in ms. */
@@ -19,12 +20,25 @@ export interface Sample {
   arrived: number;
   /** When it was new; null: its age is not known. */
   newAt: number | null;
+  /** Of video: how much less than was asked for, because this browser's line takes no more; 0: as asked for. */
+  step: number;
 }
 
 /** A request that was refused or not answered; the text is for people. */
-export class AskError extends Error {}
+export class AskError extends Error {
+  /** Nobody answered: it was not refused, and may even have been done. */
+  readonly noAnswer: boolean;
+
+  constructor(text: string, noAnswer: boolean) {
+    super(text);
+    this.noAnswer = noAnswer;
+  }
+}
 
 type Listener = (sample: Sample) => void;
+
+/** The console ended the session that this page belongs to; the reason says why. */
+const SIGNED_OUT = 4401;
 
 export const hello = signal<ToPage_Hello | null>(null);
 /** Keys of the liveliness tokens that are alive. */
@@ -39,8 +53,25 @@ let socket: WebSocket | null = null;
 let lastAsk = 0n;
 let retryMs = 250;
 
-/** Connects, and keeps connecting. */
-export function connect(): void {
+/** Connects, and keeps connecting.
+ *
+ * @param ready Whether whoever is here may connect now; null: the console does not answer.
+ * @param ended Told that the session is over, and why. */
+export function keepConnected(ready: () => Promise<boolean | null>, ended: (why: string) => void): () => void {
+  const again = () => {
+    setTimeout(begin, retryMs);
+    retryMs = Math.min(retryMs * 2, 2000);
+  };
+  const begin = () =>
+    void ready().then((may) => {
+      if (may) connect(again, ended);
+      else if (may === null) again();
+    });
+  begin();
+  return begin;
+}
+
+function connect(again: () => void, ended: (why: string) => void): void {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
   const opened = new WebSocket(`${scheme}://${location.host}/mesh`);
   opened.binaryType = "arraybuffer";
@@ -51,13 +82,15 @@ export function connect(): void {
     for (const expression of listeners.keys()) send({ case: "watch", value: { key: expression } });
   };
   opened.onmessage = (event: MessageEvent<ArrayBuffer>) => receive(new Uint8Array(event.data));
-  opened.onclose = () => {
+  opened.onclose = (event) => {
     socket = null;
     if (lostAt.value === null) lostAt.value = Date.now();
-    for (const { reject } of asked.values()) reject(new AskError(t("not_connected")));
+    for (const { reject } of asked.values()) reject(new AskError(t("not_connected"), true));
     asked.clear();
-    setTimeout(connect, retryMs);
-    retryMs = Math.min(retryMs * 2, 2000);
+    if (event.code === SIGNED_OUT) {
+      hello.value = null;
+      ended(event.reason);
+    } else again();
   };
 }
 
@@ -95,12 +128,12 @@ export async function ask<Q extends DescMessage, A extends DescMessage>(
   const payload = toBinary(requestSchema, create(requestSchema, request));
   const answer = new Promise<Uint8Array>((resolve, reject) => {
     if (!send({ case: "ask", value: { id, key, payload, timeoutS } })) {
-      reject(new AskError(t("not_connected")));
+      reject(new AskError(t("not_connected"), true));
       return;
     }
     // The server tells a time-out itself; this is for a server that says nothing any more.
     const timer = setTimeout(
-      () => settle(id)?.reject(new AskError(t("timed_out", { seconds: timeoutS }))),
+      () => settle(id)?.reject(new AskError(t("timed_out", { seconds: timeoutS }), true)),
       timeoutS * 1000 + 1000,
     );
     const done = () => clearTimeout(timer);
@@ -141,19 +174,23 @@ function receive(bytes: Uint8Array): void {
     case "answer": {
       const waiting = settle(message.value.id);
       if (message.value.ok) waiting?.resolve(message.value.payload);
-      else waiting?.reject(new AskError(message.value.error));
+      else waiting?.reject(new AskError(message.value.error, message.value.noAnswer));
       break;
     }
     case "sample": {
-      const { key, attachment, payload, live, ageS } = message.value;
+      const { key, attachment, payload, live, ageS, step } = message.value;
       const header = readHeader(attachment);
       const arrived = performance.now();
       const before = newest.get(key);
       const repeated = before?.publisher === header.publisher && before.sequence === header.sequence;
-      let newAt = live ? arrived - (ageS ?? 0) * 1000 : null;
+      let newAt = null;
       // A repeat (after a new connection, say) is as old as it was.
       if (repeated && before.newAt !== null) newAt = before.newAt;
-      const sample = { key, payload, ...header, live, arrived, newAt };
+      else if (live) {
+        // What the console's server knows of its age, or what it was late on the whole way to here.
+        newAt = arrived - Math.max((ageS ?? 0) * 1000, lateness(key, header.publisher, header.sourceTime, arrived));
+      }
+      const sample = { key, payload, ...header, live, arrived, newAt, step };
       newest.set(key, sample);
       for (const [expression, set] of listeners) {
         if (matches(expression, key)) for (const listener of [...set]) listener(sample);

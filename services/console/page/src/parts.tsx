@@ -26,10 +26,17 @@ export function Panel(props: {
 
 /** What became of an action, where the action was; it keeps its place when empty. */
 export function NoticeLine({ notice, idle }: { notice: Notice | null; idle?: string }) {
+  const bad = notice?.kind === "refused" || notice?.kind === "lost";
   return (
-    <p class={`notice ${notice?.kind ?? "idle"}`} role={notice?.kind === "refused" ? "alert" : "status"}>
-      {notice?.kind === "refused" && <span class="shape warning" aria-hidden="true" />}
+    <p class={`notice ${notice?.kind ?? "idle"}`} role={bad ? "alert" : "status"}>
+      {bad && <span class="shape warning" aria-hidden="true" />}
       {notice?.text ?? idle ?? "\u00a0"}
+      {notice?.mind && (
+        <span class="mind">
+          <span class="shape warning" aria-hidden="true" />
+          {t("mind", { text: notice.mind })}
+        </span>
+      )}
     </p>
   );
 }
@@ -39,11 +46,12 @@ export function Unit({ of: unit }: { of: string }) {
   return <span class={unit === "°" ? "unit degree" : "unit"}>{unit}</span>;
 }
 
-/** A state word with the shape and colour of its level. */
-export function State({ state }: { state: StateWord }) {
+/** A state word with the shape and colour of its level; of several, how many. */
+export function State({ state, count }: { state: StateWord; count?: number }) {
   return (
     <span class={`state ${state.level}`}>
       <span class={`shape ${state.level}`} aria-hidden="true" />
+      {count !== undefined && `${count} `}
       {t(state.word)}
     </span>
   );
@@ -82,5 +90,17 @@ export function Toggle(props: { on: boolean; set: (on: boolean) => void; childre
     <button class="toggle" aria-pressed={props.on} onClick={() => props.set(!props.on)}>
       {props.children}
     </button>
+  );
+}
+
+/** Stands in where there is no picture. */
+export function Silhouette({ label }: { label: string }) {
+  return (
+    <svg viewBox="0 0 160 90" class="silhouette" role="img" aria-label={label}>
+      <path d="M50 80h38M68 80V56l26-24 24 16" />
+      <circle cx="68" cy="54" r="6" />
+      <circle cx="94" cy="32" r="5" />
+      <circle cx="118" cy="48" r="4" />
+    </svg>
   );
 }

@@ -1,72 +1,125 @@
 // One robot: what it looks like, what it does, and control of it.
 
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
+import { Alarm } from "./alarm";
 import { Camera } from "./camera";
-import { held, holds, seeHolder } from "./control";
+import type { VideoPlace } from "./camera";
+import { seeLease } from "./control";
 import { ControlPanel } from "./control-panel";
 import { EventsPanel } from "./events-panel";
 import {
   ControllerStateSchema,
+  ControllerState_Check as Check,
   ControllerState_Known as Known,
   ControllerState_Link as Link,
   ControllerState_Mode as Mode,
 } from "./gen/robomesh_pb";
-import { DescriptionSchema, KinematicStateSchema, LeaseSchema } from "./gen/robomesh_pb";
-import type { ControllerState, Description } from "./gen/robomesh_pb";
+import { DescriptionSchema, KinematicStateSchema, LeaseSchema, ProgramStateSchema } from "./gen/robomesh_pb";
+import type { ControllerState, Description, Event, ProgramState } from "./gen/robomesh_pb";
 import { JointStatesSchema } from "./gen/foxglove/JointStates_pb";
 import { History } from "./history";
 import { JointsPanel } from "./joints-panel";
+import { Missing, useMissing } from "./missing";
 import { State, Tag } from "./parts";
-import { stateWord, stopText } from "./robot-state";
+import { ProgramLine, isTold } from "./program-line";
+import { disobeys, stateWord, stoppedByItself, stopText } from "./robot-state";
+import { RecordButton, RecordPanel } from "./record-panel";
+import { ReplayRobot } from "./recordings/replay-robot";
+import { FarChoice, ClockHint } from "./far";
+import { jointsTopic } from "./reach";
+import { isReplay, programLink } from "./route";
 import type { RobotName } from "./route";
+import type { Stage } from "./scene";
 import { SceneView } from "./scene-view";
 import { t } from "./texts";
+import type { TextName } from "./texts";
 import { ToolPanel } from "./tool-panel";
-import { ageOf, isStale, jointsAge, useTopic } from "./topics";
+import { ageOf, isStale, jointsAge, useEvents, useTopic } from "./topics";
 import type { Latest } from "./topics";
 
-export function Robot({ site, robot }: RobotName) {
+/** A robot's page; a replay's is another: it has nothing to command. */
+export function Robot(name: RobotName) {
+  return isReplay(name.robot) ? <ReplayRobot {...name} /> : <LiveRobot {...name} />;
+}
+
+function LiveRobot({ site, robot }: RobotName) {
   const key = `robomesh/${site}/${robot}`;
   const controller = useTopic(ControllerStateSchema, `${key}/controller`);
   const lease = useTopic(LeaseSchema, `${key}/lease`);
   const description = useTopic(DescriptionSchema, `${key}/description`);
-  const joints = useTopic(JointStatesSchema, `${key}/joints`);
+  const joints = useTopic(JointStatesSchema, `${key}/${jointsTopic(key)}`);
   const kinematics = useTopic(KinematicStateSchema, `${key}/kinematics`);
+  const program = useTopic(ProgramStateSchema, `${key}/program`);
+  const events = useEvents(key);
   const age = jointsAge(joints, controller);
   const stale = isStale("joints", age);
   const lost = useLostAt(stale, joints !== undefined);
   const holder = lease && !isStale("lease", ageOf(lease)) ? lease.message.holder : null;
   useEffect(() => {
-    if (lease && holder !== null) seeHolder(key, holder);
-  }, [key, lease, holder]);
-  const [videoLarge, setVideoLarge] = useState(false);
-  const inControl = holds(key) && held.value !== null;
+    if (lease) seeLease(key, lease.message);
+  }, [key, lease]);
+  const [videoPlace, setVideoPlace] = useState<VideoPlace>("beside");
+  const stage = useRef<Stage | null>(null);
+  const state = controller?.message;
+  const positions = new Map(joints?.message.joints.map((joint) => [joint.name, joint.position]));
+  const motion = {
+    running: lease?.message.motion === true,
+    stopped: state?.stop !== undefined || stoppedByItself(state),
+    positions: (description?.message.joints ?? []).map((joint) => positions.get(joint.name)),
+  };
+  if (useMissing(key, Boolean(controller ?? description ?? lease))) return <Missing site={site} robot={robot} />;
   return (
-    <div class={`robot ${inControl ? "in-control" : ""} ${videoLarge ? "video-large" : ""}`}>
-      <Headline name={robot} controller={controller} description={description?.message} stale={stale} age={age} />
-      <SceneView
-        robotKey={key}
-        description={description?.message}
-        stale={stale}
-        age={joints ? age : undefined}
-        lostAt={lost}
-      />
-      <div class="side">
-        <ControlPanel robotKey={key} controller={controller} holder={holder} lease={lease?.message} />
-        <JointsPanel
+    <>
+      <Alarm state={state} events={events} />
+      <div class={`robot video-${videoPlace}`}>
+        <Headline
+          site={site}
+          name={robot}
+          controller={controller}
+          description={description?.message}
+          program={program}
+          events={events}
+        />
+        <SceneView
           robotKey={key}
           description={description?.message}
-          joints={joints?.message}
-          controller={controller?.message}
           stale={stale}
           age={joints ? age : undefined}
+          lostAt={lost}
+          staged={(made) => (stage.current = made)}
         />
-        <ToolPanel kinematics={kinematics} description={description?.message} />
-        <EventsPanel robotKey={key} />
+        <div class="side">
+          <ControlPanel
+            robotKey={key}
+            controller={controller}
+            holder={holder}
+            lease={lease?.message}
+            description={description?.message}
+            motion={motion}
+            disobeyed={disobeys(state, events)}
+          />
+          <JointsPanel
+            robotKey={key}
+            description={description?.message}
+            joints={joints?.message}
+            controller={state}
+            motion={motion}
+            stale={stale}
+            age={joints ? age : undefined}
+          />
+          <ToolPanel robotKey={key} kinematics={kinematics} description={description?.message} />
+          <EventsPanel robotKey={key} events={events} controller={controller} />
+        </div>
+        <Camera
+          robotKey={key}
+          description={description?.message}
+          place={videoPlace}
+          setPlace={setVideoPlace}
+          sceneView={() => stage.current?.view() ?? null}
+        />
+        <History robotKey={key} description={description?.message} />
       </div>
-      <Camera robotKey={key} description={description?.message} large={videoLarge} setLarge={setVideoLarge} />
-      <History robotKey={key} description={description?.message} />
-    </div>
+    </>
   );
 }
 
@@ -77,39 +130,72 @@ function useLostAt(stale: boolean, any: boolean): number | null {
   return at;
 }
 
+const CHECKS: Partial<Record<Check, TextName>> = {
+  [Check.OFF]: "check_off",
+  [Check.WARN]: "check_warn",
+  [Check.REQUIRE]: "check_require",
+};
+
 function Headline(props: {
+  site: string;
   name: string;
   controller: Latest<ControllerState> | undefined;
   description: Description | undefined;
-  stale: boolean;
-  age: number | null;
+  program: Latest<ProgramState> | undefined;
+  events: readonly Event[];
 }) {
-  const { controller, description } = props;
+  const { controller, description, program, events } = props;
   const message = controller?.message;
-  const state = stateWord(controller);
+  const state = stateWord(controller, events);
   const facts: string[] = [];
   // What was so is not said as if it were so.
   if (message && !isStale("controller", ageOf(controller))) {
     facts.push(t(message.mode === Mode.LOCAL ? "mode_local" : message.mode === Mode.REMOTE ? "mode_remote" : "mode_unknown"));
     facts.push(t(message.homed === Known.YES ? "homed" : message.homed === Known.NO ? "not_homed" : "homed_unknown"));
+    const check = CHECKS[message.check];
+    if (check) facts.push(t(check));
     if (message.readOnly) facts.push(t("read_only"));
+    if (message.legacyClients?.attached) facts.push(t("legacy_some", { count: message.legacyClients.attached }));
   }
+  const flooding = message?.health?.flooding === true;
   const trouble = message?.fault || (message?.link !== Link.UP && message?.linkText);
   return (
     <div class="headline">
       <h1>{props.name}</h1>
       <State state={state} />
       <span class="facts dim">{facts.join(" · ")}</span>
+      <a class="page-link" href={programLink(props.site, props.name)}>
+        {t("program")}
+      </a>
+      <RecordButton robotKey={`robomesh/${props.site}/${props.name}`} />
       {description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>}
-      {trouble && <span class={`trouble ${state.level}`}>{trouble}</span>}
-      {message?.stop && (
-        <span class="trouble">{stopText(message.stop)}</span>
+      <FarChoice robotKey={`robomesh/${props.site}/${props.name}`} />
+      <ClockHint site={props.site} />
+      {trouble && <span class={`trouble ${state.level}`} lang="en">{trouble}</span>}
+      {flooding && (
+        <span class="trouble warning">
+          <span class="shape warning" aria-hidden="true" />
+          {t("flooding")}
+        </span>
       )}
-      {description?.provenance && (
-        <span class="provenance dim" title={description.provenance}>
+      {message?.stop && (
+        <span class="trouble">{stopText(message, disobeys(message, events))}</span>
+      )}
+      {message?.checkText && (
+        <span class="trouble warning">
+          <span class="shape warning" aria-hidden="true" />
+          {t(message.check === Check.REQUIRE ? "check_refuses" : "check_cannot", { text: message.checkText })}
+        </span>
+      )}
+      {/* In the place of what matters less, so that nothing below moves. */}
+      {isTold(program, events) ? (
+        <ProgramLine latest={program} />
+      ) : description?.provenance && (
+        <span class="provenance dim" lang="en" title={description.provenance}>
           {description.title}: {description.provenance}
         </span>
       )}
+      <RecordPanel robotKey={`robomesh/${props.site}/${props.name}`} description={description} />
     </div>
   );
 }

@@ -11,6 +11,9 @@ export interface Palette {
   grid: string;
   gridStrong: string;
   accent: string;
+  dim: string;
+  warning: string;
+  alarm: string;
 }
 
 /** The page's colours for the scene, from the style sheet. */
@@ -23,6 +26,9 @@ export function palette(): Palette {
     grid: read("--scene-grid"),
     gridStrong: read("--scene-grid-strong"),
     accent: read("--accent"),
+    dim: read("--dim"),
+    warning: read("--warning"),
+    alarm: read("--stop"),
   };
 }
 

@@ -2,17 +2,26 @@
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { create } from "@bufbuild/protobuf";
+import { Vector3 } from "three";
+import { distanceText, useClearanceLevel } from "./clearance";
 import { staleText, timeOfDay } from "./format";
-import { ViewSchema, View_Projection } from "./gen/robomesh_pb";
-import type { Description, View } from "./gen/robomesh_pb";
-import { ghost } from "./ghost";
+import { KinematicStateSchema, ReplayStateSchema, ViewSchema, View_Projection } from "./gen/robomesh_pb";
+import type { Description, Vector3 as Point, View } from "./gen/robomesh_pb";
+import { forwardOf } from "./forward";
+import { ghost, redLinks, toolPath } from "./ghost";
 import { watch } from "./mesh";
 import { Choice, Toggle } from "./parts";
 import { RobotScene } from "./scene";
-import { t, textOr } from "./texts";
+import type { Stage } from "./scene";
+import type { Nearest } from "./scene-lines";
+import { Neighbours } from "./scene-neighbours";
+import type { OfMoment } from "./recordings/of-moment";
+import { framesOf, framesTopic } from "./reach";
+import { r } from "./recordings/texts";
+import { t, viewText } from "./texts";
 import { theme } from "./theme";
 import { useFramesAge } from "./frames-age";
-import { isStale } from "./topics";
+import { ageOf, isStale, useTopic } from "./topics";
 
 // Where the free camera stands, from the target, in lengths of the arm's reach.
 const FREE_EYE = { x: 1.2, y: -1.69, z: 0.72 };
@@ -41,18 +50,19 @@ function freeView(others: readonly View[]): View {
   });
 }
 
-export function viewText(name: string): string {
-  return textOr(`view_${name}`, name);
-}
-
 export function SceneView(props: {
   robotKey: string;
   description: Description | undefined;
   stale: boolean;
   age: number | null | undefined;
   lostAt: number | null;
+  /** Of a replay: whether its joints are of the moment at which it is. */
+  arm?: OfMoment;
+  /** Told of each scene that is made, and of its end: somebody else's parts may stand in it. */
+  staged?: (stage: Stage | null) => void;
 }) {
   const canvas = useRef<HTMLCanvasElement>(null);
+  const label = useRef<HTMLSpanElement>(null);
   const scene = useRef<RobotScene | null>(null);
   const [problem, setProblem] = useState("");
   const [loaded, setLoaded] = useState(false);
@@ -61,31 +71,38 @@ export function SceneView(props: {
   const [frames, setFrames] = useState(false);
   const { robotKey, description } = props;
   const prefix = robotKey.split("/").slice(1).join("/");
-  const framesAge = useFramesAge(robotKey);
-  const stale = props.stale || isStale("frames", framesAge);
+  const topic = framesTopic(robotKey);
+  const framesAge = useFramesAge(robotKey, topic);
+  const replayed = description?.replay !== undefined;
+  // A replay that is paused sends no frames, and they are not old; whether it is there its page says.
+  const absent = props.arm === "absent" || props.arm === "coming";
+  const stale = props.stale || absent || (!replayed && isStale(topic, framesAge));
   const age = props.stale ? props.age : framesAge;
+  const rate = useTopic(ReplayStateSchema, `${robotKey}/replay`)?.message.speed || 1;
 
   // One scene for one description: a changed one begins anew.
   const identity = useMemo(
-    () => description && JSON.stringify([description.links, description.baseToSite]),
+    () => description && JSON.stringify([description.links, description.fixtures, description.baseToSite]),
+    [description],
+  );
+  const forward = useMemo(
+    () => description && forwardOf(description.urdf, description.joints.map((joint) => joint.name)),
     [description],
   );
   useEffect(() => {
-    if (!canvas.current || !description) return;
+    if (!canvas.current || !label.current || !description) return;
     setProblem("");
     setLoaded(false);
     let made: RobotScene;
     try {
-      made = new RobotScene(canvas.current, prefix);
+      made = new RobotScene(canvas.current, prefix, label.current);
     } catch {
       setProblem(t("no_webgl"));
       return;
     }
     scene.current = made;
+    props.staged?.(made.stage());
     const missing = new Map<string, string>();
-    const stop = watch(`${robotKey}/frames`, (sample) =>
-      made.placeFrames(sample.payload, sample.sourceTime, sample.arrived),
-    );
     void made
       .load(description, (link, text) => {
         if (text) missing.set(link, t("model_failed", { link, text }));
@@ -94,16 +111,30 @@ export function SceneView(props: {
       })
       .then(() => setLoaded(true));
     return () => {
-      stop();
+      props.staged?.(null);
       made.dispose();
       scene.current = null;
     };
   }, [identity]);
+  useEffect(() => {
+    const made = scene.current;
+    if (!made || !description || !forward) return;
+    const read = topic === "frames" ? (payload: Uint8Array) => payload : framesOf(prefix, description, forward);
+    return watch(`${robotKey}/${topic}`, (sample) =>
+      made.placeFrames(read(sample.payload), sample.sourceTime, sample.arrived),
+    );
+  }, [identity, topic]);
   useEffect(() => scene.current?.setStale(stale), [stale, identity, loaded]);
+  useEffect(() => scene.current?.setRate(rate), [rate, identity]);
   useEffect(() => scene.current?.setColours(), [theme.value]);
   useEffect(() => scene.current?.showTrail(trail), [trail, identity]);
   useEffect(() => scene.current?.showFrames(frames), [frames, identity]);
-  useEffect(() => scene.current?.showGhost(ghost.value), [ghost.value, loaded]);
+  const shown = ghost.value?.robotKey === robotKey ? ghost.value.positions : null;
+  useEffect(() => scene.current?.showGhost(shown && (forward?.(shown) ?? null)), [shown, forward, loaded]);
+  useEffect(() => scene.current?.setRed(redLinks.value), [redLinks.value, identity]);
+  useEffect(() => scene.current?.showPath(toolPath.value), [toolPath.value, identity]);
+  const near = useNearest(robotKey);
+  useEffect(() => scene.current?.showGap(near?.nearest ?? null, near?.sourceTime), [near, identity]);
   const views = viewsOf(description);
   const chosen = views.find((each) => each.name === view) ?? freeView([]);
   useEffect(() => scene.current?.look(chosen), [chosen.name, identity]);
@@ -123,7 +154,7 @@ export function SceneView(props: {
   };
   const waiting = !description ? t("waiting_description") : !loaded && !problem ? t("loading_model") : "";
   return (
-    <section class={`panel scene ${stale && loaded ? "is-stale" : ""}`} aria-label={t("scene")}>
+    <section class={`panel scene ${stale && loaded ? "is-stale" : ""}`} aria-label={t("scene")} data-moment={props.arm}>
       <div class="canvas-place">
         <canvas
           key={identity ?? "none"}
@@ -134,6 +165,7 @@ export function SceneView(props: {
           onKeyDown={onKey}
           data-loaded={loaded}
         />
+        <span class="scene-label" ref={label} hidden />
       </div>
       <div class="scene-tools">
         <Choice
@@ -152,9 +184,18 @@ export function SceneView(props: {
           </Toggle>
         </div>
       </div>
+      {replayed && <span class="replay-mark">{t("replay")}</span>}
+      {scene.current && loaded && description?.cell && !replayed && topic === "frames" && (
+        <Neighbours robotKey={robotKey} cell={description.cell} scene={scene.current} />
+      )}
       {waiting && <p class="scene-word dim">{waiting}</p>}
       {problem && <p class="scene-word trouble">{problem}</p>}
-      {stale && (loaded || problem) && (
+      {!props.stale && props.arm === "absent" && (loaded || problem) && (
+        <p class="scene-stale" role="status">
+          {r("no_joints_then")}
+        </p>
+      )}
+      {stale && (props.stale || !absent) && (loaded || problem) && (
         <p class="scene-stale" role="status">
           <span class="shape warning" aria-hidden="true" />
           {age === undefined ? t("no_data") : staleText(age)}
@@ -163,4 +204,21 @@ export function SceneView(props: {
       )}
     </section>
   );
+}
+
+/** The nearest two points of the arm and what stands around it, while that is known. */
+function useNearest(robotKey: string): { nearest: Nearest; sourceTime: number } | null {
+  const latest = useTopic(KinematicStateSchema, `${robotKey}/kinematics`);
+  const clearance = latest?.message.clearance;
+  const level = useClearanceLevel(robotKey, clearance);
+  const known = clearance && !isStale("kinematics", ageOf(latest));
+  return useMemo(() => {
+    if (!known) return null;
+    const points = [at(clearance.firstPoint), at(clearance.secondPoint)] as const;
+    return { nearest: { points, level, text: distanceText(clearance) }, sourceTime: latest.sample.sourceTime };
+  }, [known, clearance, level]);
+}
+
+function at(point: Point | undefined): Vector3 {
+  return new Vector3(point?.x, point?.y, point?.z);
 }

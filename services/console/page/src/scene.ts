@@ -2,25 +2,35 @@
 
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
-import { toCreasedNormals } from "three/addons/utils/BufferGeometryUtils.js";
-import { fromBinary } from "@bufbuild/protobuf";
-import { FrameTransformsSchema } from "./gen/foxglove/FrameTransforms_pb";
-import { View_Projection } from "./gen/robomesh_pb";
+import { create } from "@bufbuild/protobuf";
+import { ViewSchema, View_Projection } from "./gen/robomesh_pb";
 import type { Description, View } from "./gen/robomesh_pb";
-import { FramePlayer } from "./frame-player";
+import { Arm, loadOrSay, meshUrl } from "./scene-arm";
+import type { Failed } from "./scene-arm";
+import { Gap, Path, Trail } from "./scene-lines";
+import type { Nearest } from "./scene-lines";
+import { colourEdges, dressedFixture, paint } from "./scene-models";
 import { floor, lights, palette } from "./scene-surroundings";
 
 const FIELD_OF_VIEW = 32; // degrees, upright
-const TRAIL_POINTS = 900;
-const SAME_PLACE = 2e-3; // m, or of a rotation's matrix
-const LATE_MS = 45;
-const LATE_FRAMES = 15;
-const SOFTWARE_FRAME_MS = 60;
-const LATE_FRAME_MS = 120;
-const NO_ANSWER = 504; // the mesh's service did not answer
-const ASK_AGAIN_MS = 2000;
-const CREASE_ANGLE = 0.6; // rad: sharper edges stay sharp
+const DEAR_MS = 50; // a picture that takes longer costs the rest of the page its time
+const DEAR_ONES = 3; // in a row: the first one of all, and the first after the page was hidden, are dear anywhere
+const REST = 3; // times as long as such a picture took, nothing is drawn
+const LONGEST_REST_MS = 2000;
+
+/** What somebody else's parts in the picture need: see Program's gizmo. */
+export interface Stage {
+  scene: THREE.Scene;
+  canvas: HTMLCanvasElement;
+  /** The robot's base in the site's frame. */
+  base: () => THREE.Matrix4;
+  /** As they are now: a view takes others. */
+  camera: () => THREE.Camera;
+  controls: () => OrbitControls;
+  /** What is seen, for somebody else to draw. */
+  view: () => View;
+  changed: () => void;
+}
 
 /** A scene on a canvas. Placements come by `placeFrames`; `dispose` frees the GPU. */
 export class RobotScene {
@@ -30,48 +40,42 @@ export class RobotScene {
   private readonly orthographic = new THREE.OrthographicCamera(-1, 1, 1, -1, 0.02, 60);
   private camera: THREE.PerspectiveCamera | THREE.OrthographicCamera = this.perspective;
   private controls: OrbitControls;
-  private readonly player = new FramePlayer();
-  private readonly links = new Map<string, THREE.Group>();
-  private readonly ghosts = new Map<string, THREE.Group>();
+  private readonly arm: Arm;
+  private readonly neighbours = new Set<Arm>();
+  private readonly fixtures = new Map<string, THREE.Group>();
   private readonly axes = new Map<string, THREE.AxesHelper>();
-  private readonly trail: THREE.Line<THREE.BufferGeometry, THREE.LineBasicMaterial>;
-  private trailLength = 0;
+  private readonly trail = new Trail();
+  private readonly path = new Path();
+  private readonly gap: Gap;
   private base = new THREE.Matrix4();
-  private stale = false;
+  private colours = palette();
+  private red: ReadonlySet<string> = new Set();
   private dirty = true;
   private framesShown = false;
   private request = 0;
   private drawnAt = 0;
-  private late = 0;
+  private drawing: WebGLSync | null = null; // until the picture is done
+  private nextAt = 0;
+  private dear = 0;
   private disposed = false;
-  private spared: number;
-  private shortest: number; // ms between two pictures, at least
   private readonly observer: ResizeObserver;
 
   /** @throws Error where the browser has no WebGL. */
   constructor(
     private readonly canvas: HTMLCanvasElement,
     private readonly prefix: string,
+    label: HTMLElement,
   ) {
     const software = drawsInSoftware();
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !software, alpha: false });
     this.renderer.setPixelRatio(software ? 1 : Math.min(devicePixelRatio, 2));
     this.renderer.shadowMap.enabled = !software;
-    this.spared = software ? 1 : 0;
-    this.shortest = software ? SOFTWARE_FRAME_MS : 0;
     this.renderer.shadowMap.type = THREE.PCFShadowMap;
     this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
     this.renderer.toneMappingExposure = 1.05;
-    this.trail = new THREE.Line(
-      new THREE.BufferGeometry().setAttribute(
-        "position",
-        new THREE.BufferAttribute(new Float32Array(TRAIL_POINTS * 3), 3),
-      ),
-      new THREE.LineBasicMaterial({ transparent: true, opacity: 0.9 }),
-    );
-    this.trail.frustumCulled = false;
-    this.trail.visible = false;
-    this.scene.add(...lights(), this.trail);
+    this.arm = new Arm(this.scene, prefix, "arm", this.changed);
+    this.gap = new Gap(label);
+    this.scene.add(...lights(), this.trail.line, this.path.line, this.gap.group);
     this.setColours();
     this.controls = this.makeControls();
     this.observer = new ResizeObserver(() => this.resize());
@@ -82,7 +86,7 @@ export class RobotScene {
 
   /** Background, floor and lines after the page's theme. */
   setColours(): void {
-    const colours = palette();
+    const colours = (this.colours = palette());
     this.scene.background = new THREE.Color(colours.background);
     const old = this.scene.getObjectByName("floor");
     if (old) this.scene.remove(old);
@@ -90,13 +94,24 @@ export class RobotScene {
     made.name = "floor";
     made.applyMatrix4(this.base);
     this.scene.add(made);
-    this.trail.material.color.set(colours.accent);
-    this.dirty = true;
+    this.trail.line.material.color.set(colours.accent);
+    this.path.line.material.color.set(colours.accent);
+    this.setRed(this.red);
   }
 
-  /** Loads the links' meshes; `failed` hears why one cannot be yet, and "" when it could. */
-  async load(description: Description, failed: (link: string, why: string) => void): Promise<void> {
+  private readonly changed = (): void => {
+    this.dirty = true;
+  };
+
+  stage(): Stage {
+    const { scene, canvas, changed } = this;
+    return { scene, canvas, base: () => this.base, camera: () => this.camera, controls: () => this.controls, view: () => this.view(), changed };
+  }
+
+  /** Loads the models of the arm and of what stands around it. */
+  async load(description: Description, failed: Failed): Promise<void> {
     if (description.baseToSite.length === 16) this.base.fromArray(description.baseToSite).transpose();
+    this.path.line.matrix.copy(this.base);
     this.setColours();
     for (const frame of description.frames) {
       const axes = new THREE.AxesHelper(frame.name === "tool" ? 0.14 : 0.09);
@@ -104,134 +119,98 @@ export class RobotScene {
       this.axes.set(`${this.prefix}/${frame.name}`, axes);
       this.scene.add(axes);
     }
-    const loader = new GLTFLoader();
+    // Made when a target is first dragged, a ghost's shader would hold up the page, and with it the lease.
+    const compiled = (ghost: THREE.Group) => this.renderer.compile(ghost, this.camera, this.scene);
+    await Promise.all([this.arm.load(description, failed, compiled), this.loadFixtures(description, failed)]);
+  }
+
+  private async loadFixtures({ fixtures }: Description, failed: Failed): Promise<void> {
     await Promise.all(
-      description.links.map(async ({ name, mesh, meshSha256, color }) => {
-        if (!mesh) return;
-        try {
-          const url = `/mesh/${this.prefix}/${encodeURIComponent(mesh)}?sha=${meshSha256}`;
-          let answer = await fetch(url);
-          // Its service may be starting: said at once, and asked until it is there.
-          while (answer.status === NO_ANSWER && !this.disposed) {
-            failed(name, await answer.text());
-            await new Promise((resolve) => setTimeout(resolve, ASK_AGAIN_MS));
-            answer = await fetch(url);
-          }
-          if (!answer.ok) throw new Error(await answer.text());
-          if (this.disposed) return;
-          failed(name, "");
-          const { scene } = await loader.parseAsync(await answer.arrayBuffer(), "");
-          this.addLink(`${this.prefix}/${name}`, scene, color);
-        } catch (error) {
-          failed(name, error instanceof Error ? error.message : String(error));
-        }
+      fixtures.map(async ({ name, mesh, meshSha256, fixtureToSite, color }) => {
+        const url = meshUrl(this.prefix, mesh, meshSha256);
+        const model = await loadOrSay(url, () => !this.disposed, (why) => failed(name, why));
+        if (!model) return;
+        const group = dressedFixture(model, color);
+        if (fixtureToSite.length === 16) group.matrix.fromArray(fixtureToSite).transpose();
+        this.fixtures.set(name, group);
+        this.scene.add(group);
+        this.canvas.dataset["fixtures"] = String(this.fixtures.size);
+        this.setRed(this.red);
       }),
     );
   }
 
-  private addLink(frame: string, model: THREE.Group, color: string): void {
-    model.traverse((part) => {
-      if (!(part instanceof THREE.Mesh)) return;
-      part.castShadow = true;
-      part.receiveShadow = true;
-      if (!part.geometry.getAttribute("normal")) part.geometry = toCreasedNormals(part.geometry, CREASE_ANGLE);
-      const own = part.material instanceof THREE.MeshStandardMaterial ? part.material : null;
-      const material = new THREE.MeshStandardMaterial({
-        color: own?.color ?? new THREE.Color(color || "#8a8f94"),
-        vertexColors: part.geometry.hasAttribute("color"),
-        map: own?.map ?? null,
-        roughness: 0.55,
-        metalness: 0.1,
-        side: THREE.DoubleSide,
-      });
-      part.material = material;
-      part.userData["colour"] = material.color.clone();
-    });
-    const group = new THREE.Group();
-    group.add(model);
-    group.matrixAutoUpdate = false;
-    group.visible = false; // until its frame has come
-    this.links.set(frame, group);
-    this.scene.add(group);
-    this.paint();
-    this.player.touch();
-  }
-
   /** Takes a FrameTransforms payload. */
   placeFrames(payload: Uint8Array, sourceTimeMs: number, arrivedMs: number): void {
-    this.player.add(fromBinary(FrameTransformsSchema, payload), sourceTimeMs, arrivedMs);
+    this.arm.placeFrames(payload, sourceTimeMs, arrivedMs);
+  }
+
+  /** How fast a replay passes; see `FramePlayer`. */
+  setRate(rate: number): void {
+    this.arm.player.setRate(rate);
   }
 
   /** Grey and translucent when what is known of the robot is old. */
   setStale(stale: boolean): void {
-    if (stale === this.stale) return;
-    this.stale = stale;
-    this.paint();
+    this.arm.setStale(stale);
   }
 
-  private paint(): void {
-    for (const group of this.links.values()) {
-      group.traverse((part) => {
-        if (!(part instanceof THREE.Mesh)) return;
-        const material = part.material as THREE.MeshStandardMaterial;
-        material.color.copy(part.userData["colour"] as THREE.Color);
-        if (this.stale) material.color.set("#7d8387");
-        material.vertexColors = !this.stale && part.geometry.hasAttribute("color");
-        material.transparent = this.stale;
-        material.opacity = this.stale ? 0.38 : 1;
-        material.needsUpdate = true;
-        part.castShadow = !this.stale;
-      });
+  /** Another robot of the cell, drawn dimmed until it is removed; its placements are its own to take. */
+  addNeighbour(prefix: string, description: Description): Arm {
+    const neighbour = new Arm(this.scene, prefix, "neighbour", this.changed);
+    this.neighbours.add(neighbour);
+    this.canvas.dataset["neighbours"] = String(this.neighbours.size);
+    neighbour.setRed(this.red);
+    // A neighbour without its model is no trouble of this robot's: its own page says why.
+    void neighbour.load(description, () => undefined);
+    return neighbour;
+  }
+
+  removeNeighbour(neighbour: Arm): void {
+    this.neighbours.delete(neighbour);
+    neighbour.remove();
+  }
+
+  /** Draws links (`<robot>/<link>`) and fixtures red. */
+  setRed(names: ReadonlySet<string>): void {
+    this.red = names;
+    for (const arm of [this.arm, ...this.neighbours]) arm.setRed(names);
+    const { alarm, dim } = this.colours;
+    for (const [name, group] of this.fixtures) {
+      paint(group, { stale: false, red: names.has(name), kind: "fixture" }, alarm);
+      colourEdges(group, names.has(name) ? alarm : dim);
     }
+    this.canvas.dataset["red"] = [...names].sort().join(" ");
     this.dirty = true;
   }
 
-  /** Shows where the links would be, as placements in the base frame by rows; null: not at all. */
-  showGhost(placements: ReadonlyMap<string, readonly number[]> | null): void {
-    for (const [frame, group] of this.links) {
-      const placement = placements?.get(frame.slice(this.prefix.length + 1));
-      let copy = this.ghosts.get(frame);
-      if (!copy && placement) {
-        copy = this.ghostOf(group);
-        this.ghosts.set(frame, copy);
-        this.scene.add(copy);
-      }
-      if (!copy) continue;
-      if (placement) copy.matrix.fromArray(placement).transpose().premultiply(this.base);
-      // A link that stays where it is needs no ghost over it.
-      copy.visible = placement !== undefined && !alike(copy.matrix, group.matrix);
-    }
-    this.canvas.dataset["ghost"] = String([...this.ghosts.values()].filter((copy) => copy.visible).length);
+  /** Shows where the links would be, as placements in the base frame; null: not at all. */
+  showGhost(placements: ReadonlyMap<string, THREE.Matrix4> | null): void {
+    this.canvas.dataset["ghost"] = String(this.arm.showGhost(placements));
+  }
+
+  /** Shows a path of the tool, in the base frame [m]; null: none. */
+  showPath(points: readonly (readonly [number, number, number])[] | null): void {
+    this.path.show(points);
+    this.canvas.dataset["path"] = String(points?.length ?? 0);
     this.dirty = true;
   }
 
-  private ghostOf(group: THREE.Group): THREE.Group {
-    const copy = group.clone();
-    copy.matrixAutoUpdate = false;
-    const material = new THREE.MeshStandardMaterial({
-      color: palette().accent,
-      transparent: true,
-      opacity: 0.4,
-      depthWrite: false,
-    });
-    copy.traverse((part) => {
-      if (!(part instanceof THREE.Mesh)) return;
-      part.material = material;
-      part.castShadow = false;
-    });
-    return copy;
+  /** Shows the nearest two points when the arm is drawn where it was at their source time [ms]; null: none. */
+  showGap(nearest: Nearest | null, sourceTimeMs = 0): void {
+    if (nearest) this.gap.add(nearest, sourceTimeMs);
+    else this.gap.hide();
+    this.dirty = true;
   }
 
   showTrail(shown: boolean): void {
-    this.trail.visible = shown;
-    this.trailLength = 0;
-    this.trail.geometry.setDrawRange(0, 0);
+    this.trail.show(shown);
     this.dirty = true;
   }
 
   showFrames(shown: boolean): void {
     this.framesShown = shown;
-    this.player.touch();
+    this.arm.player.touch();
     this.dirty = true;
   }
 
@@ -253,6 +232,29 @@ export class RobotScene {
     this.controls.target.copy(target);
     this.resize();
     this.controls.update();
+  }
+
+  /** The camera as it is now, as a view in the base's frame, for somebody else to draw. */
+  view(): View {
+    const camera = this.camera;
+    const toBase = this.base.clone().invert();
+    const { x, y, z } = this.controls.target.clone().applyMatrix4(toBase);
+    const eye = camera.position.clone().applyMatrix4(toBase);
+    const up = camera.up.clone().transformDirection(toBase);
+    const view = create(ViewSchema, {
+      name: "own",
+      eye: { x: eye.x, y: eye.y, z: eye.z },
+      target: { x, y, z },
+      up: { x: up.x, y: up.y, z: up.z },
+    });
+    if (camera === this.perspective) {
+      view.projection = View_Projection.PERSPECTIVE;
+      view.fieldOfView = THREE.MathUtils.degToRad(this.perspective.fov);
+    } else {
+      view.projection = View_Projection.ORTHOGRAPHIC;
+      view.height = (this.orthographic.top - this.orthographic.bottom) / this.orthographic.zoom;
+    }
+    return view;
   }
 
   private makeControls(): OrbitControls {
@@ -296,63 +298,56 @@ export class RobotScene {
     this.dirty = true;
   }
 
-  /** A machine that is late gets no shadow, then fewer pictures, so that the rest of the page is not late too. */
-  private spare(took: number): void {
-    if (took > 1000 || this.spared === 2) return; // hidden meanwhile; nothing left to spare
-    this.late = Math.max(0, this.late + (took > this.shortest + LATE_MS ? 1 : -2));
-    if (this.late < LATE_FRAMES) return;
-    this.late = 0;
-    this.spared++;
+  /** Whether the last picture is done. After a dear one, drawing rests; after some, shadows are spared. */
+  private isDone(at: number): boolean {
+    if (!this.drawing) return true;
+    const gl = this.renderer.getContext() as WebGL2RenderingContext;
+    if (gl.getSyncParameter(this.drawing, gl.SYNC_STATUS) !== gl.SIGNALED && !gl.isContextLost()) return false;
+    gl.deleteSync(this.drawing);
+    this.drawing = null;
+    const took = at - this.drawnAt;
+    this.dear = took < DEAR_MS ? 0 : this.dear + 1;
+    if (this.dear > 0) this.nextAt = at + Math.min(REST * took, LONGEST_REST_MS);
+    if (this.dear !== DEAR_ONES) return true;
     this.scene.traverse((part) => {
       if (part instanceof THREE.DirectionalLight) part.castShadow = false;
     });
-    this.renderer.setPixelRatio(1);
-    if (this.spared === 2) this.shortest = LATE_FRAME_MS;
-    this.resize();
+    if (this.renderer.getPixelRatio() > 1) {
+      this.renderer.setPixelRatio(1);
+      this.resize();
+    }
+    return true;
   }
 
-  private readonly frame = (at: number): void => {
+  private readonly frame = (): void => {
     this.request = requestAnimationFrame(this.frame);
-    if (at - this.drawnAt < this.shortest) return;
-    const placements = this.player.at(at);
+    const at = performance.now();
+    if (!this.isDone(at) || at < this.nextAt) return;
+    const placements = this.arm.placeAt(at);
     if (placements) this.place(placements);
+    for (const neighbour of this.neighbours) if (neighbour.placeAt(at)) this.dirty = true;
     if (this.controls.enableDamping) this.controls.update();
-    const took = at - this.drawnAt;
-    this.drawnAt = at;
     if (!this.dirty) return;
     this.dirty = false;
-    this.spare(took);
+    this.drawnAt = at;
     this.renderer.render(this.scene, this.camera);
+    const gl = this.renderer.getContext() as WebGL2RenderingContext;
+    this.gap.placeLabel(this.camera, this.canvas.clientWidth, this.canvas.clientHeight);
+    this.drawing = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
     this.canvas.dataset["drawn"] = String(Number(this.canvas.dataset["drawn"] ?? 0) + 1);
   };
 
   private place(placements: ReadonlyMap<string, THREE.Matrix4>): void {
-    for (const [frame, placement] of placements) {
-      const group = this.links.get(frame);
-      if (group) {
-        group.matrix.copy(placement);
-        group.visible = true;
-      }
-      const axes = this.axes.get(frame);
-      if (axes) {
-        axes.visible = this.framesShown;
-        placement.decompose(axes.position, axes.quaternion, axes.scale);
-      }
+    for (const [frame, axes] of this.axes) {
+      const placement = placements.get(frame);
+      if (!placement) continue;
+      axes.visible = this.framesShown;
+      placement.decompose(axes.position, axes.quaternion, axes.scale);
     }
-    for (const at of this.player.passed(`${this.prefix}/tool`)) this.extendTrail(at);
+    this.gap.showAt(this.arm.player.shown, this.colours);
+    for (const at of this.arm.player.passed(`${this.prefix}/tool`)) this.trail.extend(at);
     this.dirty = true;
-  }
-
-  private extendTrail(at: THREE.Vector3): void {
-    if (!this.trail.visible) return;
-    const points = this.trail.geometry.getAttribute("position") as THREE.BufferAttribute;
-    if (this.trailLength === TRAIL_POINTS) {
-      points.array.copyWithin(0, 3);
-      this.trailLength--;
-    }
-    points.setXYZ(this.trailLength++, at.x, at.y, at.z);
-    points.needsUpdate = true;
-    this.trail.geometry.setDrawRange(0, this.trailLength);
   }
 
   dispose(): void {
@@ -360,6 +355,7 @@ export class RobotScene {
     cancelAnimationFrame(this.request);
     this.observer.disconnect();
     this.controls.dispose();
+    for (const arm of [this.arm, ...this.neighbours]) arm.remove();
     this.scene.traverse((part) => {
       if (!(part instanceof THREE.Mesh || part instanceof THREE.Line)) return;
       part.geometry.dispose();
@@ -369,15 +365,14 @@ export class RobotScene {
   }
 }
 
-/** Whether the browser draws 3-D without a graphics processor: then every pixel is the main processor's. */
-function drawsInSoftware(): boolean {
+/** Whether the browser draws 3-D without a graphics processor: then every pixel is the main processor's.
+ *
+ * @throws Error where it draws none. */
+export function drawsInSoftware(): boolean {
   const context = document.createElement("canvas").getContext("webgl2");
-  const names = context?.getExtension("WEBGL_debug_renderer_info");
-  const name = context && names ? String(context.getParameter(names.UNMASKED_RENDERER_WEBGL)) : "";
-  context?.getExtension("WEBGL_lose_context")?.loseContext();
+  if (!context) throw new Error("no WebGL");
+  const names = context.getExtension("WEBGL_debug_renderer_info");
+  const name = names ? String(context.getParameter(names.UNMASKED_RENDERER_WEBGL)) : "";
+  context.getExtension("WEBGL_lose_context")?.loseContext();
   return /swiftshader|llvmpipe|software|basic render/i.test(name);
-}
-
-function alike(first: THREE.Matrix4, second: THREE.Matrix4): boolean {
-  return first.elements.every((value, i) => Math.abs(value - (second.elements[i] ?? 0)) < SAME_PLACE);
 }

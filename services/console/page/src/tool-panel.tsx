@@ -1,14 +1,15 @@
-// Where the tool is, how fast, and how far from the nearest limit.
+// Where the tool is, how fast, and how far the arm is from what it must not come to.
 
-import { DASH, fixed, rollPitchYaw, toDegrees } from "./format";
-import { Description_Joint_Type } from "./gen/robomesh_pb";
+import { fixed, rollPitchYaw, toDegrees } from "./format";
 import type { Description, KinematicState } from "./gen/robomesh_pb";
+import { Margins } from "./margins";
 import { Age, Panel, Unit } from "./parts";
 import { t } from "./texts";
 import { ageOf, isStale } from "./topics";
 import type { Latest } from "./topics";
 
 export function ToolPanel(props: {
+  robotKey: string;
   kinematics: Latest<KinematicState> | undefined;
   description: Description | undefined;
 }) {
@@ -20,7 +21,6 @@ export function ToolPanel(props: {
   const angles = pose ? rollPitchYaw(pose).map(toDegrees) : [];
   const v = state?.linearVelocity;
   const speed = v ? Math.hypot(v.x, v.y, v.z) * 1000 : undefined;
-  const nearest = nearestMargin(state, props.description);
   return (
     <Panel
       name="tool"
@@ -36,20 +36,15 @@ export function ToolPanel(props: {
         ))}
         <Number label={t("tool_speed")} text={fixed(speed, 1)} unit="mm/s" />
         <Number label={t("manipulability")} text={fixed(state?.manipulability, 4)} unit="" />
-        <Number
-          label={nearest ? t("margins", { joint: nearest.name }) : t("margin")}
-          text={nearest ? fixed(nearest.value, nearest.unit === "mm" ? 1 : 2) : DASH}
-          unit={nearest?.unit ?? ""}
-          beyond={nearest !== null && nearest.value < 0}
-        />
       </dl>
+      <Margins robotKey={props.robotKey} state={state} description={props.description} stale={stale} />
     </Panel>
   );
 }
 
-function Number(props: { label: string; text: string; unit: string; beyond?: boolean }) {
+function Number(props: { label: string; text: string; unit: string }) {
   return (
-    <div class={props.beyond ? "beyond" : ""}>
+    <div>
       <dt title={props.label}>{props.label}</dt>
       <dd>
         {props.text}
@@ -57,18 +52,4 @@ function Number(props: { label: string; text: string; unit: string; beyond?: boo
       </dd>
     </div>
   );
-}
-
-/** The joint nearest to one of its limits, by its share of the range. */
-function nearestMargin(state: KinematicState | undefined, description: Description | undefined) {
-  let nearest: { name: string; value: number; unit: string; share: number } | null = null;
-  for (const { name, lower, upper } of state?.limitMargins ?? []) {
-    const margin = Math.min(lower, upper);
-    const share = margin / Math.max(1e-9, lower + upper);
-    if (nearest && nearest.share <= share) continue;
-    const joint = description?.joints.find((each) => each.name === name);
-    const slides = joint?.type === Description_Joint_Type.PRISMATIC;
-    nearest = { name, share, value: slides ? margin * 1000 : toDegrees(margin), unit: slides ? "mm" : "°" };
-  }
-  return nearest;
 }

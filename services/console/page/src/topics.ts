@@ -2,6 +2,8 @@
 
 import { fromBinary } from "@bufbuild/protobuf";
 import type { DescMessage, MessageShape } from "@bufbuild/protobuf";
+import { timestampMs } from "@bufbuild/protobuf/wkt";
+import type { Timestamp } from "@bufbuild/protobuf/wkt";
 import { signal } from "@preact/signals";
 import type { Signal } from "@preact/signals";
 import { useEffect, useMemo } from "preact/hooks";
@@ -84,36 +86,48 @@ export function useTopic<S extends DescMessage>(schema: S, key: string): Latest<
   return useTopics(schema, key).get(key);
 }
 
-/** The last events or audit entries of a robot, newest first. */
-export function useEvents(key: string): readonly Event[] {
-  return useList(key, (sample) =>
+/** The last events of a robot, newest first: the gateway's, and those of every other service. */
+export function useEvents(robotKey: string): readonly Event[] {
+  return useList([`${robotKey}/events`, `${robotKey}/events/*`], (sample) =>
     sample.live ? [fromBinary(EventSchema, sample.payload)] : fromBinary(EventListSchema, sample.payload).events,
   );
 }
 
-export function useAudit(key: string): readonly AuditEntry[] {
-  return useList(key, (sample) =>
+/** The last audit entries of a robot, newest first. */
+export function useAudit(robotKey: string): readonly AuditEntry[] {
+  return useList([`${robotKey}/audit`], (sample) =>
     sample.live
       ? [fromBinary(AuditEntrySchema, sample.payload)]
       : fromBinary(AuditListSchema, sample.payload).entries,
   );
 }
 
-function useList<M>(key: string, decode: (sample: Sample) => readonly M[]): readonly M[] {
-  const list = useMemo(() => signal<readonly M[]>([]), [key]);
+interface Dated {
+  timestamp?: Timestamp | undefined;
+}
+const timeOf = ({ timestamp }: Dated): number => (timestamp ? timestampMs(timestamp) : 0);
+
+function useList<M extends Dated>(
+  expressions: readonly string[],
+  decode: (sample: Sample) => readonly M[],
+): readonly M[] {
+  const list = useMemo(() => signal<readonly M[]>([]), expressions);
   useEffect(() => {
-    const seen = new Set<string>();
-    return watch(key, (sample) => {
-      if (!sample.live) {
-        list.value = [...decode(sample)].reverse().slice(0, LIST_LENGTH);
-        seen.clear();
-        return;
-      }
+    const lists = new Map<string, { entries: readonly M[]; seen: Set<string> }>();
+    const take = (sample: Sample) => {
+      const told = (sample.live && lists.get(sample.key)) || { entries: [], seen: new Set() };
       const id = `${sample.publisher}:${sample.sequence}`;
-      if (seen.has(id)) return; // sent again after a new connection
-      seen.add(id);
-      list.value = [...decode(sample), ...list.value].slice(0, LIST_LENGTH);
-    });
+      if (told.seen.has(id)) return; // sent again after a new connection
+      if (sample.live) told.seen.add(id);
+      told.entries = [...[...decode(sample)].reverse(), ...told.entries].slice(0, LIST_LENGTH);
+      lists.set(sample.key, told);
+      // The sort is stable: what one publisher told keeps its order.
+      const merged = [...lists.values()].flatMap(({ entries }) => entries);
+      if (lists.size > 1) merged.sort((first, second) => timeOf(second) - timeOf(first));
+      list.value = merged.slice(0, LIST_LENGTH);
+    };
+    const stops = expressions.map((expression) => watch(expression, take));
+    return () => stops.forEach((stop) => stop());
   }, [list]);
   return list.value;
 }

@@ -11,8 +11,9 @@ import type { Sample } from "./mesh";
 export const decodesVideo = "VideoDecoder" in window;
 
 export interface VideoListener {
-  /** A picture was drawn; `newAt` is when it was new on this page's clock [ms], null: not known. */
-  drawn: (newAt: number | null) => void;
+  /** A picture was drawn; `newAt` is when it was new on this page's clock [ms], null: not known; `step`: how
+   * far the video is reduced for this browser's line. */
+  drawn: (newAt: number | null, step: number) => void;
   failed: (text: string) => void;
 }
 
@@ -24,6 +25,7 @@ export function playVideo(key: string, canvas: HTMLCanvasElement, listener: Vide
   let waiting: VideoFrame | null = null;
   let drawing = 0;
   let clock = 0; // decode order; source times may repeat
+  let step = 0;
   const newAt = new Map<number, number | null>();
 
   const draw = () => {
@@ -34,7 +36,7 @@ export function playVideo(key: string, canvas: HTMLCanvasElement, listener: Vide
     if (canvas.width !== frame.displayWidth) canvas.width = frame.displayWidth;
     if (canvas.height !== frame.displayHeight) canvas.height = frame.displayHeight;
     context?.drawImage(frame, 0, 0);
-    listener.drawn(newAt.get(frame.timestamp) ?? null);
+    listener.drawn(newAt.get(frame.timestamp) ?? null, step);
     for (const time of newAt.keys()) if (time <= frame.timestamp) newAt.delete(time);
     frame.close();
   };
@@ -64,6 +66,10 @@ export function playVideo(key: string, canvas: HTMLCanvasElement, listener: Vide
   };
   const take = (sample: Sample) => {
     try {
+      if (sample.step !== step) {
+        step = sample.step;
+        codec = ""; // another stream: it begins with a key frame
+      }
       if (sample.live) {
         decode(fromBinary(CompressedVideoSchema, sample.payload).data, sample.newAt);
         return;

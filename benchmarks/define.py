@@ -1,0 +1,60 @@
+"""How soon Define's checks answer: the worker's start, then a check as one types.
+
+./dev run python benchmarks/define.py [--robot puma560] [--checks 300] [--json]
+"""
+
+import argparse
+import asyncio
+import json
+import statistics
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from robots.description import LIBRARY
+from robots.save import read_robot
+from services.console.define.store import lay_out, open_store, put
+from services.console.define.workshop import Limits, Workshop
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--robot", default="puma560")
+    parser.add_argument("--checks", type=int, default=300)
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    result = asyncio.run(measure(arguments.robot, arguments.checks))
+    if arguments.json:
+        print(json.dumps(result))
+    else:
+        for name, value in result.items():
+            print(f"{name:>12} {value:8.1f}")
+
+
+async def measure(robot: str, checks: int) -> dict[str, float]:
+    """Times [ms] of the first check, with the worker's start, and of those that follow."""
+    values, paths = read_robot(LIBRARY / robot)
+    with tempfile.TemporaryDirectory() as folder:
+        store = open_store(Path(folder) / "store")
+        files = {path: put(store, file.read_bytes()) for path, file in paths.items()}
+        workshop = Workshop(store.folder, Limits())
+        times = []
+        try:
+            for _ in range(checks + 1):
+                begun = time.perf_counter()
+                request: dict[str, Any] = {"description": values, "joints": None}
+                await workshop.quick.do("check", lay_out(store, files), request)
+                times.append((time.perf_counter() - begun) * 1e3)
+        finally:
+            await workshop.close()
+    first, *rest = times
+    return {
+        "first_ms": first,
+        "median_ms": statistics.median(rest),
+        "p99_ms": statistics.quantiles(rest, n=100)[98],
+    }
+
+
+if __name__ == "__main__":
+    main()

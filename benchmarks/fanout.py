@@ -1,0 +1,339 @@
+"""Fan-out: ten robots at 100 Hz and one 720p video to many monitors, through each of several systems.
+
+    ./dev run python benchmarks/fanout.py [--monitors 1,4,16,64] [--seconds 5] [--repeats 3] [--minutes 10]
+        [--arms NAMES] [--peers-python PYTHON] [--nats-server FILE] [--json]
+
+Arms: `robomesh` (our publishers, our router, plain Zenoh clients), `zenoh` (a bare router, the same payloads
+without our bus), `page` (our console, clients that speak the page's protocol), `pyzmq` (no broker), `nats`,
+`foxglove` (foxglove-sdk's server); `-plain` behind a name: without TLS, which all others have (pyzmq: CURVE).
+The peers need a Python with pyzmq, nats-py and foxglove-sdk, and a nats-server. Each arm has the same
+publisher, at most four processes of monitors, and notes only the age of what came; the arms take turns,
+so that a busy machine is busy for all. `--stopped`: beside each, the same with one more monitor, stopped.
+A peer that is not there is left out, what does not come up within a minute is told and passed over, and
+after `--minutes` nothing more is begun.
+
+Reach: all delivered; p99 at 64 at most 1.3 times the bare router's, and below NATS and foxglove-sdk;
+a stopped monitor changes the others' p99 by less than a fifth.
+"""
+
+import argparse
+import contextlib
+import json
+import os
+import shutil
+import signal
+import socket
+import statistics
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+if __name__ == "__main__":
+    # A program beside this one has a room's name: what is imported is looked for from the root.
+    sys.path[0] = str(Path(__file__).parents[1])
+
+from benchmarks.fanout_sent import prepared
+from tests.conftest import free_port
+
+HERE = Path(__file__)
+ARMS = ("robomesh", "zenoh", "page", "pyzmq", "nats", "foxglove", "robomesh-plain", "page-plain")
+MOST_PROCESSES = 4
+OUR_ROLES, PEERS_ROLES = HERE.with_name("fanout_ours.py"), HERE.with_name("fanout_peers.py")
+PEERS = {"pyzmq": "zmq", "nats": "nats", "foxglove": "foxglove"}
+# From its first process to its last word, beside the seconds that it measures.
+MOST_S = 60.0
+
+
+class NotMeasured(Exception):
+    """Why an arm has no figure."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--monitors", default="1,4,16,64")
+    parser.add_argument("--seconds", type=float, default=5.0)
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--minutes", type=float, default=10.0, help="after which nothing more is begun")
+    parser.add_argument("--arms", default=",".join(ARMS))
+    parser.add_argument("--stopped", action="store_true", help="beside each, with a stopped monitor too")
+    parser.add_argument("--peers-python", metavar="PYTHON")
+    parser.add_argument("--nats-server", default="nats-server", metavar="FILE")
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    arms = [each for each in arguments.arms.split(",") if each]
+    if unknown := set(arms) - {f"{arm}{plain}" for arm in ARMS[:6] for plain in ("", "-plain")}:
+        parser.error(f"no such arm: {', '.join(sorted(unknown))}; there are {', '.join(ARMS)}")
+    for arm in tuple(arms):
+        if missing := missing_peer(arm.removesuffix("-plain"), arguments):
+            arms.remove(arm)
+            print(f"{arm} is left out: {missing}", file=sys.stderr, flush=True)
+    rows, left_out = [], 0
+    last_s = time.monotonic() + 60 * arguments.minutes
+    with tempfile.TemporaryDirectory() as name:
+        plain, secured = prepared(Path(name))
+        for _ in range(arguments.repeats):
+            for count in (int(each) for each in arguments.monitors.split(",")):
+                for arm in arms:
+                    for stopped in (False, True) if arguments.stopped else (False,):
+                        folder = plain if arm.endswith("-plain") else secured
+                        cell = Cell(arm, count, stopped, folder, arguments)
+                        if time.monotonic() > last_s:
+                            left_out += 1
+                            continue
+                        try:
+                            rows.append({**cell.row(), **cell.measure()})
+                            print(words(rows[-1]), file=sys.stderr, flush=True)
+                        except NotMeasured as error:
+                            print(f"{count:3} {arm}: not measured: {error}", file=sys.stderr, flush=True)
+    if left_out:
+        print(f"{left_out} not begun within {arguments.minutes:g} minutes", file=sys.stderr)
+    result = {"cores": os.cpu_count(), "seconds": arguments.seconds, "rows": summed(rows)}
+    print(json.dumps(result) if arguments.json else "\n".join(words(row) for row in result["rows"]))
+
+
+def missing_peer(kind: str, arguments: Any) -> str:
+    """What an arm needs and is not there, in words; nothing: it can run."""
+    if kind not in PEERS:
+        return ""
+    if arguments.peers_python is None:
+        return "--peers-python names no Python"
+    imported = [arguments.peers_python, "-c", f"import {PEERS[kind]}"]
+    if not shutil.which(arguments.peers_python) or subprocess.run(imported, capture_output=True).returncode:
+        return f"{arguments.peers_python} has no {PEERS[kind]}"
+    if kind == "nats" and not shutil.which(arguments.nats_server):
+        return f"there is no {arguments.nats_server}"
+    return ""
+
+
+class Cell:
+    """One arm with so many monitors, once."""
+
+    def __init__(self, arm: str, count: int, stopped: bool, folder: Path, arguments: Any) -> None:
+        self.arm, self.count, self.stopped, self.folder = arm, count, stopped, folder
+        self.kind = arm.removesuffix("-plain")
+        self.tls = (folder / "tls").exists()
+        self.seconds, self.nats_server = arguments.seconds, arguments.nats_server
+        self.peers = self.kind in PEERS
+        self.python = arguments.peers_python if self.peers else sys.executable
+        self.address = f"127.0.0.1:{free_port()}"
+        self.page = f"127.0.0.1:{free_port()}"
+        self.processes: list[subprocess.Popen[str]] = []
+
+    def row(self) -> dict[str, Any]:
+        """What it is."""
+        return {"arm": self.arm, "monitors": self.count, "stopped": self.stopped}
+
+    def measure(self) -> dict[str, Any]:
+        """Starts everything, lets it run, counts.
+
+        Raises:
+            NotMeasured: If something does not come up, or does not end in time.
+        """
+        with tempfile.TemporaryDirectory() as out, contextlib.ExitStack() as stack:
+            # Who is waited for in vain is killed, which its pipe tells.
+            limit = threading.Timer(MOST_S + self.seconds, self.end)
+            stack.callback(limit.cancel)
+            limit.start()
+            stack.callback(self.end)
+            folder = Path(out)
+            for file in self.folder.iterdir():
+                (folder / file.name).symlink_to(file)
+            servers = [self.started(each) for each in self.servers(folder)]
+            publisher = self.role("publish", folder)
+            monitors = [self.role("receive", folder, 1)] if self.stopped else []
+            monitors += [self.role("receive", folder, share) for share in shares(self.count)]
+            everyone = (publisher, *monitors)
+            for each in everyone:
+                heard(each, "ready")
+            begin = time.time_ns() + 2 * 10**9
+            end = begin + round(self.seconds * 1e9)
+            for each in everyone:
+                tell(each, f"{begin} {end}")
+            time.sleep(1.0)
+            if self.stopped:
+                monitors.pop(0).send_signal(signal.SIGSTOP)
+            time.sleep(max(0.0, (begin - time.time_ns()) / 1e9))
+            groups = {"servers": servers, "publisher": [publisher], "monitors": monitors}
+            used = {name: cpu_s(group) for name, group in groups.items()}
+            time.sleep(max(0.0, (end - time.time_ns()) / 1e9))
+            cores = {name: (cpu_s(group) - used[name]) / self.seconds for name, group in groups.items()}
+            sent = json.loads(heard(publisher))
+            for each in monitors:
+                each.wait()
+            if not limit.is_alive():
+                raise NotMeasured(f"did not end within {MOST_S + self.seconds:g} s")
+            return {**self.summary(folder, sent), "cores": cores}
+
+    def summary(self, folder: Path, sent: dict[str, int]) -> dict[str, Any]:
+        """Shares delivered, and ages [ms]."""
+        ages = {
+            what: np.concatenate([np.fromfile(file, dtype=np.int64) for file in folder.glob(f"{what}.*")])
+            for what in ("joints", "pictures")
+        }
+        percentiles = np.percentile(ages["joints"], (50, 99)) / 1e6 if ages["joints"].size else (np.nan,) * 2
+        return {
+            "delivered": ages["joints"].size / max(1, sent["joints"] * self.count),
+            "pictures": ages["pictures"].size / max(1, sent["pictures"] * self.count),
+            "p50_ms": float(percentiles[0]),
+            "p99_ms": float(percentiles[1]),
+        }
+
+    def role(self, role: str, folder: Path, count: int | None = None) -> Any:
+        """A process that publishes, or receives for so many monitors."""
+        file = PEERS_ROLES if self.peers else OUR_ROLES
+        address = self.page if self.kind == "page" and role == "receive" else self.address
+        kind = "robomesh" if self.kind == "page" and role == "publish" else self.kind
+        words = [self.python, str(file), role, kind, address, str(folder)]
+        return self.started(words if count is None else [*words, str(count)])
+
+    def started(self, words: list[str]) -> subprocess.Popen[str]:
+        """A process, which `end` ends."""
+        process = subprocess.Popen(
+            words,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=None if os.environ.get("FANOUT_DEBUG") else subprocess.DEVNULL,
+            text=True,
+            cwd=HERE.parents[1],
+        )
+        self.processes.append(process)
+        return process
+
+    def end(self) -> None:
+        """Ends all of them."""
+        for process in self.processes:
+            process.kill()
+            process.wait()
+
+    def servers(self, folder: Path) -> Iterator[list[str]]:
+        """What stands between publisher and monitors, started in this order."""
+        if self.kind in ("robomesh", "page"):
+            scheme = "tls" if self.tls else "tcp"
+            site = folder / "site.toml"
+            lines = [
+                'site = "bench"',
+                "[router]",
+                f'listen = ["{scheme}/{self.address}"]',
+                *([TLS_LINE.format(folder=folder)] if self.tls else []),
+            ]
+            if self.kind == "page":
+                lines += ["[console]", f'listen = "{self.page}"']
+                lines += [CONSOLE_TLS_LINE.format(folder=folder)] if self.tls else []
+            site.write_text("\n".join(lines) + "\n")
+            robomesh = [sys.executable, "-m", "services.command_line.main"]
+            yield [*robomesh, "router", "--site", str(site)]
+            until_connectable(self.address)
+            if self.kind == "page":
+                attach = ("--connect", f"{scheme}/{self.address}")
+                yield [*robomesh, "console", "--site", str(site), *attach]
+                until_connectable(self.page)
+        elif self.kind == "zenoh":
+            yield [sys.executable, str(OUR_ROLES), "route", self.address, str(folder)]
+            until_connectable(self.address)
+        elif self.kind == "nats":
+            host, port = self.address.split(":")
+            tls = ["--tls", "--tlscert", f"{folder}/tls", "--tlskey", f"{folder}/key"] if self.tls else []
+            yield [self.nats_server, "-a", host, "-p", port, *tls]
+            until_connectable(self.address)
+
+
+TLS_LINE = 'tls = {{ ca = "{folder}/ca", certificate = "{folder}/tls", key = "{folder}/key" }}'
+CONSOLE_TLS_LINE = 'tls = {{ certificate = "{folder}/tls", key = "{folder}/key" }}'
+
+
+def shares(count: int) -> list[int]:
+    """So many monitors on at most four processes."""
+    processes = min(count, MOST_PROCESSES)
+    return [count // processes + (number < count % processes) for number in range(processes)]
+
+
+def tell(process: Any, line: str) -> None:
+    """Gives a process a line; one that has ended is noticed when it is heard."""
+    with contextlib.suppress(BrokenPipeError):
+        process.stdin.write(f"{line}\n")
+        process.stdin.flush()
+
+
+def heard(process: Any, word: str = "") -> str:
+    """A process's next line.
+
+    Raises:
+        NotMeasured: If it says something else than that word, or nothing.
+    """
+    line = str(process.stdout.readline()).strip()
+    if not line or (word and line != word):
+        said = f"{' '.join(process.args[1:4])}: said {line!r}, not {word or 'what it counted'!r}"
+        raise NotMeasured(f"{said} (FANOUT_DEBUG=1 shows why)")
+    return line
+
+
+def until_connectable(address: str) -> None:
+    """Waits until something listens there.
+
+    Raises:
+        NotMeasured: If nothing does within a minute.
+    """
+    host, port = address.split(":")
+    deadline = time.monotonic() + MOST_S
+    while time.monotonic() < deadline:
+        with contextlib.suppress(OSError), socket.create_connection((host, int(port))):
+            return
+        time.sleep(0.05)
+    raise NotMeasured(f"nothing listens on {address} (FANOUT_DEBUG=1 shows why)")
+
+
+def cpu_s(processes: list[Any]) -> float:
+    """Processor time that they have used [s].
+
+    Raises:
+        NotMeasured: If one was ended.
+    """
+    ticks = 0
+    for process in processes:
+        try:
+            fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+        except OSError:
+            raise NotMeasured(f"did not come up within {MOST_S:g} s") from None
+        ticks += int(fields[11]) + int(fields[12])
+    return ticks / os.sysconf("SC_CLK_TCK")
+
+
+def summed(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Medians of the repeats; the p99's spread."""
+    kinds: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
+    for row in rows:
+        kinds.setdefault((row["monitors"], row["arm"], row["stopped"]), []).append(row)
+    found = []
+    for (count, arm, stopped), same in sorted(kinds.items(), key=lambda item: item[0][0]):
+        values = {
+            name: statistics.median(row[name] for row in same)
+            for name in ("delivered", "pictures", "p50_ms", "p99_ms")
+        }
+        cores = {group: statistics.median(row["cores"][group] for row in same) for group in same[0]["cores"]}
+        late = [row["p99_ms"] for row in same]
+        found.append({"arm": arm, "monitors": count, "stopped": stopped, **values, "cores": cores})
+        found[-1]["p99_spread_ms"] = [min(late), max(late)]
+    return found
+
+
+def words(row: dict[str, Any]) -> str:
+    spread = "{:.1f}..{:.1f}".format(*row["p99_spread_ms"]) if "p99_spread_ms" in row else ""
+    cores = ", ".join(f"{name} {value:.2f}" for name, value in row["cores"].items())
+    return (
+        f"{row['monitors']:3} {row['arm'] + (' +stopped' if row['stopped'] else ''):<24} "
+        f"joints {row['delivered']:8.3%}  pictures {row['pictures']:8.3%}  "
+        f"p50 {row['p50_ms']:7.2f} ms  p99 {row['p99_ms']:8.2f} ms {spread:>14}  cores: {cores}"
+    )
+
+
+if __name__ == "__main__":
+    if sys.platform != "linux":
+        sys.exit("benchmarks/fanout.py: reads /proc: run it on Linux")
+    main()

@@ -1,0 +1,231 @@
+"""Faults of a controller: what the gateway shows of each, how soon, and how soon all is well again.
+
+    ./dev run python benchmarks/faults.py [--only freeze,flood] [--rounds 3] [--json]
+
+Router, gateway and simulator are processes of their own; each fault is begun and ended by request while
+they run. Times are this program's, a monitor's: from the answer to the request until the state and the
+event are here. `stale_s`, where the units cease: from the last joints message until the link is shown
+as silent or down.
+
+Reach: stale within 1 s of the last unit; every fault shown, and recovered from by itself.
+"""
+
+import argparse
+import asyncio
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import AsyncIterator, Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from latency import free_port, service, until_connectable
+
+from bus.keys import robot_key
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import Session, SessionSettings, open_session
+
+STATE = schema.ControllerState
+LONGEST_S = 20.0
+CALM_S = 1.5
+Shown = Callable[["Seen"], bool]
+
+
+@dataclass
+class Seen:
+    """What the monitor has seen."""
+
+    controller: STATE = field(default_factory=STATE)
+    events: list[str] = field(default_factory=list)
+    last_joints_s: float = 0.0
+    joints: int = 0
+    newer_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Row:
+    """What a fault should show."""
+
+    state: str
+    shown: Shown
+    event: str = ""
+    ceases: bool = False  # no more units of use come
+
+
+def link(state: int, text: str = "") -> Shown:
+    return lambda seen: seen.controller.link == state and text in seen.controller.link_text
+
+
+ROWS = {
+    "freeze": Row("SILENT, then DOWN", link(STATE.SILENT), "link.silent", ceases=True),
+    "garbage": Row(
+        "malformed counted", lambda s: s.controller.counters.units_malformed > 0, "unit.malformed"
+    ),
+    "split": Row("UP, nothing malformed", link(STATE.UP)),
+    "flood": Row("flooding", lambda s: s.controller.health.flooding, "link.flooding"),
+    "deluge": Row("SILENT", link(STATE.SILENT, "sends far too much"), "link.deluge", ceases=True),
+    "drop": Row("DOWN", link(STATE.DOWN, "closed the connection"), "link.down"),
+    "jump": Row("motion", lambda s: "motion.foreign" in s.events, "motion.foreign"),
+    "local": Row("mode LOCAL", lambda s: s.controller.mode == STATE.LOCAL, "controller.local"),
+    "fault": Row("activity FAULT", lambda s: s.controller.activity == STATE.FAULT, "controller.fault"),
+    "mute": Row("mode UNKNOWN", lambda s: s.controller.mode == STATE.MODE_UNKNOWN, "status.gone"),
+    "joints": Row(
+        "SILENT", link(STATE.SILENT, "the description has 5"), "controller.joint_count", ceases=True
+    ),
+    "restart": Row("DOWN", link(STATE.DOWN), "link.down"),
+    "refuse": Row("DOWN", link(STATE.DOWN, "too many clients"), "link.down", ceases=True),
+    "burst": Row("SILENT", link(STATE.SILENT), "link.silent", ceases=True),
+    "bare": Row("mode UNKNOWN", lambda s: s.controller.mode == STATE.MODE_UNKNOWN, "status.gone"),
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--only", default=",".join(ROWS), metavar="NAME,NAME")
+    parser.add_argument("--rounds", type=int, default=1)
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    names = arguments.only.split(",")
+    if unknown := [name for name in names if name not in ROWS]:
+        parser.error(f"--only {unknown[0]}: there are {', '.join(ROWS)}")
+    result = measure(names, arguments.rounds)
+    if arguments.json:
+        print(json.dumps(result))
+        return
+    for row in result["faults"]:
+        times = "   ".join(
+            f"{key} {row[key]:6.2f}" for key in ("shown_s", "stale_s", "recovered_s") if key in row
+        )
+        print(f"{row['fault']:<8} {row['state']:<22} {row['event']:<22} {times}")
+    print(f"most stale: {result['most_stale_s']:.3f} s")
+    print(f"joints dated newer than they came: {result['newer_s']:.3f} s")
+
+
+def measure(names: list[str], rounds: int) -> dict[str, Any]:
+    """Every fault, one after the other."""
+    router, port = free_port(), free_port()
+    endpoint = f"tcp/127.0.0.1:{router}"
+    with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
+        site = Path(folder) / "site.toml"
+        site.write_text(
+            f'site = "bench"\n[router]\nlisten = ["{endpoint}"]\n[audit]\nfolder = "{folder}"\n'
+            f'[[robot]]\nname = "arm"\nmodel = "pt600"\ncontroller = "tcp://127.0.0.1:{port}"\n'
+        )
+        stack.enter_context(service("router", site, endpoint))
+        until_connectable(router)
+        stack.enter_context(simulator(port, endpoint))
+        stack.enter_context(service("gateway", site, endpoint))
+        return asyncio.run(watch(endpoint, names * rounds))
+
+
+@contextlib.contextmanager
+def simulator(port: int, endpoint: str) -> Iterator[None]:
+    """A simulated controller that takes requests for faults."""
+    words = ("simulate", "--listen", f"127.0.0.1:{port}", "--for", "bench/arm", "--connect", endpoint)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "services.command_line.main", *words],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        until_connectable(port)
+        yield
+    finally:
+        process.terminate()
+        process.wait()
+
+
+async def watch(endpoint: str, names: list[str]) -> dict[str, Any]:
+    settings = SessionSettings(connect=(endpoint,), wait_s=20.0)
+    async with open_session(settings) as session, seeing(session) as seen:
+        rows = [await one(session, seen, name) for name in names]
+    return {
+        "faults": rows,
+        "most_stale_s": max((row["stale_s"] for row in rows if "stale_s" in row), default=0.0),
+        "newer_s": seen.newer_s,
+        "cores": os.cpu_count(),
+    }
+
+
+@contextlib.asynccontextmanager
+async def seeing(session: Session) -> AsyncIterator[Seen]:
+    """A monitor of the robot."""
+    seen = Seen()
+
+    async def take(topic: str) -> None:
+        async for sample in session.subscribe(robot_key("bench", "arm", topic), newest=10_000):
+            message = sample.message()
+            if isinstance(message, STATE):
+                seen.controller = message
+            elif isinstance(message, schema.Event):
+                seen.events.append(message.code)
+            elif isinstance(message, JointStates) and sample.live:
+                seen.last_joints_s = time.monotonic()
+                seen.joints += 1
+                newer_s = message.timestamp.ToNanoseconds() * 1e-9 - time.time()
+                seen.newer_s = max(seen.newer_s, newer_s)
+
+    tasks = [asyncio.create_task(take(topic)) for topic in ("controller", "events", "joints")]
+    try:
+        yield seen
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def one(session: Session, seen: Seen, name: str) -> dict[str, Any]:
+    """Begin a fault, see it, end it, see that all is well."""
+    row = ROWS[name]
+    await until(lambda: well(seen), "well before")
+    await asyncio.sleep(CALM_S)
+    seen.events.clear()
+    await ask(session, name)
+    begin_s = time.monotonic()
+    await until(lambda: row.shown(seen) and (not row.event or row.event in seen.events), name)
+    shown_s = time.monotonic()
+    result: dict[str, Any] = {"fault": name, "state": row.state, "event": row.event}
+    result["shown_s"] = shown_s - begin_s
+    if row.ceases:
+        result["stale_s"] = shown_s - seen.last_joints_s
+    await asyncio.sleep(CALM_S)
+    before = seen.joints
+    await ask(session, name, off=True)
+    end_s = time.monotonic()
+    await until(lambda: well(seen) and seen.joints > before, f"{name} is over")
+    result["recovered_s"] = time.monotonic() - end_s
+    return result
+
+
+def well(seen: Seen) -> bool:
+    state = seen.controller
+    return (
+        state.link == STATE.UP
+        and state.mode == STATE.REMOTE
+        and state.activity != STATE.FAULT
+        and not state.health.flooding
+    )
+
+
+async def ask(session: Session, name: str, *, off: bool = False) -> None:
+    request = schema.FaultRequest(fault=name, off=off)
+    await session.ask(robot_key("bench", "arm", "simulator/fault"), request, timeout_s=5.0)
+
+
+async def until(condition: Callable[[], bool], what: str) -> None:
+    try:
+        async with asyncio.timeout(LONGEST_S):
+            while not condition():
+                await asyncio.sleep(0.002)
+    except TimeoutError:
+        raise SystemExit(f"{what}: not seen within {LONGEST_S:g} s") from None
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,250 @@
+"""The gateway under load: units parsed a second, robots that one process carries, clients that do not read.
+
+    ./dev run python benchmarks/gateway.py [--parse] [--robots 1,10,100] [--legacy] [--seconds 10] [--json]
+
+All three sections unless some are named. Processes are real ones (router, gateway, controllers, monitor),
+all on this machine: latencies are taken on its monotonic clock, from just before a unit is written to its
+controller's socket until a monitor's subscriber has the message. CPU is user and system time of all the
+gateway's threads. The peer is a bare Zenoh put of as many bytes, as often, right after.
+
+Reach: 150,000 five-joint units a second on one core; 100 robots x 100 Hz, nothing lost, p99 under 20 ms,
+at most 60 us of CPU a unit; one of 64 clients that never reads costs the others at most 20 % of p99.
+"""
+
+import argparse
+import contextlib
+import json
+import multiprocessing
+import os
+import random
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import zenoh
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from latency import STEP_DEG, process, summary
+from legacy_clients import serve_old_programs
+from plant import RATE_HZ, cpu_s, paced, rss_mib, running_controllers, running_site, until
+
+from bus.endpoints import client_config
+from bus.header import unpack
+from protocol_gateway.drivers.unit import UnitDriver
+from robots.joints import JointType
+
+DEGREES = 180 / 3.141592653589793
+
+Seen = tuple[str, bytes, bytes, int]  # key, payload, attachment, monotonic ns
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--parse", action="store_true", help="units parsed a second")
+    parser.add_argument("--robots", type=numbers, default=(), metavar="N,N", help="robots in one gateway")
+    parser.add_argument("--legacy", action="store_true", help="64 legacy clients, one of which does not read")
+    parser.add_argument("--seconds", type=float, default=10.0, help="of each measurement")
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    everything = not (arguments.parse or arguments.robots or arguments.legacy)
+    result: dict[str, Any] = {"cores": os.cpu_count()}
+    if arguments.parse or everything:
+        result["parse"] = parse()
+    if robots := arguments.robots or ((1, 10, 50, 100, 200) if everything else ()):
+        result["robots"] = [carry(count, arguments.seconds) for count in robots]
+    if arguments.legacy or everything:
+        result["legacy"] = serve_old_programs()
+    if arguments.json:
+        print(json.dumps(result))
+    else:
+        show(result)
+
+
+def numbers(text: str) -> tuple[int, ...]:
+    return tuple(int(each) for each in text.split(","))
+
+
+def show(result: dict[str, Any]) -> None:
+    for name, row in result.get("parse", {}).items():
+        print(f"{name:<44} {row['units_s']:>9,.0f} units/s, {row['us']:.1f} us each")
+    for row in result.get("robots", ()):
+        unit, bare = row["unit"], row["bare"]
+        print(
+            f"{row['robots']:>3} robots x {RATE_HZ} Hz: lost {row['lost']} of {row['sent']:,}; "
+            f"p50 {unit['p50']:.2f} p99 {unit['p99']:.2f} max {unit['max']:.1f} ms; "
+            f"CPU {row['cpu_us']:.1f} us a unit, {row['cpu_share']:.0%} of a core; "
+            f"memory {row['rss_mib']:.0f} MiB\n"
+            f"      bare puts: p50 {bare['p50']:.2f} p99 {bare['p99']:.2f} max {bare['max']:.1f} ms, "
+            f"CPU {row['bare_cpu_us']:.1f} us each; gateway / bare: p50 {row['ratio_p50']:.1f}, "
+            f"CPU {row['ratio_cpu']:.1f}"
+        )
+    if row := result.get("legacy"):
+        reading, ratio = row["p99_ms"], row["ratio_p99"]
+        print(
+            f"{row['readers']} old programs beside one that reads: p99 {reading['all read']:.2f} ms; "
+            f"beside one that never reads: {reading['one does not']:.2f} ms, ratio {ratio:.2f} "
+            f"(of each pair of runs: {', '.join(f'{each:.2f}' for each in row['ratios'])}); "
+            f"it missed {row['states_skipped']} states; "
+            f"the others lost {row['lost']} of {row['sent']:,}"
+        )
+
+
+# ------------------------------------------------------------------------- parsing
+
+
+def parse() -> dict[str, dict[str, float]]:
+    """Bytes in, events out, on one core; the best of five runs over 20,000 units."""
+    chance = random.Random(1)
+
+    def values(separator: str = ";") -> str:
+        return separator.join(f"{chance.uniform(-180, 180):.2f}" for _ in range(5))
+
+    forms: dict[str, tuple[Callable[[int], str], dict[int, str]]] = {
+        "names": (lambda k: f"1#ABSOLUTE.DEG*{values()}@", {}),
+        "codes": (lambda k: f"1#2*{values()}@", {2: "ABSOLUTE.DEG"}),
+        "as the paper prints it": (lambda k: f"1#ABSOLUTE.DEG* {values('; ').replace('-', '- ')}@", {}),
+        "with velocities, status and time": (
+            lambda k: (
+                f"4#ABSOLUTE.DEG*{values()}&VELOCITY.DEG*{values()}"
+                f"&STATUS*moving;remote;homed&TIME*{k / 100:.2f}@"
+            ),
+            {},
+        ),
+    }
+    result = {}
+    for name, (form, codes) in forms.items():
+        units = [form(k).encode() for k in range(20_000)]
+        whole = b"".join(units)
+        for cut, pieces in (
+            ("4 KiB pieces", [whole[at : at + 4096] for at in range(0, len(whole), 4096)]),
+            ("a unit a piece", units),
+        ):
+            seconds = min(parsed_s(pieces, codes, len(units)) for _ in range(5))
+            result[f"{name}, {cut}"] = {"units_s": len(units) / seconds, "us": seconds / len(units) * 1e6}
+    return result
+
+
+def parsed_s(pieces: list[bytes], codes: dict[int, str], units: int) -> float:
+    driver = UnitDriver([JointType.ROTARY] * 5, codes)
+    begun = time.process_time()
+    for piece in pieces:
+        driver.receive(piece)
+    took = time.process_time() - begun
+    assert driver.units_received == units
+    return took
+
+
+# -------------------------------------------------------------------------- robots
+
+
+def carry(robots: int, seconds: float) -> dict[str, Any]:
+    """So many robots in one gateway, and as many bare publishers after them."""
+    units = int(seconds * RATE_HZ)
+    sent = robots * units
+    written, put = multiprocessing.RawArray("q", sent), multiprocessing.RawArray("q", sent)
+    go, bare_cpu = multiprocessing.Event(), multiprocessing.Value("d")
+    with (
+        running_controllers(robots, written, units, go) as ports,
+        running_site(ports) as (endpoint, gateway),
+    ):
+        with monitor(endpoint, "robomesh/bench/*/joints") as seen:
+            until(lambda: len({key for key, *_ in list(seen)}) == robots)
+            begun_s, begun_cpu_s = time.monotonic(), cpu_s(gateway.pid)
+            go.set()
+            time.sleep(seconds)
+            lasted_s, took_s = time.monotonic() - begun_s, cpu_s(gateway.pid) - begun_cpu_s
+            memory = rss_mib(gateway.pid)
+            time.sleep(2.0)
+            rows = [place for key, payload, _, at in seen if (place := decoded(key, payload, at))]
+            gaps = lost_numbers(seen)
+            size = max(len(payload) for _, payload, *_ in seen)
+        with (
+            monitor(endpoint, "bare/*") as bare,
+            process(bare_puts, (endpoint, robots, put, units, size, bare_cpu)),
+        ):
+            until(lambda: bool(bare_cpu.value))
+    latencies = summary([at - written[robot * units + k - 1] for robot, k, at in rows])
+    puts = summary([at - put[int.from_bytes(data[:8], "little")] for _, data, _, at in bare])
+    cpu_us, bare_cpu_us = took_s / (lasted_s * RATE_HZ * robots) * 1e6, bare_cpu.value / sent * 1e6
+    return {
+        "robots": robots,
+        "sent": sent,
+        "received": len(rows),
+        "lost": sent - len(rows),
+        "lost_on_the_mesh": gaps,
+        "unit": latencies,
+        "cpu_us": cpu_us,
+        "cpu_share": took_s / lasted_s,
+        "rss_mib": memory,
+        "bare": puts,
+        "bare_lost": sent - len(bare),
+        "bare_cpu_us": bare_cpu_us,
+        "ratio_p50": latencies["p50"] / puts["p50"],
+        "ratio_cpu": cpu_us / bare_cpu_us,
+    }
+
+
+def decoded(key: str, payload: bytes, at: int) -> tuple[int, int, int] | None:
+    """Which robot's which unit it was, and when it came; None: one from before the measurement."""
+    joints = JointStates.FromString(payload).joints
+    k = round(joints[-1].position * DEGREES / STEP_DEG) + round(joints[0].position * DEGREES) * 10_000
+    return (int(key.split("/")[2].removeprefix("arm-")), k, at) if k else None
+
+
+def lost_numbers(seen: list[Seen]) -> int:
+    """Gaps in the sequences of all publishers."""
+    numbers: dict[str, list[int]] = {}
+    for key, _, attachment, _ in seen:
+        numbers.setdefault(key, []).append(unpack(attachment).sequence)
+    return sum(max(each) - min(each) + 1 - len(each) for each in numbers.values())
+
+
+@contextlib.contextmanager
+def monitor(endpoint: str, key_expr: str) -> Iterator[list[Seen]]:
+    """All that comes on a key, with the time at which it was in hand; nothing is decoded meanwhile."""
+    seen: list[Seen] = []
+    with zenoh.open(client_config((endpoint,))) as session:
+        subscriber = session.declare_subscriber(key_expr, zenoh.handlers.RingChannel(100_000))
+
+        def take() -> None:
+            for sample in subscriber:
+                at = time.monotonic_ns()
+                seen.append(
+                    (str(sample.key_expr), sample.payload.to_bytes(), sample.attachment.to_bytes(), at)
+                )
+
+        taking = threading.Thread(target=take)
+        taking.start()
+        try:
+            yield seen
+        finally:
+            subscriber.undeclare()
+            taking.join(10)
+
+
+def bare_puts(endpoint: str, robots: int, put: Any, units: int, size: int, cpu: Any) -> None:
+    """What Zenoh itself takes: as many publishers and bytes, the same rate, priority and router."""
+    with zenoh.open(client_config((endpoint,))) as session:
+        publishers = [
+            session.declare_publisher(
+                f"bare/{robot}",
+                priority=zenoh.Priority.REAL_TIME,
+                congestion_control=zenoh.CongestionControl.DROP,
+            )
+            for robot in range(robots)
+        ]
+        time.sleep(1.0)
+        begun_s = time.process_time()
+        filling = bytes(size - 8)
+        for k, robot in paced(robots, units):
+            place = robot * units + k - 1
+            put[place] = time.monotonic_ns()
+            publishers[robot].put(place.to_bytes(8, "little") + filling, attachment=bytes(24))
+        took_s = time.process_time() - begun_s
+        time.sleep(2.0)
+        cpu.value = took_s
+
+
+if __name__ == "__main__":
+    multiprocessing.set_start_method("spawn")
+    main()

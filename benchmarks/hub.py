@@ -1,0 +1,211 @@
+"""What a hub costs as the mesh grows: many sites' routers, each with many robots' keys, and one who joins.
+
+    ./dev run python benchmarks/hub.py [--sites 5,10,20] [--robots 50] [--json]
+
+Each site is a router with one client that declares what a robot's services declare: a publisher and a
+queryable for each topic of the table, a queryable for each request, four tokens of presence. The sites
+share a process, whose start costs more than they do; the hub has its own. No state is sent. Told: the hub's
+memory, the processor time of the hub and of all sites' routers and clients, what this machine's loopback
+carried until the hub knew everything, how long somebody who joins at the hub waits for everybody's presence
+and for every robot's answer to one get; and what one site more takes.
+"""
+
+import argparse
+import contextlib
+import json
+import multiprocessing
+import socket
+import sys
+import time
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+import psutil
+import zenoh
+
+if __name__ == "__main__":
+    # A program beside this one has a room's name: what is imported is looked for from the root.
+    sys.path[0] = str(Path(__file__).parents[1])
+
+from bus.endpoints import client_config, router_config
+from bus.topics import REQUESTS, TOPICS
+from tests.conftest import free_port
+
+SERVICES = ("gateway", "kinematics", "renderer", "recorder")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--sites", default="5,10,20")
+    parser.add_argument("--robots", type=int, default=50, help="of each site")
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    for sites in arguments.sites.split(","):
+        row = measure(int(sites), arguments.robots)
+        words = "  ".join(f"{name} {value:.6g}" for name, value in row.items())
+        print(json.dumps(row) if arguments.json else words, flush=True)
+
+
+def measure(sites: int, robots: int) -> dict[str, Any]:
+    """So many sites on one hub."""
+    context = multiprocessing.get_context("spawn")
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    hub = context.Process(target=route, args=(endpoint,), daemon=True)
+    hub.start()
+    until_connectable(endpoint)
+    ours, theirs = context.Pipe()
+    plants = context.Process(target=serve_plants, args=(theirs, robots, endpoint), daemon=True)
+    plants.start()
+    ours.recv()
+    try:
+        empty, carried = memory(hub.pid), loopback()
+        used = {process: cpu_s(process.pid) for process in (hub, plants)}
+        with zenoh.open(client_config((endpoint,))) as watching, Present(watching) as present:
+            begun = time.monotonic()
+            ours.send(sites)
+            present.until(sites * robots * len(SERVICES))
+            known_s = time.monotonic() - begun
+        time.sleep(2.0)  # what presence overtook
+        row = {
+            "sites": sites,
+            "robots": sites * robots,
+            "declarations": sites * robots * (2 * len(topics()) + len(requests()) + len(SERVICES)),
+            "empty_mib": empty,
+            "hub_mib": memory(hub.pid),
+            "carried_mb": (loopback() - carried) / 1e6,
+            "known_s": known_s,
+            "hub_cpu_s": cpu_s(hub.pid) - used[hub],
+            "sites_cpu_s": cpu_s(plants.pid) - used[plants],
+        }
+        begun = time.monotonic()
+        with zenoh.open(client_config((endpoint,))) as joining, Present(joining) as present:
+            present.until(sites * robots * len(SERVICES))
+            row["joined_s"] = time.monotonic() - begun
+            begun = time.monotonic()
+            answers = sum(reply.ok is not None for reply in joining.get("robomesh/*/*/joints", timeout=30.0))
+            row["answers_s"], row["answers"] = time.monotonic() - begun, answers
+            begun, carried = time.monotonic(), loopback()
+            ours.send(1)
+            present.until((sites + 1) * robots * len(SERVICES))
+            row["more_s"] = time.monotonic() - begun
+            time.sleep(1.0)
+            row["more_kb"] = (loopback() - carried) / 1e3
+        return row
+    finally:
+        for process in (plants, hub):
+            process.kill()
+            process.join(10)
+
+
+class Present:
+    """Whose tokens are known to a session."""
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self._keys: set[str] = set()
+        self._subscriber = session.liveliness().declare_subscriber(
+            "robomesh/*/*/alive/*/*", lambda sample: self._keys.add(str(sample.key_expr)), history=True
+        )
+
+    def __enter__(self) -> "Present":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._subscriber.undeclare()
+
+    def until(self, count: int) -> None:
+        """Until so many are.
+
+        Raises:
+            SystemExit: If they are not within 2 minutes.
+        """
+        deadline = time.monotonic() + 120.0
+        while len(self._keys) < count:
+            if time.monotonic() > deadline:
+                sys.exit(f"{len(self._keys)} of {count} tokens after 2 minutes")
+            time.sleep(0.01)
+
+
+def topics() -> list[str]:
+    """Keys of a robot's topics; of views the four."""
+    found = [name for name in TOPICS if not name.endswith("/*")]
+    return found + [
+        f"{kind}/{view}" for kind in ("video", "image") for view in ("front", "top", "left", "free")
+    ]
+
+
+def requests() -> list[str]:
+    return list(REQUESTS)
+
+
+def route(endpoint: str) -> None:
+    with zenoh.open(router_config((endpoint,))):
+        time.sleep(3600)
+
+
+def serve_plants(told: Connection, robots: int, hub: str) -> None:
+    """Starts as many sites more as it is told."""
+    with contextlib.ExitStack() as stack:
+        kept: list[Any] = []
+        number = 0
+        told.send("ready")
+        while True:
+            for _ in range(told.recv()):
+                kept += start(stack, number, robots, hub)
+                number += 1
+
+
+def start(stack: contextlib.ExitStack, number: int, robots: int, hub: str) -> list[Any]:
+    """A site: its router, and a client in whose name all its robots' services speak."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    stack.enter_context(zenoh.open(router_config((endpoint,), (hub,))))
+    session = stack.enter_context(zenoh.open(client_config((endpoint,))))
+    kept: list[Any] = []
+    for robot in range(robots):
+        base = f"robomesh/site-{number}/arm-{robot}"
+        for name in topics():
+            kept.append(session.declare_publisher(f"{base}/{name}"))
+            kept.append(session.declare_queryable(f"{base}/{name}", answering(f"{base}/{name}")))
+        kept += [session.declare_queryable(f"{base}/{name}", refusing) for name in requests()]
+        for service in SERVICES:
+            kept.append(session.liveliness().declare_token(f"{base}/alive/{service}/0a0b0c0d"))
+    return kept
+
+
+def answering(key: str) -> Any:
+    return lambda query: query.reply(key, b"")
+
+
+def refusing(query: zenoh.Query) -> None:
+    query.reply_err(b"")
+
+
+def memory(pid: int | None) -> float:
+    return float(psutil.Process(pid).memory_info().rss / 2**20)
+
+
+def cpu_s(pid: int | None) -> float:
+    times = psutil.Process(pid).cpu_times()
+    return float(times.user + times.system)
+
+
+def loopback() -> int:
+    """What the loopback interface has carried [bytes]."""
+    return int(psutil.net_io_counters(pernic=True)["lo"].bytes_sent)
+
+
+def until_connectable(endpoint: str) -> None:
+    host, port = endpoint.removeprefix("tcp/").split(":")
+    deadline = time.monotonic() + 30.0
+    while time.monotonic() < deadline:
+        with socket.socket() as probe:
+            if probe.connect_ex((host, int(port))) == 0:
+                return
+        time.sleep(0.05)
+    sys.exit(f"nothing listens on {endpoint}")
+
+
+if __name__ == "__main__":
+    if sys.platform != "linux":
+        sys.exit("benchmarks/hub.py: reads /proc: run it on Linux")
+    main()

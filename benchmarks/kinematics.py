@@ -1,0 +1,348 @@
+"""Kinematics and checks: how many a second, how often solved, how long; beside peers in the same run.
+
+    ./dev run python benchmarks/kinematics.py [--targets 1000] [--peers-python PYTHON] [--json]
+
+PYTHON has roboticstoolbox-python, mujoco and ikpy, in a venv of its own. UR5 and Panda are measured where
+`./dev example-robots` installed them. All are asked for the same targets, which random joint positions
+within limits reach; a solution counts within limits and 1e-4 m, 1e-3 rad (ours answers only within
+1e-5 m, 2e-4 rad). Pt500 and Pt600 are asked for position and tool axis; roboticstoolbox, which has no such
+task, for the whole pose, which there is reachable too. TRAC-IK's figures are its own, read, not measured.
+"""
+
+import argparse
+import json
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio
+
+from robots.cells import CellDescription, CellRobot, Fixture
+from robots.collision import allowed_positions, build_cell, outside_nearest, own_contacts, own_nearest
+from robots.description import known_names, load
+from robots.inverse import InverseSolver, Task, build_solver, solve
+from robots.joints import FloatArray, violations
+from robots.model import RobotModel, build_model, tool_jacobian, tool_placement
+from robots.poses import inverse
+from robots.programs.check import check_program
+from services.site_fixtures import Fixture as FixtureSettings
+from services.site_fixtures import fixture_shape
+
+ARMS = {
+    "ur5": Task.POSE_6D,
+    "panda": Task.POSE_6D,
+    "puma560": Task.POSE_6D,
+    "pt500": Task.POSITION_AND_AXIS_5D,
+    "pt600": Task.POSITION_AND_AXIS_5D,
+}
+# TRAC-IK 1.5.1, its README: 10,000 targets each, 1e-5, at most 5 ms; solved, average ms.
+TRAC_IK = {"ur5": (99.17, 0.37), "panda": (99.88, 0.37), "Fanuc M-430iA/2F, 5 joints": (99.93, 0.36)}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--targets", type=int, default=1000)
+    parser.add_argument("--peers-python", default="", help="a Python that has the peers")
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    result = measure(arguments.targets, arguments.peers_python)
+    print(json.dumps(result)) if arguments.json else tell(result)
+
+
+def measure(count: int, peers_python: str) -> dict[str, Any]:
+    names = [name for name in ARMS if name in known_names()]
+    arms = {name: Arm(name, count) for name in names}
+    peers = ask_peers(arms, peers_python) if peers_python else {}
+    toolbox, others = peers.get("roboticstoolbox", {}), peers.get("mujoco", {})
+    result: dict[str, Any] = {"targets": count, "forward": [], "inverse": [], "trac_ik_read": TRAC_IK}
+    result["peers"] = {name: next(iter(arms_of.values())).get("version") for name, arms_of in peers.items()}
+    for name, arm in arms.items():
+        there = toolbox.get(name, {})
+        row = {"arm": name, **arm.forward(), "roboticstoolbox": there.get("per_second")}
+        row["mujoco"] = others.get(name, {}).get("per_second")
+        if "tools" in there:
+            own = [tool_placement(arm.model, arm.whole(x)) for x in arm.positions]
+            row["from_roboticstoolbox_m"] = float(np.abs(np.array(there["tools"]) - own).max())
+        result["forward"].append(row)
+        searching = replace(arm.solver, closed=None)
+        solvers = {"ours": arm.solver, "ours, by search": searching}
+        for who, solver in solvers.items() if arm.solver.closed else [("ours, by search", searching)]:
+            result["inverse"].append({"arm": name, "who": who, **arm.inverse(solver)})
+        for peer in ("roboticstoolbox", "ikpy"):
+            found = peers.get(peer, {}).get(name, {})
+            if "solutions" in found:
+                judged = arm.judged(found["solutions"], found["seconds"])
+                result["inverse"].append({"arm": name, "who": peer, **judged})
+    result["collision"] = collisions("ur5" if "ur5" in names else "puma560")
+    result["program"] = program()
+    return result
+
+
+class Arm:
+    """An arm, and what all are asked of it: x (m,) are the positions of the joints that move its tool."""
+
+    def __init__(self, name: str, count: int) -> None:
+        description = load(name)
+        self.name, self.task = name, ARMS[name]
+        self.model: RobotModel = build_model(description)
+        self.solver: InverseSolver = build_solver(description)
+        self.chain = self.solver.chain
+        random = np.random.default_rng(1)
+        self.positions: list[FloatArray] = []
+        while len(self.positions) < count:
+            x = random.uniform(self.chain.lower, self.chain.upper)
+            if not violations(self.model.joints, self.whole(x)):
+                self.positions.append(x)
+        self.targets = [tool_placement(self.model, self.whole(x)) for x in self.positions]
+
+    def whole(self, x: Sequence[float] | FloatArray) -> FloatArray:
+        positions = self.model.joints.home.copy()
+        positions[self.chain.moving] = x
+        return positions
+
+    def forward(self) -> dict[str, Any]:
+        """Calls a second of forward kinematics and Jacobian together."""
+        model, everywhere = self.model, [self.whole(x) for x in self.positions]
+        inner, data, frame = model._pinocchio, model._workspace, model._frame_ids[0]
+
+        def ours(positions: FloatArray) -> None:
+            tool_placement(model, positions)
+            tool_jacobian(model, positions)
+
+        everything = (
+            [model._followers[0] @ x + model._followers[1] for x in everywhere]
+            if model._followers
+            else everywhere
+        )
+
+        def bare(positions: FloatArray) -> None:
+            pinocchio.computeJointJacobians(inner, data, positions)
+            pinocchio.updateFramePlacement(inner, data, frame)
+
+        return {
+            "ours": rate(ours, everywhere),
+            "pinocchio": rate(bare, everything),
+            "from_product_m": max(self._from_product(x) for x in everywhere),
+        }
+
+    def _from_product(self, positions: FloatArray) -> float:
+        """How far the tool is from where a plain product of matrices puts it."""
+        placement = np.eye(4)
+        for fixed, angle in zip(self.fixed()[:-1], positions[self.chain.moving], strict=True):
+            c, s = np.cos(angle), np.sin(angle)
+            turn = np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+            placement = placement @ fixed @ turn
+        return float(np.abs(placement @ self.fixed()[-1] - tool_placement(self.model, positions)).max())
+
+    def fixed(self) -> list[FloatArray]:
+        """(4, 4) from each joint to the one before it, z its axis, and from the tool to the last."""
+        if not hasattr(self, "_fixed"):
+            frames = [np.eye(4)]
+            for axis, origin in zip(self.chain.axes, self.chain.origins, strict=True):
+                side = np.cross(axis, [1, 0, 0] if abs(axis[0]) < 0.7 else [0, 1, 0])
+                side /= np.linalg.norm(side)
+                frame = np.eye(4)
+                frame[:3, :3] = np.column_stack([side, np.cross(axis, side), axis])
+                frame[:3, 3] = origin
+                frames.append(frame)
+            frames.append(self.chain.tool_to_base)
+            self._fixed = [inverse(one) @ other for one, other in pairwise(frames)]
+        return self._fixed
+
+    def inverse(self, solver: InverseSolver) -> dict[str, Any]:
+        found, times = [], []
+        for target in self.targets:
+            begin = time.perf_counter()
+            result = solve(solver, target, task=self.task)
+            times.append(time.perf_counter() - begin)
+            found.append(result.solutions[0][self.chain.moving] if len(result.solutions) else None)
+        return self.judged(found, times)
+
+    def judged(self, found: Sequence[Any], seconds: Sequence[float]) -> dict[str, Any]:
+        """Whether each solution is one, put back through the forward kinematics.
+
+        Coupled limits do not count: the peers know none.
+        """
+        solved, worst = 0, 0.0
+        for x, target in zip(found, self.targets, strict=False):
+            if x is None or not np.isfinite(x).all():
+                continue
+            x = np.asarray(x)
+            positions = self.whole(x)
+            apart = inverse(target) @ tool_placement(self.model, positions)
+            away = float(np.linalg.norm(apart[:3, 3]))
+            if self.task is Task.POSE_6D:
+                angle = float(np.arccos(np.clip((np.trace(apart[:3, :3]) - 1) / 2, -1, 1)))
+            else:
+                angle = float(np.arctan2(np.hypot(apart[0, 2], apart[1, 2]), apart[2, 2]))
+            inside = (x >= self.chain.lower - 1e-9).all() and (x <= self.chain.upper + 1e-9).all()
+            if away <= 1e-4 and angle <= 1e-3 and inside:
+                solved += 1
+                worst = max(worst, away)
+        spread = 1000 * np.array(seconds)
+        return {
+            "targets": len(found),
+            "solved": 100.0 * solved / len(found),
+            "worst_m": worst,
+            "median_ms": float(np.median(spread)),
+            "mean_ms": float(spread.mean()),
+            "p99_ms": float(np.percentile(spread, 99)),
+        }
+
+
+def ask_peers(arms: dict[str, Arm], python: str) -> dict[str, Any]:
+    asked = {
+        name: {
+            "joints": [fixed.tolist() for fixed in arm.fixed()[:-1]],
+            "tool": arm.fixed()[-1].tolist(),
+            "lower": arm.chain.lower.tolist(),
+            "upper": arm.chain.upper.tolist(),
+            "home": arm.chain.home.tolist(),
+            "positions": [x.tolist() for x in arm.positions],
+            "targets": [target.tolist() for target in arm.targets],
+        }
+        for name, arm in arms.items()
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "arms.json"
+        path.write_text(json.dumps(asked))
+        program = Path(__file__).with_name("kinematics_peers.py")
+        done = subprocess.run([python, str(program), str(path)], capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise SystemExit(f"{python}: {done.stderr.strip().splitlines()[-1:]}")
+    answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return answer
+
+
+def rate(call: Callable[[FloatArray], Any], positions: Sequence[FloatArray]) -> float:
+    """Calls a second: the best of five rounds over the positions."""
+    best = np.inf
+    for _ in range(5):
+        begin = time.perf_counter()
+        for each in positions:
+            call(each)
+        best = min(best, time.perf_counter() - begin)
+    return len(positions) / float(best)
+
+
+def around() -> tuple[Fixture, ...]:
+    """Three fixtures about an arm that stands on the floor."""
+    rows = [
+        ("table", (600.0, 800.0, 100.0), (650.0, 0.0, 50.0)),
+        ("fence", (20.0, 1500.0, 1000.0), (-800.0, 0.0, 500.0)),
+        ("post", (80.0, 80.0, 900.0), (150.0, -900.0, 450.0)),
+    ]
+    fixtures = []
+    for name, size, xyz in rows:
+        placement = np.eye(4)
+        placement[:3, 3] = np.divide(xyz, 1000.0)
+        shape = fixture_shape(FixtureSettings(cell="a", name=name, box=size))
+        fixtures.append(Fixture(name, (shape,), placement))
+    return tuple(fixtures)
+
+
+def collisions(name: str) -> dict[str, Any]:
+    """Checks a second at random positions, of hulls."""
+    cell = build_cell(CellDescription((CellRobot("arm", name, np.eye(4)),), around()))
+    joints = cell.arms["arm"].joints
+    random = np.random.default_rng(2)
+    positions = [random.uniform(joints.lower, joints.upper) for _ in range(1000)]
+    free = [x for x in positions if not own_contacts(cell, "arm", x)]
+    return {
+        "arm": name,
+        "pairs": len(cell.arms["arm"].own.pairs),
+        "own_contacts": rate(lambda x: own_contacts(cell, "arm", x), free),
+        "touching": 1.0 - len(free) / len(positions),
+        "own_contacts_with_points": rate(lambda x: own_contacts(cell, "arm", x), positions),
+        "own_nearest": rate(lambda x: own_nearest(cell, "arm", x), positions),
+        "outside_within_warning": rate(
+            lambda x: outside_nearest(cell, "arm", x, {}, within_m=0.05), positions
+        ),
+    }
+
+
+def program() -> dict[str, Any]:
+    """A minute of moves beside three fixtures, and how long its check takes, the best of three."""
+    cell = build_cell(CellDescription((CellRobot("arm", "pt600", np.eye(4)),), around()))
+    joints = cell.arms["arm"].joints
+    start = joints.home
+    clear = [
+        x
+        for x in allowed_positions(joints, 500, seed=3)
+        if not own_contacts(cell, "arm", x) and not outside_nearest(cell, "arm", x, {}, within_m=0.05)
+    ]
+    # No motion comes twice: a check keeps what it has seen of one.
+    lines = ["speed 60", *("move_joints " + " ".join(f"{x:.2f}" for x in np.degrees(x)) for x in clear)]
+    count, found = 1, None
+    while found is None or found.duration_s < 60:
+        count += 1
+        text = "\n".join(lines[:count])
+        found = check_program(text, cell, "arm", start)
+    best = np.inf
+    for _ in range(3):
+        begin = time.perf_counter()
+        found = check_program(text, cell, "arm", start)
+        best = min(best, time.perf_counter() - begin)
+    return {
+        "duration_s": found.duration_s,
+        "check_s": float(best),
+        "ok": found.ok,
+        "samples": len(found.path.times_s),
+        "violations": [violation.text for violation in found.violations][:5],
+    }
+
+
+def tell(result: dict[str, Any]) -> None:
+    if not result["peers"]:
+        print("without peers: 'pip install roboticstoolbox-python mujoco ikpy' in a venv of its own,")
+        print("and --peers-python its python, puts them beside")
+    print("peers:", ", ".join(f"{name} {version}" for name, version in result["peers"].items()) or "none")
+    print(
+        "\nFK + Jacobian, calls/s      ours  Pinocchio alone  roboticstoolbox    mujoco   "
+        "FK off NumPy's, roboticstoolbox's [m]"
+    )
+    for row in result["forward"]:
+        apart = f"{row['from_product_m']:.1e} {row.get('from_roboticstoolbox_m', float('nan')):.1e}"
+        print(
+            f"  {row['arm']:18} {row['ours']:11,.0f} {row['pinocchio']:16,.0f} "
+            f"{_count(row['roboticstoolbox']):>16} {_count(row['mujoco']):>9}   {apart}"
+        )
+    print(f"\nIK, {result['targets']} targets       solved   median ms    mean     p99   worst m")
+    for row in result["inverse"]:
+        print(
+            f"  {row['arm']:8} {row['who']:16} {row['solved']:6.1f} % {row['median_ms']:9.4f} "
+            f"{row['mean_ms']:8.4f} {row['p99_ms']:7.3f}   {row['worst_m']:.1e}"
+            + (f"   ({row['targets']} targets)" if row["targets"] != result["targets"] else "")
+        )
+    print("  TRAC-IK's own table, read: " + "; ".join(f"{n} {s} %, {t} ms" for n, (s, t) in TRAC_IK.items()))
+    found = result["collision"]
+    print(f"\n{found['arm']} with hulls, {found['pairs']} pairs of its own links, calls/s:")
+    print(f"  touches itself or not, at random positions where it does not: {found['own_contacts']:,.0f}")
+    print(
+        f"  and what touches where, at all random positions ({100 * found['touching']:.0f} % touch): "
+        f"{found['own_contacts_with_points']:,.0f}"
+    )
+    print(
+        f"  nearest of its own links: {found['own_nearest']:,.0f}; nearest of three fixtures within 50 mm: "
+        f"{found['outside_within_warning']:,.0f}"
+    )
+    found = result["program"]
+    print(
+        f"a program of {found['duration_s']:.1f} s beside three fixtures: checked in "
+        f"{found['check_s']:.2f} s, {found['samples']} samples; "
+        + ("nothing found" if found["ok"] else "; ".join(found["violations"]))
+    )
+
+
+def _count(value: float | None) -> str:
+    return "-" if value is None else f"{value:,.0f}"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,156 @@
+"""Live kinematics: how late, and at what cost, one process tells where ten arms are and how near to things.
+
+    ./dev run python benchmarks/live_kinematics.py [--robots 10] [--seconds 20] [--checks] [--json]
+
+Two arms a cell, with a table, a post and a fence of which one is within the warning distance, so that all of
+it is measured. Router, gateway, kinematics and controllers are real processes; joints come at 100 Hz and
+differ each time. A latency is from when the gateway had the unit (which `kinematics` carries as its source
+time) until a monitor's subscriber has the message; CPU is user and system time of all the service's threads.
+With --checks somebody asks for one program's check after another meanwhile, of worker processes.
+
+Reach, for 10 robots: p99 under 20 ms, at most half a core.
+"""
+
+import argparse
+import asyncio
+import contextlib
+import json
+import multiprocessing
+import os
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from latency import free_port, service, summary, until_connectable
+from plant import RATE_HZ, cpu_s, rss_mib, running_controllers, until
+
+from bus.errors import BusError
+from bus.schemas.robomesh_pb2 import CheckRequest, KinematicState
+from bus.session import Session, SessionSettings, open_session
+from bus.subscription import Sample, Subscription
+
+WARM_UP_S = 3.0
+PROGRAM = "repeat 3\n  move_joints 30 60 -60 20 0\n  move_joints -30 80 -40 -20 0\nend\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--robots", type=int, default=10)
+    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--checks", action="store_true", help="programs are checked meanwhile")
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    result = measure(arguments.robots, arguments.seconds, checks=arguments.checks)
+    if arguments.json:
+        print(json.dumps(result))
+        return
+    late = result["latency_ms"]
+    print(
+        f"{result['robots']} robots x {RATE_HZ} Hz: {late['n']:,} states, {result['rate_hz']:.1f} a second "
+        f"each, {result['with_clearance']:.0%} with clearance, {result['near']:.0%} near something, "
+        f"lost {result['lost']}\n"
+        f"unit at the gateway -> kinematics at a monitor: p50 {late['p50']:.2f} p99 {late['p99']:.2f} "
+        f"max {late['max']:.1f} ms; CPU {result['cpu_share']:.0%} of a core, {result['rss_mib']:.0f} MiB"
+        + ("" if result["checks"] is None else f"; {result['checks']} programs checked meanwhile")
+    )
+
+
+def measure(robots: int, seconds: float, *, checks: bool) -> dict[str, Any]:
+    """One run."""
+    units = int((seconds + WARM_UP_S + 2.0) * RATE_HZ)
+    written, go = multiprocessing.RawArray("q", robots * units), multiprocessing.Event()
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    with contextlib.ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        ports = stack.enter_context(running_controllers(robots, written, units, go))
+        site = folder / "site.toml"
+        site.write_text(site_text(endpoint, folder, ports))
+        stack.enter_context(service("router", site, endpoint))
+        until_connectable(int(endpoint.rpartition(":")[2]))
+        stack.enter_context(service("gateway", site, endpoint))
+        running = stack.enter_context(service("kinematics", site, endpoint))
+        return asyncio.run(listen(endpoint, go, running.pid, robots, seconds, checks=checks))
+
+
+def site_text(endpoint: str, folder: Path, ports: list[int]) -> str:
+    """A cell for each two robots, a few metres apart."""
+    text = f'site = "bench"\n[router]\nlisten = ["{endpoint}"]\n[audit]\nfolder = "{folder}/audit"\n'
+    for number, port in enumerate(ports):
+        cell, y = number // 2, 0.45 if number % 2 else -0.45
+        text += (
+            f'[[robot]]\nname = "arm-{number}"\nmodel = "pt600"\ncontroller = "tcp://127.0.0.1:{port}"\n'
+            f'cell = "{cell}"\ncheck = "off"\npose = {{ xyz = [{cell * 3000}.0, {y * 1000}, 0.0] }}\n'
+        )
+    for cell in range((len(ports) + 1) // 2):
+        for name, shape, (x, y, z) in (
+            ("table", "box = [400.0, 1800.0, 300.0]", (600, 0, 150)),
+            ("post", "cylinder = [40.0, 1000.0]", (-500, 0, 500)),
+            ("fence", "box = [20.0, 1800.0, 1000.0]", (-700, 0, 500)),
+        ):
+            text += (
+                f'[[fixture]]\ncell = "{cell}"\nname = "{name}-{cell}"\n{shape}\n'
+                f"pose = {{ xyz = [{cell * 3000 + x}.0, {y}.0, {z}.0] }}\n"
+            )
+    return text
+
+
+async def listen(
+    endpoint: str, go: Any, process: int, robots: int, seconds: float, *, checks: bool
+) -> dict[str, Any]:
+    """The monitor: each robot's kinematics, with the time that it came."""
+    came: list[tuple[Sample, int]] = []
+    checked: list[float] = []
+    async with open_session(SessionSettings(connect=(endpoint,), wait_s=20.0)) as session:
+        states = session.subscribe("robomesh/bench/*/kinematics", newest=10_000, history=False)
+        taking = [asyncio.create_task(take(states, came))]
+        await asyncio.to_thread(until, lambda: len(states.keys) == robots)
+        if checks:
+            taking.append(asyncio.create_task(ask_checks(session, checked)))
+        go.set()
+        await asyncio.sleep(WARM_UP_S)
+        came.clear()
+        checked.clear()
+        lost_before = sum(states.lost(key) for key in states.keys)
+        begun, cpu_before = time.monotonic(), cpu_s(process)
+        await asyncio.sleep(seconds)
+        took_s, cpu = time.monotonic() - begun, cpu_s(process) - cpu_before
+        kept, memory = [*came], rss_mib(process)
+        lost = sum(states.lost(key) for key in states.keys) - lost_before
+        for task in taking:
+            task.cancel()
+        await asyncio.wait(taking)
+    messages = [KinematicState.FromString(sample.payload) for sample, _ in kept]
+    return {
+        "robots": robots,
+        "latency_ms": summary([at - sample.header.source_time_ns for sample, at in kept]),
+        "rate_hz": len(kept) / took_s / robots,
+        "with_clearance": sum(message.HasField("clearance") for message in messages) / len(messages),
+        "near": sum(message.clearance.distance < 0.05 for message in messages) / len(messages),
+        "lost": lost,
+        "cpu_share": cpu / took_s,
+        "rss_mib": memory,
+        "checks": len(checked) if checks else None,
+        "cores": os.cpu_count(),
+    }
+
+
+async def take(states: Subscription, came: list[tuple[Sample, int]]) -> None:
+    async for sample in states:
+        if sample.live:
+            # The gateway's clock is this machine's.
+            came.append((sample, time.time_ns() - int((time.monotonic() - sample.received) * 1e9)))
+
+
+async def ask_checks(session: Session, checked: list[float]) -> None:
+    while True:
+        with contextlib.suppress(BusError):
+            await session.ask(
+                "robomesh/bench/arm-0/kinematics/check", CheckRequest(program=PROGRAM), timeout_s=60.0
+            )
+            checked.append(time.monotonic())
+
+
+if __name__ == "__main__":
+    multiprocessing.set_start_method("spawn")
+    main()

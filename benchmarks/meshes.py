@@ -1,0 +1,208 @@
+"""How long mesh files take to read, and how much memory; beside VTK's importers in the same run.
+
+    ./dev run python benchmarks/meshes.py [--runs 5] [--vtk-python PYTHON] [--large] [--json]
+
+The files are made here: a wavy plate of 50,000 triangles in each format (3DS holds it in five objects),
+and with --large one of 1,000,000 as VRML, with its progress. Each reading is a process of its own, in
+turns; importing the libraries is not counted, for either.
+"""
+
+import argparse
+import json
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from robots.meshes.mesh import Material, Mesh, Part
+from robots.meshes.normals import creased
+from robots.meshes.read import read_mesh
+from robots.meshes.three_ds.write import write_3ds
+from robots.meshes.write_glb import glb_of
+from robots.meshes.write_others import write_obj, write_ply, write_stl
+
+VTK = {
+    ".wrl": "vtkVRMLImporter",
+    ".3ds": "vtk3DSImporter",
+    ".stl": "vtkSTLReader",
+    ".obj": "vtkOBJReader",
+    ".ply": "vtkPLYReader",
+    ".glb": "vtkGLTFReader",
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--vtk-python", default=sys.executable, help="a Python that has vtk")
+    parser.add_argument("--large", action="store_true", help="1,000,000 triangles of VRML, too")
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--child", nargs=2, metavar=("WHO", "FILE"), help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.child:
+        print(json.dumps(_reading(*arguments.child)))
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        result = measure(Path(folder), arguments.runs, arguments.vtk_python, large=arguments.large)
+    if arguments.json:
+        print(json.dumps(result))
+        return
+    if result["vtk"] is None:
+        print(f"without VTK: {arguments.vtk_python} has none; 'pip install vtk' in a venv of its own,")
+        print("and --vtk-python its python, puts it beside")
+    print(
+        "file         triangles     MB   ours: s (least .. most)  memory/file  VTK: s (least .. most)   ratio"
+    )
+    for row in result["rows"]:
+        ours, vtk = row["ours"], row["vtk"]
+        print(
+            f"{row['file']:10} {row['triangles']:10,} {row['bytes'] / 1e6:6.1f}   {_times(ours)} "
+            f"{row['memory_ratio']:11.1f}   "
+            + (f"{_times(vtk)} {ours['median'] / vtk['median']:8.2f}" if vtk else "")
+        )
+
+
+def _times(found: dict[str, float]) -> str:
+    return f"{found['median']:7.3f} ({found['least']:.3f} .. {found['most']:.3f})"
+
+
+def measure(folder: Path, runs: int, vtk_python: str, *, large: bool) -> dict[str, Any]:
+    """Medians and spreads [s] of each format, and the memory that reading took over the file's size."""
+    version = _vtk_version(vtk_python)
+    sizes = [(ending, 50_000) for ending in WRITERS] + ([(".wrl", 1_000_000)] if large else [])
+    rows = []
+    for ending, count in sizes:
+        path = folder / f"plate{count // 1000}k{ending}"
+        path.write_bytes(WRITERS[ending](plate(count)))
+        ours, theirs, memory = [], [], []
+        for _ in range(runs if count < 1_000_000 else min(runs, 2)):
+            found = _child(sys.executable, "ours", path)
+            ours.append(found["seconds"])
+            memory.append(found["bytes"])
+            if version is not None:
+                theirs.append(_child(vtk_python, "vtk", path)["seconds"])
+        rows.append(
+            {
+                "file": path.name,
+                "triangles": found["triangles"],
+                "bytes": path.stat().st_size,
+                "progress_calls": found["progress_calls"],
+                "ours": _spread(ours),
+                "vtk": _spread(theirs) if theirs else None,
+                "memory_ratio": statistics.median(memory) / path.stat().st_size,
+            }
+        )
+    return {"vtk": version, "runs": runs, "rows": rows}
+
+
+def _spread(values: list[float]) -> dict[str, float]:
+    return {"median": statistics.median(values), "least": min(values), "most": max(values)}
+
+
+def _vtk_version(python: str) -> str | None:
+    code = "import vtkmodules.vtkCommonCore as c; print(c.vtkVersion().GetVTKVersion())"
+    done = subprocess.run([python, "-c", code], capture_output=True, text=True, check=False)
+    return done.stdout.strip() if done.returncode == 0 else None
+
+
+def _child(python: str, who: str, path: Path) -> dict[str, Any]:
+    command = [python, __file__, "--child", who, str(path)]
+    if who == "vtk":
+        command = [python, "-c", _VTK_READING, VTK[path.suffix], str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise SystemExit(f"{who} on {path.name}: {done.stderr.strip().splitlines()[-1:]}")
+    answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return answer
+
+
+def _reading(_who: str, file: str) -> dict[str, Any]:
+    path = Path(file)
+    if path.suffix in (".stl", ".obj", ".ply", ".glb"):
+        import trimesh  # noqa: F401
+    calls: list[float] = []
+    # Resident now, not at most so far: what the imports took and gave back is no gift to the reading.
+    before = int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+    start = time.perf_counter()
+    mesh = read_mesh(path, calls.append)
+    seconds = time.perf_counter() - start
+    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 - before
+    return {
+        "seconds": seconds,
+        "bytes": grown,
+        "triangles": mesh.triangle_count,
+        "progress_calls": len(calls),
+    }
+
+
+_VTK_READING = """
+import json, sys, time
+name, path = sys.argv[1:]
+import vtkmodules.vtkIOImport, vtkmodules.vtkIOGeometry, vtkmodules.vtkIOPLY
+import vtkmodules.vtkRenderingOpenGL2
+modules = (vtkmodules.vtkIOImport, vtkmodules.vtkIOGeometry, vtkmodules.vtkIOPLY)
+reader = next(getattr(module, name) for module in modules if hasattr(module, name))()
+reader.SetFileName(path)
+start = time.perf_counter()
+reader.Update()
+print(json.dumps({"seconds": time.perf_counter() - start}))
+"""
+
+
+def plate(count: int) -> Mesh:
+    """A wavy plate of about so many triangles."""
+    side = round((count / 2) ** 0.5)
+    x, y = np.meshgrid(np.arange(side + 1.0), np.arange(side + 1.0))
+    vertices = np.column_stack([x.ravel(), y.ravel(), 5 * np.sin(x / 7).ravel() * np.cos(y / 9).ravel()])
+    corner = (np.arange(side)[:, None] * (side + 1) + np.arange(side)).ravel()
+    triangles = np.concatenate(
+        [
+            np.column_stack([corner, corner + 1, corner + side + 2]),
+            np.column_stack([corner, corner + side + 2, corner + side + 1]),
+        ]
+    )
+    return Mesh((Part("plate", Material("steel", (0.5, 0.6, 0.7)), *creased(vertices, triangles, np.pi)),))
+
+
+def _in_pieces(mesh: Mesh, pieces: int) -> Mesh:
+    (part,) = mesh.parts
+    parts = []
+    for triangles in np.array_split(part.triangles, pieces):
+        used, faces = np.unique(triangles, return_inverse=True)
+        parts.append(
+            Part(part.name, part.material, part.vertices[used], part.normals[used], faces.reshape(-1, 3))
+        )
+    return Mesh(tuple(parts))
+
+
+def _vrml(mesh: Mesh) -> bytes:
+    """As CAD programs write it: points and faces, and the normals left to the reader."""
+    (part,) = mesh.parts
+    points = ",\n".join(f"{x:.6f} {y:.6f} {z:.6f}" for x, y, z in part.vertices.tolist())
+    faces = ",\n".join(f"{a}, {b}, {c}, -1" for a, b, c in part.triangles.tolist())
+    return (
+        "#VRML V2.0 utf8\nShape { appearance Appearance { material Material { diffuseColor 0.5 0.6 0.7 } }\n"
+        f"geometry IndexedFaceSet {{ coord Coordinate {{ point [\n{points} ] }}\n"
+        f"coordIndex [\n{faces} ] }} }}\n"
+    ).encode()
+
+
+WRITERS: Mapping[str, Callable[[Mesh], bytes]] = {
+    ".wrl": _vrml,
+    ".3ds": lambda mesh: write_3ds(_in_pieces(mesh, 5)),
+    ".stl": write_stl,
+    ".obj": lambda mesh: write_obj(mesh, "none.mtl")[0].replace("mtllib none.mtl\n", "").encode(),
+    ".ply": write_ply,
+    ".glb": glb_of,
+}
+
+
+if __name__ == "__main__":
+    main()

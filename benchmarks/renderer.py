@@ -1,0 +1,262 @@
+"""Pictures a second beside VTK, pyrender and mujoco: same meshes, cameras and sizes, software OpenGL.
+
+    ./dev run python benchmarks/renderer.py [--peers-python PYTHON] [--rounds 3] [--turns 12] [--json]
+
+PYTHON has vtk, pyrender and mujoco, in a venv of its own. Each is a process of its own, which draws and
+reads back to NumPy; they take turns, row by row, so that all meet the same machine. Ours draws more than
+they are asked for: the floor and its grid, the arm's soft shadow, edges, dimmed hollows; its rows
+"full" with the lamp's shadow on the arm too. Medians of all turns; the spread is from p10 to p90. On a
+machine that does other things too, pictures for a second of one core's time say more than by the clock.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+if __name__ == "__main__":
+    # This program has a room's name: what it imports is looked for from the root.
+    sys.path[0] = str(Path(__file__).parents[1])
+
+from benchmarks.renderer_peers import serve
+from renderer.cameras import Camera
+from renderer.drawing import Drawing
+from renderer.mesh import Mesh, prepared
+from renderer.opengl import open_context
+from renderer.scene import Part, Scene
+from robots.description import load
+from robots.glb import link_meshes
+from robots.model import build_model, link_placements
+
+ROBOT = "pt600"
+SIZES = {"480p": (854, 480), "720p": (1280, 720)}
+FIELD_OF_VIEW = float(np.deg2rad(24.0))
+TARGET = np.array([0.0, 0.0, 0.45])
+EYES = TARGET + np.array([[1.9, -1.9, 0.9], [2.6, 0.6, 0.8], [-1.8, -2.0, 1.1], [0.2, -2.7, 0.6]])
+PEERS = ("vtk", "pyrender", "mujoco")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--peers-python", default="", help="a Python that has the peers")
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--turns", type=int, default=12)
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--serve", default="", help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.serve:
+        serve_ours(Path(arguments.serve))
+        return
+    result = measure(arguments.peers_python, arguments.rounds, arguments.turns)
+    print(json.dumps(result)) if arguments.json else tell(result)
+
+
+def rows() -> list[dict[str, Any]]:
+    """Every row: sizes, anti-aliasing and triangles, then views."""
+    some = [
+        {"size": size, "samples": samples, "count": count, "views": 1}
+        for count in ("20k", "100k")
+        for size in SIZES.values()
+        for samples in (0, 4)
+    ]
+    more = [{"size": SIZES["720p"], "samples": 4, "count": "20k", "views": views} for views in (2, 4)]
+    return some + more
+
+
+def measure(peers_python: str, rounds: int, turns: int) -> dict[str, Any]:
+    """Milliseconds of each row and program."""
+    with tempfile.TemporaryDirectory() as folder:
+        scene = Path(folder) / "scene.npz"
+        triangles = write_scene(scene)
+        here = Path(__file__)
+        commands = {
+            name: [sys.executable, str(here), "--serve", str(scene)] for name in ("ours", "ours, full")
+        }
+        if peers_python:
+            peers = here.with_name("renderer_peers.py")
+            commands |= {peer: [peers_python, str(peers), peer, str(scene)] for peer in PEERS}
+        servers = {name: Server(command) for name, command in commands.items()}
+        try:
+            versions = {name: server.answer() for name, server in servers.items()}
+            here_now = {name: server for name, server in servers.items() if "ready" in versions[name]}
+            answers: dict[tuple[int, str], list[dict[str, Any]]] = {}
+            for _ in range(rounds):
+                for number, row in enumerate(rows()):
+                    for name, server in here_now.items():
+                        shading = "full" if name.endswith("full") else "fast"
+                        answer = server.ask({**row, "turns": turns, "shading": shading})
+                        answers.setdefault((number, name), []).append(answer)
+                    print(f"row {number + 1} of {len(rows())}", file=sys.stderr, flush=True)
+        finally:
+            for server in servers.values():
+                server.close()
+    return {
+        "robot": ROBOT,
+        "triangles": triangles,
+        "programs": {name: next(iter(version.values())) for name, version in versions.items()},
+        "rows": [
+            {**row, **{name: summary(answers[number, name], row["views"]) for name in here_now}}
+            for number, row in enumerate(rows())
+        ],
+    }
+
+
+def summary(answers: list[dict[str, Any]], views: int) -> dict[str, float]:
+    """Of one row and program: pictures a second, also of processor time, ms of a turn, memory."""
+    ms = np.concatenate([answer["ms"] for answer in answers])
+    low, middle, high = np.percentile(ms, [10, 50, 90]).tolist()
+    cpu_ms = float(np.median(np.concatenate([answer["cpu_ms"] for answer in answers])))
+    return {
+        "pictures_per_core_s": 1e3 * views / cpu_ms,
+        "cpu_ms": cpu_ms,
+        "pictures_per_s": 1e3 * views / middle,
+        "ms": middle,
+        "ms_p10": low,
+        "ms_p90": high,
+        "drawn": answers[0]["drawn"],
+        "rss_mib": max(answer["rss_mib"] for answer in answers),
+    }
+
+
+def write_scene(path: Path) -> dict[str, int]:
+    """The arm's meshes with few and with many triangles, its motion, the cameras."""
+    description = load(ROBOT)
+    model = build_model(description)
+    glbs = link_meshes(description)
+    arrays: dict[str, Any] = {
+        "links": len(glbs),
+        "eyes": EYES,
+        "target": TARGET,
+        "field_of_view": FIELD_OF_VIEW,
+    }
+    totals = {}
+    for count in ("20k", "100k"):
+        meshes = [mesh_of(glb, count) for glb in glbs.values()]
+        totals[count] = sum(len(mesh.triangles) for mesh in meshes)
+        for number, mesh in enumerate(meshes):
+            arrays[f"{count}/{number}/positions"] = mesh.positions
+            arrays[f"{count}/{number}/normals"] = mesh.normals
+            arrays[f"{count}/{number}/triangles"] = mesh.triangles
+            arrays[f"{count}/{number}/color"] = mesh.colors[:, :3].mean(axis=0) / 255.0
+    arrays["placements"] = np.array(
+        [
+            [
+                placement
+                for name, placement in zip(
+                    model.link_names,
+                    link_placements(model, model.joints.home + 0.4 * np.sin(turn / 6)),
+                    strict=True,
+                )
+                if name in glbs
+            ]
+            for turn in range(40)
+        ]
+    )
+    np.savez(path, **arrays)
+    return totals
+
+
+@cache
+def mesh_of(glb: bytes, count: str) -> Mesh:
+    return prepared(glb) if count == "20k" else subdivided(prepared(glb, most_triangles=10**9))
+
+
+def subdivided(mesh: Mesh) -> Mesh:
+    """Each triangle made four."""
+    faces = mesh.triangles.astype(np.int64)
+    sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    unique, numbers = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
+    ab, bc, ca = numbers.reshape(3, -1) + len(mesh.positions)
+    a, b, c = faces.T
+    pieces = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+
+    def halved(values: np.ndarray) -> np.ndarray:
+        middle = values[unique].astype(np.float64).mean(axis=1)
+        return np.concatenate([values, middle.astype(values.dtype)])
+
+    return replace(
+        mesh,
+        positions=halved(mesh.positions),
+        normals=halved(mesh.normals),
+        colors=halved(mesh.colors),
+        surface=halved(mesh.surface),
+        triangles=np.concatenate([np.stack(piece, axis=1) for piece in pieces]).astype(np.uint32),
+    )
+
+
+def serve_ours(path: Path) -> None:
+    """Answer rows as the peers do."""
+    scene = dict(np.load(path))
+    glbs = link_meshes(load(ROBOT))
+    print(json.dumps({"ready": "robomesh"}), flush=True)
+
+    def make(row: dict[str, Any]) -> Any:
+        drawing = Drawing(open_context(), tuple(row["size"]), samples=row["samples"], shading=row["shading"])
+        for name, glb in glbs.items():
+            drawing.add(name, mesh_of(glb, row["count"]))
+        cameras = [
+            Camera(eye, TARGET, np.array([0.0, 0.0, 1.0]), field_of_view=FIELD_OF_VIEW) for eye in EYES
+        ]
+
+        def render(placements: np.ndarray, view: int) -> np.ndarray:
+            parts = tuple(Part(name, placement) for name, placement in zip(glbs, placements, strict=True))
+            return drawing.draw(Scene(parts, TARGET, 0.95), cameras[view])
+
+        return render, drawing.close
+
+    serve(make, scene)
+
+
+class Server:
+    """A process that answers a line with a line."""
+
+    def __init__(self, command: list[str]) -> None:
+        environment = {**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1"}
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
+        )
+
+    def ask(self, row: dict[str, Any]) -> dict[str, Any]:
+        assert self._process.stdin is not None
+        self._process.stdin.write(json.dumps(row) + "\n")
+        self._process.stdin.flush()
+        return self.answer()
+
+    def answer(self) -> dict[str, Any]:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            if line.startswith("{"):
+                answer: dict[str, Any] = json.loads(line)
+                return answer
+        raise RuntimeError(f"{self._process.args} ended with {self._process.wait()}")
+
+    def close(self) -> None:
+        self._process.kill()
+        self._process.communicate()
+
+
+def tell(result: dict[str, Any]) -> None:
+    names = [name for name in result["rows"][0] if name not in ("size", "samples", "count", "views")]
+    print(f"{result['robot']}, {result['triangles']} triangles; {result['programs']}")
+    print("pictures a core's second; by the clock (ms of a turn, p10 to p90; MiB)")
+    for row in result["rows"]:
+        width, height = row["size"]
+        print(f"{row['count']:>4} {width} x {height}, {row['samples']}x, {row['views']} views")
+        for name in names:
+            cell = row[name]
+            print(
+                f"    {name:<12} {cell['pictures_per_core_s']:7.1f} {cell['pictures_per_s']:7.1f}   "
+                f"({cell['ms']:6.1f}, {cell['ms_p10']:.1f} to {cell['ms_p90']:.1f}; {cell['rss_mib']:.0f})"
+            )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,304 @@
+"""A whole site for hours: what is lost, what grows, which stops nobody asked for.
+
+    ./dev run python benchmarks/soak.py HOURS [--robots 8] [--kills SECONDS] [--json]
+
+`robomesh up` with simulated robots at 100 Hz and every service; here a monitor of all joints and a page's
+WebSocket; half of each minute one robot is recorded, and the recording deleted. With `--kills` a service
+(never the router: that is benchmarks/wan.py's) is killed about so often, and the supervisor starts it again.
+Each minute a line of JSON, at the end one more: share of joint states delivered, memory and open files of
+each process with their slopes (a line through the last four fifths), events by code, latched stops.
+
+Reach: 99.995 % delivered without kills, no slope, no stop.
+"""
+
+import argparse
+import asyncio
+import contextlib
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+
+if __name__ == "__main__":
+    # A program beside this one has a room's name: what is imported is looked for from the root.
+    sys.path[0] = str(Path(__file__).parents[1])
+
+from benchmarks.fanout_parts import HEADER, WebSocketReader, connected
+from bus.schemas.robomesh_pb2 import FromPage
+from bus.session import Session, SessionSettings, open_session
+from tests.conftest import free_port
+
+SITE = "soak"
+ROBOMESH = (sys.executable, "-m", "services.command_line.main")
+LOOK_EACH_S = 60.0
+CAPTURE_S = 30.0
+KILLED = ("gateway", "kinematics", "console", "recorder", "renderer", "player", "watch")
+# A page shows fewer states than there are when a machine stalls: it counts apart.
+WATCHED = f"robomesh/{SITE}/*/joints"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("hours", type=float)
+    parser.add_argument("--robots", type=int, default=8)
+    parser.add_argument("--kills", type=float, metavar="SECONDS", help="kill a service about so often")
+    parser.add_argument("--json", action="store_true", help="the last line only")
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        ports = Ports(free_port(), free_port())
+        file = site_file(Path(folder), arguments.robots, ports)
+        with up(file) as site:
+            result = asyncio.run(soak(site, Path(folder), file, ports, arguments))
+    print(json.dumps(result))
+
+
+class Ports:
+    """Where the site is."""
+
+    def __init__(self, router: int, page: int) -> None:
+        self.router, self.page = f"tcp/127.0.0.1:{router}", f"127.0.0.1:{page}"
+
+
+def site_file(folder: Path, robots: int, ports: Ports) -> Path:
+    parts = [
+        f'site = "{SITE}"',
+        f'[router]\nlisten = ["{ports.router}"]',
+        f'[console]\nlisten = "{ports.page}"',
+        f'[recorder]\nfolder = "{folder}/recordings"',
+        f'[audit]\nfolder = "{folder}/audit"',
+        f'[define]\nfolder = "{folder}/robots"',
+        *(
+            f'[[robot]]\nname = "arm-{number}"\nmodel = "pt600"\ncontroller = "simulated"'
+            for number in range(robots)
+        ),
+    ]
+    file = folder / "site.toml"
+    file.write_text("\n".join(parts) + "\n")
+    return file
+
+
+@contextlib.contextmanager
+def up(file: Path) -> Iterator[subprocess.Popen[str]]:
+    """The site, once its arms are on the page."""
+    log = (file.parent / "log").open("w")
+    process = subprocess.Popen(
+        [*ROBOMESH, "up", str(file)],
+        stdout=subprocess.PIPE,
+        stderr=log,
+        text=True,
+        cwd=Path(__file__).parents[1],
+    )
+    try:
+        assert process.stdout is not None
+        if not process.stdout.readline().startswith("console "):
+            sys.exit(f"the site did not come up: {(file.parent / 'log').read_text()[-2000:]}")
+        yield process
+    finally:
+        process.send_signal(signal.SIGINT)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(10)
+        process.kill()
+
+
+class Seen:
+    """What came of a stream, by publisher: numbers without a gap are all."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[tuple[str, int], list[int]] = {}
+
+    def note(self, key: str, publisher: int, number: int) -> None:
+        first_last_count = self._numbers.setdefault((key, publisher), [number, number, 0])
+        first_last_count[1] = max(first_last_count[1], number)
+        first_last_count[2] += 1
+
+    @property
+    def sent(self) -> int:
+        return sum(last - first + 1 for first, last, _ in self._numbers.values())
+
+    @property
+    def came(self) -> int:
+        return sum(count for _, _, count in self._numbers.values())
+
+
+class Grown:
+    """Memory and open files of every process, over time."""
+
+    def __init__(self, site: int) -> None:
+        self._site = psutil.Process(site)
+        self._rows: dict[str, list[tuple[float, float, float]]] = {}
+
+    def look(self) -> dict[str, Any]:
+        """One look; resident MiB and open files now."""
+        now = {}
+        for process in (self._site, *self._site.children(recursive=True)):
+            with contextlib.suppress(psutil.Error, OSError):
+                name = self._name(process)
+                resident = process.memory_info().rss / 2**20
+                # A killed service's successor is another: its memory begins anew.
+                self._rows.setdefault(f"{name} {process.pid}", []).append(
+                    (time.monotonic(), resident, process.num_fds())
+                )
+                now[name] = {"mib": round(resident, 1), "files": process.num_fds()}
+        return now
+
+    def slopes(self) -> dict[str, dict[str, float]]:
+        """MiB and open files an hour."""
+        found = {}
+        for name, rows in self._rows.items():
+            late = np.array(rows[len(rows) // 5 :])
+            if len(late) >= 4:
+                hours = (late[:, 0] - late[0, 0]) / 3600
+                found[name] = {
+                    "mib": round(float(late[-1, 1]), 1),
+                    "mib_per_h": round(float(np.polyfit(hours, late[:, 1], 1)[0]), 2),
+                    "files": int(late[-1, 2]),
+                    "files_per_h": round(float(np.polyfit(hours, late[:, 2], 1)[0]), 2),
+                }
+        return found
+
+    @staticmethod
+    def _name(process: psutil.Process) -> str:
+        words = process.cmdline()
+        if "services.command_line.main" not in words:
+            return f"worker of {process.parent().cmdline()[3]}"
+        return words[words.index("services.command_line.main") + 1]
+
+
+async def soak(
+    site: subprocess.Popen[str], folder: Path, file: Path, ports: Ports, arguments: Any
+) -> dict[str, Any]:
+    begun, hours = time.monotonic(), arguments.hours
+    joints, pages = Seen(), Seen()
+    events: Counter[str] = Counter()
+    stops: set[str] = set()
+    kills: Counter[str] = Counter()
+    grown = Grown(site.pid)
+    async with open_session(SessionSettings(connect=(ports.router,), wait_s=20.0)) as session:
+        tasks = [
+            asyncio.create_task(work)
+            for work in (
+                watch_joints(session, joints),
+                watch_stops(session, stops),
+                watch_events(session, events),
+                record(folder, ports, arguments.robots),
+                *([kill(site.pid, arguments.kills, kills)] if arguments.kills else []),
+            )
+        ]
+        page = asyncio.create_task(watch_page(ports.page, pages))
+
+        def told() -> dict[str, Any]:
+            return {
+                "minutes": round((time.monotonic() - begun) / 60, 1),
+                "sent": joints.sent,
+                "delivered": joints.came / max(1, joints.sent),
+                "page": pages.came / max(1, pages.sent),
+                "events": dict(events),
+                "stops": sorted(stops),
+                "kills": dict(kills),
+                "disk_mib": round(sum(f.stat().st_size for f in folder.rglob("*") if f.is_file()) / 2**20, 1),
+            }
+
+        while time.monotonic() < begun + hours * 3600:
+            await asyncio.sleep(min(LOOK_EACH_S, max(1.0, hours * 3600 / 20)))
+            for task in tasks:
+                if task.done():
+                    task.result()
+            if page.done():
+                page = asyncio.create_task(watch_page(ports.page, pages))
+            now = {**told(), "processes": grown.look()}
+            if not arguments.json:
+                print(json.dumps(now), flush=True)
+        for task in (*tasks, page):
+            task.cancel()
+        await asyncio.gather(*tasks, page, return_exceptions=True)
+        return {**told(), "slopes": grown.slopes(), "cores": os.cpu_count()}
+
+
+async def watch_joints(session: Session, seen: Seen) -> None:
+    async for sample in session.subscribe(WATCHED, newest=50_000, history=False):
+        seen.note(sample.key, sample.header.publisher, sample.header.sequence)
+
+
+async def watch_stops(session: Session, stops: set[str]) -> None:
+    async for sample in session.subscribe(f"robomesh/{SITE}/*/controller", newest=1000):
+        if sample.message().HasField("stop"):  # type: ignore[arg-type]
+            stops.add(sample.key)
+
+
+async def watch_events(session: Session, events: Counter[str]) -> None:
+    async def of(expression: str) -> None:
+        async for sample in session.subscribe(expression, newest=1000, history=False):
+            if sample.live:
+                events[sample.message().code] += 1  # type: ignore[attr-defined]
+
+    await asyncio.gather(of(f"robomesh/{SITE}/*/events"), of(f"robomesh/{SITE}/*/events/*"))
+
+
+async def watch_page(address: str, seen: Seen) -> None:
+    """A page's WebSocket; it ends when the console is killed, and is begun anew."""
+
+    def take(_: WebSocketReader, opcode: int, message: bytes) -> None:
+        at = message.find(b"\x12\x18", 0, 120)
+        if at > 0:
+            publisher, number, _ = HEADER.unpack_from(message, at + 2)
+            seen.note(message[:at].decode(errors="replace"), publisher, number)
+
+    reader = await connected(address, "/mesh", False, take)
+    reader.send(FromPage(watch=FromPage.Watch(key=WATCHED)).SerializeToString())
+    while reader.transport is not None and not reader.transport.is_closing():
+        await asyncio.sleep(1.0)
+
+
+async def record(folder: Path, ports: Ports, robots: int) -> None:
+    """A capture of one robot after another, each deleted when it is whole: the disk stays as it is."""
+    number = 0
+    while True:
+        process = await asyncio.create_subprocess_exec(
+            *(*ROBOMESH, "record", f"arm-{number % robots}", "--name", f"soak-{number}"),
+            *("--connect", ports.router),
+            cwd=Path(__file__).parents[1],
+            stdout=asyncio.subprocess.DEVNULL,
+            stderr=asyncio.subprocess.DEVNULL,
+        )
+        try:
+            await asyncio.sleep(CAPTURE_S)
+            process.send_signal(signal.SIGINT)
+            await asyncio.wait_for(process.wait(), 20.0)
+        finally:
+            if process.returncode is None:
+                process.kill()
+        await asyncio.sleep(CAPTURE_S)
+        for file in (folder / "recordings").rglob(f"*soak-{number}*"):
+            file.unlink(missing_ok=True)
+        number += 1
+
+
+async def kill(site: int, each_s: float, kills: Counter[str]) -> None:
+    while True:
+        await asyncio.sleep(each_s * random.uniform(0.7, 1.3))
+        services = {
+            words[3]: child
+            for child in psutil.Process(site).children()
+            if len(words := child.cmdline()) > 3 and words[3] in KILLED
+        }
+        if services:
+            name = random.choice(sorted(services))
+            services[name].kill()
+            kills[name] += 1
+
+
+if __name__ == "__main__":
+    if sys.platform != "linux":
+        sys.exit("benchmarks/soak.py: counts open files in /proc: run it on Linux")
+    main()

@@ -1,0 +1,193 @@
+"""The renderer's streams: how soon the first picture comes, how many come, and what each watcher costs.
+
+    ./dev run python benchmarks/streams.py [--size 1280x720] [--seconds 8] [--json]
+
+A site of its own: router, a robot that moves at 100 Hz, kinematics, and the renderer in a process of
+its own, whose CPU is measured. It is watched from here.
+"""
+
+import argparse
+import asyncio
+import contextlib
+import json
+import math
+import multiprocessing
+import os
+import statistics
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+if __name__ == "__main__":
+    # A program beside this one has a room's name: what is imported is looked for from the root.
+    sys.path[0] = str(Path(__file__).parents[1])
+
+import zenoh
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+
+from bus.endpoints import router_config
+from bus.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
+from bus.session import Session, SessionSettings, open_session
+from renderer import service
+from services import kinematics
+from tests.cells import arm_alone
+from tests.conftest import free_port
+
+JOINTS = ("waist", "shoulder", "elbow", "wrist", "roll")
+VIEWS = ("front", "top", "left", "free")
+ARM = "robomesh/hall/arm"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--size", default="1280x720")
+    parser.add_argument("--seconds", type=float, default=8.0, help="each step is watched")
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    width, height = (int(part) for part in arguments.size.split("x"))
+    with tempfile.TemporaryDirectory() as folder:
+        endpoint = f"tcp/127.0.0.1:{free_port()}"
+        settings = SessionSettings(connect=(endpoint,), wait_s=10.0)
+        wanted = service.Settings(site="hall", size=(width, height), folder=Path(folder))
+        with zenoh.open(router_config((endpoint,))):
+            process = multiprocessing.get_context("spawn").Process(
+                target=render, args=(settings, wanted), daemon=True
+            )
+            process.start()
+            try:
+                result = asyncio.run(measure(settings, process.pid or 0, arguments.seconds))
+            finally:
+                process.terminate()
+                process.join(5)
+    result["size"] = arguments.size
+    print(json.dumps(result) if arguments.json else words(result))
+
+
+def render(settings: SessionSettings, wanted: service.Settings) -> None:
+    async def serve() -> None:
+        async with open_session(settings) as session:
+            await service.serve(session, wanted)
+
+    asyncio.run(serve())
+
+
+async def measure(settings: SessionSettings, renderer: int, seconds: float) -> dict[str, Any]:
+    async with open_session(settings) as robot, open_session(settings) as monitor:
+        arm = arm_alone(simulated=True)
+        tasks = [
+            asyncio.create_task(kinematics.serve(robot, kinematics.Settings(site="hall", robots=(arm,)))),
+            asyncio.create_task(move(robot)),
+        ]
+        try:
+            while await monitor.last(f"{ARM}/image/front", timeout_s=5.0) is None:
+                pass
+            result: dict[str, Any] = {"first_ms": {}, "rates": []}
+            result["first_ms"]["own view"] = [
+                await first_ms(monitor, f"{ARM}/video/{view}") for _ in range(5) for view in VIEWS
+            ]
+            result["first_ms"]["a view that was asked for"] = [
+                await asked_ms(monitor, number) for number in range(8)
+            ]
+            for views, watchers in ((1, 1), (1, 2), (1, 4), (2, 1), (4, 1)):
+                result["rates"].append(await rates(monitor, renderer, views, watchers, seconds))
+            return result
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def move(robot: Session) -> None:
+    publisher = robot.declare_publisher("hall", "arm", "joints")
+    for tick in range(10_000_000):
+        message = JointStates()
+        message.timestamp.GetCurrentTime()
+        for number, name in enumerate(JOINTS):
+            message.joints.add(name=name, position=(1.4 if number == 1 else 0.0) + 0.5 * math.sin(tick / 60))
+        publisher.put(message)
+        await asyncio.sleep(0.01)
+
+
+async def first_ms(monitor: Session, key: str) -> float:
+    """From subscribing to the first packet that comes live."""
+    await asyncio.sleep(0.3)  # the watcher before has gone
+    began = time.monotonic()
+    video = monitor.subscribe(key, history=False)
+    async with asyncio.timeout(10):
+        sample = await anext(video)
+    video.close()
+    return (sample.received - began) * 1e3
+
+
+async def asked_ms(monitor: Session, number: int) -> float:
+    """From asking for a view of one's own, of a size that nobody has, to its first packet."""
+    began = time.monotonic()
+    request = ViewRequest(of="free", width=480 + 16 * number, height=320)
+    answer = await monitor.ask(f"{ARM}/views", request, timeout_s=5.0)
+    assert isinstance(answer, ViewAnswer)
+    video = monitor.subscribe(f"{ARM}/{answer.topic}", history=False)
+    async with asyncio.timeout(10):
+        sample = await anext(video)
+    video.close()
+    return (sample.received - began) * 1e3
+
+
+async def rates(monitor: Session, renderer: int, views: int, watchers: int, seconds: float) -> dict[str, Any]:
+    """Pictures a second of each view, and the renderer's CPU, in shares of a core."""
+    watched = [
+        monitor.subscribe(f"{ARM}/video/{view}", newest=4, history=False)
+        for view in VIEWS[:views]
+        for _ in range(watchers)
+    ]
+    counts = [0] * len(watched)
+
+    async def count(number: int) -> None:
+        async for _ in watched[number]:
+            counts[number] += 1
+
+    tasks = [asyncio.create_task(count(number)) for number in range(len(watched))]
+    await asyncio.sleep(1.0)
+    counts[:] = [0] * len(watched)
+    began, cpu = time.monotonic(), cpu_s(renderer)
+    await asyncio.sleep(seconds)
+    took, used = time.monotonic() - began, cpu_s(renderer) - cpu
+    for task in tasks:
+        task.cancel()
+    for video in watched:
+        video.close()
+    await asyncio.sleep(0.5)
+    return {
+        "views": views,
+        "watchers": watchers,
+        "rates": [count / took for count in counts],
+        "cores": used / took,
+        "load": os.getloadavg()[0],
+    }
+
+
+def cpu_s(process: int) -> float:
+    with contextlib.suppress(OSError, IndexError):
+        fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return math.nan
+
+
+def words(result: dict[str, Any]) -> str:
+    lines = [
+        f"first packet of {what}: median {statistics.median(times):.0f} ms, "
+        f"{min(times):.0f} to {max(times):.0f} ms, {len(times)} times"
+        for what, times in result["first_ms"].items()
+    ]
+    for row in result["rates"]:
+        rate = ", ".join(f"{rate:.1f}" for rate in row["rates"])
+        lines.append(
+            f"{row['views']} views of {result['size']}, {row['watchers']} watchers each: {rate} pictures/s; "
+            f"renderer {row['cores']:.2f} cores (load {row['load']:.0f})"
+        )
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    main()

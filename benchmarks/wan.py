@@ -1,0 +1,332 @@
+"""Sites over a wide area: emulated links (`tests/wan/link.py`) between network namespaces, real services.
+
+A plant (controller, gateway, router), a hub (router), a control room (a monitor of the hub's router). The far
+link is the one between plant and hub. All clocks are this machine's. Needs root, or whatever may make
+network namespaces and TUN devices.
+
+    ./dev run python benchmarks/wan.py [--only delay,narrow,cut,kills,failover,frozen,bytes,border] [--json]
+
+delay      80 ms there and back, with and without 1 % of the packets lost each way: how late the room has
+           the joints; how soon a stop is on the controller's socket after it was asked for over both
+           links, as stops are, and over one, as other requests are
+narrow     100, 20 and 2 Mbit/s, 40 ms each way, beside publications like 8 Mbit/s of video: how late the
+           joints are and how many come, and how much of the video comes
+cut        the link cut for 5 and 60 s: how soon the room sees it, how soon all is live again, and whether
+           what was lost is what was counted
+kills      the plant's router killed with -9, 20 times: how soon the room has live joints and the last state
+failover   a monitor with two routers, of which the one it is at is killed: for how long nothing comes
+frozen     the plant's router frozen (SIGSTOP): how soon that is noticed, how soon all is live again
+bytes      what a robot costs on the link, a topic at a time, by TLS too, and what an idle mesh does
+border     all of a robot's topics and its far view watched from the hub, by TLS: what crosses the link, and
+           what a slow border leaves of it
+
+On a machine that others use too, `chrt -r 5 python benchmarks/wan.py` shows the line and not the others.
+"""
+
+import argparse
+import contextlib
+import json
+import os
+import signal
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+if __name__ == "__main__":
+    sys.path[0] = str(Path(__file__).parents[1])
+
+from benchmarks.wan_bytes import bytes_per_topic, over_border
+from tests.wan.network import Link, Network, missing
+from tests.wan.sites import ARM, PORT, Probe, Site
+
+JOINTS = "robomesh/plant/arm/joints"
+CONTROLLER = "robomesh/plant/arm/controller"
+EVENTS = "robomesh/plant/arm/events"
+VIDEO = "robomesh/plant/arm/video/free"
+ONE_WAY_MS = 40.0
+# As much as a few views of 1280 x 720; and what a line's own router queues, 0.26 s at 2 Mbit/s.
+VIDEO_MBIT = 8.0
+QUEUE_BYTES = 64_000
+
+
+@dataclass
+class Stage:
+    """What stands there."""
+
+    network: Network
+    plant: Site
+    hub: Site
+    far: Link
+    near: Link
+    beside: Probe
+    room: Probe
+    stops: list[float] = field(default_factory=list)
+
+    @property
+    def at_hub(self) -> str:
+        """The hub's router, from the room."""
+        return f"tcp/{self.near.far}:{PORT}"
+
+
+@contextlib.contextmanager
+def stage(**link: Any) -> Iterator[Stage]:
+    """Everything up, and joints live in the room."""
+    with tempfile.TemporaryDirectory() as folder, Network() as network:
+        hosts = {name: network.host(name) for name in ("plant", "hub", "room")}
+        far = network.link(hosts["plant"], hosts["hub"])
+        near = network.link(hosts["room"], hosts["hub"])
+        hub = Site(hosts["hub"], "hub", Path(folder))
+        hub.start("router")
+        plant = Site(hosts["plant"], "plant", Path(folder), links=(f"tcp/{far.far}:{PORT}",), more=ARM)
+        beside = plant.with_arm()
+        room = Probe(hosts["room"], f"tcp/{near.far}:{PORT}")
+        made = Stage(network, plant, hub, far, near, beside, room)
+        read = threading.Thread(target=note_stops, args=(made,), daemon=True)
+        read.start()
+        for topic in (JOINTS, CONTROLLER, EVENTS):
+            room.do("watch", topic)
+        room.until(JOINTS, stale=False, within_s=60.0)
+        far.change(**link)
+        yield made
+    read.join(5.0)
+
+
+def note_stops(made: Stage) -> None:
+    """When each stop was on the controller's socket."""
+    output = made.plant.processes["controller"].stdout
+    assert output is not None
+    with contextlib.suppress(ValueError):  # closed
+        for line in output:
+            made.stops.append(float(line))
+
+
+def quantiles(values: list[float]) -> dict[str, float]:
+    """Of durations [s], in ms."""
+    if not values:
+        return {"n": 0}
+    ordered = sorted(value * 1e3 for value in values)
+    at = {f"p{p}": ordered[min(len(ordered) * p // 100, len(ordered) - 1)] for p in (50, 90, 99)}
+    return {
+        "n": len(ordered),
+        **{name: round(value, 2) for name, value in at.items()},
+        "max": round(ordered[-1], 2),
+    }
+
+
+def joints_for(made: Stage, seconds: float, topic: str = JOINTS) -> list[tuple[float, float]]:
+    """(when it came, how long after its source's time) [s] of each sample that came."""
+    made.room.do("samples", topic)
+    time.sleep(seconds)
+    return [(at, lag) for at, lag, live, *_ in made.room.do("samples", topic) if live]
+
+
+# -------------------------------------------------------------------------- delay
+
+
+def delay(seconds: float, stops: int) -> dict[str, Any]:
+    """80 ms there and back, with and without losses."""
+    rows: dict[str, Any] = {}
+    for loss in (0.0, 0.01):
+        with stage(delay_ms=ONE_WAY_MS, loss=loss) as made:
+            time.sleep(2.0)
+            lags = [lag for _, lag in joints_for(made, seconds)]
+            row = {"joints_ms": quantiles(lags), "joints_lost": made.room.do("state", JOINTS, JOINTS)["lost"]}
+            for name, order in (
+                ("stop_ms", ("ask", "robomesh/plant/arm/stop", {"by": "zhao"}, 5.0)),
+                ("stop_over_one_link_ms", ("stop_over_one_link", "robomesh/plant/arm/stop")),
+            ):
+                row[name] = stops_asked(made, stops, order)
+            rows[f"loss {loss:.0%}"] = row
+    return rows
+
+
+def stops_asked(made: Stage, number: int, order: tuple[Any, ...]) -> dict[str, Any]:
+    """From asking for a stop to its unit on the controller's socket."""
+    took = []
+    for _ in range(number):
+        before = len(made.stops)
+        began = made.room.do(*order)["began"]
+        deadline = time.monotonic() + 5.0
+        while len(made.stops) == before and time.monotonic() < deadline:
+            time.sleep(0.002)
+        if len(made.stops) > before:
+            took.append(made.stops[before] - began)
+        time.sleep(0.15)  # those closer than 0.1 s share a unit
+    return {"asked": number, **quantiles(took)}
+
+
+# ------------------------------------------------------------------------- narrow
+
+
+def narrow(seconds: float) -> dict[str, Any]:
+    """Joints beside video on a narrow link."""
+    rows: dict[str, Any] = {}
+    with stage(delay_ms=ONE_WAY_MS) as made:
+        made.beside.do("pour", "plant", "arm", "free", VIDEO_MBIT, 30.0)
+        made.room.do("watch", VIDEO)
+        for mbit in (100, 20, 2):
+            made.far.change(rate_bps=mbit * 1e6, queue_bytes=QUEUE_BYTES)
+            time.sleep(5.0)
+            made.room.do("samples", VIDEO)
+            before = made.far.counters()["forth"]
+            lags = [lag for _, lag in joints_for(made, seconds)]
+            after = made.far.counters()["forth"]
+            pictures = [each for each in made.room.do("samples", VIDEO) if each[2]]
+            rows[f"{mbit} Mbit/s"] = {
+                "joints_ms": quantiles(lags),
+                "joints_share": round(len(lags) / (100 * seconds), 4),
+                "pictures_per_s": round(len(pictures) / seconds, 1),
+                "pictures_ms": quantiles([each[1] for each in pictures]),
+                "mbit_per_s": round((after["bytes"] - before["bytes"]) * 8e-6 / seconds, 2),
+                "overflowed": after["overflowed"] - before["overflowed"],
+            }
+    return rows
+
+
+# ---------------------------------------------------------------------------- cut
+
+
+def cut(lengths: tuple[float, ...]) -> dict[str, Any]:
+    """The link goes and comes back."""
+    rows: dict[str, Any] = {}
+    with stage(delay_ms=ONE_WAY_MS) as made:
+        for length in lengths:
+            time.sleep(2.0)
+            made.room.do("samples", JOINTS)
+            lost_before = made.room.do("state", JOINTS, JOINTS)["lost"]
+            made.far.change(cut=True)
+            went = time.monotonic()
+            stale = made.room.until(JOINTS, stale=True, within_s=length + 5.0) - went
+            time.sleep(max(went + length - time.monotonic(), 0.0))
+            made.far.change(cut=False)
+            healed = time.monotonic()
+            live = made.room.until(JOINTS, stale=False, within_s=60.0) - healed
+            state = made.room.until(CONTROLLER, stale=False, within_s=60.0) - healed
+            came = [each for each in made.room.do("samples", JOINTS) if each[0] > healed]
+            gap = max(after[0] - before[0] for before, after in pairwise(came)) if came[1:] else 0.0
+            lost = made.room.do("state", JOINTS, JOINTS)["lost"] - lost_before
+            rows[f"{length:g} s"] = {
+                "stale_after_s": round(stale, 3),
+                "live_after_healing_s": round(live, 3),
+                "controller_after_healing_s": round(state, 3),
+                "counted_lost": lost,
+                "expected_lost": round((length + live) * 100),
+                "late_ones": sum(each[4] > 0.3 for each in came if each[4] is not None),
+                "longest_gap_after_s": round(gap, 3),
+            }
+    return rows
+
+
+# ---------------------------------------------------------------- kills, failover
+
+
+def kills(times: int) -> dict[str, Any]:
+    """The plant's router is killed and started again."""
+    took, state = [], []
+    with stage(delay_ms=ONE_WAY_MS) as made:
+        for _ in range(times):
+            time.sleep(1.0)
+            router = made.plant.processes["router"]
+            made.room.do("samples", JOINTS)
+            router.kill()
+            router.wait()
+            killed = time.monotonic()
+            made.plant.start("router")
+            while made.room.do("last", CONTROLLER, 1.0) is None:
+                time.sleep(0.02)
+            state.append(time.monotonic() - killed)
+            came: list[float] = []
+            while not came:  # but for what was on its way
+                came = [at for at, *_ in made.room.do("samples", JOINTS) if at > killed + 4e-3 * ONE_WAY_MS]
+            took.append(came[0] - killed)
+    return {"joints_again_ms": quantiles(took), "last_state_again_ms": quantiles(state)}
+
+
+def failover(times: int) -> dict[str, Any]:
+    """A monitor that knows two routers; the one that it is at dies."""
+    gaps = []
+    with stage(delay_ms=ONE_WAY_MS) as made:
+        second = made.network.host("second")
+        there = made.network.link(second, made.hub.host)
+        other = Site(second, "second", made.hub.folder, links=(f"tcp/{there.far}:{PORT}",))
+        other.start("router")
+        to_second = made.network.link(made.plant.host, second)
+        monitor = Probe(made.plant.host, f"tcp/{to_second.far}:{PORT},tcp/127.0.0.1:{PORT}")
+        monitor.do("watch", JOINTS)
+        for _ in range(times):
+            monitor.until(JOINTS, stale=False, within_s=30.0)
+            time.sleep(3.0)
+            monitor.do("samples", JOINTS)
+            other.processes["router"].kill()
+            other.processes["router"].wait()
+            time.sleep(3.0)
+            came = [each[0] for each in monitor.do("samples", JOINTS)]
+            gaps.append(max(after - before for before, after in pairwise(came)))
+            other.start("router")
+            time.sleep(3.0)
+            monitor.process.kill()
+            monitor = Probe(made.plant.host, f"tcp/{to_second.far}:{PORT},tcp/127.0.0.1:{PORT}")
+            monitor.do("watch", JOINTS)
+    return {"gap_ms": quantiles(gaps)}
+
+
+def frozen(times: int) -> dict[str, Any]:
+    """The plant's router stands still for 5 s."""
+    noticed, well = [], []
+    with stage(delay_ms=ONE_WAY_MS) as made:
+        for _ in range(times):
+            time.sleep(2.0)
+            pid = made.plant.processes["router"].pid
+            os.kill(pid, signal.SIGSTOP)
+            froze = time.monotonic()
+            while any("gateway" in each for each in made.room.do("present")):
+                time.sleep(0.05)
+            noticed.append(time.monotonic() - froze)
+            time.sleep(max(froze + 5.0 - time.monotonic(), 0.0))
+            os.kill(pid, signal.SIGCONT)
+            thawed = time.monotonic()
+            well.append(made.room.until(JOINTS, stale=False, within_s=60.0) - thawed)
+    return {"given_up_ms": quantiles(noticed), "live_again_ms": quantiles(well)}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--only", default="delay,narrow,cut,kills,failover,frozen,bytes,border")
+    parser.add_argument("--seconds", type=float, default=20.0, help="of joints, for each figure")
+    parser.add_argument("--stops", type=int, default=300)
+    parser.add_argument("--cuts", default="5,60")
+    parser.add_argument("--kills", type=int, default=20)
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    if why := missing():
+        print(why, file=sys.stderr)
+        sys.exit(2)
+    lengths = tuple(float(each) for each in arguments.cuts.split(","))
+    wanted = {
+        "delay": lambda: delay(arguments.seconds, arguments.stops),
+        "narrow": lambda: narrow(arguments.seconds),
+        "cut": lambda: cut(lengths),
+        "kills": lambda: kills(arguments.kills),
+        "failover": lambda: failover(5),
+        "frozen": lambda: frozen(5),
+        "bytes": lambda: bytes_per_topic(arguments.seconds / 2),
+        "border": lambda: over_border(arguments.seconds / 2),
+    }
+    result = {name: wanted[name]() for name in arguments.only.split(",")}
+    if arguments.json:
+        print(json.dumps(result))
+        return
+    for name, row in result.items():
+        print(name)
+        for key, value in row.items():
+            print(f"  {key}: {value}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,31 @@
+"""Ask whether a teach program would do harm: the mesh checks it from where the robot stands now.
+
+    ./dev run python examples/check.py examples/square.program [ROBOT] [ROUTER]
+
+Exit status 1 when something is wrong with it. Nothing moves.
+"""
+
+import asyncio
+import sys
+from pathlib import Path
+
+from bus.schemas.robomesh_pb2 import CheckRequest
+from bus.session import SessionSettings, open_session
+
+PROGRAM = Path(sys.argv[1]).read_text()
+ROBOT = sys.argv[2] if len(sys.argv) > 2 else "demo/pt600"
+ROUTER = sys.argv[3] if len(sys.argv) > 3 else "tcp/127.0.0.1:7447"
+
+
+async def main() -> int:
+    """Do it."""
+    async with open_session(SessionSettings(connect=(ROUTER,), wait_s=2.0)) as session:
+        request = CheckRequest(program=PROGRAM)
+        answer = await session.ask(f"robomesh/{ROBOT}/kinematics/check", request, timeout_s=30.0)
+    for each in answer.violations:
+        print(f"line {each.line}, {each.time_s:.2f} s: {each.kind}: {each.text}")
+    print(f"{answer.duration_s:.2f} s, {'nothing wrong' if answer.ok else 'not as it should be'}")
+    return 0 if answer.ok else 1
+
+
+sys.exit(asyncio.run(main()))

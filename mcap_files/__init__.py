@@ -1,0 +1,1 @@
+"""Recordings as MCAP files that explain themselves: written, finished, recovered, read."""

@@ -1,0 +1,121 @@
+"""What is in a recording, told from the file itself."""
+
+import contextlib
+from datetime import UTC, datetime
+from functools import lru_cache
+from pathlib import Path
+
+from google.protobuf.duration_pb2 import Duration
+from google.protobuf.message import DecodeError
+from google.protobuf.timestamp_pb2 import Timestamp
+
+from bus.schemas import robomesh_pb2 as schema
+from mcap_files.errors import RecordingError
+from mcap_files.layout import Layout, layout_of
+from mcap_files.names import ABOUT, LOST
+from mcap_files.reading import RecordingFile
+from mcap_files.records import number_in
+
+_CONTROLLER = "/controller"
+
+
+def describe_file(path: Path) -> schema.Recording:
+    """What a recording holds; a file whose writer was killed is read as far as it goes.
+
+    Raises:
+        RecordingError: If it cannot be read at all.
+    """
+    try:
+        found = path.stat()
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror}") from None
+    recording = schema.Recording()
+    recording.CopyFrom(_described(path, found.st_ino, found.st_size, found.st_mtime_ns))
+    return recording
+
+
+def describe_unreadable(path: Path, *, robot: str, problem: str) -> schema.Recording:
+    """What a file's name tells, of one that cannot be read."""
+    name = path.stem.partition("Z_")[2] or path.stem
+    return schema.Recording(
+        robot=robot, name=name, file=path.name, start=_timestamp(_begun_ns(path)), problem=problem
+    )
+
+
+# One that has been described costs a look at its folder's entry only, however many there are.
+@lru_cache(maxsize=4096)
+def _described(path: Path, inode: int, size: int, mtime_ns: int) -> schema.Recording:
+    if not size:
+        raise RecordingError(f"{path.name}: nothing was written: its disk was full, or its recorder killed")
+    layout = layout_of(path)
+    about, lost = layout.metadata.get(ABOUT, {}), _lost(layout.metadata.get(LOST, {}))
+    if not layout.whole and not about and not layout.counts:
+        raise RecordingError(f"{path}: no recording that can be read: it ends before its first message")
+    recording = schema.Recording(
+        site=about.get("site", ""),
+        robot=about.get("robot", ""),
+        name=about.get("name", path.stem),
+        started_by=about.get("started_by", ""),
+        cause=about.get("cause", ""),
+        part=number_in(about.get("part", "")),
+        recovered=about.get("recovered", "") not in ("", "false"),
+        file=path.name,
+        start=_timestamp(layout.start_ns or _begun_ns(path)),
+        duration=_duration(layout.end_ns - layout.start_ns),
+        bytes=size,
+        problem="" if layout.whole else "its writer was killed: it reads up to there",
+        attachments=sorted(layout.attachments),
+    )
+    state = _newest_state(path)
+    if state.HasField("audit_head"):
+        recording.audit_head.CopyFrom(state.audit_head)
+    counts = _counts(layout)
+    for topic in sorted({*counts, *lost}):
+        recording.topics.add(topic=topic, messages=counts.get(topic, 0), lost=lost.get(topic, 0))
+    return recording
+
+
+def _counts(layout: Layout) -> dict[str, int]:
+    counts: dict[str, int] = {}
+    for number, channel in layout.channels.items():
+        if number in layout.counts:
+            counts[channel.topic] = counts.get(channel.topic, 0) + layout.counts[number]
+    return counts
+
+
+def _newest_state(path: Path) -> schema.ControllerState:
+    """The newest state of the controller, which tells the audit log's head."""
+    with RecordingFile(path) as file:
+        topics = [topic for topic in file.topics if topic.endswith(_CONTROLLER)]
+        try:
+            newest = [file.newest(topic, file.layout.end_ns) for topic in topics]
+            data = [each.data for each in newest if each is not None]
+            return schema.ControllerState.FromString(data[0] if data else b"")
+        except (RecordingError, DecodeError):
+            return schema.ControllerState()
+
+
+def _lost(record: dict[str, str]) -> dict[str, int]:
+    return {key: number_in(text) for key, text in record.items()}
+
+
+def _begun_ns(path: Path) -> int:
+    """When a file was begun, which holds no message: its name tells it, or its time."""
+    with contextlib.suppress(ValueError):
+        begun = datetime.strptime(path.name.partition("_")[0], "%Y-%m-%dT%H-%M-%S.%fZ").replace(tzinfo=UTC)
+        return round(begun.timestamp() * 1e6) * 1000
+    with contextlib.suppress(OSError):
+        return path.stat().st_mtime_ns
+    return 0
+
+
+def _timestamp(nanoseconds: int) -> Timestamp:
+    timestamp = Timestamp()
+    timestamp.FromNanoseconds(nanoseconds)
+    return timestamp
+
+
+def _duration(nanoseconds: int) -> Duration:
+    duration = Duration()
+    duration.FromNanoseconds(max(nanoseconds, 0))
+    return duration

@@ -1,0 +1,273 @@
+"""Messages of a file by topic and time, only what is asked for."""
+
+import heapq
+import os
+import struct
+from collections.abc import Callable, Collection, Iterator
+from functools import cached_property
+from pathlib import Path
+from typing import IO, Any, NamedTuple, Self
+
+from mcap.opcode import Opcode
+from mcap_protobuf.decoder import DecoderFactory
+
+from mcap_files.errors import RecordingError
+from mcap_files.layout import Attached, Block, layout_of
+from mcap_files.records import DAMAGE, MESSAGE, RECORD, unpack_chunk
+
+FOREVER_NS = (1 << 64) - 1
+# What waits because its chunk overlaps with the next; beyond it a file's order is taken as it is.
+_MOST_WAITING_BYTES = 64 << 20
+
+
+class RecordedMessage(NamedTuple):
+    """A message of a file; sorts by its time.
+
+    Attributes:
+        received_ns: Recorder's clock, ns since the Unix epoch.
+        place: In the file, so that none is equal to another.
+        source_ns: Publisher's clock.
+    """
+
+    received_ns: int
+    place: tuple[int, int]
+    topic: str
+    source_ns: int
+    sequence: int
+    data: bytes
+
+
+class RecordingFile:
+    """A recording, open for reading; for one thread at a time.
+
+    Raises:
+        RecordingError: If it cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.layout = layout_of(path)
+        try:
+            self._stream: IO[bytes] = path.open("rb")
+        except OSError as error:
+            raise RecordingError(f"{path.name}: cannot be read: {error.strerror}") from None
+        self._unpacked: tuple[Block, bytes] | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Read no more."""
+        self._stream.close()
+
+    @cached_property
+    def _newest_first(self) -> list[Block]:
+        return sorted(self.layout.blocks, key=lambda block: block.end_ns, reverse=True)
+
+    @cached_property
+    def topics(self) -> dict[str, frozenset[int]]:
+        """The channels of each topic, by their numbers."""
+        found: dict[str, frozenset[int]] = {}
+        for number, channel in self.layout.channels.items():
+            found[channel.topic] = found.get(channel.topic, frozenset()) | {number}
+        return found
+
+    def schema_name(self, topic: str) -> str:
+        """Full name of what a topic's messages are: "foxglove.JointStates"; empty: they have none.
+
+        Raises:
+            RecordingError: If there is no such topic.
+        """
+        schema = self.layout.schemas.get(self.layout.channels[min(self._channels(topic))].schema_id)
+        return schema.name if schema is not None else ""
+
+    def decoder(self, topic: str) -> Callable[[bytes], Any] | None:
+        """What makes messages of a topic's bytes; None: they are not protobuf."""
+        channel = self.layout.channels[min(self._channels(topic))]
+        schema = self.layout.schemas.get(channel.schema_id)
+        if schema is None:
+            return None
+        try:
+            return DecoderFactory().decoder_for(channel.message_encoding, schema)
+        except (*DAMAGE, TypeError):
+            return None
+
+    def messages(
+        self,
+        topics: Collection[str] | None = None,
+        *,
+        start_ns: int = 0,
+        end_ns: int = FOREVER_NS,
+    ) -> Iterator[RecordedMessage]:
+        """Messages by their time, `start_ns` included and `end_ns` not.
+
+        Raises:
+            RecordingError: If there is no such topic, or the file is damaged there.
+        """
+        wanted = None if topics is None else frozenset().union(*map(self._channels, topics))
+        waiting: list[RecordedMessage] = []
+        waiting_bytes = 0
+        for block in self.layout.blocks:
+            if block.end_ns < start_ns or block.start_ns >= end_ns or not _has(block, wanted):
+                continue
+            while waiting and (
+                waiting[0].received_ns < block.start_ns or waiting_bytes > _MOST_WAITING_BYTES
+            ):
+                waiting_bytes -= len(waiting[0].data)
+                yield heapq.heappop(waiting)
+            for message in self._read(block, wanted, start_ns, end_ns):
+                heapq.heappush(waiting, message)
+                waiting_bytes += len(message.data)
+        while waiting:
+            yield heapq.heappop(waiting)
+
+    def newest(
+        self, topic: str, at_ns: int, accept: Callable[[bytes], bool] = lambda data: True
+    ) -> RecordedMessage | None:
+        """The newest message of a topic that was received until `at_ns`; None: there is none.
+
+        Args:
+            accept: Told its bytes: whether it counts.
+
+        Raises:
+            RecordingError: If there is no such topic, or the file is damaged there.
+        """
+        wanted = self._channels(topic)
+        best: RecordedMessage | None = None
+        for block in self._newest_first:
+            if best is not None and block.end_ns < best.received_ns:
+                break
+            if block.start_ns > at_ns or not _has(block, wanted):
+                continue
+            for message in sorted(self._read(block, wanted, 0, at_ns + 1), reverse=True):
+                if best is not None and message < best:
+                    break
+                if accept(message.data):
+                    best = message
+                    break
+        return best
+
+    def last(self, topic: str, at_ns: int, count: int) -> list[RecordedMessage]:
+        """The newest so many messages of a topic that were received until `at_ns`, oldest first.
+
+        Raises:
+            RecordingError: If there is no such topic, or the file is damaged there.
+        """
+        wanted = self._channels(topic)
+        found: list[RecordedMessage] = []
+        for block in self._newest_first:
+            if len(found) >= count and block.end_ns < found[0].received_ns:
+                break
+            if block.start_ns <= at_ns and _has(block, wanted):
+                found = sorted([*found, *self._read(block, wanted, 0, at_ns + 1)])[-count:]
+        return found
+
+    def state_at(self, topics: Collection[str], at_ns: int) -> dict[str, RecordedMessage]:
+        """The newest message of each topic that was received until `at_ns`, where there is one.
+
+        Raises:
+            RecordingError: If there is no such topic, or the file is damaged there.
+        """
+        channels = {topic: self._channels(topic) for topic in topics}
+        newest: dict[str, RecordedMessage] = {}
+        for block in self._newest_first:
+            if block.start_ns > at_ns:
+                continue
+            wanted: frozenset[int] = frozenset().union(
+                *(
+                    own
+                    for topic, own in channels.items()
+                    if topic not in newest or newest[topic].received_ns <= block.end_ns
+                )
+            )
+            if wanted and _has(block, wanted):
+                for message in self._read(block, wanted, 0, at_ns + 1):
+                    if message.topic not in newest or newest[message.topic] < message:
+                        newest[message.topic] = message
+        return newest
+
+    def attached(self, name: str) -> Attached:
+        """Where something attached lies.
+
+        Raises:
+            RecordingError: If nothing of that name is.
+        """
+        try:
+            return self.layout.attachments[name]
+        except KeyError:
+            there = ", ".join(self.layout.attachments) or "nothing"
+            raise RecordingError(f"{self.path.name}: no attachment {name!r}; it has {there}") from None
+
+    def attachment(self, name: str) -> bytes:
+        """The bytes of something attached.
+
+        Raises:
+            RecordingError: If nothing of that name is.
+        """
+        found = self.attached(name)
+        return self._bytes(found.offset, found.length)
+
+    def _channels(self, topic: str) -> frozenset[int]:
+        try:
+            return self.topics[topic]
+        except KeyError:
+            there = ", ".join(sorted(self.topics)) or "none"
+            raise RecordingError(f"{self.path.name}: no topic {topic!r}; it has {there}") from None
+
+    def _bytes(self, offset: int, length: int) -> bytes:
+        try:
+            if offset + length > os.fstat(self._stream.fileno()).st_size:
+                raise RecordingError(f"{self.path.name}: it ends before byte {offset + length}")
+            data = os.pread(self._stream.fileno(), length, offset)
+        except OSError as error:
+            raise RecordingError(f"{self.path.name}: cannot be read: {error.strerror}") from None
+        if len(data) < length:
+            raise RecordingError(f"{self.path.name}: it ends before byte {offset + length}")
+        return data
+
+    def _read(
+        self, block: Block, wanted: frozenset[int] | None, start_ns: int, end_ns: int
+    ) -> Iterator[RecordedMessage]:
+        data = self._records(block)
+        channels = self.layout.channels
+        at, end = 0, len(data)
+        try:
+            while at + RECORD.size <= end:
+                opcode, length = RECORD.unpack_from(data, at)
+                if not opcode:
+                    raise ValueError("no record")
+                at += RECORD.size
+                if opcode == Opcode.MESSAGE:
+                    channel, sequence, received_ns, source_ns = MESSAGE.unpack_from(data, at)
+                    if start_ns <= received_ns < end_ns and (wanted is None or channel in wanted):
+                        yield RecordedMessage(
+                            received_ns,
+                            (block.offset, at),
+                            channels[channel].topic,
+                            source_ns,
+                            sequence,
+                            data[at + MESSAGE.size : at + length],
+                        )
+                at += length
+        except (struct.error, KeyError, ValueError):
+            raise RecordingError(f"{self.path.name}: damaged near byte {block.offset + at}") from None
+
+    def _records(self, block: Block) -> bytes:
+        """A block's records, unpacked; the last one is kept, for most who ask go on where they were."""
+        if self._unpacked is not None and self._unpacked[0] == block:
+            return self._unpacked[1]
+        data = self._bytes(block.offset, block.length)
+        if block.chunk:
+            try:
+                data = unpack_chunk(data[RECORD.size :])
+            except DAMAGE as error:
+                raise RecordingError(f"{self.path.name}: damaged near byte {block.offset}: {error}") from None
+        self._unpacked = block, data
+        return data
+
+
+def _has(block: Block, wanted: frozenset[int] | None) -> bool:
+    return wanted is None or block.channels is None or not wanted.isdisjoint(block.channels)

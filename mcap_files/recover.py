@@ -1,0 +1,123 @@
+"""Recordings whose writer was killed, or whose disk was full, made whole."""
+
+import contextlib
+import itertools
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum, auto
+from pathlib import Path
+from types import MappingProxyType
+
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.records import Metadata
+
+from mcap_files import records
+from mcap_files.capture import is_being_written
+from mcap_files.errors import CaptureError
+from mcap_files.finish import rewrite
+from mcap_files.names import ABOUT, LOST
+
+
+class State(Enum):
+    """How far a file came."""
+
+    OPEN = auto()  # somebody writes it now
+    UNFINISHED = auto()  # its writer was killed
+    CLOSED = auto()  # whole, but without an index of its messages
+    INDEXED = auto()
+
+
+@dataclass(frozen=True)
+class Recovered:
+    """What a recovery found.
+
+    Attributes:
+        cut: The file ended in the middle of a record, or without an end.
+        damaged: Chunks that could not be unpacked, and are left out.
+    """
+
+    messages: int
+    cut: bool
+    damaged: int = 0
+
+
+def state_of(path: Path) -> State:
+    """How far a file came.
+
+    Raises:
+        CaptureError: If it is no MCAP file, or cannot be read.
+    """
+    try:
+        if is_being_written(path):
+            return State.OPEN
+        with path.open("rb") as stream:
+            begin = stream.read(len(records.MAGIC))
+            if begin != records.MAGIC[: len(begin)]:
+                raise CaptureError(f"{path.name}: no MCAP file: it does not begin as one")
+            stream.seek(0)
+            try:
+                summary = make_reader(stream).get_summary()
+            except records.DAMAGE:
+                return State.UNFINISHED
+    except OSError as error:
+        raise CaptureError(f"{path}: cannot be read: {error.strerror}") from None
+    if summary is None or summary.statistics is None:
+        return State.UNFINISHED
+    return State.INDEXED if summary.chunk_indexes or not summary.statistics.message_count else State.CLOSED
+
+
+def is_ours(path: Path) -> bool:
+    """Whether a recorder of ours wrote it: a stranger's file is not written again without being asked to.
+
+    Raises:
+        OSError: If it cannot be read.
+    """
+    with path.open("rb") as stream, contextlib.suppress(*records.DAMAGE):
+        for opcode, body, _ in itertools.islice(records.walk(stream), 2):
+            if opcode == Opcode.METADATA and Metadata.read(records.stream_of(body)).name == ABOUT:
+                return True
+    return False
+
+
+def recover(path: Path, progress: Callable[[float], None] = lambda _: None) -> Recovered:
+    """Make a file whole, with an index; the original is kept until the new one is checked.
+
+    Raises:
+        CaptureError: If there is nothing to recover, or the new one would not hold the same.
+        OSError: If the disk refuses.
+    """
+    if path.stat().st_size < len(records.MAGIC):
+        raise CaptureError(f"{path.name}: nothing to recover: its writer was killed before it wrote anything")
+    unfinished = state_of(path) is State.UNFINISHED
+    about = {"recovered": "yes"} if unfinished else None
+    copied = rewrite([path], path, about=about, progress=progress)
+    return Recovered(copied.messages.total(), copied.cut > 0, copied.damaged)
+
+
+def mend(path: Path, missed: Mapping[str, int] = MappingProxyType({})) -> None:
+    """Give an unfinished file an end where it is: for a full disk, where it cannot be written again.
+
+    Args:
+        missed: Publications that are not in it, by topic.
+
+    Raises:
+        OSError: If there is no room for that either.
+    """
+    contents, end = records.Contents(), 0
+    with path.open("rb") as stream:
+        for opcode, body, after in records.walk(stream):
+            if opcode == Opcode.DATA_END:
+                return
+            contents.note(opcode, body, after - len(body) - records.RECORD.size)
+            end = after
+    with path.open("r+b") as stream:
+        stream.truncate(end)
+        stream.seek(end)
+        lost = {key: str(number) for key, number in missed.items() if number}
+        data = records.record_bytes(Metadata(LOST, lost))
+        contents.note(data[0], data[records.RECORD.size :], end)
+        stream.write(data + contents.end(end + len(data)))
+        stream.flush()
+        os.fsync(stream.fileno())

@@ -1,0 +1,250 @@
+"""Values over time, thinned so that no peak is lost: the lowest and highest of each piece of time."""
+
+import itertools
+import logging
+from collections import OrderedDict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from math import isfinite
+
+import numpy as np
+from google.protobuf.message import DecodeError
+from numpy.typing import NDArray
+
+from bus import keys
+from bus.errors import KeyNameError
+from bus.schemas.robomesh_pb2 import Description
+from mcap_files.errors import RecordingError
+from mcap_files.reading import RecordingFile
+from mcap_files.values import has_values, unit_of, values_of
+
+POINTS, MOST_POINTS = 1000, 10_000
+MOST_VALUES = 64
+# Pieces that a whole recording is cut into once; what looks closer reads the file again.
+_PIECES = 20_000
+_MOST_NAMES = 2000
+_LOOKED_AT = 200
+# Kept for the next question: in all, and of a topic besides what was asked for.
+_MOST_KEPT_BYTES = 64 << 20
+_MOST_UNASKED = 32
+_JOINTS = "joints/"
+
+log = logging.getLogger(__name__)
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Series:
+    """A value's lowest and highest in each piece of time in which there is something.
+
+    Attributes:
+        times_s: Middle of the pieces, since the recording's start.
+    """
+
+    name: str
+    unit: str
+    times_s: FloatArray
+    lowest: FloatArray
+    highest: FloatArray
+
+
+@dataclass
+class _Pieces:
+    """Lowest and highest of values while they are read, a column a piece of time.
+
+    Attributes:
+        asked: Which are taken however many there are.
+        all: None was left out.
+    """
+
+    asked: frozenset[str]
+    start_ns: int
+    end_ns: int
+    count: int
+    lowest: dict[str, FloatArray] = field(default_factory=dict)
+    highest: dict[str, FloatArray] = field(default_factory=dict)
+    all: bool = True
+
+    @property
+    def bytes(self) -> int:
+        return len(self.lowest) * self.count * 16
+
+    def take(self, name: str, piece: int, value: float) -> None:
+        lowest = self.lowest.get(name)
+        if lowest is None:
+            if name not in self.asked and len(self.lowest) >= _MOST_UNASKED:
+                self.all = False
+                return
+            lowest = self.lowest[name] = np.full(self.count, np.inf)
+            self.highest[name] = np.full(self.count, -np.inf)
+        if value < lowest[piece]:
+            lowest[piece] = value
+        if value > self.highest[name][piece]:
+            self.highest[name][piece] = value
+
+
+class SeriesReader:
+    """Series of recordings; what a whole one was cut into is kept for the next question."""
+
+    def __init__(self) -> None:
+        self._kept: OrderedDict[tuple[str, int, int, str], _Pieces] = OrderedDict()
+
+    def read(
+        self, file: RecordingFile, names: Sequence[str], *, start_ns: int, end_ns: int, points: int
+    ) -> list[Series]:
+        """Series of values between two times (both included).
+
+        Raises:
+            RecordingError: If there is no such value, or the file is damaged.
+        """
+        if len(names) > MOST_VALUES:
+            raise RecordingError(f"{len(names)} values: {MOST_VALUES} at most at a time")
+        topics = topics_of_values(file)
+        wanted: dict[str, list[str]] = {}
+        for name in names:
+            topic = _topic_of(name, topics)
+            if topic is None:
+                raise RecordingError(
+                    f"{file.path.name}: no value {name!r}; "
+                    f"topics that have some: {', '.join(topics) or 'none'}"
+                )
+            wanted.setdefault(topic, []).append(name)
+        sliding = _sliding(file, names)
+        found: dict[str, Series] = {}
+        for topic, own in wanted.items():
+            pieces = self._pieces(file, topic, topics[topic], start_ns, end_ns, points, frozenset(own))
+            for name in own:
+                thinned = _thinned(name, pieces, file.layout.start_ns, start_ns, end_ns, points)
+                slides = name.split("/")[1] in sliding and name.startswith(_JOINTS)
+                found[name] = replace(thinned, unit=thinned.unit.replace("rad", "m")) if slides else thinned
+        return [found[name] for name in names]
+
+    def _pieces(
+        self,
+        file: RecordingFile,
+        topic: str,
+        key: str,
+        start_ns: int,
+        end_ns: int,
+        points: int,
+        asked: frozenset[str],
+    ) -> _Pieces:
+        whole_ns = max(file.layout.end_ns - file.layout.start_ns, 1)
+        share = (end_ns - start_ns) / whole_ns
+        if share * _PIECES < points * 4:
+            return _cut(file, topic, key, _Pieces(asked, start_ns, end_ns, points))
+        found = file.path.stat()
+        about = (str(file.path), found.st_mtime_ns, found.st_size, topic)
+        pieces = self._kept.get(about)
+        if pieces is None or not (pieces.all or asked <= pieces.asked | pieces.lowest.keys()):
+            first, last = file.layout.start_ns, file.layout.end_ns
+            pieces = self._kept[about] = _cut(file, topic, key, _Pieces(asked, first, last, _PIECES))
+        self._kept.move_to_end(about)
+        while len(self._kept) > 1 and sum(each.bytes for each in self._kept.values()) > _MOST_KEPT_BYTES:
+            self._kept.popitem(last=False)
+        return pieces
+
+
+def topics_of_values(file: RecordingFile) -> dict[str, str]:
+    """The topics with numbers, as values are named after them, and their channels' names in the file."""
+    found: dict[str, str] = {}
+    for key in sorted(file.topics):
+        if has_values(file.schema_name(key)) and file.decoder(key) is not None:
+            try:
+                found.setdefault(keys.parse_key(key).topic, key)
+            except KeyNameError:
+                found.setdefault(key.strip("/"), key)
+    return found
+
+
+def known_values(file: RecordingFile) -> list[str]:
+    """The names of a recording's values, from the first messages of each topic and its last.
+
+    Raises:
+        RecordingError: If the file is damaged.
+    """
+    known: dict[str, None] = {}
+    for topic, key in topics_of_values(file).items():
+        last = file.newest(key, file.layout.end_ns)
+        looked = itertools.islice(file.messages([key]), _LOOKED_AT)
+        values = _Values(file, key)
+        for message in (*looked, *([] if last is None else [last])):
+            known.update((f"{topic}/{name}", None) for name, _ in values.of(message.data))
+    return list(known)[:_MOST_NAMES]
+
+
+def _sliding(file: RecordingFile, names: Sequence[str]) -> frozenset[str]:
+    """The joints that slide: their unit is the metre."""
+    topics = [topic for topic in file.topics if topic.endswith("/description")]
+    if not any(name.startswith(_JOINTS) for name in names) or not topics:
+        return frozenset()
+    told = file.newest(topics[0], file.layout.end_ns)
+    try:
+        description = Description.FromString(b"" if told is None else told.data)
+    except DecodeError:
+        return frozenset()
+    return frozenset(joint.name for joint in description.joints if joint.type == Description.Joint.PRISMATIC)
+
+
+def _topic_of(name: str, topics: dict[str, str]) -> str | None:
+    return max((each for each in topics if name.startswith(f"{each}/")), key=len, default=None)
+
+
+class _Values:
+    """The values of a topic's messages; those that cannot be read have none, and are counted."""
+
+    def __init__(self, file: RecordingFile, key: str) -> None:
+        decode = file.decoder(key)
+        assert decode is not None
+        self.unread = 0
+        self._schema, self._decode = file.schema_name(key), decode
+
+    def of(self, data: bytes) -> Iterator[tuple[str, float]]:
+        try:
+            message = self._decode(data)
+        except (DecodeError, ValueError):
+            self.unread += 1
+            return iter(())
+        return values_of(self._schema, message)
+
+
+def _cut(file: RecordingFile, topic: str, key: str, pieces: _Pieces) -> _Pieces:
+    """Pieces, with the file's values in them."""
+    start_ns, end_ns, count = pieces.start_ns, pieces.end_ns, pieces.count
+    values = _Values(file, key)
+    scale = count / max(end_ns - start_ns + 1, 1)
+    for message in file.messages([key], start_ns=start_ns, end_ns=end_ns + 1):
+        piece = min(int((message.received_ns - start_ns) * scale), count - 1)
+        for name, value in values.of(message.data):
+            if isfinite(value):
+                pieces.take(f"{topic}/{name}", piece, value)
+    if values.unread:
+        log.warning("%s: %d messages of %s cannot be read: left out", file.path.name, values.unread, topic)
+    return pieces
+
+
+def _thinned(name: str, pieces: _Pieces, zero_ns: int, start_ns: int, end_ns: int, points: int) -> Series:
+    """A value's pieces put together to as many as were asked for."""
+    lowest, highest = pieces.lowest.get(name), pieces.highest.get(name)
+    none = np.empty(0)
+    if lowest is None or highest is None:
+        return Series(name, unit_of(name), none, none, none)
+    width_ns = max(pieces.end_ns - pieces.start_ns, 1) / pieces.count
+    first = max(int((start_ns - pieces.start_ns) / width_ns), 0)
+    last = min(int(np.ceil((end_ns - pieces.start_ns) / width_ns)), pieces.count)
+    there = np.flatnonzero(lowest[first:last] <= highest[first:last]) + first
+    if not len(there):
+        return Series(name, unit_of(name), none, none, none)
+    together = max((last - first) / points, 1.0)
+    group = ((there - first) / together).astype(np.int64)
+    begins = np.flatnonzero(np.diff(group, prepend=-1))
+    ends = np.append(begins[1:], len(there)) - 1
+    middle_ns = (there[begins] + there[ends] + 1) / 2 * width_ns + (pieces.start_ns - zero_ns)
+    return Series(
+        name,
+        unit_of(name),
+        middle_ns * 1e-9,
+        np.minimum.reduceat(lowest[there], begins),
+        np.maximum.reduceat(highest[there], begins),
+    )

@@ -1,0 +1,74 @@
+"""Joints and tool as a table: a row a recorded state, SI, units in the header.
+
+Knows messages only, no files: whoever has them in order of time makes the table.
+"""
+
+from collections.abc import Iterable
+from datetime import UTC, datetime
+
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+
+from bus.schemas import robomesh_pb2 as schema
+
+# The tool's place comes less often than the joints'; older than this it is left out.
+_TOOL_FOR_NS = 250_000_000
+_TOOL = ("tool x [m]", "tool y [m]", "tool z [m]", "tool speed [m/s]", "clearance [m]")
+
+
+class Table:
+    """The rows of one recording.
+
+    Args:
+        joints: Their names, in the table's order.
+        prismatic: Those that slide: their unit is the metre.
+        start_ns: From which the second column counts, ns since the Unix epoch.
+    """
+
+    def __init__(self, joints: Iterable[str], prismatic: Iterable[str], *, start_ns: int) -> None:
+        self._joints, self._start_ns = tuple(joints), start_ns
+        self._tool: tuple[int, list[str]] = (0, [""] * len(_TOOL))
+        sliding = frozenset(prismatic)
+        units = ["m" if joint in sliding else "rad" for joint in self._joints]
+        named = list(zip(self._joints, units, strict=True))
+        self.header = [
+            "time",
+            "t [s]",
+            *(f"{joint} [{unit}]" for joint, unit in named),
+            *(f"{joint} velocity [{unit}/s]" for joint, unit in named),
+            *_TOOL,
+        ]
+
+    def take_tool(self, state: schema.KinematicState, time_ns: int) -> None:
+        """What the rows from here on say of the tool."""
+        pose = [""] * 3
+        if len(state.tool_to_base) == 16:
+            pose = [repr(state.tool_to_base[index]) for index in (3, 7, 11)]
+        v = state.linear_velocity
+        speed = repr((v.x**2 + v.y**2 + v.z**2) ** 0.5) if state.HasField("linear_velocity") else ""
+        clearance = repr(state.clearance.distance) if state.HasField("clearance") else ""
+        self._tool = time_ns, [*pose, speed, clearance]
+
+    def row(self, state: JointStates, time_ns: int) -> list[str]:
+        """One recorded state; what it does not tell is empty."""
+        joints = {joint.name: joint for joint in state.joints}
+        told = [joints.get(name) for name in self._joints]
+        when, tool = self._tool
+        return [
+            _text(time_ns),
+            f"{(time_ns - self._start_ns) * 1e-9:.6f}",
+            *("" if joint is None else repr(joint.position) for joint in told),
+            *(repr(joint.velocity) if joint and joint.HasField("velocity") else "" for joint in told),
+            *(tool if time_ns - when <= _TOOL_FOR_NS else [""] * len(tool)),
+        ]
+
+
+def table_of(first: JointStates, description: schema.Description | None, *, start_ns: int) -> Table:
+    """The table of a recording: its joints as its first state tells them."""
+    described = [] if description is None else description.joints
+    sliding = [joint.name for joint in described if joint.type == schema.Description.Joint.PRISMATIC]
+    return Table((joint.name for joint in first.joints), sliding, start_ns=start_ns)
+
+
+def _text(time_ns: int) -> str:
+    second, rest = divmod(time_ns, 1_000_000_000)
+    return f"{datetime.fromtimestamp(second, tz=UTC):%Y-%m-%dT%H:%M:%S}.{rest // 1000:06d}Z"

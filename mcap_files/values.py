@@ -1,0 +1,112 @@
+"""The numbers in recorded messages, by name: "joints/waist/position", "kinematics/tool/x", ...
+
+A name is the topic below its robot, then the fields; what repeats is told apart by its name field.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+from google.protobuf.descriptor import FieldDescriptor as Field
+
+_NUMBERS = frozenset(
+    {
+        Field.CPPTYPE_DOUBLE,
+        Field.CPPTYPE_FLOAT,
+        Field.CPPTYPE_INT32,
+        Field.CPPTYPE_INT64,
+        Field.CPPTYPE_UINT32,
+        Field.CPPTYPE_UINT64,
+        Field.CPPTYPE_BOOL,
+        Field.CPPTYPE_ENUM,
+    }
+)
+_TIMES = frozenset({"google.protobuf.Timestamp", "google.protobuf.Duration"})
+# What a message may hold is its sender's affair; so many levels are somebody's mistake.
+_DEEPEST = 6
+_NO_NUMBERS = frozenset(
+    {
+        "foxglove.FrameTransforms",  # 12 a link, 60 times a second: a picture shows them better
+        "foxglove.CompressedVideo",
+        "foxglove.CompressedImage",
+        "robomesh.Description",
+        "robomesh.AuditEntry",
+        "robomesh.RawRecord",
+    }
+)
+
+
+def has_values(schema: str) -> bool:
+    """Whether messages of a schema are looked through for numbers."""
+    return schema not in _NO_NUMBERS
+
+
+def values_of(schema: str, message: Any) -> Iterator[tuple[str, float]]:
+    """The numbers of a message, by their names below its topic."""
+    if schema == "foxglove.JointStates":
+        for joint in message.joints:
+            yield f"{joint.name}/position", joint.position
+            if joint.HasField("velocity"):
+                yield f"{joint.name}/velocity", joint.velocity
+    elif schema == "robomesh.KinematicState":
+        yield from _kinematics(message)
+    else:
+        yield from _fields(message, "", _DEEPEST)
+
+
+def unit_of(name: str) -> str:
+    """The unit of a value, from its name; empty: none, or nobody knows."""
+    first, *_, last = name.split("/")
+    if first == "joints":
+        return {"position": "rad", "velocity": "rad/s"}.get(last, "")
+    if first == "kinematics":
+        if name.startswith("kinematics/tool/"):
+            return "m" if len(last) == 1 else "m/s"
+        if name.startswith("kinematics/margin/"):
+            return "rad"
+        return "m" if "clearance" in last else ""
+    for ending, unit in (("_s", "s"), ("_m", "m"), ("_hz", "Hz"), ("_percent", "%"), ("bytes", "B")):
+        if last.endswith(ending):
+            return unit
+    return ""
+
+
+def _kinematics(message: Any) -> Iterator[tuple[str, float]]:
+    pose = message.tool_to_base
+    if len(pose) == 16:
+        yield "tool/x", pose[3]
+        yield "tool/y", pose[7]
+        yield "tool/z", pose[11]
+    if message.HasField("linear_velocity"):
+        v = message.linear_velocity
+        yield "tool/speed", (v.x * v.x + v.y * v.y + v.z * v.z) ** 0.5
+    for name in ("manipulability", "singularity_margin"):
+        if message.HasField(name):
+            yield name, getattr(message, name)
+    for name in ("clearance", "own_clearance"):
+        if message.HasField(name):
+            yield name, getattr(message, name).distance
+    for margin in message.limit_margins:
+        yield f"margin/{margin.name}", min(margin.lower, margin.upper)
+
+
+def _fields(message: Any, prefix: str, deepest: int) -> Iterator[tuple[str, float]]:
+    for field in message.DESCRIPTOR.fields:
+        name = prefix + field.name
+        if field.cpp_type in _NUMBERS:
+            if field.is_repeated:
+                for number, value in enumerate(getattr(message, field.name)):
+                    yield f"{name}/{number}", float(value)
+            elif not field.has_presence or message.HasField(field.name):
+                yield name, float(getattr(message, field.name))
+        elif field.cpp_type == Field.CPPTYPE_MESSAGE and deepest and _is_plain(field):
+            if field.is_repeated:
+                for number, child in enumerate(getattr(message, field.name)):
+                    own = getattr(child, "name", "") or str(number)
+                    yield from _fields(child, f"{name}/{own}/", deepest - 1)
+            elif message.HasField(field.name):
+                yield from _fields(getattr(message, field.name), f"{name}/", deepest - 1)
+
+
+def _is_plain(field: Field) -> bool:
+    kind = field.message_type
+    return kind is not None and kind.full_name not in _TIMES and not kind.GetOptions().map_entry

@@ -1,0 +1,1 @@
+"""The audit log: what was asked of a robot, by whom, and what became of it."""

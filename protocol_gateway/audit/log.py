@@ -1,0 +1,336 @@
+"""The audit log of one robot: who asked for what, and what became of it. Append-only, hash-chained.
+
+    append    what is about to be done: on disk, or refused
+    note      what has happened: kept until the disk takes it
+
+Entries stand in the order of the calls. `audit_entry` says what a line is, `audit_files` where the
+lines are and how a log is checked, `audit_find` how one is searched. When the live file has grown to
+its size it becomes an older part, and a new one goes on with the chain:
+
+    new file, locked, ROTATE in it -> the live one's second name, the part's -> the new one is the live one
+
+Whoever is killed meanwhile: there is one whole live file, and it is never empty.
+"""
+
+import asyncio
+import errno
+import fcntl
+import logging
+import os
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from protocol_gateway.audit.entry import Entry, Outcome, chained
+from protocol_gateway.audit.files import Verification, older_parts, part_name, read_entries, verify
+from protocol_gateway.audit.restart import ROTATE, Memory, carried, follow, with_stop
+from protocol_gateway.audit.start import find_end
+from protocol_gateway.errors import AuditError
+
+__all__ = ["AuditLog", "Entry", "Outcome", "Verification", "read_entries", "verify"]
+
+log = logging.getLogger(__name__)
+
+ROTATE_BYTES = 16 << 20
+# What has happened is noted after the wire, also while the disk is full: so much waits for it to be mended,
+# the second half for all but refusals.
+MOST_KEPT = 1000
+GATEWAY = "gateway"
+
+
+@dataclass(frozen=True)
+class _Waiting:
+    entry: Entry
+    told: asyncio.Future[Entry] | None
+    kept: bool
+
+
+class AuditLog:
+    """The open log of one robot. Its file is locked: two gateways must not write one chain.
+
+    Attributes:
+        mended: What was found wrong with the file when it was opened, in words; empty: nothing.
+        problem: Why the last write failed, in words; empty: it did not.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        on_written: Callable[[Entry], None] = lambda entry: None,
+        rotate_bytes: int = ROTATE_BYTES,
+    ) -> None:
+        """Open the log, or begin one; a damaged one (`start`) latches a stop.
+
+        Args:
+            on_written: Told of every entry that is on disk, in order.
+            rotate_bytes: A live file that has grown to this becomes an older part.
+
+        Raises:
+            AuditError: If the folder or file cannot be written, or another process has it open.
+        """
+        self.path = path
+        self.problem = ""
+        self._on_written = on_written
+        self._rotate_bytes = self._rotate_at = rotate_bytes
+        self._queue: list[_Waiting] = []
+        self._left_out = 0
+        self._writer: asyncio.Task[None] | None = None
+        self._writing_since_s: float | None = None
+        # A thread of its own: a disk that hangs must not hold the threads of everything else.
+        self._disk = ThreadPoolExecutor(1, thread_name_prefix=f"audit-{path.stem}")
+        self._torn = False
+        self._untold: list[Entry] = []
+        self._named = False  # whether the folder is on disk with the file's name in it
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = _open_locked(path)
+            _finish_rotation(path)
+            self._end, self.mended, in_doubt = find_end(path)
+            if in_doubt:
+                self._latch()
+            else:
+                os.ftruncate(self._file, self._end.length)
+            os.fsync(self._file)
+        except OSError as error:
+            raise AuditError(
+                f"audit log {path} cannot be written ({error.strerror}): without it no robot is moved"
+            ) from None
+
+    @property
+    def head(self) -> tuple[int, str]:
+        """Number and hash of the last entry."""
+        return self._end.number, self._end.hash
+
+    @property
+    def memory(self) -> Memory:
+        """What the log's entries say must be remembered across a restart."""
+        return self._end.memory
+
+    @property
+    def stuck_s(self) -> float:
+        """How long the disk has been busy with one write [s]."""
+        since_s = self._writing_since_s
+        return 0.0 if since_s is None else time.monotonic() - since_s
+
+    def append(self, entry: Entry) -> asyncio.Future[Entry]:
+        """Write an entry down before it is acted on: awaited, it is on disk, with its number and hashes.
+
+        Raises (when awaited):
+            AuditError: If it could not be written; then it is not in the log.
+        """
+        return self._put(entry, kept=False)
+
+    def note(self, entry: Entry) -> asyncio.Future[Entry]:
+        """As `append`, for what has happened already: what cannot be written now is kept, and written later.
+
+        Raises (when awaited):
+            AuditError: If it could not be written yet.
+        """
+        most = MOST_KEPT // 2 if entry.outcome is Outcome.REFUSED else MOST_KEPT
+        if len(self._queue) < most:
+            return self._put(entry, kept=True)
+        self._left_out += 1 + entry.repeated
+        told: asyncio.Future[Entry] = asyncio.get_running_loop().create_future()
+        told.set_exception(AuditError(self.problem or f"{len(self._queue)} entries wait for the disk"))
+        return told
+
+    def pay(self) -> None:
+        """Try again to write what was kept; to be called now and then."""
+        if self._queue or self._left_out:
+            self._start_writer()
+
+    async def settle(self) -> None:
+        """Wait until all that waits is written, or could not be."""
+        if self._writer is not None:
+            await self._writer
+
+    async def close(self) -> None:
+        """Write what waits, then close the file."""
+        self.pay()
+        await self.settle()
+        self._disk.shutdown()
+        os.close(self._file)
+
+    def _latch(self) -> None:
+        """Remember a stop, since one may be lost; until it is written, the damage stays as it is."""
+        memory, stop = with_stop(self._end.memory, by=GATEWAY, since_ns=time.time_ns())
+        self._end = replace(self._end, memory=memory)
+        values = {"stop_id": str(stop.id), "reason": stop.reason}
+        entry = _own_entry("STOP", Outcome.ACCEPTED, self.mended, values)
+        self._queue.append(_Waiting(entry, None, kept=True))
+        self._torn, self._rotate_at = True, 1
+
+    def _put(self, entry: Entry, *, kept: bool) -> asyncio.Future[Entry]:
+        told: asyncio.Future[Entry] = asyncio.get_running_loop().create_future()
+        self._queue.append(_Waiting(entry, told, kept))
+        self._start_writer()
+        return told
+
+    def _start_writer(self) -> None:
+        if self._writer is None or self._writer.done():
+            self._writer = asyncio.create_task(self._write_queue())
+
+    async def _write_queue(self) -> None:
+        """Everything that waits, in one write and one fsync, again until nothing new does."""
+        loop = asyncio.get_running_loop()
+        while True:
+            batch, self._queue = self._queue, []
+            if self._left_out:
+                batch.append(_Waiting(_left_out(self._left_out), None, kept=True))
+            left_out, self._left_out = self._left_out, 0
+            self._writing_since_s = time.monotonic()
+            try:
+                # An fsync takes milliseconds, seconds on a busy disk: the joint stream must not wait for it.
+                placed = await loop.run_in_executor(self._disk, self._write, [each.entry for each in batch])
+            except Exception as error:
+                self.problem = f"the audit log {self.path.name} cannot be written ({_reason(error)})"
+                self._left_out += left_out
+                new = bool(self._queue)
+                self._queue[:0] = self._refuse(batch[:-1] if left_out else batch)
+            else:
+                self.problem = ""
+                new = bool(self._queue)
+                # Before them may stand the entry that begins a new file.
+                for each, entry in zip(batch, placed[-len(batch) :], strict=True):
+                    if each.told is not None and not each.told.done():
+                        each.told.set_result(entry)
+                self._tell(placed)
+            finally:
+                self._writing_since_s = None
+            if not new:
+                return
+
+    def _refuse(self, batch: list[_Waiting]) -> list[_Waiting]:
+        """Tell who waits that it was not written; those that are kept."""
+        for each in batch:
+            if each.told is not None and not each.told.done():
+                each.told.set_exception(AuditError(self.problem))
+        return [replace(each, told=None) for each in batch if each.kept]
+
+    def _tell(self, entries: list[Entry]) -> None:
+        for entry in entries:
+            try:
+                self._on_written(entry)
+            except Exception:
+                log.exception("audit log %s: entry %d was not published", self.path.name, entry.number)
+
+    # ------------------------------------------------- on the disk's own thread
+
+    def _write(self, entries: Sequence[Entry]) -> list[Entry]:
+        if self._torn:
+            os.ftruncate(self._file, self._end.length)
+        if self._end.length >= self._rotate_at or (self._end.number and not self._end.length):
+            self._rotate()
+        end = self._end
+        placed, lines = [], []
+        for entry in entries:
+            each, line = chained(entry, number=end.number + 1, previous=end.hash)
+            placed.append(each)
+            lines.append(line)
+            end = replace(end, number=each.number, hash=each.hash, memory=follow(end.memory, each))
+        self._torn = True
+        written = _write_all(self._file, b"".join(lines), end.length)
+        os.fsync(self._file)
+        if not self._named:
+            _sync_folder(self.path.parent)
+            self._named = True
+        self._torn = False
+        self._end = replace(end, length=end.length + written)
+        told, self._untold = [*self._untold, *placed], []
+        return told
+
+    def _rotate(self) -> None:
+        """Go on in a new file; where that fails, in this one, until it has grown by as much again."""
+        end, fresh = self._end, self.path.with_suffix(".new")
+        part = part_name(self.path, end.first)
+        text = f"the log goes on from {part.name}"
+        beginning = _own_entry(ROTATE, Outcome.ACCEPTED, text, carried(end.memory))
+        entry, line = chained(beginning, number=end.number + 1, previous=end.hash)
+        try:
+            file = os.open(fresh, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o640)
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                # Before it is the live file: one that is empty was emptied by somebody.
+                _write_all(file, line, 0)
+                os.fsync(file)
+                if end.length:
+                    os.link(self.path, part)
+                fresh.rename(self.path)
+            except OSError:
+                os.close(file)
+                _finish_rotation(self.path)
+                raise
+        except OSError as error:
+            if not end.length:
+                raise
+            log.warning("audit log %s was not rotated: %s", self.path.name, error)
+            self._rotate_at = end.length + self._rotate_bytes
+            return
+        os.close(self._file)
+        self._file, self._named = file, False
+        self._rotate_at = self._rotate_bytes
+        self._end = replace(end, first=entry.number, number=entry.number, hash=entry.hash, length=len(line))
+        self._untold.append(entry)
+
+
+def _reason(error: Exception) -> str:
+    if not isinstance(error, OSError):
+        return repr(error)
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    return f"{error.strerror}: {'make space on its disk' if full else 'see to its disk'}"
+
+
+def _left_out(number: int) -> Entry:
+    text = f"{number} requests have no entry here: the disk took none, and no more could be kept"
+    return _own_entry("LOST", Outcome.FAILED, text, {"requests": str(number)})
+
+
+def _own_entry(request: str, outcome: Outcome, text: str, values: dict[str, str]) -> Entry:
+    return Entry(
+        time_ns=time.time_ns(),
+        operator=GATEWAY,
+        source=GATEWAY,
+        request=request,
+        outcome=outcome,
+        text=text,
+        values=values,
+    )
+
+
+def _open_locked(path: Path) -> int:
+    while True:
+        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o640)
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(file)
+            raise AuditError(f"audit log {path} is open in another gateway: stop that one first") from None
+        if os.path.samestat(os.fstat(file), path.stat()):
+            return file
+        os.close(file)  # it has become an older part meanwhile
+
+
+def _finish_rotation(path: Path) -> None:
+    """Take away what a rotation that was broken off has left: the log is whole without it."""
+    path.with_suffix(".new").unlink(missing_ok=True)
+    for part in older_parts(path):
+        if part.samefile(path):
+            part.unlink()
+
+
+def _write_all(file: int, data: bytes, place: int) -> int:
+    written = 0
+    while written < len(data):
+        written += os.pwrite(file, data[written:], place + written)
+    return written
+
+
+def _sync_folder(folder: Path) -> None:
+    number = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        os.fsync(number)
+    finally:
+        os.close(number)

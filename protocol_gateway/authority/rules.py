@@ -1,0 +1,378 @@
+"""Who may move a robot: lease, once-only commands, latched stop. No I/O; time is an argument.
+
+Two states that do not know each other, the lease's and the stop's:
+
+    lease    ACQUIRE  RENEW   an end of it                    motion command  motion over  link lost
+    -------  -------  ------  ------------------------------  --------------  -----------  -----------------
+    free     held     no      -                               no              -            -
+    held     no*      held    free                            moving          -            held
+    moving   no*      moving  free, and the robot is stopped  moving          held         held, and stopped
+
+    ends of a lease: its RELEASE, its time is over, another's TAKE, the offered one's ACCEPT (not while
+    moving), its holder's session is gone, motion that nobody commanded
+
+    stop                 STOP      RESET of this stop   RESET of another   motion command
+    -------------------  --------  -------------------  -----------------  --------------
+    clear                latched   no                   no                 yes
+    latched, it moves    latched   no                   no                 no
+    latched, it stands   latched   clear                no                 no
+
+"no" is a refusal in words, * but the holder's own ACQUIRE renews. OFFER and ACCEPT pass a lease that
+does not move on to another operator; TAKE gives a reason, which everybody is told; ASK changes
+nothing, but everybody sees for half a minute who would like to have control. Every stop has a number
+of its own, so a RESET never clears a stop that its sender has not seen; nor one that is not heeded
+yet, for what moves on would be nobody's motion. "moving" covers motion that is held (HOLD): it would
+go on with anybody's RESUME. A link that is lost, or silent, while the holder's motion runs is a stop:
+nobody sees any more where the arm goes. Motion that nobody commanded stops the robot too, where motion
+had been commanded under the lease: it may be that motion, begun far too late.
+"""
+
+import hmac
+from dataclasses import dataclass, field, replace
+from enum import Enum, auto
+from typing import NamedTuple
+
+from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
+
+DEFAULT_TTL_S = 2.0
+SHORTEST_TTL_S = 0.5
+LONGEST_TTL_S = 5.0
+
+# A robot that was moved by others this short a while ago may go on: no surprise to the next operator.
+RECENT_S = 10.0
+# Who asked for control is shown so long, and so many at most.
+ASKED_FOR_S = 30.0
+MOST_ASKERS = 20
+
+_C = CommandRequest.Command
+MOTION_COMMANDS = frozenset({_C.HOME, _C.RESUME, _C.MOVE_ABSOLUTE, _C.MOVE_RELATIVE, _C.RUN_PROGRAM})
+
+
+class Now(NamedTuple):
+    """The two clocks: what has passed is measured on the first, dates are told on the second."""
+
+    monotonic_s: float
+    wall_ns: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """The holder's motion, from the command that began it.
+
+    Attributes:
+        last_s: When it was last commanded, or seen to move (monotonic).
+        seen: It was seen to move.
+        held: HOLD was sent; it goes on with RESUME.
+        way: Everywhere that it goes, in order, its target last [rad] or [m]; empty: not known.
+        alone: No other unit was sent shortly before it, or since: a refusal is an answer to it.
+    """
+
+    last_s: float
+    seen: bool = False
+    held: bool = False
+    way: tuple[tuple[float, ...], ...] = ()
+    alone: bool = True
+
+    @property
+    def target(self) -> tuple[float, ...] | None:
+        """Where it ends [rad] or [m]; None: not known."""
+        return self.way[-1] if self.way else None
+
+
+class Why(Enum):
+    """The kind of a refusal, for protocols that have numbers for some."""
+
+    NOT_IN_CONTROL = auto()
+    READ_ONLY = auto()
+    LOCAL_MODE = auto()
+    STOPPED = auto()
+    LIMIT = auto()
+    OTHER = auto()
+
+
+class Answer(NamedTuple):
+    """What became of a request, for its sender; `why`: of one that is refused."""
+
+    accepted: bool
+    text: str
+    why: Why = Why.OTHER
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lease:
+    """Control of a robot by one operator, for a time.
+
+    Attributes:
+        until_s: End, monotonic; `until_ns` is the same moment on the wall clock.
+        session: Of its holder's program or page; when that is gone, so is the lease. Empty: not told.
+        last_id: Highest command id so far, and `last_answer` what it got.
+        commanded: Motion was commanded under it.
+        tolerates_motion: The robot moved by itself when the lease began, so that is no surprise.
+    """
+
+    holder: str
+    secret: str = field(repr=False)
+    since_ns: int
+    ttl_s: float
+    until_s: float
+    until_ns: int
+    session: str = ""
+    last_id: int = 0
+    last_answer: Answer | None = None
+    offered_to: str = ""
+    renewals: int = 0
+    motion: Motion | None = None
+    commanded: bool = False
+    tolerates_motion: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stop:
+    """A latched stop; `sent_s`: when its unit reached the controller's socket (monotonic)."""
+
+    id: int
+    by: str
+    reason: str
+    since_ns: int
+    sent_s: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeaseEnd:
+    """A lease that is over. `stop`: its holder's motion runs, or may, so the robot must be stopped."""
+
+    holder: str
+    why: str
+    renewals: int
+    stop: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asker:
+    """Somebody who would like to have control."""
+
+    operator: str
+    reason: str
+    since_ns: int
+    until_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Authority:
+    """The whole state.
+
+    Attributes:
+        moving: What was last seen; None before anything was.
+        ended: Why the last lease that is over ended; empty: there was none.
+        asked_by: Who asks its holder for control, oldest first.
+        stopping_s: When the first of the stops since the last RESET was sent (monotonic): whoever presses
+            again must not hide that the robot does not heed them.
+    """
+
+    lease: Lease | None = None
+    ended: str = ""
+    asked_by: tuple[Asker, ...] = ()
+    stop: Stop | None = None
+    last_stop_id: int = 0
+    stopping_s: float | None = None
+    moving: bool | None = None
+    # When motion was last seen that nobody commanded (monotonic).
+    foreign_s: float | None = None
+
+
+class LeaseOutcome(NamedTuple):
+    """A lease request's outcome; `granted`: the lease to show to the asker, with its secret."""
+
+    authority: Authority
+    answer: Answer
+    granted: Lease | None = None
+    ended: LeaseEnd | None = None
+
+
+def request_lease(
+    authority: Authority, request: LeaseRequest, *, operator: str, now: Now, secret: str
+) -> LeaseOutcome:
+    """Answer ACQUIRE, RENEW, RELEASE, OFFER, ACCEPT, TAKE, ASK.
+
+    Args:
+        operator: Who asks, as the router vouches for it.
+        secret: Fresh; becomes the lease's if one is granted.
+    """
+    lease = authority.lease
+    action = LeaseRequest.Action
+    mine = lease is not None and holds(authority, operator, request.lease)
+    match request.action:
+        case action.ACQUIRE if lease is None:
+            return _grant(authority, request, operator=operator, now=now, secret=secret, text="control taken")
+        case action.ACQUIRE | action.RENEW if mine and lease is not None:
+            renewed = replace(
+                _timed(lease, request.ttl_s, now),
+                renewals=lease.renewals + 1,
+                session=request.session or lease.session,
+            )
+            return LeaseOutcome(replace(authority, lease=renewed), Answer(True, "control renewed"), renewed)
+        case action.RELEASE if mine and lease is not None:
+            why = f": {request.reason.strip()}" if request.reason.strip() else ""
+            free, ended = end_lease(authority, f"{operator} gave control back{why}")
+            return LeaseOutcome(free, Answer(True, "control given back"), ended=ended)
+        case action.OFFER if mine and lease is not None:
+            offered = replace(lease, offered_to="" if request.to == operator else request.to)
+            text = f"control offered to {offered.offered_to}" if offered.offered_to else "offer withdrawn"
+            return LeaseOutcome(replace(authority, lease=offered), Answer(True, text), offered)
+        case action.ACCEPT if lease is not None and lease.offered_to == operator:
+            if lease.motion is not None:
+                return _refused(
+                    authority, f"{lease.holder}'s motion still runs: wait until it ends, then accept"
+                )
+            free, ended = end_lease(authority, f"handed over to {operator}")
+            text = f"control taken over from {lease.holder}"
+            granted = _grant(free, request, operator=operator, now=now, secret=secret, text=text)
+            return granted._replace(ended=ended)
+        case action.TAKE if lease is None or mine or request.reason.strip():
+            free, ended = end_lease(authority, f"taken by {operator}: {request.reason.strip()}")
+            granted = _grant(free, request, operator=operator, now=now, secret=secret, text="control taken")
+            return granted._replace(ended=ended)
+        case action.ASK if lease is not None and lease.holder != operator:
+            return LeaseOutcome(
+                _asked(authority, operator, request.reason.strip(), now),
+                Answer(True, f"{lease.holder} is told that {operator} asks for control"),
+            )
+        case action.ASK:
+            return _refused(
+                authority,
+                f"{operator} is in control already" if lease else "nobody is in control: take it (ACQUIRE)",
+            )
+        case action.ACCEPT:
+            return _refused(authority, f"control was not offered to {operator}: ask its holder, or ACQUIRE")
+        case action.TAKE:
+            return _refused(authority, "TAKE needs a reason: say in `reason` why control is taken away")
+    return _refused(authority, why_not_holder(authority, operator))
+
+
+def holds(authority: Authority, operator: str, secret: str) -> bool:
+    """Whether the operator holds the lease, and this is its secret."""
+    lease = authority.lease
+    # Compared in constant time: how long a refusal takes must not spell the secret.
+    return (
+        lease is not None
+        and hmac.compare_digest(lease.secret.encode(), secret.encode())
+        and lease.holder == operator
+    )
+
+
+def expire(authority: Authority, now: Now) -> tuple[Authority, LeaseEnd | None]:
+    """End the lease when its time is over, and forget who asked for it too long ago."""
+    if authority.asked_by and now.monotonic_s >= authority.asked_by[0].until_s:
+        authority = replace(authority, asked_by=_still_asking(authority, now))
+    lease = authority.lease
+    if lease is None or now.monotonic_s < lease.until_s:
+        return authority, None
+    return end_lease(authority, f"{lease.holder}'s lease was not renewed within {lease.ttl_s:g} s")
+
+
+def end_session(authority: Authority, session: str) -> tuple[Authority, LeaseEnd | None]:
+    """A session is gone: end its lease, and nobody else's."""
+    lease = authority.lease
+    if lease is None or not session or lease.session != session:
+        return authority, None
+    return end_lease(authority, f"{lease.holder}'s page or program has gone")
+
+
+def end_lease(authority: Authority, why: str, *, foreign: bool = False) -> tuple[Authority, LeaseEnd | None]:
+    """End the lease, if there is one; says whether its holder's motion has to be stopped.
+
+    Args:
+        foreign: Because of motion that nobody is known to have commanded.
+    """
+    lease = authority.lease
+    if lease is None:
+        return authority, None
+    stop = lease.motion is not None or (foreign and lease.commanded)
+    ended = LeaseEnd(holder=lease.holder, why=why, renewals=lease.renewals, stop=stop)
+    return replace(authority, lease=None, ended=why), ended
+
+
+def _grant(
+    authority: Authority, request: LeaseRequest, *, operator: str, now: Now, secret: str, text: str
+) -> LeaseOutcome:
+    lease = Lease(
+        holder=operator,
+        secret=secret,
+        since_ns=now.wall_ns,
+        ttl_s=0.0,
+        until_s=0.0,
+        until_ns=0,
+        session=request.session,
+        tolerates_motion=moved_recently(authority, now),
+    )
+    lease = _timed(lease, request.ttl_s, now)
+    # Who waited for it and got it waits no more; the others still do.
+    asked_by = tuple(each for each in _still_asking(authority, now) if each.operator != operator)
+    return LeaseOutcome(replace(authority, lease=lease, asked_by=asked_by), Answer(True, text), lease)
+
+
+def _asked(authority: Authority, operator: str, reason: str, now: Now) -> Authority:
+    """Somebody asks for control, for the first time or again."""
+    others = [each for each in _still_asking(authority, now) if each.operator != operator]
+    asker = Asker(
+        operator=operator, reason=reason, since_ns=now.wall_ns, until_s=now.monotonic_s + ASKED_FOR_S
+    )
+    return replace(authority, asked_by=(*others, asker)[-MOST_ASKERS:])
+
+
+def _still_asking(authority: Authority, now: Now) -> tuple[Asker, ...]:
+    return tuple(each for each in authority.asked_by if now.monotonic_s < each.until_s)
+
+
+def _timed(lease: Lease, ttl_s: float, now: Now) -> Lease:
+    kept = min(max(ttl_s or DEFAULT_TTL_S, SHORTEST_TTL_S), LONGEST_TTL_S)
+    return replace(
+        lease,
+        ttl_s=kept,
+        until_s=now.monotonic_s + kept,
+        until_ns=now.wall_ns + round(kept * 1e9),
+    )
+
+
+def _refused(authority: Authority, text: str) -> LeaseOutcome:
+    return LeaseOutcome(authority, Answer(False, text))
+
+
+def why_not_holder(authority: Authority, operator: str) -> str:
+    """Why a request in an operator's name is not its lease's holder's, and what to do."""
+    lease = authority.lease
+    if lease is None:
+        return "nobody is in control, or the lease has ended: take control first (ACQUIRE)"
+    if lease.holder != operator:
+        return f"{lease.holder} is in control: wait until it is given back, or ask for it"
+    return f"{operator} is in control with another lease (another window or program?): this one is not valid"
+
+
+def stop(authority: Authority, *, by: str, reason: str, now: Now) -> tuple[Authority, Stop]:
+    """Latch a stop under a number of its own, and forget the motion that it ends."""
+    number = authority.last_stop_id + 1
+    latched = Stop(id=number, by=by, reason=reason or "no reason given", since_ns=now.wall_ns)
+    lease = authority.lease
+    if lease is not None:
+        lease = replace(lease, motion=None)
+    return replace(authority, stop=latched, last_stop_id=number, lease=lease), latched
+
+
+def stop_sent(authority: Authority, stop_id: int, sent_s: float, *, first: bool = False) -> Authority:
+    """The stop's unit is on the controller's socket, since a monotonic time.
+
+    Args:
+        first: It is the first one on a new connection: the controller may not have had those before.
+    """
+    if authority.stop is None or authority.stop.id != stop_id:
+        return authority
+    return replace(
+        authority,
+        stop=replace(authority.stop, sent_s=sent_s),
+        stopping_s=sent_s if first or authority.stopping_s is None else authority.stopping_s,
+    )
+
+
+def moved_recently(authority: Authority, now: Now) -> bool:
+    """Whether the robot was just moved by somebody who did not command it through the gateway."""
+    return authority.foreign_s is not None and now.monotonic_s - authority.foreign_s < RECENT_S

@@ -1,0 +1,194 @@
+"""The gateway's end of a worker process: kept running, asked in time, or said why not."""
+
+import asyncio
+import contextlib
+import logging
+import time
+from collections.abc import Collection, Mapping
+
+from bus.worker import Worker, WorkerError
+from protocol_gateway.checking.questions import Checked, CheckMotion, CheckProgram, Prepare
+from protocol_gateway.errors import CheckError
+from robots.cells import CellDescription
+from robots.errors import RobotError
+
+log = logging.getLogger(__name__)
+
+# A command that waits for over a second is not sent any more.
+MOTION_WITHIN_S = 0.8
+PROGRAM_WITHIN_S = 25.0
+# Past this, the process is ended: it hangs.
+_HANGS_S = 10.0
+_PREPARED_WITHIN_S = 60.0
+_AGAIN_S = 5.0
+# For cells of several robots: beyond that, some share one.
+MOST_PROCESSES = 8
+_STARTING = "the check is still getting ready: try again in a few seconds"
+
+
+class Checker:
+    """Checks motions of some robots, or their programs: what takes long must not delay a motion.
+
+    One question at a time; the others wait, as long as somebody waits for their answers.
+
+    Args:
+        cells: What stands around each robot, by the robot's name.
+        at_once: Begin with the gateway, so that the first motion need not wait; otherwise with the first
+            program.
+    """
+
+    def __init__(self, cells: Mapping[str, CellDescription], *, at_once: bool) -> None:
+        self._robots = tuple(cells)
+        self._wanted = asyncio.Event()
+        if at_once:
+            self._wanted.set()
+        self._worker = Worker("protocol_gateway.checking.worker", dict(cells))
+        self._problems = dict.fromkeys(cells, _STARTING)
+        self._turn = asyncio.Lock()
+        self._failed = ""
+        self._process: int | None = None
+
+    @property
+    def pid(self) -> int | None:
+        """Of the worker process, while there is one."""
+        return self._worker.pid
+
+    def problem(self, robot: str) -> str:
+        """Why motions of a robot cannot be checked now; empty: they can."""
+        return self._problems[robot]
+
+    async def run(self) -> None:
+        """Keep the process running and every robot's cell ready, until cancelled."""
+        await self._wanted.wait()
+        try:
+            while True:
+                if self._worker.pid is None or self._worker.pid != self._process:
+                    self._problems = dict.fromkeys(self._robots, _STARTING)
+                    self._process = await self._started()
+                await asyncio.sleep(0.1 if self._process is not None else _AGAIN_S)
+        finally:
+            await self._worker.close()
+
+    async def _started(self) -> int | None:
+        try:
+            await self._worker.start()
+            process = self._worker.pid
+            for robot in self._robots:
+                self._problems[robot] = await self._prepared(robot)
+        except Exception as error:
+            why = _in_words(error)
+            if why != self._failed:
+                log.error("motions cannot be checked: %s", why)
+            self._failed = why
+            self._problems = dict.fromkeys(self._robots, f"the check does not work: {why}")
+            return None
+        self._failed = ""
+        return process
+
+    async def _prepared(self, robot: str) -> str:
+        try:
+            text: str = await self._worker.ask(Prepare(robot), timeout_s=_PREPARED_WITHIN_S)
+        except WorkerError:
+            raise
+        except Exception as error:
+            text = _in_words(error)
+        if text:
+            log.warning("%s: its motions cannot be checked: %s", robot, text)
+        return text
+
+    async def motion(self, question: CheckMotion) -> Checked:
+        """What a check of a motion finds.
+
+        Raises:
+            CheckError: If it cannot be checked, or not in time; the text says why.
+        """
+        return await self._ask(question, within_s=MOTION_WITHIN_S)
+
+    async def program(self, question: CheckProgram) -> Checked:
+        """What a check of a program finds.
+
+        Raises:
+            CheckError: If it cannot be checked, or not in time; the text says why.
+        """
+        self._wanted.set()
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(PROGRAM_WITHIN_S):
+                while self._problems[question.robot] == _STARTING:
+                    await asyncio.sleep(0.05)
+        return await self._ask(question, within_s=PROGRAM_WITHIN_S)
+
+    async def _ask(self, question: CheckMotion | CheckProgram, *, within_s: float) -> Checked:
+        if self._problems[question.robot]:
+            raise CheckError(self._problems[question.robot])
+        began_s = time.monotonic()
+        try:
+            # What nobody waits for any more is not begun.
+            async with asyncio.timeout(within_s):
+                await self._turn.acquire()
+        except TimeoutError:
+            raise CheckError(f"the check took longer than {within_s:g} s: others are being checked") from None
+        asked = asyncio.ensure_future(self._answer(question, max(_HANGS_S, within_s)))
+        asked.add_done_callback(self._done)
+        # What is merely late goes on: ending the process would make the next one late, too.
+        done, _ = await asyncio.wait([asked], timeout=max(within_s - (time.monotonic() - began_s), 0.0))
+        if not done:
+            asked.add_done_callback(_told)
+            raise CheckError(f"the check took longer than {within_s:g} s")
+        return asked.result()
+
+    async def _answer(self, question: CheckMotion | CheckProgram, hangs_s: float) -> Checked:
+        try:
+            found: Checked = await self._worker.ask(question, timeout_s=hangs_s)
+        except Exception as error:
+            raise CheckError(f"the check failed: {_in_words(error)}") from error
+        return found
+
+    def _done(self, asked: asyncio.Future[Checked]) -> None:
+        self._turn.release()
+        if not asked.cancelled():
+            asked.exception()  # whoever asked may be gone
+
+
+def _in_words(error: Exception) -> str:
+    """What went wrong; by its name, too, where nobody foresaw it."""
+    if isinstance(error, (WorkerError, RobotError)):
+        return str(error)
+    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+
+
+def _told(asked: asyncio.Future[Checked]) -> None:
+    """Nobody waits for it any more; what went wrong is said all the same."""
+    if not asked.cancelled() and (error := asked.exception()) is not None:
+        log.warning("a check that came too late failed: %s", error)
+
+
+def checkers_of(
+    surroundings: Mapping[str, CellDescription], *, at_once: Collection[str] = ()
+) -> dict[str, Checker]:
+    """A checker for each robot: robots of one cell share one, and few processes share all cells.
+
+    Whoever keeps one cell's process busy delays nobody in the cells of the others.
+
+    Args:
+        surroundings: What stands around each robot, by the robot's name.
+        at_once: Robots whose checkers begin with the gateway.
+    """
+    cells: dict[frozenset[str], dict[str, CellDescription]] = {}
+    for name, cell in surroundings.items():
+        cells.setdefault(frozenset(robot.name for robot in cell.robots), {})[name] = cell
+    # Who is alone has no mate whose way would have to be gone through: that takes no time.
+    shares: list[dict[str, CellDescription]] = [{}]
+    for names, robots in sorted(cells.items(), key=lambda each: len(each[0])):
+        if len(names) == 1:
+            shares[0] |= robots
+        elif len(shares) <= MOST_PROCESSES:
+            shares.append(dict(robots))
+        else:
+            min(shares[1:], key=len).update(robots)
+    return {
+        name: checker
+        for share in shares
+        if share
+        for checker in [Checker(share, at_once=any(name in at_once for name in share))]
+        for name in share
+    }

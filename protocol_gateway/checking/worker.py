@@ -1,0 +1,93 @@
+"""The gateway's worker process: answers what `questions` holds, with what `robots` knows."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from bus.worker import answer_all
+from protocol_gateway.checking.questions import Cells, Checked, CheckMotion, CheckProgram, Positions, Prepare
+from robots.collision import Cell, build_cell, missing_meshes, unshaped
+from robots.joints import FloatArray
+from robots.programs.check import check_plan, check_program
+from robots.programs.steps import CheckResult, Step, StepKind, Violation, ViolationKind
+
+# Steps that end before the program does are not run.
+_UNREADABLE = (ViolationKind.PROGRAM, ViolationKind.UNREACHABLE)
+
+
+def begin(cells: Cells) -> Callable[[Any], Any]:
+    """What answers a question; robots of one cell share what was made ready for it."""
+    ready: dict[tuple[str, ...], Cell] = {}
+
+    def cell_of(robot: str) -> Cell:
+        names = tuple(each.name for each in cells[robot].robots)
+        if names not in ready:
+            ready[names] = build_cell(cells[robot])
+        return ready[names]
+
+    def answer(question: Prepare | CheckMotion | CheckProgram) -> str | Checked:
+        cell = cell_of(question.robot)
+        match question:
+            case Prepare(robot):
+                return _why_not(cell, robot)
+            case CheckMotion():
+                steps = [
+                    Step(line=0, kind=StepKind.MOVE, target=np.array(target)) for target in question.targets
+                ]
+                start, others = np.array(question.start), _paths(question.others)
+                return _checked(
+                    cell, check_plan(cell, question.robot, start, steps, others=others, far=False)
+                )
+            case CheckProgram():
+                start, others = np.array(question.start), _paths(question.others)
+                return _checked(
+                    cell, check_program(question.text, cell, question.robot, start, others=others, far=False)
+                )
+
+    return answer
+
+
+def _why_not(cell: Cell, robot: str) -> str:
+    """Why a robot's motions cannot be checked; empty: they can."""
+    links = cell.arms[robot].model.link_names
+    if len(unshaped(cell, robot)) == len(links):
+        return "its description gives no link a shape, so nothing can be checked"
+    return ""
+
+
+def _coverage(cell: Cell) -> tuple[list[str], list[str]]:
+    """What of a cell no check covers: that must not be so, and that is only to be known."""
+    refusals, warnings = [], []
+    for name, arm in cell.arms.items():
+        bare, missing = unshaped(cell, name), missing_meshes(cell, name)
+        if len(bare) == len(arm.model.link_names):
+            refusals.append(f"{name}'s description gives no link a shape, so nothing of it can be checked")
+        elif missing:
+            refusals.append(f"{name} cannot be checked whole: no such mesh file: {', '.join(missing)}")
+        elif bare:
+            warnings.append(f"not checked, for they have no shape: {', '.join(bare)} of {name}")
+    return refusals, warnings
+
+
+def _paths(others: Mapping[str, tuple[Positions, ...]]) -> dict[str, FloatArray]:
+    return {name: np.array(path) for name, path in others.items()}
+
+
+def _checked(cell: Cell, result: CheckResult) -> Checked:
+    refusals, warnings = _coverage(cell)
+    return Checked(
+        refusals=(*refusals, *(_sentence(each) for each in result.violations if each.refuses)),
+        warnings=(*(_sentence(each) for each in result.violations if not each.refuses), *warnings),
+        readable=not any(each.kind in _UNREADABLE for each in result.violations),
+        steps=result.steps,
+        duration_s=result.duration_s,
+    )
+
+
+def _sentence(violation: Violation) -> str:
+    return f"line {violation.line}: {violation.text}" if violation.line else violation.text
+
+
+if __name__ == "__main__":
+    answer_all(begin)

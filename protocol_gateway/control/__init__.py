@@ -1,0 +1,1 @@
+"""Requests to move or control one robot: judged, written down, done, answered."""

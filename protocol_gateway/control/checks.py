@@ -1,0 +1,255 @@
+"""Motions of one robot checked before they are made, against where everything in its cell is now.
+
+    policy    checked and good     warned of       fails           cannot be checked
+    --------  -------------------  --------------  --------------  -----------------
+    require   made                 made, and said  refused         refused
+    warn      made                 made, and said  made, and said  made, and said
+    off       (no motion is; a program is, for its steps are found so, and what that finds is said)
+
+Checked is the straight path in joint space from where the robot stands to where it is to go, against
+fixtures, its own links, and every other robot of the cell where it is and where it has been told to go.
+"""
+
+import contextlib
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractAsyncContextManager
+from dataclasses import dataclass, replace
+
+from bus.schemas.robomesh_pb2 import CommandRequest
+from protocol_gateway.authority.obstacles import Controller, after, target_of
+from protocol_gateway.authority.rules import MOTION_COMMANDS, Answer
+from protocol_gateway.checking.cell_mates import CellMates, Whereabouts
+from protocol_gateway.checking.checker import Checker
+from protocol_gateway.checking.policy import Policy
+from protocol_gateway.checking.questions import Checked, CheckMotion, CheckProgram, Positions
+from protocol_gateway.control.stops import Guarded
+from protocol_gateway.drivers.driver import Activity
+from protocol_gateway.errors import CheckError
+from protocol_gateway.motion import has_arrived
+from robots.joints import Joints
+
+_C = CommandRequest.Command
+# What a robot at rest may seem to move by [rad] or [m].
+_STOOD = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """What a check says of commands.
+
+    Attributes:
+        refusal: Why they must not be sent; None: they may.
+        warning: What is to be said of them all the same.
+        serious: It would have been refused where checks are required.
+        start: Where the robot stood, where that must still be so when they are sent.
+        others: Where the others were and went, where that must still be so.
+    """
+
+    refusal: Answer | None = None
+    warning: str = ""
+    serious: bool = False
+    start: Positions | None = None
+    others: Mapping[str, tuple[Positions, ...]] | None = None
+
+
+class Checks:
+    """The check of one robot's motions.
+
+    Args:
+        cell: Names of the robots of its cell, its own among them.
+        checker: Of motions.
+        planner: Of programs.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        policy: Policy,
+        *,
+        cell: Sequence[str],
+        checker: Checker,
+        planner: Checker,
+        mates: CellMates,
+        joints: Joints,
+        guarded: Guarded,
+    ) -> None:
+        self.policy = policy
+        self._name, self._cell = name, tuple(cell)
+        self._checker, self._planner, self._mates = checker, planner, mates
+        self._joints, self._guarded = joints, guarded
+        mates.join(name, self.whereabouts)
+
+    @property
+    def problem(self) -> str:
+        """Why motions cannot be checked now; empty: they can, or need not."""
+        return "" if self.policy is Policy.OFF else self._checker.problem(self._name)
+
+    def turn(self, requests: Sequence[CommandRequest]) -> AbstractAsyncContextManager[None]:
+        """The cell, for commands that move the robot: nobody else's motion begins meanwhile."""
+        moves = any(each.command in MOTION_COMMANDS for each in requests)
+        # Who is not checked himself is one whom the others are checked against.
+        meets = self.policy is not Policy.OFF or len(self._cell) > 1
+        return self._mates.turn if moves and meets else contextlib.nullcontext()
+
+    async def find(self, requests: Sequence[CommandRequest]) -> Finding:
+        """What is to be said of commands that would be sent now."""
+        moves = any(each.command in MOTION_COMMANDS and each.command != _C.RUN_PROGRAM for each in requests)
+        if self.policy is Policy.OFF or not moves:
+            return Finding()
+        try:
+            start = self._start(standing=self.policy is Policy.REQUIRE)
+            others, left_out = self._others()
+            checked = await self._checker.motion(
+                CheckMotion(robot=self._name, start=start, targets=self._targets(requests), others=others)
+            )
+        except CheckError as error:
+            return self._unchecked(str(error))
+        return self._judged(checked, left_out, start, others)
+
+    async def program(self, text: str) -> tuple[Checked, Finding]:
+        """What a program does from where the robot is, and what is to be said of it.
+
+        Raises:
+            CheckError: If it cannot be checked, or not in time: then nobody knows its steps.
+        """
+        # Whatever the policy, its steps are found from here on.
+        start = self._start(standing=True)
+        others, left_out = self._others()
+        checked = await self._planner.program(
+            CheckProgram(robot=self._name, text=text, start=start, others=others)
+        )
+        if not checked.readable:
+            text = "; ".join(checked.refusals)
+            return checked, Finding(refusal=Answer(False, f"Not run: {text}."))
+        # Each step is checked again, against the others as they are then.
+        finding = self._judged(checked, left_out, start, others, refused="Not run:")
+        return checked, replace(finding, start=start, others=None)
+
+    def whereabouts(self) -> Whereabouts:
+        """What this robot may take up from now on."""
+        guarded = self._guarded
+        controller, authority = guarded.controller(), guarded.authority
+        if controller.positions is None:
+            return Whereabouts(unknown="its controller does not tell where it is")
+        motion = None if authority.lease is None else authority.lease.motion
+        ahead = () if guarded.program is None else guarded.program.ahead
+        if motion is not None and motion.way:
+            ahead = (*motion.way, *ahead)
+        elif motion is not None or _moves(controller, authority.moving):
+            return Whereabouts(unknown="it moves, and nobody knows where to")
+        return Whereabouts(path=(controller.positions, *ahead))
+
+    def changed(self, finding: Finding) -> str:
+        """What is not any more as it was when a motion was checked, in words; empty: it all is."""
+        if finding.start and not self.stands_at(finding.start):
+            return "the robot has moved"
+        for name, checked in (finding.others or {}).items():
+            now = self._mates.others(self._name, self._cell)[name]
+            # On its way it is somewhere on it; one that stood has to stand there.
+            stood = len(checked) == 1 and now.path and not self._near(now.path[0], checked[0])
+            told = any(not any(self._near(place, was) for was in checked) for place in now.path[1:])
+            if now.unknown or stood or told:
+                return f"{name} has moved, or was told to,"
+        return ""
+
+    def _near(self, one: Positions, other: Positions) -> bool:
+        return len(one) == len(other) and all(abs(a - b) <= _STOOD for a, b in zip(one, other, strict=True))
+
+    def stands_at(self, start: Positions) -> bool:
+        """Whether the robot is where it was when its motion was checked, at rest."""
+        controller = self._guarded.controller()
+        resting = not _moves(controller, self._guarded.authority.moving)
+        return resting and has_arrived(start, controller.positions, self._joints.types)
+
+    def _start(self, *, standing: bool) -> Positions:
+        """Where the robot is.
+
+        Args:
+            standing: It must not move, nor be about to.
+
+        Raises:
+            CheckError: If that is no place to check a motion from.
+        """
+        controller, authority = self._guarded.controller(), self._guarded.authority
+        if controller.positions is None:
+            raise CheckError("its controller does not tell where the robot is")
+        if standing:
+            lease = authority.lease
+            motion = None if lease is None else lease.motion
+            arrived = motion is not None and has_arrived(
+                motion.target, controller.positions, self._joints.types
+            )
+            if _moves(controller, authority.moving) or (motion and not motion.held and not arrived):
+                # What moves by itself, as a demonstration does, ends with a command.
+                how = "stop it" if self.policy is Policy.REQUIRE else "send it home"
+                raise CheckError(f"the robot moves, or is about to: wait until it stands, or {how}")
+        return controller.positions
+
+    def _targets(self, requests: Sequence[CommandRequest]) -> tuple[Positions, ...]:
+        """Everywhere that the commands take the robot, in order.
+
+        Raises:
+            CheckError: If nobody knows where one goes.
+        """
+        targets: list[Positions] = []
+        controller = self._guarded.controller()
+        for request in requests:
+            if request.command == _C.RESUME:
+                lease = self._guarded.authority.lease
+                way = () if lease is None or lease.motion is None else lease.motion.way
+                if not way:
+                    raise CheckError("where the held motion goes is not known: give it up (RESET), move anew")
+                targets += way
+            elif (target := target_of(request, controller, self._joints)) is not None:
+                targets.append(target)
+            controller = after(request, controller, self._joints)
+        return tuple(targets)
+
+    def _others(self) -> tuple[dict[str, tuple[Positions, ...]], str]:
+        """Where the cell's other robots are and go; and, where that may be left out, whose is not known.
+
+        Raises:
+            CheckError: If one's is not known, and must be.
+        """
+        others = self._mates.others(self._name, self._cell)
+        unknown = [
+            f"where {name} is or goes ({each.unknown})" for name, each in others.items() if each.unknown
+        ]
+        if unknown and self.policy is Policy.REQUIRE:
+            raise CheckError(f"nobody knows {' or '.join(unknown)}")
+        known = {name: each.path for name, each in others.items() if not each.unknown}
+        return known, f"not known: {', '.join(unknown)}" if unknown else ""
+
+    def _unchecked(self, why: str) -> Finding:
+        if self.policy is Policy.REQUIRE:
+            text = f'Not sent: it cannot be checked, and this robot\'s site says check = "require": {why}.'
+            return Finding(refusal=Answer(False, text))
+        return Finding(warning=f"not checked: {why}", serious=True)
+
+    def _judged(
+        self,
+        checked: Checked,
+        left_out: str,
+        start: Positions,
+        others: Mapping[str, tuple[Positions, ...]],
+        *,
+        refused: str = "Not sent: on its way",
+    ) -> Finding:
+        said = [*checked.warnings, *filter(None, [left_out])]
+        if self.policy is Policy.REQUIRE:
+            if checked.refusals:
+                return Finding(refusal=Answer(False, f"{refused} {_few(checked.refusals)}."))
+            return Finding(warning=_few(said), start=start, others=others)
+        serious = bool(checked.refusals or left_out)
+        return Finding(warning=_few([*checked.refusals, *said]), serious=serious)
+
+
+def _moves(controller: Controller, moving: bool | None) -> bool:
+    # At the first moment nobody knows yet: then its controller's word counts alone.
+    return bool(moving) or controller.status.activity in (Activity.MOVING, Activity.HOMING)
+
+
+def _few(texts: Sequence[str], most: int = 3) -> str:
+    """The first of many findings, and how many more there are."""
+    more = f"; and {len(texts) - most} more" if len(texts) > most else ""
+    return "; ".join(texts[:most]) + more

@@ -1,0 +1,387 @@
+"""Commands to one robot: judged, written down, done, answered.
+
+    command                 judge -> check the motion -> audit on disk -> judge again -> controller's socket
+    STOP, dead-man stop     controller's socket -> audit (`stops`)
+
+Commands wait for each other, so that they reach the controller in the order of the audit log; stops
+and renewals wait for nothing. Between the two judgements the disk may take its time: a stop or the
+lease's end in between is obeyed, and what has waited too long is not sent any more.
+"""
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+from bus.errors import RefusedError
+from bus.schemas import robomesh_pb2 as schema
+from protocol_gateway.audit.log import GATEWAY, Entry, Outcome
+from protocol_gateway.authority import holders_motion, rules
+from protocol_gateway.authority.admission import (
+    Verdict,
+    admit,
+    delay,
+    lateness,
+    remember,
+    stop_refusal,
+    used_up,
+)
+from protocol_gateway.authority.obstacles import Controller, after, controller_command, obstacle, target_of
+from protocol_gateway.authority.rules import MOTION_COMMANDS, Answer, Authority, Now, Why
+from protocol_gateway.control.checks import Checks, Finding
+from protocol_gateway.control.leases import Leases
+from protocol_gateway.control.ledger import command_entry
+from protocol_gateway.control.stops import Guarded, Stops, both_clocks, why_not
+from protocol_gateway.drivers.driver import Activity
+from protocol_gateway.errors import AuditError, CheckError, CommandError, LinkError
+from protocol_gateway.motion import has_arrived, motion_may_be_held
+from robots.joints import Joints
+
+_C = schema.CommandRequest.Command
+_S = schema.Event.Severity
+
+# A controller goes on telling the stop that was just reset for so long at most.
+RESET_SHOWS_WITHIN_S = 0.3
+# In the audit log: where the steps of a program come from.
+PROGRAM = "program"
+
+
+@dataclass(frozen=True)
+class _Attempt:
+    """Commands that go to the controller as one unit.
+
+    Attributes:
+        arrived_s: When they came (monotonic).
+        counted: Their ids are the holder's, so the answer is kept for a repeat.
+        step: The program that runs asks for them.
+        begin: What is done in the place of sending a unit.
+    """
+
+    requests: tuple[schema.CommandRequest, ...]
+    entries: tuple[Entry, ...]
+    arrived_s: float
+    counted: bool = False
+    step: bool = False
+    begin: Callable[[], None] | None = None
+
+
+class Control:
+    """The authority over one robot: who asks what of it, and what becomes of that.
+
+    Attributes:
+        leases: Who controls.
+        speed_percent: Last set through here, since the link came up; None: not known.
+    """
+
+    def __init__(self, joints: Joints, guarded: Guarded, checks: Checks | None = None) -> None:
+        self._joints = joints
+        self._guarded = guarded
+        self._checks = checks
+        self._stops = Stops(guarded)
+        self._ledger, self._journal, self._driver = guarded.ledger, guarded.journal, guarded.driver
+        self.speed_percent: float | None = None
+        self._reset_s: float | None = None
+        self._unit_s = float("-inf")  # when the newest unit of commands was sent
+        self._one_at_a_time = asyncio.Lock()
+        self.leases = Leases(guarded, self._stops, self._one_at_a_time)
+
+    @property
+    def authority(self) -> Authority:
+        """Who controls, and whether a stop is latched."""
+        return self._guarded.authority
+
+    def stop(self, *, by: str, reason: str, source: str) -> schema.StopAnswer:
+        """Stop the robot; from anyone, at any time."""
+        return self._stops.stop(by=by, reason=reason, source=source)
+
+    def link_lost(self, why: str) -> None:
+        """No units come any more: where motion of the holder's runs, stop the robot."""
+        self.speed_percent = None  # a controller may come back another
+        lease = self.authority.lease
+        if lease is not None and lease.motion is not None:
+            self.stop(by=GATEWAY, reason=f"{lease.holder}'s motion ran, and {why}", source=GATEWAY)
+
+    # --------------------------------------------------------------- commands
+
+    async def command(
+        self, request: schema.CommandRequest, *, operator: str, source: str
+    ) -> schema.CommandAnswer:
+        """Do a command; answered when its unit is on the controller's socket.
+
+        Raises:
+            RefusedError: With what, why and what next; nothing was sent.
+        """
+        return await self.commands([request], operator=operator, source=source)
+
+    async def commands(
+        self, requests: Sequence[schema.CommandRequest], *, operator: str, source: str
+    ) -> schema.CommandAnswer:
+        """Do commands in order, as one unit, all of them or none.
+
+        Raises:
+            RefusedError: With what, why and what next; nothing was sent.
+        """
+        answer = await self.attempt(requests, operator=operator, source=source)
+        if not answer.accepted:
+            raise RefusedError(answer.text)
+        return schema.CommandAnswer(accepted=True, text=answer.text)
+
+    async def attempt(
+        self,
+        requests: Sequence[schema.CommandRequest],
+        *,
+        operator: str,
+        source: str,
+        begin: Callable[[], None] | None = None,
+        refused: str = "",
+    ) -> Answer:
+        """What `commands` does, with a refusal as the answer, and its kind.
+
+        Args:
+            begin: What is done in the place of sending a unit.
+            refused: Why not, where that is known already: it is answered and written down.
+        """
+        arrived_s = both_clocks().monotonic_s
+        entries = tuple(command_entry(each, operator=operator, source=source) for each in requests)
+        # HOLD makes a robot slower whatever comes before it: it waits for nobody's check.
+        holds = all(each.command == _C.HOLD for each in requests)
+        async with contextlib.nullcontext() if holds else self._one_at_a_time:
+            verdict = self.admit(requests, operator)
+            if verdict.repeat:
+                return verdict.answer
+            problem = verdict.answer if not verdict.answer.accepted else None
+            if problem is None and refused:
+                problem = Answer(False, refused)
+            attempt = _Attempt(tuple(requests), entries, arrived_s, counted=verdict.counted, begin=begin)
+            return await self._do(attempt, problem)
+
+    async def step(self, request: schema.CommandRequest, *, operator: str) -> Answer:
+        """Do a step of the program that the holder runs: all is judged but its id."""
+        arrived_s = both_clocks().monotonic_s
+        entries = (command_entry(request, operator=operator, source=PROGRAM),)
+        async with self._one_at_a_time:
+            self.leases.expire()
+            problem = None
+            if not rules.holds(self.authority, operator, request.lease):
+                problem = Answer(False, "Not sent: control ended.", Why.NOT_IN_CONTROL)
+            return await self._do(_Attempt((request,), entries, arrived_s, step=True), problem)
+
+    def admit(self, requests: Sequence[schema.CommandRequest], operator: str) -> Verdict:
+        """Whether commands are their holder's, in time and new, and no stop forbids them."""
+        self.leases.expire()
+        authority, now = self.authority, both_clocks()
+        for request in requests:
+            verdict = admit(authority, request, operator=operator, now=now)
+            if verdict.repeat or not verdict.answer.accepted:
+                return verdict
+            authority = used_up(authority, request)
+        return verdict
+
+    async def _do(self, attempt: _Attempt, problem: Answer | None) -> Answer:
+        async with contextlib.nullcontext() if self._checks is None else self._checks.turn(attempt.requests):
+            problem = problem or self._refusal(attempt)
+            send, finding = attempt.begin, Finding()
+            if problem is None and send is None:
+                try:
+                    unit = self._driver.encode(*map(controller_command, attempt.requests))
+                    send = partial(self._guarded.send, unit)
+                except CommandError as error:
+                    problem = Answer(False, f"Not sent: {error}.")
+            if problem is None and self._checks is not None:
+                finding = await self._checks.find(attempt.requests)
+                problem = finding.refusal
+            if problem is not None:
+                self._remember(attempt, problem)
+                self._note(attempt.entries, Outcome.REFUSED, problem.text)
+                return problem
+            assert send is not None
+            # Used up before anything is done: whatever happens below, a repeat does not do it again.
+            broken_off = "Not sent: it was broken off while it was being written down."
+            self._remember(attempt, Answer(False, broken_off))
+            answer = await self._write_and_send(attempt, send, finding)
+            self._remember(attempt, answer)
+            return answer
+
+    async def _write_and_send(self, attempt: _Attempt, send: Callable[[], None], finding: Finding) -> Answer:
+        entries = [replace(entry, text=finding.warning) for entry in attempt.entries]
+        try:
+            await self._ledger.before(*entries)
+        except AuditError as error:
+            return Answer(False, f"Not sent: {error}, and what is not written down is not done.")
+        problem = self._second_thoughts(attempt, finding)
+        if problem is None:
+            try:
+                send()
+            except (LinkError, CheckError) as error:
+                problem = Answer(False, f"Not sent: {why_not(error)}.")
+        if problem is not None:
+            self._note(attempt.entries, Outcome.FAILED, problem.text)
+            return problem
+        now = both_clocks()
+        alone = now.monotonic_s - self._unit_s >= holders_motion.ANSWERED_WITHIN_S
+        self._unit_s = now.monotonic_s
+        names = ", ".join(_C.Name(request.command) for request in attempt.requests)
+        if attempt.begin is None:
+            controller = self._guarded.controller()
+            for request in attempt.requests:
+                # Each goes on from where those before it lead.
+                self._sent(request, now, controller, alone=alone)
+                controller = after(request, controller, self._joints)
+            text = f"{names} {'is' if len(attempt.requests) == 1 else 'are'} on the controller's socket"
+        else:
+            text = f"{names}: it runs"
+        if finding.warning and (finding.serious or not attempt.step):
+            self._journal.say(_S.WARNING, "check.warning", f"{names}: {finding.warning}")
+        if finding.warning:
+            text = f"{text}; mind: {finding.warning}"
+        return Answer(True, text)
+
+    def _second_thoughts(self, attempt: _Attempt, finding: Finding) -> Answer | None:
+        """Why what was allowed before it was written down must not be sent now; None: it may."""
+        self.leases.expire()
+        if not rules.holds(self.authority, attempt.entries[0].operator, attempt.requests[0].lease):
+            text = "Not sent: control ended while the command was being written down."
+            return Answer(False, text, Why.NOT_IN_CONTROL)
+        if refusal := self._refusal(attempt):
+            return refusal
+        changed = "" if self._checks is None else self._checks.changed(finding)
+        return Answer(False, f"Not sent: {changed} since the motion was checked.") if changed else None
+
+    def _note(self, entries: Sequence[Entry], outcome: Outcome, text: str) -> None:
+        for entry in entries:
+            self._ledger.after_later(replace(entry, outcome=outcome, text=text))
+
+    def _remember(self, attempt: _Attempt, answer: Answer) -> None:
+        if attempt.counted:
+            self._guarded.authority = remember(self.authority, attempt.requests[-1], answer)
+
+    def _refusal(self, attempt: _Attempt) -> Answer | None:
+        """Why commands cannot be done now, each judged as those before it leave things; None: they can."""
+        authority, controller, now = self.authority, self._guarded.controller(), both_clocks()
+        refusal = delay(attempt.arrived_s, now)
+        motions = [each.command for each in attempt.requests if each.command in MOTION_COMMANDS]
+        if len(motions) > 1 and _C.RESUME in motions:
+            # Some go on with what is on hold first, some forget it: nobody would know the way.
+            return Answer(False, "Not sent: RESUME and another motion are two units: resume first, or RESET.")
+        for request in attempt.requests:
+            refusal = (
+                refusal
+                or lateness(request, now)
+                or stop_refusal(authority, request)
+                or (None if attempt.step else self._program_refusal(request))
+                or self._obstacle(request, controller)
+            )
+            if refusal is not None:
+                return refusal
+            authority = used_up(authority, request)
+            controller = after(request, controller, self._joints)
+        return refusal
+
+    def _program_refusal(self, request: schema.CommandRequest) -> Answer | None:
+        program = self._guarded.program
+        # Of its speed its check is true.
+        if program is None or request.command not in (MOTION_COMMANDS | {_C.SPEED}) - {_C.RESUME}:
+            return None
+        text = f"the program {program.name} runs: stop it, or wait until it has ended"
+        return Answer(False, f"Not sent: {text}.")
+
+    def why_not(self, request: schema.CommandRequest) -> str:
+        """Why the controller as it is now cannot do a command, in words; empty: it can."""
+        found = self._obstacle(request, self._guarded.controller())
+        return "" if found is None else found.text
+
+    def _obstacle(self, request: schema.CommandRequest, controller: Controller) -> Answer | None:
+        status = controller.status
+        now_s = both_clocks().monotonic_s
+        just_reset = self._reset_s is not None and now_s - self._reset_s < RESET_SHOWS_WITHIN_S
+        if just_reset and status.activity in (Activity.STOPPED, Activity.FAULT):
+            # It still tells the stop that was just reset; if it does refuse, it says so itself.
+            controller = replace(controller, status=replace(status, activity=None))
+        return obstacle(request, controller, self._joints)
+
+    def _sent(self, request: schema.CommandRequest, now: Now, controller: Controller, *, alone: bool) -> None:
+        latched = self.authority.stop
+        target = target_of(request, controller, self._joints)
+        self._guarded.authority = holders_motion.command_sent(
+            self.authority,
+            request,
+            now,
+            way=() if target is None else (target,),
+            arrived=self._has_arrived(),
+            alone=alone,
+        )
+        program = self._guarded.program
+        if program is not None and request.command in (_C.HOLD, _C.RESUME, _C.RESET):
+            self._guarded.program = replace(program, held=request.command == _C.HOLD)
+        if request.command == _C.SPEED:
+            self.speed_percent = request.speed_percent
+        if request.command == _C.RESET:
+            self._reset_s = now.monotonic_s
+            if latched is not None:
+                text = f"stop request {latched.id} was reset"
+                self._journal.say(_S.INFO, "stop.reset", text, stop_id=latched.id)
+        self._guarded.on_change()
+
+    # ----------------------------------------------------------------- motion
+
+    def send_latched_stop(self) -> None:
+        """Send the latched stop, if there is one: units can be sent again, or soon."""
+        self._stops.send_latched_stop()
+
+    def news(self) -> None:
+        """The controller told something new of itself: after a RESET, a stop or fault is a new one."""
+        self._reset_s = None
+
+    def refused(self) -> None:
+        """The controller refused a unit."""
+        self.speed_percent = None  # which unit is not said; it may have been that
+        before = self.authority
+        self._guarded.authority = holders_motion.refused(before)
+        if before is not self.authority:
+            self._guarded.on_change()
+
+    def observe(self, *, moving: bool | None) -> None:
+        """Follow whether the robot moves; called some times a second. None: it is not known."""
+        if moving is None:
+            return
+        now = both_clocks()
+        self._stop_orphan(moving)
+        before = self.authority
+        self._guarded.authority, foreign = holders_motion.observe(
+            before,
+            moving=moving,
+            pending=motion_may_be_held(self._guarded.controller().status.activity),
+            arrived=self._has_arrived(),
+            now=now,
+        )
+        lease = self.authority.lease
+        if foreign and not rules.moved_recently(before, now):
+            self._journal.say(
+                _S.INFO if lease is None else _S.WARNING,
+                "motion.foreign",
+                "the robot began to move, and nobody commanded it through the gateway",
+            )
+        if foreign and lease is not None and not lease.tolerates_motion:
+            self.leases.end("the robot began to move, and its holder had not commanded it", foreign=True)
+        if (before.lease and before.lease.motion is None) != (lease and lease.motion is None):
+            self._guarded.on_change()
+        self._stops.check_heeded(moving=moving, now=now)
+
+    def _stop_orphan(self, moving: bool) -> None:
+        """Stop what still moves of a motion that a killed gateway's holder commanded: nobody holds it now."""
+        mover, self._guarded.orphan = self._guarded.orphan, ""
+        if mover and moving and self.authority.lease is None:
+            text = f"dead-man: the gateway was killed while {mover} had control, and the robot still moves"
+            self.stop(by=GATEWAY, reason=text, source=GATEWAY)
+
+    def _has_arrived(self) -> bool:
+        lease, controller = self.authority.lease, self._guarded.controller()
+        if lease is None or lease.motion is None or controller.status.homed is False:
+            return False  # a robot that is at its home, but does not know it, has still to be homed
+        return has_arrived(lease.motion.target, controller.positions, self._joints.types)
+
+    async def close(self) -> None:
+        """End the lease, if there still is one, and write what is still to be written."""
+        self.leases.close()
+        await self._ledger.settle()

@@ -1,0 +1,147 @@
+"""Who controls one robot: lease requests judged, written down, in force; and the ends of a lease.
+
+ACQUIRE, OFFER, ACCEPT, TAKE            judge -> audit on disk -> judge again
+RELEASE, expiry, session's end, ASK     at once (with a dead-man stop if needed) -> audit
+RENEW                                   at once; its lease's end tells how many there were
+"""
+
+import asyncio
+import secrets
+import time
+from collections.abc import Callable
+from functools import partial
+
+from bus.errors import RefusedError
+from bus.schemas import robomesh_pb2 as schema
+from protocol_gateway.audit.log import GATEWAY, Entry, Outcome
+from protocol_gateway.authority import rules
+from protocol_gateway.authority.rules import Answer, Authority, LeaseEnd, LeaseOutcome
+from protocol_gateway.control.ledger import entry_of, lease_entry
+from protocol_gateway.control.stops import Guarded, Stops, both_clocks
+from protocol_gateway.errors import AuditError
+from protocol_gateway.states import lease_answer
+
+_A = schema.LeaseRequest.Action
+_S = schema.Event.Severity
+
+
+class Leases:
+    """The lease of one robot.
+
+    Args:
+        turn: Held while a command, or a request that is written down first, is done.
+    """
+
+    def __init__(self, guarded: Guarded, stops: Stops, turn: asyncio.Lock) -> None:
+        self._guarded = guarded
+        self._stops = stops
+        self._turn = turn
+        self._ledger, self._journal = guarded.ledger, guarded.journal
+        self._expiry: asyncio.TimerHandle | None = None
+
+    async def ask(self, request: schema.LeaseRequest, *, operator: str, source: str) -> schema.LeaseAnswer:
+        """Answer a lease request.
+
+        Raises:
+            RefusedError: With what, why and what next.
+        """
+        judge = partial(self._judge_lease, request, operator, secrets.token_urlsafe(24))
+        record = partial(lease_entry, request, operator=operator, source=source)
+        if request.action in (_A.RENEW, _A.RELEASE, _A.ASK):
+            # None of them moves anything, and the first two must be in time: they wait for no disk.
+            asks_again = any(each.operator == operator for each in self._guarded.authority.asked_by)
+            outcome = judge()
+            told = request.action == _A.RENEW or (request.action == _A.ASK and asks_again)
+            if outcome.answer.accepted and not told:
+                self._ledger.after_later(record(outcome=Outcome.ACCEPTED, text=outcome.answer.text))
+            return self._take_effect(outcome, record)
+        async with self._turn:
+            outcome = judge()
+            if outcome.answer.accepted:
+                try:
+                    await self._ledger.before(record(outcome=Outcome.ACCEPTED, text=outcome.answer.text))
+                except AuditError as error:
+                    raise RefusedError(f"no control: {error}, so it would not be known who had it") from None
+                outcome = judge()
+            return self._take_effect(outcome, record)
+
+    def _judge_lease(self, request: schema.LeaseRequest, operator: str, secret: str) -> LeaseOutcome:
+        self.expire()
+        read_only = self._guarded.controller().read_only
+        if read_only and request.action in (_A.ACQUIRE, _A.TAKE):
+            return LeaseOutcome(
+                self._guarded.authority, Answer(False, f"this robot is read-only: {read_only}")
+            )
+        return rules.request_lease(
+            self._guarded.authority, request, operator=operator, now=both_clocks(), secret=secret
+        )
+
+    def _take_effect(self, outcome: LeaseOutcome, record: Callable[..., Entry]) -> schema.LeaseAnswer:
+        if not outcome.answer.accepted:
+            self._ledger.after_later(record(outcome=Outcome.REFUSED, text=outcome.answer.text))
+            raise RefusedError(outcome.answer.text)
+        self._set_authority(outcome.authority)
+        if outcome.ended is not None:
+            self._after_lease_end(outcome.ended)
+        return lease_answer(outcome.granted, both_clocks())
+
+    def expire(self) -> None:
+        """End a lease whose time is over."""
+        authority, ended = rules.expire(self._guarded.authority, both_clocks())
+        if ended is not None:
+            self._end(authority, ended, "EXPIRE")
+        elif authority is not self._guarded.authority:
+            self._set_authority(authority)
+
+    def end_session(self, session: str) -> None:
+        """A program's or page's session is gone: end the lease that was its."""
+        authority, ended = rules.end_session(self._guarded.authority, session)
+        if ended is not None:
+            self._end(authority, ended, "REVOKE")
+
+    def end(self, why: str, *, foreign: bool = False) -> None:
+        """End the lease, if there is one, for a reason of the gateway's; `foreign`: of foreign motion."""
+        authority, ended = rules.end_lease(self._guarded.authority, why, foreign=foreign)
+        if ended is not None:
+            self._end(authority, ended, "REVOKE")
+
+    def _end(self, authority: Authority, ended: LeaseEnd, request: str) -> None:
+        self._set_authority(authority)
+        self._after_lease_end(ended)
+        self._ledger.after_later(
+            entry_of(
+                request,
+                operator=GATEWAY,
+                source=GATEWAY,
+                outcome=Outcome.ACCEPTED,
+                text=ended.why,
+                holder=ended.holder,
+                renewals=ended.renewals,
+            )
+        )
+
+    def _after_lease_end(self, ended: LeaseEnd) -> None:
+        if ended.stop:
+            self._stops.stop(by=GATEWAY, reason=f"dead-man: {ended.why}", source=GATEWAY)
+        severity = _S.WARNING if ended.stop else _S.INFO
+        text = f"control ended: {ended.why}{', its motion was stopped' if ended.stop else ''}"
+        self._journal.say(severity, "lease.ended", text, holder=ended.holder)
+
+    def _set_authority(self, authority: Authority) -> None:
+        """Take a new state, and set the alarm clock to its lease's end."""
+        self._guarded.authority = authority
+        if self._expiry is not None:
+            self._expiry.cancel()
+            self._expiry = None
+        if authority.lease is not None:
+            loop = asyncio.get_running_loop()
+            left_s = authority.lease.until_s - time.monotonic()
+            # A millisecond late rather than early: early, the alarm would find nothing to end.
+            self._expiry = loop.call_later(max(0.0, left_s) + 0.001, self.expire)
+        self._guarded.on_change()
+
+    def close(self) -> None:
+        """End the lease, if there still is one."""
+        self.end("the gateway is being ended")
+        if self._expiry is not None:
+            self._expiry.cancel()

@@ -1,0 +1,264 @@
+"""A program of the holder's, run step by step: each step is a command like any other, judged and checked.
+
+    RUN_PROGRAM   read and checked whole (worker process) -> judge -> audit on disk -> it runs
+    each step     judge -> check against where everything is now -> audit on disk -> controller's socket
+                  -> wait until the robot stands at the step's target
+
+It ends with its last step, with a stop, with its holder's control, with a refused step, or where the
+robot comes to rest elsewhere. HOLD and RESUME are its holder's, as with any motion.
+"""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from bus.errors import RefusedError
+from bus.schemas import robomesh_pb2 as schema
+from protocol_gateway.audit.log import Outcome
+from protocol_gateway.authority import rules
+from protocol_gateway.checking.questions import Checked
+from protocol_gateway.control.checks import Checks
+from protocol_gateway.control.control import PROGRAM, Control
+from protocol_gateway.control.ledger import entry_of
+from protocol_gateway.control.stops import Guarded, Running
+from protocol_gateway.drivers.driver import Activity
+from protocol_gateway.errors import CheckError
+from protocol_gateway.states import timestamp
+from protocol_gateway.texts import LONGEST, one_line
+from robots.programs.steps import Step, StepKind
+from robots.programs.text import MOST_BYTES
+
+_C = schema.CommandRequest.Command
+_S = schema.Event.Severity
+_STATE = schema.ProgramState
+
+_LOOK_S = 0.02
+# A robot that is where its step goes already may still begin to move: homing looks for its marks.
+_BEGINS_WITHIN_S = 0.3
+# Who asked has been told by then that nobody answers.
+WITHIN_S = 25.0
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A program that runs.
+
+    Attributes:
+        secret: Of the lease under which it runs.
+        last_stop_id: Of the newest stop when it began.
+    """
+
+    name: str
+    operator: str
+    secret: str
+    last_stop_id: int
+    lines: tuple[str, ...]
+    checked: Checked
+
+
+class Programs:
+    """Runs one robot's programs, one at a time.
+
+    Attributes:
+        state: Of the program that runs, or ran last; its timestamp is set when it is published.
+    """
+
+    def __init__(self, control: Control, guarded: Guarded, checks: Checks) -> None:
+        self._control, self._guarded, self._checks = control, guarded, checks
+        self.state = _STATE()
+        self._task: asyncio.Task[None] | None = None
+
+    async def run(
+        self, request: schema.CommandRequest, *, operator: str, source: str
+    ) -> schema.CommandAnswer:
+        """Check a program, and begin it; answered when it runs.
+
+        Raises:
+            RefusedError: With what, why and what next; the robot has not moved.
+        """
+        verdict = self._control.admit([request], operator)
+        name = one_line(request.program_name, LONGEST).strip() or "unnamed"
+        # What was refused stays so, though its reason may be gone a moment later: nothing was planned.
+        refused, warning, begin = "" if verdict.answer.accepted else verdict.answer.text, "", None
+        if verdict.answer.accepted and not verdict.repeat:
+            # It came in time; what planning takes is not the way's delay.
+            request.ClearField("not_after")
+            try:
+                async with asyncio.timeout(WITHIN_S):
+                    refused, warning, begin = await self._prepared(request, name, operator)
+            except CheckError as error:
+                refused = f"Not run: {error}."
+            except TimeoutError:
+                refused = f"Not run: it takes longer than {WITHIN_S:g} s to plan; nobody would wait for it."
+        answer = await self._control.attempt(
+            [request], operator=operator, source=source, begin=begin, refused=refused
+        )
+        if not answer.accepted:
+            raise RefusedError(answer.text)
+        mind = f"; mind: {warning}" if warning else ""
+        return schema.CommandAnswer(accepted=True, text=answer.text + mind)
+
+    async def _prepared(
+        self, request: schema.CommandRequest, name: str, operator: str
+    ) -> tuple[str, str, Callable[[], None]]:
+        """Why a program must not be run, or nothing; what to mind; and what begins it."""
+        if len(request.program.encode()) > MOST_BYTES:
+            raise CheckError(f"a program has at most {MOST_BYTES // 1024} KiB")
+        checked, finding = await self._checks.program(request.program)
+        lines = tuple(request.program.split("\n"))
+        newest_stop = self._guarded.authority.last_stop_id
+        run = _Run(name, operator, request.lease, newest_stop, lines, checked)
+        if finding.refusal is not None:
+            return finding.refusal.text, "", lambda: None
+        first = next((step for step in checked.steps if step.target is not None), None)
+        # Whether it is homed, or on hold, is known before its first step.
+        if first is not None and (text := self._control.why_not(_request(first, ""))):
+            return text, "", lambda: None
+        if finding.warning:
+            self._guarded.journal.say(_S.WARNING, "check.warning", f"program {name}: {finding.warning}")
+        targets = tuple(tuple(each.target.tolist()) for each in checked.steps if each.target is not None)
+
+        def begin() -> None:
+            if finding.start and not self._checks.stands_at(finding.start):
+                raise CheckError("the robot has moved since its program was checked")
+            self._guarded.program = Running(name, targets)
+            self.state = _STATE(
+                outcome=_STATE.RUNNING,
+                name=name,
+                operator=operator,
+                since=timestamp(time.time_ns()),
+                steps=len(checked.steps),
+                duration_s=checked.duration_s,
+            )
+            self._task = asyncio.create_task(self._run(run))
+
+        return "", finding.warning, begin
+
+    async def close(self) -> None:
+        """End what runs."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+
+    async def _run(self, run: _Run) -> None:
+        text = "the gateway failed at it: its log says why"
+        self._guarded.journal.say(_S.INFO, "program.started", f"{run.operator} runs program {run.name}")
+        try:
+            text = await self._all_steps(run)
+        except asyncio.CancelledError:
+            text = "the gateway is being ended"
+            raise
+        except Exception:
+            log.exception("program %s failed", run.name)
+        finally:
+            self._end(run, text)
+
+    async def _all_steps(self, run: _Run) -> str:
+        """Do a program's steps; why it was broken off, or nothing."""
+        for number, step in enumerate(run.checked.steps):
+            self.state.step, self.state.line = number + 1, step.line
+            self.state.statement = one_line(run.lines[step.line - 1].partition("#")[0].strip(), LONGEST)
+            self._guarded.on_change()
+            problem = await self._step(run, step)
+            if problem:
+                return problem
+        # Whoever gives control back when it is done ends no motion by that.
+        return await self._until(run, self._settled)
+
+    async def _step(self, run: _Run, step: Step) -> str:
+        begin_s = time.monotonic()
+        if step.kind is StepKind.WAIT:
+            return await self._until(run, lambda: time.monotonic() - begin_s >= (step.seconds or 0.0))
+        # On hold between two motions, it waits for RESUME like a motion would.
+        if problem := await self._until(run, self._not_held):
+            return problem
+        answer = await self._control.step(_request(step, run.secret), operator=run.operator)
+        if not answer.accepted:
+            return answer.text.removeprefix("Not sent: ").rstrip(".")
+        if step.target is None:
+            return ""
+        # From now on the motion itself says where the robot goes.
+        if (running := self._guarded.program) is not None:
+            self._guarded.program = replace(running, done=running.done + 1)
+        target = tuple(step.target.tolist())
+        begun = not self._checks.stands_at(target)
+
+        def arrived() -> bool:
+            nonlocal begun
+            begun = begun or not self._checks.stands_at(target)
+            patience_s = 0.0 if begun else _BEGINS_WITHIN_S
+            return self._checks.stands_at(target) and time.monotonic() - begin_s >= patience_s
+
+        return await self._until(run, arrived, moves=True)
+
+    async def _until(self, run: _Run, done: Callable[[], bool], *, moves: bool = False) -> str:
+        """Wait; why the program is broken off, or nothing."""
+        while True:
+            if problem := self._broken_off(run):
+                return problem
+            if done():
+                return ""
+            lease = self._guarded.authority.lease
+            if moves and (lease is None or lease.motion is None):
+                return "the robot came to rest before it was where the line goes"
+            await asyncio.sleep(_LOOK_S)
+
+    def _settled(self) -> bool:
+        lease = self._guarded.authority.lease
+        return lease is None or lease.motion is None
+
+    def _not_held(self) -> bool:
+        program = self._guarded.program
+        holding = self._guarded.controller().status.activity is Activity.HOLDING
+        return not holding and (program is None or not program.held)
+
+    def _broken_off(self, run: _Run) -> str:
+        authority = self._guarded.authority
+        if authority.stop is not None:
+            return f"stopped by {authority.stop.by}: {authority.stop.reason}"
+        if authority.last_stop_id != run.last_stop_id:
+            return f"stopped: stop request {authority.last_stop_id}"
+        if not rules.holds(authority, run.operator, run.secret):
+            return f"control ended: {authority.ended or 'nobody says why'}"
+        return ""
+
+    def _end(self, run: _Run, text: str) -> None:
+        self._guarded.program = None
+        self.state.outcome = _STATE.ENDED if text else _STATE.DONE
+        self.state.text = text
+        where = f"line {self.state.line}"
+        said = f"program {run.name} ended at {where}: {text}" if text else f"program {run.name} is done"
+        self._guarded.journal.say(
+            _S.WARNING if text else _S.INFO, "program.ended" if text else "program.done", said
+        )
+        self._guarded.ledger.after_later(
+            entry_of(
+                "PROGRAM_END",
+                operator=run.operator,
+                source=PROGRAM,
+                outcome=Outcome.FAILED if text else Outcome.ACCEPTED,
+                text=said,
+            )
+        )
+        self._guarded.on_change()
+
+
+def _request(step: Step, secret: str) -> schema.CommandRequest:
+    request = schema.CommandRequest(lease=secret)
+    match step.kind:
+        case StepKind.HOME:
+            request.command = _C.HOME
+        case StepKind.MOVE:
+            assert step.target is not None
+            request.command = _C.MOVE_ABSOLUTE
+            request.joint_positions.extend(step.target.tolist())
+        case StepKind.SPEED:
+            assert step.percent is not None
+            request.command, request.speed_percent = _C.SPEED, step.percent
+        case StepKind.TRACE:
+            request.command = _C.TRACE_ON if step.on else _C.TRACE_OFF
+    return request

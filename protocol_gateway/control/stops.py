@@ -1,0 +1,208 @@
+"""Stops of one robot: on the wire first, latched, and only then said and written down.
+
+    stop          controller's socket -> latched -> event -> audit, owed while the disk takes none
+    link is back  a latched stop is sent (again): the controller may not have had it, or was restarted
+    still moving  2 s after the first stop: critical event, and the stop is sent again, each 2 s
+    within 0.1 s  the unit of one that was just sent is on its way for others too: the same asker's is that
+                  stop, and counted; another's is latched under a number of its own
+
+Nothing here waits, for a lock, a queue or a disk.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from bus.schemas import robomesh_pb2 as schema
+from protocol_gateway.audit.log import GATEWAY, Outcome
+from protocol_gateway.authority import rules
+from protocol_gateway.authority.obstacles import Controller
+from protocol_gateway.authority.rules import Authority, Now
+from protocol_gateway.control.ledger import Ledger, entry_of
+from protocol_gateway.drivers.driver import Driver, Stop
+from protocol_gateway.errors import CommandError, LinkError
+from protocol_gateway.journal import Journal
+from protocol_gateway.link.link import LinkState
+
+_S = schema.Event.Severity
+
+# Longer than any arm takes to come to rest: one that still moves does not heed its stop unit.
+HEEDED_WITHIN_S = 2.0
+# Dozens of units at once would look like a controller that does not read, and cost the connection.
+ON_ITS_WAY_S = 0.1
+
+
+def both_clocks() -> Now:
+    """Now, on both clocks."""
+    return Now(time.monotonic(), time.time_ns())
+
+
+def why_not(error: Exception) -> str:
+    """A link's error without what the sentence around it says already."""
+    return str(error).removeprefix("not sent: ")
+
+
+@dataclass(frozen=True)
+class Running:
+    """The program that moves a robot.
+
+    Attributes:
+        targets: Everywhere that it goes, in order [rad] or [m].
+        done: So many of them are told to the controller already.
+        held: HOLD was sent, and no RESUME since.
+    """
+
+    name: str
+    targets: tuple[tuple[float, ...], ...] = ()
+    done: int = 0
+    held: bool = False
+
+    @property
+    def ahead(self) -> tuple[tuple[float, ...], ...]:
+        """Everywhere that it will still go after the motion that runs."""
+        return self.targets[self.done :]
+
+
+@dataclass(kw_only=True)
+class Guarded:
+    """One robot as what guards it has it.
+
+    Attributes:
+        authority: The state of `protocol_gateway.authority.rules`.
+        send: Puts a unit on the controller's socket at once, or raises LinkError.
+        controller: What is known of the controller now.
+        on_change: Told when lease or stop changed.
+        program: What runs step by step under the lease; None: nothing does.
+        orphan: Whose motion may still run from before a gateway was killed; empty: nobody's.
+    """
+
+    authority: Authority
+    driver: Driver
+    ledger: Ledger
+    journal: Journal
+    send: Callable[[bytes], None]
+    controller: Callable[[], Controller]
+    on_change: Callable[[], None]
+    program: Running | None = None
+    orphan: str = ""
+
+
+class Stops:
+    """Stops one robot, and sees to it that the stop is heeded."""
+
+    def __init__(self, guarded: Guarded) -> None:
+        self._guarded = guarded
+        self._told_disobeyed_s = 0.0
+        self._newest: tuple[str, str, schema.StopAnswer] | None = None  # who asked, from where
+
+    def stop(self, *, by: str, reason: str, source: str) -> schema.StopAnswer:
+        """Send the stop unit, latch it, and only then say and write down that it was so."""
+        guarded, now = self._guarded, both_clocks()
+        if guarded.controller().read_only:
+            return self._stop_of_read_only(by=by, reason=reason, source=source)
+        sent_s = self._on_its_way_since(now)
+        if sent_s is not None and self._newest is not None and self._newest[:2] == (by, source):
+            answer = self._newest[2]
+            self._note("STOP", answer, by=by, source=source, reason=reason)
+            return answer
+        problem = self._send() if sent_s is None else ""
+        guarded.authority, latched = rules.stop(guarded.authority, by=by, reason=reason, now=now)
+        if not problem:
+            guarded.authority = rules.stop_sent(guarded.authority, latched.id, sent_s or now.monotonic_s)
+        text = f"stop request {latched.id} is on the controller's socket"
+        if problem:
+            text = f"stop request {latched.id} is latched, but not sent: {problem}"
+        guarded.on_change()
+        guarded.journal.say(
+            _S.ERROR if problem else _S.WARNING,
+            "stop.latched",
+            f"{text} ({by}: {latched.reason})",
+            stop_id=latched.id,
+            by=by,
+            reason=latched.reason,
+            sent=not problem,
+        )
+        answer = schema.StopAnswer(stop_id=latched.id, sent=not problem, text=text)
+        self._newest = None if problem else (by, source, answer)
+        self._note("STOP", answer, by=by, source=source, reason=latched.reason)
+        return answer
+
+    def _stop_of_read_only(self, *, by: str, reason: str, source: str) -> schema.StopAnswer:
+        """Nothing is sent, and nothing latched: nobody could clear it, and nothing needs it."""
+        guarded = self._guarded
+        why = guarded.controller().read_only
+        text = f"stop request not sent: stop it at its own panel, for it is read-only: {why}"
+        guarded.journal.say(_S.ERROR, "stop.not_sent", f"{text} ({by}: {reason})", by=by)
+        answer = schema.StopAnswer(sent=False, text=text)
+        self._note("STOP", answer, by=by, source=source, reason=reason)
+        return answer
+
+    def send_latched_stop(self) -> None:
+        """Send a latched stop (again)."""
+        guarded = self._guarded
+        latched = guarded.authority.stop
+        if latched is None or guarded.controller().read_only:
+            return
+        if not self._send():
+            guarded.authority = rules.stop_sent(
+                guarded.authority, latched.id, both_clocks().monotonic_s, first=True
+            )
+            guarded.on_change()
+            text = f"stop request {latched.id} was sent to the controller when its link came back"
+            guarded.journal.say(_S.WARNING, "stop.sent", text, stop_id=latched.id)
+            self._note_again(schema.StopAnswer(stop_id=latched.id, sent=True, text=text))
+
+    def check_heeded(self, *, moving: bool, now: Now) -> None:
+        """A robot that goes on moving after its stop is told of, and told again."""
+        guarded = self._guarded
+        latched, first_s = guarded.authority.stop, guarded.authority.stopping_s
+        if not moving or latched is None or first_s is None:
+            return
+        if now.monotonic_s - max(first_s, self._told_disobeyed_s) < HEEDED_WITHIN_S:
+            return
+        self._told_disobeyed_s = now.monotonic_s
+        problem = self._send()
+        text = (
+            f"the robot moves although stop request {latched.id} was sent: use the emergency stop there "
+            f"({problem or 'the stop unit was sent again'})"
+        )
+        guarded.journal.say(_S.CRITICAL, "stop.disobeyed", text, stop_id=latched.id)
+        self._note_again(schema.StopAnswer(stop_id=latched.id, sent=not problem, text=text))
+
+    def _note_again(self, answer: schema.StopAnswer) -> None:
+        # By a name of its own: it latches nothing, so a start need not read it.
+        self._note("STOP_AGAIN", answer, by=GATEWAY, source=GATEWAY)
+
+    def _note(
+        self, request: str, answer: schema.StopAnswer, *, by: str, source: str, reason: str = ""
+    ) -> None:
+        self._guarded.ledger.after_later(
+            entry_of(
+                request,
+                operator=by,
+                source=source,
+                outcome=Outcome.ACCEPTED if answer.sent else Outcome.FAILED,
+                text=answer.text,
+                stop_id=answer.stop_id,
+                reason=reason,
+            )
+        )
+
+    def _on_its_way_since(self, now: Now) -> float | None:
+        """When the latched stop's unit was sent (monotonic), if just now; no RESET came behind it."""
+        latched = self._guarded.authority.stop
+        if (
+            latched is None
+            or latched.sent_s is None
+            or self._guarded.controller().link.state is not LinkState.UP
+        ):
+            return None
+        return latched.sent_s if now.monotonic_s - latched.sent_s < ON_ITS_WAY_S else None
+
+    def _send(self) -> str:
+        """Put the stop unit on the socket; why not, or nothing."""
+        try:
+            self._guarded.send(self._guarded.driver.encode(Stop()))
+        except (LinkError, CommandError) as error:
+            return f"{why_not(error)}; it is sent as soon as the link is back"
+        return ""

@@ -1,0 +1,209 @@
+"""Driver of controllers that speak the unit protocol: SI above, degrees and millimetres below.
+
+A controller of the paper's own kind sends only ABSOLUTE.DEG. Everything else is optional.
+"""
+
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from functools import lru_cache
+from itertools import zip_longest
+from operator import mul
+from types import MappingProxyType
+
+from protocol_gateway.core.codes import code_table
+from protocol_gateway.core.grammar import TERMINATOR
+from protocol_gateway.core.records import (
+    AbsolutePositions,
+    Command,
+    Error,
+    Record,
+    RelativePositions,
+    Status,
+    Time,
+    Unknown,
+    Velocities,
+    write_number,
+    write_unit,
+)
+from protocol_gateway.core.scales import si_scales
+from protocol_gateway.core.stream import Malformed, Unit, UnitStream, printable
+from protocol_gateway.drivers.driver import (
+    Activity,
+    ControllerCommand,
+    ControllerEvent,
+    Hold,
+    Home,
+    JointsReceived,
+    MalformedReceived,
+    Mode,
+    MoveAbsolute,
+    MoveRelative,
+    Refused,
+    Reset,
+    Resume,
+    Speed,
+    StatusReceived,
+    Stop,
+    Trace,
+    UnknownReceived,
+)
+from protocol_gateway.errors import CommandError, UnitFormatError
+from protocol_gateway.texts import one_line
+from robots.joints import JointType
+
+_ACTIVITIES = {activity.value: activity for activity in Activity}
+_MODES = {mode.value: mode for mode in Mode}
+_WORDS = {Home: "home", Hold: "hold", Resume: "resume", Reset: "reset", Stop: "stop"}
+_NO_CODES: Mapping[int, str] = MappingProxyType({})
+
+
+class UnitDriver:
+    """The unit protocol behind `protocol_gateway.drivers.driver.Driver`.
+
+    Args:
+        joint_types: One a joint, in the order of the controller's numbers.
+        codes: The site file's table of type codes; empty: names.
+        relay: Gets every well-formed unit as it came, with its "@", whether it holds refusals alone, and
+            what it has in common with units that tell the same, newer.
+
+    Raises:
+        CodeTableError: If the table cannot be used.
+    """
+
+    def __init__(
+        self,
+        joint_types: Sequence[JointType],
+        codes: Mapping[int, str] = _NO_CODES,
+        *,
+        relay: Callable[[bytes, bool, Hashable], None] | None = None,
+    ) -> None:
+        self._table = code_table(codes)
+        self._stream = UnitStream(self._table)
+        self._scales = si_scales(joint_types)
+        self._relay = relay
+        self.units_received = 0
+        self.refusals_received = 0
+
+    @property
+    def can_stop(self) -> bool:
+        """Whether there is a stop unit: a controller of codes does not know the word `stop`."""
+        return self._table.can_say(_WORDS[Stop])
+
+    def connected(self) -> None:
+        """Forget the unfinished unit of the connection before."""
+        self._stream = UnitStream(self._table)
+
+    def receive(self, data: bytes) -> Sequence[ControllerEvent]:
+        """Events of the next bytes, cut anywhere."""
+        events: list[ControllerEvent] = []
+        for received in self._stream.receive(data):
+            match received:
+                case Unit():
+                    self._take(received, events)
+                case Malformed(offset, text, reason):
+                    events.append(MalformedReceived(offset, text, reason))
+        return events
+
+    def encode(self, *commands: ControllerCommand) -> bytes:
+        """The unit that tells commands, a record each.
+
+        Raises:
+            CommandError: If it has the wrong joint count, or a number that is not finite.
+        """
+        try:
+            return write_unit([self._record(command) for command in commands], self._table)
+        except UnitFormatError as error:
+            raise CommandError(f"cannot be sent: {error}") from None
+
+    # -------------------------------------------------------------- from the controller
+
+    def _take(self, unit: Unit, events: list[ControllerEvent]) -> None:
+        positions: list[tuple[float, ...]] = []
+        velocities: list[tuple[float, ...]] = []
+        time_s: float | None = None
+        others: list[Record] = []
+        for record in unit.records:
+            match record:
+                case AbsolutePositions(values) | Velocities(values):
+                    # A unit is all or nothing: one record of the wrong length refuses it whole.
+                    if len(values) != len(self._scales):
+                        events.append(self._wrong_count(values, unit))
+                        return
+                    si = tuple(map(mul, values, self._scales))
+                    (positions if isinstance(record, AbsolutePositions) else velocities).append(si)
+                case Time(seconds):
+                    time_s = seconds
+                case _:
+                    others.append(record)
+        self.units_received += 1
+        answer = bool(others) and all(isinstance(record, Error) for record in unit.records)
+        self.refusals_received += answer
+        if self._relay is not None:
+            self._relay(unit.data + TERMINATOR, answer, frozenset(map(type, unit.records)))
+        for si, velocity in zip_longest(positions, velocities[: len(positions)]):
+            events.append(JointsReceived(si, velocity, time_s))
+        for record in others:
+            _tell(record, unit, time_s, events)
+        if time_s is not None and not positions and not others:
+            events.append(StatusReceived(controller_time_s=time_s))
+
+    def _wrong_count(self, values: Sequence[float], unit: Unit) -> MalformedReceived:
+        reason = f"{len(values)} joint values, the description has {len(self._scales)}"
+        return MalformedReceived(unit.offset, printable(unit.data), reason, joint_count=True)
+
+    # ---------------------------------------------------------------- to the controller
+
+    def _record(self, command: ControllerCommand) -> Record:
+        match command:
+            case MoveAbsolute(positions):
+                return AbsolutePositions(self._legacy(positions))
+            case MoveRelative(offsets):
+                return RelativePositions(self._legacy(offsets))
+            case Speed(percent):
+                return Command((f"speed={write_number(percent)}",))
+            case Trace(on):
+                return Command(("trace" if on else "untrace",))
+            case _:
+                return Command((_WORDS[type(command)],))
+
+    def _legacy(self, values: Sequence[float]) -> tuple[float, ...]:
+        if len(values) != len(self._scales):
+            raise CommandError(f"{len(values)} values for {len(self._scales)} joints")
+        # Nine decimals are finer than any encoder, and keep pi/2 readable as 90.00.
+        return tuple([round(value / scale, 9) for value, scale in zip(values, self._scales, strict=True)])
+
+
+def _tell(record: Record, unit: Unit, time_s: float | None, events: list[ControllerEvent]) -> None:
+    match record:
+        case Error(number, text):
+            events.append(Refused(number, one_line(text)))
+        case Status(words):
+            said, unknown = _said(words)
+            events.append(StatusReceived(*said, time_s))
+            if unknown:
+                events.append(UnknownReceived("STATUS", unknown, unit.data))
+        case Unknown(type_name, items):
+            events.append(UnknownReceived(type_name, items, unit.data))
+        case Command(words):
+            # A controller that sends a client's record commands nobody: shown raw.
+            events.append(UnknownReceived("COMMAND", words, unit.data))
+        case RelativePositions(values):
+            events.append(UnknownReceived("RELATIVE.DEG", tuple(map(write_number, values)), unit.data))
+
+
+# A controller says the same all day.
+@lru_cache(maxsize=64)
+def _said(
+    words: tuple[str, ...],
+) -> tuple[tuple[Activity | None, Mode | None, bool, bool], tuple[str, ...]]:
+    """What a status record says, and its words that say nothing known.
+
+    `homed` and `trace` have no opposite word, so in a status their absence says no. Of words that
+    contradict each other the one that forbids motion holds, and otherwise none.
+    """
+    said = {_ACTIVITIES[word] for word in words if word in _ACTIVITIES}
+    modes = {_MODES[word] for word in words if word in _MODES}
+    forbid = [each for each in (Activity.FAULT, Activity.STOPPED) if each in said]
+    activity = said.pop() if len(said) == 1 else next(iter(forbid), None)
+    mode = Mode.LOCAL if Mode.LOCAL in modes else Mode.REMOTE if modes else None
+    unknown = tuple(word for word in words if word not in ("homed", "trace", *_ACTIVITIES, *_MODES))
+    return (activity, mode, "homed" in words, "trace" in words), unknown

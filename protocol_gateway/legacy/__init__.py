@@ -1,0 +1,1 @@
+"""Old client programs, which attach to the gateway as if it were the controller."""

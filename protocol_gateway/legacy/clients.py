@@ -1,0 +1,280 @@
+"""Old client programs: they attach to the gateway by TCP as if it were the controller.
+
+    controller --unit--> gateway --at once--> mesh, and the same bytes to every client
+    client --unit--> stop: done at once, whoever sends it, even one that is turned away or sends too much
+                     asks for nothing (somebody's state): renews its sender's lease, no more
+                     from a commander: done in its operator's name, as if it had come over the mesh
+                     from anybody else: ERROR 7, counted, written down
+
+One controller connection serves them all, in step with each other and with the mesh.
+Source: Chen, Zhang, Xue 2001, section 5, figures 7 and 8.
+"""
+
+import asyncio
+import os
+
+from bus.schemas import robomesh_pb2 as schema
+from protocol_gateway.audit.log import Outcome
+from protocol_gateway.control.control import Control
+from protocol_gateway.control.ledger import entry_of
+from protocol_gateway.control.stops import Guarded
+from protocol_gateway.core.codes import CodeTable
+from protocol_gateway.core.records import Error, write_unit
+from protocol_gateway.core.stream import Malformed, StreamEvent, Unit, printable
+from protocol_gateway.errors import GatewaySettingsError
+from protocol_gateway.legacy.commander import Commander
+from protocol_gateway.legacy.requests import (
+    FAULT,
+    MALFORMED,
+    READ_ONLY,
+    TOO_MANY,
+    asks_for_more,
+    asks_to_stop,
+)
+from protocol_gateway.legacy.settings import LegacySettings, plain_address
+from protocol_gateway.serving.client import Client
+from robots.joints import Joints
+
+_S = schema.Event.Severity
+# Those who came when there were too many are told so; when very many come, they are not.
+_MOST_TURNED_AWAY = 32
+
+
+class LegacyClients:
+    """All old client programs of one robot."""
+
+    def __init__(
+        self, settings: LegacySettings, table: CodeTable, joints: Joints, control: Control, guarded: Guarded
+    ) -> None:
+        self._settings = settings
+        self._table = table
+        self._joints = joints
+        self._control = control
+        self._guarded = guarded
+        self._journal = guarded.journal
+        self._clients: dict[Client, Commander | None] = {}
+        self._turned_away: set[Client] = set()
+        self._ending: set[asyncio.Task[None]] = set()
+        self._empty = asyncio.Event()
+        self._listener: asyncio.Server | None = None
+        self._units: list[bytes] = []
+        self._closing = False
+        self._counts = schema.LegacyClients()
+
+    async def listen(self) -> int:
+        """Let clients come; the port that they come to.
+
+        Raises:
+            GatewaySettingsError: If it cannot listen there.
+        """
+        host, port = self._settings.host, self._settings.port
+        loop = asyncio.get_running_loop()
+        try:
+            self._listener = await loop.create_server(self._new_client, host, port)
+        except OSError as error:
+            reason = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
+            raise GatewaySettingsError(
+                f"legacy_clients cannot listen on {host}:{port}: {reason.lower()}"
+            ) from None
+        bound: int = self._listener.sockets[0].getsockname()[1]
+        return bound
+
+    @property
+    def counts(self) -> schema.LegacyClients:
+        """How many are attached, and what was kept from them since the start."""
+        counts = schema.LegacyClients()
+        counts.CopyFrom(self._counts)
+        counts.attached = len(self._clients)
+        counts.states_skipped += sum(client.skipped for client in self._clients)
+        return counts
+
+    def relay(self, unit: bytes, answer: bool) -> None:
+        """Pass a unit of the controller's on, as it came, right after the mesh has what it tells.
+
+        Args:
+            answer: It refuses a unit of the gateway's, which concerns nobody but who is in control.
+        """
+        if answer:
+            for client, commander in self._clients.items():
+                if commander is not None and commander.in_control:
+                    client.answer(unit)
+        elif self._clients:
+            if not self._units:
+                asyncio.get_running_loop().call_soon(self._tell)
+            self._units.append(unit)
+
+    def _tell(self) -> None:
+        *earlier, newest = self._units
+        self._units.clear()
+        for client in self._clients:
+            client.tell(newest, earlier=earlier)
+
+    def link_is_down(self, why: str) -> None:
+        """Close those who were told states, as the controller would: nobody may go on showing old ones."""
+        for client in [client for client in self._clients if client.told]:
+            client.close(self._error(FAULT, why))
+
+    async def close(self) -> None:
+        """Close every connection, and wait until what they asked for is done or refused."""
+        self._closing = True
+        if self._listener is not None:
+            self._listener.close()
+        for client in [*self._clients, *self._turned_away]:
+            client.close(self._error(FAULT, "the gateway is being ended"))
+        while self._clients or self._turned_away:
+            self._empty.clear()
+            await self._empty.wait()
+        if self._ending:
+            await asyncio.wait(self._ending)
+
+    # ----------------------------------------------------------------- of its clients
+
+    def joined(self, client: Client) -> None:
+        """Take a client in, or turn it away."""
+        if self._closing:
+            client.abort()
+            return
+        operator = self._operator(client)
+        if len(self._clients) >= self._settings.most - self._kept_free(operator):
+            self._turn_away(client)
+            return
+        self._clients[client] = self._commander(client, operator) if operator else None
+        may = f"may command as {operator}" if operator else "reads"
+        text = f"an old client program has come: {client.name} {may}, {len(self._clients)} in all"
+        self._journal.say(_S.INFO, "legacy.attached", text, client=client.name)
+        self._guarded.on_change()
+
+    def left(self, client: Client) -> None:
+        """Forget a client; its control ends with it."""
+        self._turned_away.discard(client)
+        if client in self._clients:
+            commander = self._clients.pop(client)
+            self._counts.states_skipped += client.skipped
+            if commander is not None:
+                commander.end(f"{commander.operator}'s old client program {client.name} has gone")
+                task = asyncio.create_task(commander.settle())
+                self._ending.add(task)
+                task.add_done_callback(self._ending.discard)
+            text = f"an old client program has gone: {client.name}, {len(self._clients)} are left"
+            self._journal.say(_S.INFO, "legacy.gone", text, client=client.name)
+            self._guarded.on_change()
+        self._empty.set()
+
+    def heard(self, client: Client, events: list[StreamEvent]) -> None:
+        """Do what a client's units ask for; a stop among them before all else."""
+        if client not in self._clients:
+            return
+        self.overheard(client, events)
+        commander = self._clients[client]
+        for event in events:
+            if isinstance(event, Malformed):
+                self._malformed(client, event)
+                continue
+            if commander is not None:
+                commander.renew()
+            if not asks_for_more(event.records):
+                continue
+            if commander is not None:
+                commander.take(event)
+            else:
+                self._counts.units_refused += 1
+                refusal = Error(READ_ONLY, "read only: this address is not among the site file's commanders")
+                self._refuse(client, "", event, refusal, False)
+
+    def overheard(self, client: Client, events: list[StreamEvent]) -> None:
+        """Stop if a unit asks for it: of anybody, also of one that is turned away or sends too much."""
+        if any(isinstance(event, Unit) and asks_to_stop(event.records) for event in events):
+            by = self._operator(client) or f"legacy {client.address[0]}"
+            self._control.stop(by=by, reason="a stop unit", source=f"legacy {client.name}")
+
+    def outpaced(self, client: Client) -> None:
+        """Say to a client that what it sends is not done."""
+        limits = self._settings.limits
+        text = (
+            f"more than {limits.units_per_s:g} units/s or {limits.bytes_per_s / 1024:g} KiB/s: "
+            "for the next second or two only a stop is heard"
+        )
+        client.answer(self._error(FAULT, text))
+
+    def gave_up(self, client: Client, why: str) -> None:
+        """A client is being closed by this end."""
+        if client in self._clients:
+            self._counts.closed += 1
+            text = f"an old client program was closed: {client.name} {why}"
+            self._journal.say(_S.WARNING, "legacy.closed", text, client=client.name)
+
+    # ------------------------------------------------------------------------- inside
+
+    def _operator(self, client: Client) -> str:
+        """In whose name a client may command; empty: in nobody's."""
+        host, _ = client.address
+        return self._settings.commanders.get(plain_address(host), "")
+
+    def _kept_free(self, operator: str) -> int:
+        """How many places are not for this client: readers leave one to the first that may command."""
+        commanders = self._settings.commanders and not operator
+        return int(bool(commanders) and not any(self._clients.values()))
+
+    def _new_client(self) -> Client:
+        return Client(self, self._table, self._settings.limits)
+
+    def _turn_away(self, client: Client) -> None:
+        self._counts.turned_away += 1
+        text = f"an old client program was turned away: {client.name}, {self._settings.most} are attached"
+        self._journal.say(_S.WARNING, "legacy.turned_away", text, client=client.name)
+        if len(self._turned_away) >= _MOST_TURNED_AWAY:
+            client.abort()
+            return
+        self._turned_away.add(client)
+        client.close(self._error(TOO_MANY, "too many clients"))
+
+    def _commander(self, client: Client, operator: str) -> Commander:
+        def refuse(unit: Unit, error: Error, written: bool) -> None:
+            self._refuse(client, operator, unit, error, written)
+
+        return Commander(
+            self._control,
+            self._joints,
+            operator=operator,
+            source=f"legacy {client.name}",
+            refuse=refuse,
+        )
+
+    def _malformed(self, client: Client, malformed: Malformed) -> None:
+        self._counts.units_refused += 1
+        self._journal.say(
+            _S.WARNING,
+            "legacy.malformed",
+            f"a unit of the old client program {client.name} is malformed: {malformed.reason}",
+            client=client.name,
+            offset=malformed.offset,
+            bytes=malformed.text,
+            reason=malformed.reason,
+        )
+        refusal = Error(MALFORMED, f"malformed, {malformed.reason}")
+        client.answer(self._error(refusal.number, refusal.text))
+        commander = self._clients.get(client)
+        self._write_down(client, commander.operator if commander else "", malformed.text, refusal)
+
+    def _refuse(self, client: Client, operator: str, unit: Unit, error: Error, written: bool) -> None:
+        """Answer a unit that is not done; `written`: that stands in the audit log already."""
+        client.answer(self._error(error.number, error.text))
+        if not written:
+            self._write_down(client, operator, printable(unit.data), error)
+
+    def _write_down(self, client: Client, operator: str, unit: str, error: Error) -> None:
+        host, _ = client.address
+        self._guarded.ledger.after_later(
+            entry_of(
+                "UNIT",
+                operator=operator or f"legacy {host}",
+                source=f"legacy {client.name}",
+                outcome=Outcome.REFUSED,
+                text=f"Not sent: {error.text}.",
+                unit=unit,
+            )
+        )
+
+    def _error(self, number: int, text: str) -> bytes:
+        # Units are ASCII.
+        return write_unit((Error(number, text.replace("°", " deg").replace(";", ",")),), self._table)

@@ -1,0 +1,144 @@
+"""An old program that may command: its lease, and its units one after the other.
+
+unit       heard: its stop is done, its lease renewed --> waits --> lease --> control.commands
+waits > 1 s, or behind 32 others     refused
+2 s without a unit                   the lease expires
+its connection ends                  the lease ends, what waits is dropped
+"""
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+
+from bus.errors import RefusedError
+from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
+from protocol_gateway.authority.admission import LONGEST_WAIT_S
+from protocol_gateway.authority.rules import holds
+from protocol_gateway.control.control import Control
+from protocol_gateway.core.records import Error
+from protocol_gateway.core.stream import Unit
+from protocol_gateway.legacy.requests import FAULT, NUMBERS, READ_ONLY, requests_of, stop_to_reset
+from robots.joints import Joints
+
+_A = LeaseRequest.Action
+_RESET = CommandRequest.Command.RESET
+# A lease is renewed so often at most; it ends after 2 s of silence all the same.
+_RENEW_S = 0.1
+_TTL_S = 2.0 + _RENEW_S
+_MOST_WAITING = 32
+
+
+class Commander:
+    """One connection of a program that commands in an operator's name.
+
+    Args:
+        refuse: Answers a unit with why it was not done; `written`: control has written that down.
+    """
+
+    def __init__(
+        self,
+        control: Control,
+        joints: Joints,
+        *,
+        operator: str,
+        source: str,
+        refuse: Callable[[Unit, Error, bool], None],
+    ) -> None:
+        self.operator = operator
+        self._control = control
+        self._joints = joints
+        self._source = source
+        self._refuse = refuse
+        self._secret = ""
+        self._last_id = 0
+        self._renewed_s = float("-inf")
+        self._waiting: deque[tuple[Unit, float]] = deque()
+        self._work: asyncio.Task[None] | None = None
+        self._renewal: asyncio.Task[None] | None = None
+        self._gone = ""
+
+    @property
+    def in_control(self) -> bool:
+        """Whether it holds the lease."""
+        return holds(self._control.authority, self.operator, self._secret)
+
+    def renew(self) -> None:
+        """It is alive: its lease, if it has one, goes on."""
+        now_s = time.monotonic()
+        if self.in_control and now_s - self._renewed_s >= _RENEW_S:
+            self._renewed_s = now_s
+            self._renewal = asyncio.create_task(self._renew())
+
+    def take(self, unit: Unit) -> None:
+        """Do what a unit asks for, after those before it."""
+        if len(self._waiting) >= _MOST_WAITING:
+            self._refuse(unit, Error(FAULT, f"{_MOST_WAITING} units of yours wait: send fewer"), False)
+            return
+        self._waiting.append((unit, time.monotonic()))
+        if self._work is None or self._work.done():
+            self._work = asyncio.create_task(self._do_all())
+
+    def end(self, why: str) -> None:
+        """Its connection has ended: so has its control."""
+        self._gone = why
+        self._waiting.clear()
+        if self.in_control:
+            self._control.leases.end(why)
+
+    async def settle(self) -> None:
+        """Wait until what was begun is done, or refused."""
+        for task in (self._work, self._renewal):
+            if task is not None:
+                await asyncio.wait([task])
+
+    async def _renew(self) -> None:
+        with suppress(RefusedError):  # it has just ended
+            await self._lease(_A.RENEW)
+
+    async def _do_all(self) -> None:
+        while self._waiting:
+            unit, heard_s = self._waiting.popleft()
+            requests = self._requests(unit, heard_s)
+            if isinstance(requests, Error):
+                self._refuse(unit, requests, False)
+            elif requests:
+                await self._do(unit, requests)
+
+    def _requests(self, unit: Unit, heard_s: float) -> Sequence[CommandRequest] | Error:
+        requests = requests_of(unit.records, self._joints)
+        if isinstance(requests, Error):
+            return requests
+        waited_s = time.monotonic() - heard_s
+        for request in requests:
+            if request.command == _RESET:
+                stop = stop_to_reset(self._control.authority, heard_s)
+                if isinstance(stop, Error):
+                    return stop
+                request.stop_id = stop
+            request.not_after.FromNanoseconds(time.time_ns() + int((LONGEST_WAIT_S - waited_s) * 1e9))
+        return requests
+
+    async def _do(self, unit: Unit, requests: Sequence[CommandRequest]) -> None:
+        try:
+            if not self.in_control:
+                await self._lease(_A.ACQUIRE)
+        except RefusedError as error:
+            self._refuse(unit, Error(READ_ONLY, str(error)), True)
+            return
+        if self._gone:
+            self.end(self._gone)
+            return
+        for request in requests:
+            self._last_id += 1
+            request.lease, request.id = self._secret, self._last_id
+        answer = await self._control.attempt(requests, operator=self.operator, source=self._source)
+        if not answer.accepted:
+            self._refuse(unit, Error(NUMBERS[answer.why], answer.text), True)
+
+    async def _lease(self, action: LeaseRequest.Action) -> None:
+        request = LeaseRequest(action=action, lease=self._secret, ttl_s=_TTL_S)
+        answer = await self._control.leases.ask(request, operator=self.operator, source=self._source)
+        self._secret = answer.lease
+        self._renewed_s = time.monotonic()

@@ -1,0 +1,131 @@
+"""What an old client program's unit asks for, and the ERROR number of a refusal. No I/O.
+
+COMMAND words, ABSOLUTE.DEG, RELATIVE.DEG   requests, done in order, all of them or none
+STATUS, VELOCITY.DEG, TIME, ERROR           ask for nothing; beside a target: somebody's echoed state
+anything else                               refused
+"""
+
+from collections.abc import Sequence
+
+from bus.schemas.robomesh_pb2 import CommandRequest
+from protocol_gateway.authority.rules import Authority, Why
+from protocol_gateway.core.records import (
+    AbsolutePositions,
+    Command,
+    Error,
+    Record,
+    RelativePositions,
+    Status,
+    Time,
+    Unknown,
+    Velocities,
+    speed_percent,
+)
+from protocol_gateway.core.scales import si_scales
+from protocol_gateway.errors import UnitError
+from robots.joints import Joints
+
+TOO_MANY, MALFORMED, UNKNOWN_WORD, JOINT_COUNT, LIMIT, LOCAL_MODE, READ_ONLY, STOPPED, FAULT = range(1, 10)
+# The protocol's number for a refusal of control's.
+NUMBERS = {
+    Why.NOT_IN_CONTROL: READ_ONLY,
+    Why.READ_ONLY: READ_ONLY,
+    Why.LOCAL_MODE: LOCAL_MODE,
+    Why.STOPPED: STOPPED,
+    Why.LIMIT: LIMIT,
+    Why.OTHER: FAULT,
+}
+
+_C = CommandRequest.Command
+_WORDS = {
+    "trace": _C.TRACE_ON,
+    "untrace": _C.TRACE_OFF,
+    "home": _C.HOME,
+    "hold": _C.HOLD,
+    "resume": _C.RESUME,
+    "reset": _C.RESET,
+}
+# Each is written down before any is done, and others wait for that.
+_MOST_REQUESTS = 16
+# A reset that crossed a fresh stop on the wire must not clear it: nobody can have seen that stop yet.
+_SEEN_AFTER_S = 1.0
+
+
+def asks_to_stop(records: Sequence[Record]) -> bool:
+    """Whether a unit holds a stop: done whoever sends it, and whatever else is in the unit."""
+    return any(isinstance(record, Command) and "stop" in record.words for record in records)
+
+
+def asks_for_more(records: Sequence[Record]) -> bool:
+    """Whether a unit holds more than stops, and what a controller tells of itself."""
+    return not all(
+        set(record.words) == {"stop"}
+        if isinstance(record, Command)
+        else isinstance(record, Status | Velocities | Time | Error)
+        for record in records
+    )
+
+
+def requests_of(records: Sequence[Record], joints: Joints) -> list[CommandRequest] | Error:
+    """The requests of a commander's unit, without its stops, which are done already; or why it is none.
+
+    Lease, id and the stop that a RESET names are for the sender to fill in.
+    """
+    requests: list[CommandRequest] = []
+    scales = si_scales(joints.types)
+    for record in records:
+        match record:
+            case Command(words):
+                for word in words:
+                    request = _word(word)
+                    if isinstance(request, Error):
+                        return request
+                    requests += [request] if request is not None else []
+            case AbsolutePositions(values) | RelativePositions(values):
+                if len(values) != len(joints):
+                    return Error(JOINT_COUNT, f"{len(values)} values for {len(joints)} joints")
+                absolute = isinstance(record, AbsolutePositions)
+                requests.append(
+                    CommandRequest(
+                        command=_C.MOVE_ABSOLUTE if absolute else _C.MOVE_RELATIVE,
+                        joint_positions=[value * scale for value, scale in zip(values, scales, strict=True)],
+                    )
+                )
+            case Unknown(type_name):
+                return Error(UNKNOWN_WORD, f"unknown type {type_name[:40]}")
+    if len(requests) > _MOST_REQUESTS:
+        return Error(MALFORMED, f"{len(requests)} commands in one unit, {_MOST_REQUESTS} at most")
+    if requests and any(isinstance(record, Status | Velocities | Time) for record in records):
+        # An echoed state must never move an arm, whoever echoes it.
+        return Error(READ_ONLY, "STATUS, VELOCITY.DEG and TIME are a controller's: a state is no command")
+    return requests
+
+
+def _word(word: str) -> CommandRequest | Error | None:
+    if word == "stop":
+        return None
+    if word in _WORDS:
+        return CommandRequest(command=_WORDS[word])
+    try:
+        percent = speed_percent(word)
+    except UnitError as error:
+        return Error(MALFORMED, f"speed {error}")
+    if percent is None:
+        known = " ".join([*_WORDS, "stop"])
+        return Error(UNKNOWN_WORD, f"unknown word {word[:40]}, known: {known} speed=NN")
+    return CommandRequest(command=_C.SPEED, speed_percent=percent)
+
+
+def stop_to_reset(authority: Authority, asked_s: float) -> int | Error:
+    """The stop that a `reset` means, for the protocol has no number for it; 0: none is latched.
+
+    Args:
+        asked_s: When the unit came (monotonic).
+    """
+    stop = authority.stop
+    if stop is None:
+        return 0
+    if stop.sent_s is None or asked_s - stop.sent_s < _SEEN_AFTER_S:
+        since = "has just been sent" if stop.sent_s is not None else "has not been sent yet"
+        return Error(STOPPED, f"stop request {stop.id} ({stop.by}, {stop.reason}) {since}: reset it later")
+    return stop.id

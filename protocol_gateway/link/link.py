@@ -1,0 +1,360 @@
+"""The link to one controller: keeps a connection, tells its state in words, hands over every event at once.
+
+    DOWN --connected--> SILENT --unit--> UP
+    UP --no unit of use for stale_after_s--> SILENT --none for reconnect_after_s--> DOWN
+    any --connection lost--> DOWN --a pause, 0.2 s growing to 5 s--> connect again
+                                  --something could not be sent--> connect again at once, then each 0.2 s
+
+Everything is read at once, for what waits in the kernel's buffers would look new later. Of a flood, and of
+a burst after a gap, the newest of each kind is handed over and the rest is counted (`flood`). A controller
+whose units have another joint count, or one that sends over 2 MiB a second, is SILENT, and stays connected:
+a stop can be sent to it.
+
+Data is dated once, when its last byte was read from the socket (or earlier, when it was held back on
+the way: see `dating`), and never again.
+"""
+
+import asyncio
+import contextlib
+import logging
+import random
+import time
+from collections import Counter
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+
+from protocol_gateway.drivers.driver import (
+    ControllerEvent,
+    Driver,
+    JointsReceived,
+    MalformedReceived,
+    Refused,
+    StatusReceived,
+    UnknownReceived,
+)
+from protocol_gateway.errors import LinkDownError
+from protocol_gateway.link.connection import READ_BYTES, Connection, reason_of
+from protocol_gateway.link.dating import Dating, Received
+from protocol_gateway.link.flood import Flood, HandOver
+from protocol_gateway.link.health import Answers, Arrivals, LinkHealth, Losses
+from protocol_gateway.link.status import LinkState, LinkStatus
+
+__all__ = [
+    "ControllerLink",
+    "LinkCounters",
+    "LinkSettings",
+    "LinkState",
+    "LinkStatus",
+    "Received",
+]
+
+logger = logging.getLogger(__name__)
+
+_FIRST_PAUSE_S = 0.2
+_LONGEST_PAUSE_S = 5.0
+# Of a deluge a piece of 16 KiB is thrown away so often: costs little, and its end is seen.
+_DELUGE_EACH_S = 0.01
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinkSettings:
+    """Where the controller is, and how patient the link.
+
+    Attributes:
+        stale_after_s: Without a unit for this long the link is SILENT.
+        reconnect_after_s: Without a unit for this long the connection is given up and made anew.
+        connect_timeout_s: For one attempt to connect.
+    """
+
+    host: str
+    port: int
+    stale_after_s: float = 1.0
+    reconnect_after_s: float = 4.0
+    connect_timeout_s: float = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class LinkCounters:
+    """Counts since the gateway's start, as in `robomesh.LinkCounters`."""
+
+    units_received: int = 0
+    units_malformed: int = 0
+    units_sent: int = 0
+    bytes_received: int = 0
+    bytes_sent: int = 0
+    records_unknown: int = 0
+    connections: int = 0
+    refusals: int = 0
+    units_lost: int = 0
+    units_skipped: int = 0
+
+
+class ControllerLink:
+    """A link to one controller.
+
+    `on_event` and `on_status` are called on the event loop, straight from the socket's callback:
+    no queue, no task switch. They must return soon, and an exception of theirs ends `run`.
+    """
+
+    def __init__(
+        self,
+        settings: LinkSettings,
+        driver: Driver,
+        *,
+        on_event: Callable[[ControllerEvent, Received], None],
+        on_status: Callable[[LinkStatus], None] = lambda status: None,
+        monotonic_s: Callable[[], float] = time.monotonic,
+        wall_ns: Callable[[], int] = time.time_ns,
+    ) -> None:
+        self._settings = settings
+        self._driver = driver
+        self._on_status = on_status
+        self._monotonic_s = monotonic_s
+        self._wall_ns = wall_ns
+        self._where = f"{settings.host}:{settings.port}"
+        self._connection: Connection | None = None
+        self._status = LinkStatus(LinkState.DOWN, f"connecting to {self._where}")
+        self._counts: Counter[str] = Counter()
+        self._last_received: Received | None = None
+        self._refusal = ""
+        self._unusable: tuple[float, str, str] | None = None  # when such came last, why, and the event's code
+        self._dating = Dating()
+        self._arrivals = Arrivals()
+        self._losses = Losses()
+        self._answers = Answers()
+        self._handing = HandOver(on_event, self._later)
+        self._wanted = asyncio.Event()  # something could not be sent
+
+    @property
+    def status(self) -> LinkStatus:
+        """State of the link, in words too."""
+        return self._status
+
+    @property
+    def counters(self) -> LinkCounters:
+        """Counts so far."""
+        return LinkCounters(
+            units_received=self._driver.units_received,
+            units_lost=self._losses.lost,
+            units_skipped=self._handing.left_out,
+            **self._counts,
+        )
+
+    @property
+    def last_received(self) -> Received | None:
+        """When the last well-formed unit came; None: none yet."""
+        return self._last_received
+
+    @property
+    def rate_hz(self) -> float:
+        """Units a second, over the last second or so; 0 when none came."""
+        return self._arrivals.rate_hz(self._monotonic_s())
+
+    @property
+    def health(self) -> LinkHealth:
+        """How well it does."""
+        return LinkHealth(
+            jitter_s=self._arrivals.jitter_s(self._monotonic_s()),
+            network_round_trip_s=self._connection.round_trip_s if self._connection else None,
+            answer_s=self._answers.answer_s,
+        )
+
+    async def run(self) -> None:
+        """Keep the link until cancelled; the connection is closed then."""
+        pause_s = _FIRST_PAUSE_S
+        while True:
+            if await self._attempt():
+                pause_s = _FIRST_PAUSE_S
+            await self._rest(pause_s)
+            pause_s = min(pause_s * 2.0, _LONGEST_PAUSE_S)
+
+    async def _rest(self, pause_s: float) -> None:
+        """Pause between two attempts; not for long while something waits to be sent."""
+        # Spread: the gateways of a hall must not all knock on a restarted controller at once.
+        spread = random.uniform(0.8, 1.2)
+        if self._wanted.is_set():
+            await asyncio.sleep(_FIRST_PAUSE_S * spread)
+            return
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(pause_s * spread):
+                await self._wanted.wait()
+
+    def send(self, data: bytes) -> None:
+        """Write a whole unit to the socket, now. Nothing is ever queued, so nothing goes before it.
+
+        On return the unit is in the hands of the operating system, whole. After an error it is not, and it
+        will not be done later; until something is sent, a lost connection is made again without long pauses.
+        Works on a SILENT link too: a stop is worth trying there.
+
+        Raises:
+            LinkDownError: If there is no connection.
+            LinkCloggedError: If the socket does not take it whole; the connection is given up then.
+        """
+        self._wanted.set()
+        if self._connection is None:
+            raise LinkDownError(f"not sent: {self._status.text}")
+        self._connection.write(data)
+        self._wanted.clear()
+        self._counts["units_sent"] += 1
+        self._counts["bytes_sent"] += len(data)
+        self._answers.sent(self._monotonic_s())
+
+    def thins(self, kind: Hashable, call: Callable[[], None]) -> bool:
+        """Whether there is a flood: then the newest of each kind is done, 200 times a second."""
+        if self._handing.flood.on:
+            self._handing.hold(kind, call)
+        return self._handing.flood.on
+
+    async def _attempt(self) -> bool:
+        """One connection, from the attempt to its end; whether units came over it."""
+        loop = asyncio.get_running_loop()
+        try:
+            async with asyncio.timeout(self._settings.connect_timeout_s):
+                _, connection = await loop.create_connection(
+                    lambda: Connection(self._made, self._receive), self._settings.host, self._settings.port
+                )
+        except TimeoutError:
+            self._tell(LinkState.DOWN, f"{self._where} does not answer")
+            return False
+        except OSError as error:
+            self._tell(LinkState.DOWN, f"cannot connect to {self._where}: {reason_of(error)}")
+            return False
+        units_before = self._driver.units_received
+        text = "the link was closed"
+        try:
+            text = await self._watch(connection)
+        finally:
+            self._connection = None
+            self._handing.forget()
+            await connection.end()
+            self._tell(LinkState.DOWN, text)
+        came = self._driver.units_received > units_before
+        return came and not self._refusal
+
+    async def _watch(self, connection: Connection) -> str:
+        """Wait for the connection's end, telling silence; the reason of the end in words."""
+        connected_s = self._monotonic_s()
+        patience_s, limit_s = self._settings.stale_after_s, self._settings.reconnect_after_s
+        while not connection.lost.done():
+            now_s = self._monotonic_s()
+            last_s = self._last_received.monotonic_s if self._last_received else connected_s
+            quiet_s = now_s - max(last_s, connected_s)
+            mute_s = quiet_s if self._unusable is None else now_s - self._unusable[0]
+            if mute_s >= limit_s:
+                return f"{self._where} sent nothing for {limit_s:g} s; connecting again"
+            if quiet_s >= patience_s and self._status.state is LinkState.UP:
+                self._fall_silent()
+            wait_s = patience_s - quiet_s if quiet_s < patience_s else limit_s - mute_s
+            await asyncio.wait([connection.lost], timeout=wait_s)
+        end = connection.lost.result()
+        return (
+            f"{self._where} refused the connection: {self._refusal}"
+            if self._refusal
+            else f"{self._where}: {end}"
+        )
+
+    def _made(self, connection: Connection) -> None:
+        self._driver.connected()
+        self._dating = Dating()
+        self._losses.forget()
+        self._handing.flood = Flood()
+        self._unusable = None
+        self._connection = connection
+        self._refusal = ""
+        self._counts["connections"] += 1
+        self._tell(LinkState.SILENT, f"connected to {self._where}, no unit yet")
+
+    def _later(self, seconds: float, call: Callable[[], None]) -> asyncio.TimerHandle:
+        assert self._connection is not None
+        return self._connection.later(seconds, call)
+
+    def _receive(self, data: bytes) -> None:
+        # Dated before it is parsed: what we do with it is not part of its age.
+        now = Received(self._monotonic_s(), self._wall_ns())
+        self._counts["bytes_received"] += len(data)
+        if self._is_deluge(len(data), now.monotonic_s):
+            return
+        units_before, refusals_before = self._driver.units_received, self._driver.refusals_received
+        events = self._driver.receive(data)
+        if units := self._driver.units_received - units_before:
+            self._arrivals.count(units, now.monotonic_s)
+        for event in events:
+            self._count(event, now.monotonic_s)
+        self._handing.flood.count(max(units, len(events)))
+        dates = [self._date(event, now) for event in events]
+        if units > self._driver.refusals_received - refusals_before:
+            self._refusal, self._unusable = "", None
+            self._alive(max(dates, key=lambda date: date.monotonic_s, default=now), now)
+        elif not units and self._unusable is not None and self._status.state is LinkState.SILENT:
+            self._fall_silent()
+            return  # said once, not again for each unit
+        if self._handing.flood.on is not self._status.flooding:
+            self._tell(self._status.state, self._status.text, self._status.code)
+        self._handing.give(events, dates, burst=self._dating.after_gap(now.monotonic_s))
+
+    def _is_deluge(self, length: int, now_s: float) -> bool:
+        """Whether bytes are thrown away unread: they are far too many. A stop gets through all the same."""
+        before = self._handing.flood.deluge
+        more_waits = length == READ_BYTES
+        self._handing.flood.came(length, now_s, more_waits=more_waits)
+        if self._handing.flood.deluge:
+            assert self._connection is not None
+            self._connection.pause(_DELUGE_EACH_S)
+            self._unusable = now_s, f"{self._where} sends far too much: nothing of it is taken", "link.deluge"
+            self._fall_silent()
+        elif before:
+            self._driver.connected()
+            self._losses.forget()
+        return before or self._handing.flood.deluge
+
+    def _fall_silent(self) -> None:
+        if self._unusable is None:
+            self._handing.flood = Flood()
+            text = f"{self._where} has sent nothing for {self._settings.stale_after_s:g} s"
+            self._tell(LinkState.SILENT, text)
+        else:
+            _, text, code = self._unusable
+            self._tell(LinkState.SILENT, text, code)
+
+    def _date(self, event: ControllerEvent, now: Received) -> Received:
+        match event:
+            case JointsReceived() | StatusReceived():
+                if self._handing.flood.on:
+                    self._losses.forget()
+                elif event.controller_time_s is not None:
+                    self._losses.see(event.controller_time_s)
+                return self._dating.date(event.controller_time_s, now)
+            case _:
+                return self._dating.date(None, now)
+
+    def _alive(self, newest: Received, now: Received) -> None:
+        self._last_received = newest
+        old = now.monotonic_s - newest.monotonic_s >= self._settings.stale_after_s
+        if not old and self._status.state is not LinkState.UP:
+            self._tell(LinkState.UP, f"connected to {self._where}")
+
+    def _count(self, event: ControllerEvent, now_s: float) -> None:
+        match event:
+            case StatusReceived():
+                self._answers.see(event, now_s)
+            case MalformedReceived():
+                self._counts["units_malformed"] += 1
+                if event.joint_count:
+                    text = f"{self._where} sends {event.reason}"
+                    self._unusable = now_s, text, "controller.joint_count"
+            case UnknownReceived():
+                self._counts["records_unknown"] += 1
+            case Refused(_, text):
+                self._answers.see(event, now_s)
+                self._counts["refusals"] += 1
+                if self._status.state is not LinkState.UP:
+                    self._refusal = text
+
+    def _tell(self, state: LinkState, text: str, code: str = "") -> None:
+        flooding = self._handing.flood.on and state is not LinkState.DOWN
+        status = LinkStatus(state, text, code, flooding)
+        if status == self._status:
+            return
+        self._status = status
+        logger.info("link %s: %s", state.value, text)
+        self._on_status(status)

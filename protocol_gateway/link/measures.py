@@ -1,0 +1,44 @@
+"""What a gateway's metrics tell of its links; read when they are asked for."""
+
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+
+from bus.session import Session
+from protocol_gateway.link.link import ControllerLink, LinkState
+
+
+def measure_links(session: Session, links: Mapping[str, ControllerLink]) -> None:
+    """Tell how each robot's link does.
+
+    Args:
+        links: By robot.
+    """
+
+    def by_robot(read: Callable[[ControllerLink], float]) -> Callable[[], dict[str, float]]:
+        return lambda: {robot: float(read(link)) for robot, link in links.items()}
+
+    def age_s(link: ControllerLink) -> float:
+        last = link.last_received
+        return float("nan") if last is None else time.monotonic() - last.monotonic_s
+
+    def up(link: ControllerLink) -> bool:
+        return link.status.state is LinkState.UP
+
+    measure = session.measure
+    measure("links_up", "Links to controllers that are up", lambda: sum(map(up, links.values())))
+    measure("link_up", "Whether the link to the controller is up", by_robot(up))
+    measure("unit_age_seconds", "Since the last unit came; NaN: none yet", by_robot(age_s))
+    measure("units_per_second", "Units of the last second", by_robot(lambda link: link.rate_hz))
+    for name, text in (
+        ("units_received", "Units that came"),
+        ("units_malformed", "Units that could not be read"),
+        ("units_lost", "Units that never came: gaps in the controller's clock"),
+        ("units_skipped", "Units of a flood, overtaken by newer ones"),
+        ("units_sent", "Units that were sent to the controller"),
+    ):
+        measure(f"{name}_total", text, by_robot(partial(_count, name)))
+
+
+def _count(name: str, link: ControllerLink) -> float:
+    return float(getattr(link.counters, name))

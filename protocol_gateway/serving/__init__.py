@@ -1,0 +1,1 @@
+"""One TCP client of whoever serves units, a controller or the gateway, and its limits."""

@@ -1,0 +1,105 @@
+"""What does not move: a calm gradient and the floor's grid, drawn once a camera and kept."""
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.cameras import Camera
+from renderer.opengl import Programs, columns, set_uniforms
+from renderer.scene import square_m
+
+FloatArray = NDArray[np.float64]
+
+# Seen so flat, the floor is a line.
+EDGE_ON = 0.05
+_LINE_TONE = (0.30, 0.34, 0.39, 0.9)
+_MOST = 8
+_EXTENT, _SQUARES_PER_LARGE = 6.0, 5
+
+
+class Backdrops:
+    """Backdrops of a drawing's cameras."""
+
+    def __init__(self, context: moderngl.Context, programs: Programs, size: tuple[int, int]) -> None:
+        self._context, self._programs, self._size = context, programs, size
+        self._gradient = context.vertex_array(programs.backdrop, [])
+        self._plane = context.vertex_array(programs.plane, [])
+        self._line_buffer = context.buffer(reserve=24)
+        self._line = context.vertex_array(programs.edge, [(self._line_buffer, "3f", "position")])
+        self._kept: dict[tuple[object, ...], moderngl.Framebuffer] = {}
+
+    def of(
+        self, camera: Camera, site_to_clip: FloatArray, *, center: FloatArray, radius: float, floor: float
+    ) -> moderngl.Framebuffer:
+        """The backdrop of a camera, drawn when it is first asked for.
+
+        Args:
+            site_to_clip: (4, 4) of the camera.
+            center: (3,) of the arm's room, in the site's frame [m].
+            radius: Of the room [m].
+            floor: Its height [m].
+        """
+        key = (site_to_clip.tobytes(), floor)
+        backdrop = self._kept.pop(key, None)
+        if backdrop is None:
+            # A camera on a link has a new one with each picture: it must not cost the others theirs.
+            backdrop = self._take_place()
+            self._draw(backdrop, camera, site_to_clip, np.array([*center[:2], floor]), radius)
+        self._kept[key] = backdrop
+        return backdrop
+
+    def _take_place(self) -> moderngl.Framebuffer:
+        if len(self._kept) >= _MOST:
+            return self._kept.pop(next(iter(self._kept)))
+        return self._context.framebuffer([self._context.renderbuffer(self._size, 4)])
+
+    def _draw(
+        self,
+        target: moderngl.Framebuffer,
+        camera: Camera,
+        site_to_clip: FloatArray,
+        middle: FloatArray,
+        radius: float,
+    ) -> None:
+        """Seen edge-on, the floor is a line on squared paper."""
+        forward = camera.forward
+        edge_on = camera.orthographic and abs(forward[2]) < EDGE_ON
+        extent, square = _EXTENT * radius, square_m(radius)
+        coarse = _SQUARES_PER_LARGE * square
+        # Lines stay where they are in the site, wherever the scene's middle is.
+        floor = np.array([*np.round(middle[:2] / coarse) * coarse, middle[2]])
+        up = np.array([0.0, 0.0, 1.0])
+        origin, u, v = floor, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+        if edge_on:
+            origin, u, v = floor + forward * 3.5 * radius, np.cross(forward, up), up
+        target.use()
+        self._context.enable_only(moderngl.BLEND)
+        self._context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
+        # Looked at from above, there is no horizon to shade towards.
+        set_uniforms(self._programs.backdrop, level=1.0 - abs(float(forward[2])) ** 4)
+        self._gradient.render(vertices=3)
+        set_uniforms(
+            self._programs.plane,
+            site_to_clip=columns(site_to_clip),
+            origin=tuple(origin),
+            u=tuple(u),
+            v=tuple(v),
+            extent=extent,
+            drawn=(-1.0, -1.0, 1.0, 1.0),
+            fine=square,
+            coarse=coarse,
+            strength=0.7 if edge_on else 1.0,
+            floor_light=0.0 if edge_on else 1.0,
+        )
+        self._plane.render(moderngl.TRIANGLE_STRIP, vertices=4)
+        if edge_on:
+            ends = np.array([origin - u * extent, origin + u * extent], dtype=np.float32)
+            self._line_buffer.write(ends.tobytes())
+            set_uniforms(
+                self._programs.edge,
+                site_to_clip=columns(site_to_clip),
+                part_to_site=columns(np.eye(4)),
+                tone=_LINE_TONE,
+            )
+            self._context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
+            self._line.render(moderngl.LINES)

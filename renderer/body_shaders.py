@@ -1,0 +1,163 @@
+"""The shaders of bodies: soft light from above, a lamp, what the studio mirrors; in linear light.
+
+Specular after Walter et al. 2007 (GGX) and Karis 2013 (environment, fitted); tones after the Khronos
+PBR Neutral Tone Mapper, which leaves a paint its colour (without its toe: black is not told from
+black on a monitor in a hall).
+"""
+
+from renderer.shaders import COLORS, COMMON
+
+# Towards the lamp that casts the shadows; the floor's shadow falls the other way.
+KEY = (0.28, 0.36, 0.89)
+
+BODY_VERTEX = (
+    COMMON
+    + """
+uniform mat4 site_to_clip, part_to_site;
+uniform vec4 tint;                    // its share in .a
+uniform float opacity;
+in vec3 position, normal;
+in vec4 paint, surface;
+out vec3 at, facing;
+out vec4 body_paint, body_surface;
+void main() {
+    vec4 place = part_to_site * vec4(position, 1.0);
+    at = place.xyz;
+    facing = mat3(part_to_site) * normal;
+    body_paint = vec4(mix(to_linear(paint.rgb), tint.rgb, tint.a), paint.a * opacity);
+    body_surface = surface;
+    gl_Position = site_to_clip * place;
+}
+"""
+)
+
+# FULL: the lamp's shadow falls on bodies too.
+BODY_FRAGMENT = (
+    COLORS
+    + """
+uniform vec3 eye, forward, key;       // eye: of a perspective camera; forward: of an orthographic one
+uniform float orthographic, stale, floor_height, near_floor;
+in vec3 at, facing;
+in vec4 body_paint, body_surface;
+out vec4 color;
+
+// The studio as a mirror sees it: a bright ceiling with a soft box, dim walls, the floor.
+vec3 studio(vec3 way, float roughness) {
+    float soft = 0.10 + 0.75 * roughness;
+    float ceiling = smoothstep(-soft, 0.55 + soft, way.z);
+    float box = smoothstep(0.80 - soft * 0.5, 0.97, dot(way, key));
+    return mix(vec3(0.24, 0.245, 0.25), vec3(0.72, 0.75, 0.80), ceiling) + box * (1.4 - 1.2 * roughness);
+}
+
+vec3 toned(vec3 light) {
+    float peak = max(light.r, max(light.g, light.b));
+    if (peak < 0.76) return light;
+    float pressed = 1.0 - 0.0576 / (peak - 0.52);
+    float white = 1.0 - 1.0 / (0.15 * (peak - pressed) + 1.0);
+    return mix(light * (pressed / peak), vec3(pressed), white);
+}
+
+#ifdef FULL
+uniform sampler2DShadow lamp;
+uniform mat4 site_to_lamp;
+uniform float lamp_texel_m;
+// Five looks, each a mean of four: an edge as soft as a large lamp's.
+float lit(vec3 n) {
+    vec3 from = (site_to_lamp * vec4(at + n * 1.5 * lamp_texel_m, 1.0)).xyz * 0.5 + 0.5;
+    float step = 1.3 / float(textureSize(lamp, 0).x);
+    vec2 one = vec2(step, 0.45 * step), other = vec2(-0.45 * step, step);
+    float sum = texture(lamp, from) + texture(lamp, from + vec3(one, 0.0));
+    sum += texture(lamp, from - vec3(one, 0.0));
+    return (sum + texture(lamp, from + vec3(other, 0.0)) + texture(lamp, from - vec3(other, 0.0))) / 5.0;
+}
+#else
+float lit(vec3 n) { return 1.0; }
+#endif
+
+void main() {
+    vec3 n = normalize(facing);
+    vec3 to_eye = orthographic > 0.5 ? -forward : normalize(eye - at);
+    // Only faces that look at the camera are drawn: a smooth normal must not look away.
+    float facing_eye = clamp(dot(n, to_eye), 0.02, 1.0);
+    float open = body_surface.r, roughness = clamp(body_surface.g, 0.15, 1.0), metallic = body_surface.b;
+    vec3 albedo = body_paint.rgb * (1.0 - metallic);
+    vec3 mirrored = mix(vec3(0.04), body_paint.rgb, metallic);
+
+    // What comes from everywhere: the ceiling, the floor's return, a little from where one stands.
+    float up = n.z * 0.5 + 0.5;
+    float above = clamp((at.z - floor_height) / near_floor, 0.0, 1.0);
+    float sky = open * mix(1.0, 0.55 + 0.45 * above, 1.0 - up);
+    vec3 around = mix(vec3(0.25, 0.245, 0.24), vec3(0.57, 0.595, 0.63), up) * sky;
+    around += 0.20 * facing_eye * open;
+
+    float lambert = dot(n, key);
+    vec3 direct = vec3(0.0);
+    float gleam = 0.0;
+    if (lambert > 0.0) {
+        vec3 half_way = normalize(key + to_eye);
+        float along = max(dot(n, half_way), 0.0), across = max(dot(key, half_way), 0.0);
+        float a = roughness * roughness;
+        float spread = along * along * (a * a - 1.0) + 1.0;
+        float lamp_light = lambert * lit(n) * mix(0.6, 1.0, open);
+        direct = vec3(0.93, 0.90, 0.86) * lamp_light;
+        gleam = a * a / (spread * spread * max(across * across, 0.1) * (4.0 * roughness + 2.0)) * lamp_light;
+    }
+    // How much of the surroundings a surface mirrors, by its roughness and the angle.
+    vec4 fit = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
+    float aside = (1.0 - facing_eye) * (1.0 - facing_eye);
+    float grazing = min(fit.x * fit.x, aside * aside * (1.0 - facing_eye)) * fit.x + fit.y;
+    vec3 share = mirrored * (fit.z - 1.04 * grazing) + (fit.w + 1.04 * grazing);
+    vec3 mirror = studio(reflect(-to_eye, n), roughness) * share * sky;
+
+    vec3 light = albedo * (around + direct) * 1.08 + mirror + mirrored * min(gleam, 6.0);
+    // The rim darkens a little, so that a body stands out against one of its own colour.
+    light *= mix(0.72, 1.0, smoothstep(0.0, 0.32, facing_eye));
+
+    vec3 seen = to_srgb(toned(light));
+    float grey = dot(seen, vec3(0.2126, 0.7152, 0.0722));
+    seen = mix(seen, mix(vec3(mix(0.60, grey, 0.55)), vec3(0.76, 0.78, 0.81), 0.34), stale);
+    color = vec4(seen, 1.0) * body_paint.a;
+}
+"""
+)
+
+EDGE_VERTEX = """#version 330
+uniform mat4 site_to_clip, part_to_site;
+in vec3 position;
+void main() {
+    gl_Position = site_to_clip * part_to_site * vec4(position, 1.0);
+}
+"""
+
+EDGE_FRAGMENT = """#version 330
+uniform vec4 tone;
+out vec4 color;
+void main() { color = vec4(tone.rgb, 1.0) * tone.a; }
+"""
+
+# Already in clip coordinates: lines of a width in pixels, see `renderer.ribbons`.
+RIBBON_VERTEX = """#version 330
+in vec4 place, tone;
+out vec4 shade;
+void main() {
+    shade = tone;
+    gl_Position = place;
+}
+"""
+
+RIBBON_FRAGMENT = """#version 330
+in vec4 shade;
+out vec4 color;
+void main() { color = vec4(shade.rgb, 1.0) * shade.a; }
+"""
+
+# Depth alone, as the lamp sees it.
+LAMP_VERTEX = """#version 330
+uniform mat4 site_to_lamp, part_to_site;
+in vec3 position;
+void main() { gl_Position = site_to_lamp * part_to_site * vec4(position, 1.0); }
+"""
+
+LAMP_FRAGMENT = """#version 330
+void main() {}
+"""

@@ -1,0 +1,211 @@
+"""The robots that the renderer knows: what is told of them, their meshes, and when they are forgotten."""
+
+import asyncio
+import logging
+from collections import defaultdict
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+
+from bus.errors import BusError, MessageError
+from bus.keys import ROOT, robot_key
+from bus.schemas.robomesh_pb2 import ControllerState, Description, KinematicState
+from bus.session import Session
+from bus.subscription import Sample, Subscription
+from renderer.cache import store_glb, stored_glb
+from renderer.errors import RendererError
+from renderer.look import look_of, mesh_name
+from renderer.state import Ages, RobotState
+
+log = logging.getLogger(__name__)
+
+_MESH_TIMEOUT_S = 10.0
+_ASK_AGAIN_S = 2.0
+# For a site of many robots; each robot's newest counts, and the rest is skipped when read.
+_RING = 512
+_TOPICS = ("description", "frames", "joints", "controller", "kinematics")
+# Who makes a robot be there. A service that begins anew is back sooner than its robot is forgotten.
+_MAKERS = ("gateway", "kinematics", "player")
+_FORGET_AFTER_S, _FORGET_REPLAY_AFTER_S = 15.0, 1.0
+
+
+class Follower(Protocol):
+    """Who is told of robots."""
+
+    async def has_mesh(self, name: str) -> bool:
+        """Whether a mesh is there."""
+
+    async def take_mesh(self, name: str, glb: bytes, color: str) -> None:
+        """Take a mesh."""
+
+    def appeared(self, state: RobotState) -> None:
+        """A robot can be drawn, or can be drawn anew."""
+
+    def moved(self, state: RobotState) -> None:
+        """Something that a picture shows is another."""
+
+    def gone(self, state: RobotState) -> None:
+        """A robot is there no more."""
+
+
+class Robots:
+    """What is known of the robots of a site.
+
+    Attributes:
+        states: By name.
+    """
+
+    def __init__(
+        self, session: Session, site: str, follower: Follower, *, wanted: Callable[[str], bool], folder: Path
+    ) -> None:
+        self.states: dict[str, RobotState] = {}
+        self._session, self._site, self._follower = session, site, follower
+        self._wanted, self._folder = wanted, folder
+        self._subscriptions: dict[str, Subscription] = {}
+        self._meshes: dict[str, set[str]] = {}
+        self._loading: dict[str, asyncio.Task[None]] = {}
+        self._makers: defaultdict[str, set[tuple[str, str]]] = defaultdict(set)
+        self._forgetting: dict[str, asyncio.TimerHandle] = {}
+
+    async def follow(self) -> None:
+        """Follow the site's robots until cancelled."""
+        async with asyncio.TaskGroup() as group:
+            for name in _TOPICS:
+                subscription = self._session.subscribe(f"{ROOT}/{self._site}/*/{name}", newest=_RING)
+                self._subscriptions[name] = subscription
+                group.create_task(self._take_all(subscription, group))
+            group.create_task(self._watch_makers())
+
+    def ages(self, state: RobotState) -> Ages:
+        """How old what is known of a robot is, now."""
+        age = {
+            name: subscription.age_s(robot_key(state.site, state.name, name))
+            for name, subscription in self._subscriptions.items()
+            if name != "description"
+        }
+        return Ages(**age)
+
+    def neighbours(self, state: RobotState) -> list[RobotState]:
+        """The other robots of its cell; what is played back stands alone."""
+        cell = state.cell
+        if not cell:
+            return []
+        return [other for other in self.states.values() if other is not state and other.cell == cell]
+
+    @property
+    def meshes(self) -> set[str]:
+        """Names of all that their bodies need."""
+        return set().union(*self._meshes.values())
+
+    async def _take_all(self, subscription: Subscription, group: asyncio.TaskGroup) -> None:
+        async for sample in subscription:
+            robot = sample.parsed.robot
+            if not self._wanted(robot):
+                continue
+            state = self.states.setdefault(robot, RobotState(self._site, robot))
+            before = state.version
+            try:
+                self._take(state, sample, group)
+            except MessageError as error:
+                log.warning("%s: %s", sample.key, error)
+            except Exception:
+                # Whoever published it: the other robots are drawn on.
+                log.exception("%s could not be taken", sample.key)
+            if state.version != before:
+                self._follower.moved(state)
+
+    def _take(self, state: RobotState, sample: Sample, group: asyncio.TaskGroup) -> None:
+        message = sample.message()
+        if isinstance(message, FrameTransforms):
+            state.take_frames(message, sample.header.source_time_ns, sample.header.publisher)
+        elif isinstance(message, JointStates):
+            state.take_joints(message)
+        elif isinstance(message, ControllerState):
+            state.take_controller(message)
+        elif isinstance(message, KinematicState):
+            state.take_kinematics(message, self.states)
+        elif isinstance(message, Description):
+            before = self._loading.get(state.name)
+            if before is not None:
+                before.cancel()
+            self._loading[state.name] = group.create_task(self._load(state, message))
+
+    async def _load(self, state: RobotState, description: Description) -> None:
+        """Make a robot's pictures possible: its look, its meshes."""
+        where = f"{state.site}/{state.name}"
+        try:
+            look = await asyncio.to_thread(look_of, description)
+            told: list[Description.Link | Description.Fixture] = [*description.links, *description.fixtures]
+            bodies = [body for body in told if body.mesh]
+            # Those of before are drawn until then.
+            names = {mesh_name(body) for body in bodies}
+            self._meshes[state.name] = self._meshes.get(state.name, set()) | names
+            for body in bodies:
+                await self._load_mesh(state, body)
+        except RendererError as error:
+            log.error("%s cannot be drawn: %s", where, error)
+            return
+        except Exception:
+            log.exception("%s cannot be drawn", where)
+            return
+        self._meshes[state.name] = names
+        state.look = look
+        state.version += 1
+        self._follower.appeared(state)
+
+    async def _load_mesh(self, state: RobotState, body: Description.Link | Description.Fixture) -> None:
+        name = mesh_name(body)
+        if await self._follower.has_mesh(name):
+            return
+        glb = await asyncio.to_thread(stored_glb, body.mesh_sha256, self._folder)
+        key = robot_key(state.site, state.name, f"mesh/{body.mesh}")
+        told = False
+        while glb is None:
+            try:
+                glb = await self._session.ask_bytes(key, timeout_s=_MESH_TIMEOUT_S)
+            except BusError as error:
+                if not told:
+                    log.warning("mesh of %s: %s; asking until it comes", body.name, error)
+                    told = True
+                await asyncio.sleep(_ASK_AGAIN_S)
+                continue
+            await asyncio.to_thread(store_glb, glb, self._folder)
+        try:
+            await self._follower.take_mesh(name, glb, body.color)
+        except RendererError as error:
+            log.error("%s of %s/%s is not drawn: %s", body.name, state.site, state.name, error)
+
+    async def _watch_makers(self) -> None:
+        async for who, alive in self._session.watch_presence(f"{ROOT}/{self._site}/*/alive/*/*"):
+            if who.service not in _MAKERS:
+                continue
+            makers = self._makers[who.robot]
+            (makers.add if alive else makers.discard)((who.service, who.id))
+            waiting = self._forgetting.pop(who.robot, None)
+            if waiting is not None:
+                waiting.cancel()
+            if not makers:
+                del self._makers[who.robot]
+                state = self.states.get(who.robot)
+                replay = who.service == "player" or (state is not None and _is_replay(state))
+                after_s = _FORGET_REPLAY_AFTER_S if replay else _FORGET_AFTER_S
+                loop = asyncio.get_running_loop()
+                self._forgetting[who.robot] = loop.call_later(after_s, self._forget, who.robot)
+
+    def _forget(self, robot: str) -> None:
+        self._forgetting.pop(robot, None)
+        loading = self._loading.pop(robot, None)
+        if loading is not None:
+            loading.cancel()
+        self._meshes.pop(robot, None)
+        state = self.states.pop(robot, None)
+        if state is not None:
+            log.info("%s/%s is there no more", state.site, state.name)
+            self._follower.gone(state)
+
+
+def _is_replay(state: RobotState) -> bool:
+    return state.look is not None and state.look.description.HasField("replay")

@@ -1,0 +1,67 @@
+"""The size that an H.264 sequence parameter set tells (ITU-T H.264, 7.3.2.1.1)."""
+
+from renderer.errors import Mp4Error
+
+# Of these profiles the set tells colours and depths too.
+_HIGH = (100, 110, 122, 244, 44, 83, 86, 118, 128, 138, 139, 134, 135)
+
+# What a level of H.264 can have, and more.
+_MOST_PX = 16384
+
+
+class _Bits:
+    def __init__(self, data: bytes) -> None:
+        self._bits = "".join(f"{byte:08b}" for byte in data)
+        self._at = 0
+
+    def take(self, count: int) -> int:
+        bits = self._bits[self._at : self._at + count]
+        if len(bits) < count:
+            raise Mp4Error("a sequence parameter set that ends too early")
+        self._at += count
+        return int(bits, 2) if bits else 0
+
+    def golomb(self) -> int:
+        """An unsigned Exp-Golomb number, ue(v)."""
+        zeros = 0
+        while not self.take(1):
+            zeros += 1
+        return (1 << zeros) - 1 + self.take(zeros)
+
+
+def picture_size(sps: bytes) -> tuple[int, int]:
+    """Width and height [px] of a sequence parameter set, given as its NAL unit.
+
+    Raises:
+        Mp4Error: If it is none, or of a kind that is not read: interlaced, or not 4:2:0 in 8 bits.
+    """
+    # What keeps start codes out of the bytes (emulation prevention) comes off.
+    bits = _Bits(sps[1:].replace(b"\0\0\3", b"\0\0"))
+    profile = bits.take(8)
+    bits.take(16)
+    bits.golomb()
+    if profile in _HIGH:
+        # Colour format, depths, lossless, scaling lists.
+        colours = bits.golomb(), bits.golomb(), bits.golomb(), bits.take(1), bits.take(1)
+    else:
+        colours = 1, 0, 0, 0, 0
+    if colours != (1, 0, 0, 0, 0):
+        raise Mp4Error(f"H.264 of profile {profile} that is not 4:2:0 in 8 bits")
+    bits.golomb()
+    order = bits.golomb()
+    if order == 0:
+        bits.golomb()
+    elif order == 1:
+        raise Mp4Error("H.264 with a picture order of type 1 is not read")
+    bits.golomb()
+    bits.take(1)
+    width, height = 16 * (bits.golomb() + 1), 16 * (bits.golomb() + 1)
+    if not bits.take(1):
+        raise Mp4Error("interlaced H.264 is not read")
+    bits.take(1)
+    if bits.take(1):
+        left, right, top, bottom = (bits.golomb() for _ in range(4))
+        width, height = width - 2 * (left + right), height - 2 * (top + bottom)
+    if not (0 < width <= _MOST_PX and 0 < height <= _MOST_PX):
+        raise Mp4Error(f"H.264 of {width} x {height} pixels is not read")
+    return width, height

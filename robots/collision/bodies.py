@@ -1,0 +1,148 @@
+"""Shapes as what coal checks: one convex hull a link, one a piece of a fixture, or the meshes themselves.
+
+A hull misses no collision of its mesh, and a distance between hulls costs a hundredth of one between meshes.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import coal
+import numpy as np
+
+from robots.glb import link_mesh
+from robots.joints import FloatArray
+from robots.meshes.mesh import IndexArray, Mesh
+from robots.tree import Shape
+
+# Two this near touch: coal's search may end so far from the origin in bodies that overlap by millimetres.
+TOUCH_M = 1e-5
+# What is flat becomes a plate of this thickness: a hull needs a volume.
+_THINNEST_M = 1e-4
+# A box longer than wide is covered by several balls, at most so many.
+_MOST_BALLS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A hull or a mesh, in the frame of the link or fixture that it is a part of [m].
+
+    Attributes:
+        geometry: Coal's.
+        center, half: (3,) of the box about it, along the axes of its frame.
+        balls: (k, 3) centres of balls that cover the box.
+        radius: Of each ball.
+    """
+
+    geometry: Any
+    center: FloatArray
+    half: FloatArray
+    balls: FloatArray
+    radius: float
+
+
+def hull_bodies(shapes: Sequence[Shape]) -> tuple[Body, ...]:
+    """One hull about all shapes; none about nothing.
+
+    Raises:
+        MeshError: If a mesh file cannot be read.
+    """
+    vertices, _ = _solid(link_mesh(shapes))
+    return (hull_body(vertices),) if len(vertices) else ()
+
+
+def piece_bodies(shapes: Sequence[Shape]) -> tuple[Body, ...]:
+    """One hull about each piece of the shapes that hangs together.
+
+    Raises:
+        MeshError: If a mesh file cannot be read.
+    """
+    vertices, triangles = _solid(link_mesh(shapes))
+    return tuple(hull_body(piece) for piece in _pieces(vertices, triangles))
+
+
+def exact_bodies(shapes: Sequence[Shape]) -> tuple[Body, ...]:
+    """The triangles themselves: a surface, which what is wholly inside it does not touch.
+
+    Raises:
+        MeshError: If a mesh file cannot be read.
+    """
+    vertices, triangles = _solid(link_mesh(shapes))
+    if not len(triangles):
+        return hull_bodies(shapes)
+    geometry = coal.BVHModelOBBRSS()
+    geometry.beginModel(len(triangles), len(vertices))
+    geometry.addVertices(vertices)
+    geometry.addTriangles(triangles)
+    geometry.endModel()
+    return (_body(geometry, vertices),)
+
+
+def hull_body(points: FloatArray) -> Body:
+    """The convex hull of (n, 3) points, n at least 1."""
+    points = _with_volume(points)
+    vertices = coal.StdVec_Vec3s()
+    for point in points:
+        vertices.append(point)
+    # Qt: facets as triangles, which coal's hulls are made of.
+    return _body(coal.Convex.convexHull(vertices, False, "Qt"), points)
+
+
+def _body(geometry: Any, points: FloatArray) -> Body:
+    geometry.computeLocalAABB()
+    low, high = points.min(axis=0), points.max(axis=0)
+    center, half = (low + high) / 2, (high - low) / 2
+    longest = int(half.argmax())
+    wide = max(float(np.delete(half, longest).max()), _THINNEST_M)
+    count = int(np.clip(np.ceil(half[longest] / wide), 1, _MOST_BALLS))
+    part = half.copy()
+    part[longest] /= count
+    balls = np.tile(center, (count, 1))
+    balls[:, longest] += -half[longest] + part[longest] * (2 * np.arange(count) + 1)
+    return Body(geometry, center, half, balls, float(np.linalg.norm(part)))
+
+
+def _solid(mesh: Mesh) -> tuple[FloatArray, IndexArray]:
+    """All parts as one: vertices, and triangles that share those at the same place."""
+    parts = [part for part in mesh.parts if len(part.vertices)]
+    if not parts:
+        return np.empty((0, 3)), np.empty((0, 3), dtype=np.int64)
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
+    triangles = np.concatenate([part.triangles + start for part, start in zip(parts, starts, strict=True)])
+    vertices, numbers = np.unique(
+        np.concatenate([part.vertices for part in parts]), axis=0, return_inverse=True
+    )
+    return vertices, numbers.reshape(-1)[triangles]
+
+
+def _pieces(vertices: FloatArray, triangles: IndexArray) -> Iterator[FloatArray]:
+    """The vertices of each piece whose triangles hang together."""
+    labels = np.arange(len(vertices))
+    while True:
+        least = labels[triangles].min(axis=1)
+        lower = labels.copy()
+        np.minimum.at(lower, triangles.reshape(-1), np.repeat(least, 3))
+        # A label is a vertex of the same piece, whose own label may be lower yet.
+        lower = lower[lower]
+        if (lower == labels).all():
+            break
+        labels = lower
+    for label in np.unique(labels[triangles]):
+        yield vertices[labels == label]
+
+
+def _with_volume(points: FloatArray) -> FloatArray:
+    """The points, doubled along each direction in which they have no extent."""
+    points = np.unique(points, axis=0)
+    centred = points - points.mean(axis=0)
+    for direction in np.linalg.eigh(centred.T @ centred)[1].T:
+        if np.ptp(points @ direction) < _THINNEST_M:
+            points = np.concatenate(
+                [points + direction * _THINNEST_M / 2, points - direction * _THINNEST_M / 2]
+            )
+    return points
+
+
+def transform(placement: FloatArray) -> Any:
+    """Coal's form of a (4, 4) placement."""
+    return coal.Transform3s(placement[:3, :3], placement[:3, 3])

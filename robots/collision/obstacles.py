@@ -1,0 +1,137 @@
+"""What an arm keeps clear of, and a first, cheap answer to how far away it is at least."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.collision.bodies import Body
+from robots.joints import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacles:
+    """Bodies, each in its place.
+
+    Attributes:
+        names: Of each: "<robot>/<link>" or "<fixture>".
+        placements: (b, 4, 4) body to site [m].
+        moving: (b,) whether a joint moves it.
+    """
+
+    names: tuple[str, ...]
+    bodies: tuple[Body, ...]
+    placements: FloatArray
+    moving: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
+def joined(parts: Sequence[Obstacles]) -> Obstacles:
+    """All of them, in order."""
+    return Obstacles(
+        tuple(name for part in parts for name in part.names),
+        tuple(body for part in parts for body in part.bodies),
+        np.concatenate([np.empty((0, 4, 4)), *(part.placements for part in parts)]),
+        np.concatenate([np.empty(0, dtype=np.bool_), *(part.moving for part in parts)]),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Boxes:
+    """Boxes in the site's frame [m].
+
+    Attributes:
+        centers: (b, 3).
+        axes: (b, 3, 3) box to site.
+        halves: (b, 3) half of their sides.
+    """
+
+    centers: FloatArray
+    axes: FloatArray
+    halves: FloatArray
+
+
+def boxes_of(bodies: Sequence[Body], placements: FloatArray) -> Boxes:
+    """The box about each body in its place.
+
+    Args:
+        placements: (b, 4, 4) body to site [m].
+    """
+    centers = np.array([body.center for body in bodies]).reshape(-1, 3)
+    return Boxes(
+        np.einsum("bij,bj->bi", placements[:, :3, :3], centers) + placements[:, :3, 3],
+        placements[:, :3, :3],
+        np.array([body.half for body in bodies]).reshape(-1, 3),
+    )
+
+
+def box_about(boxes: Boxes) -> Boxes:
+    """One box about all, along the site's axes."""
+    reach = np.einsum("bij,bj->bi", np.abs(boxes.axes), boxes.halves)
+    low, high = (boxes.centers - reach).min(axis=0), (boxes.centers + reach).max(axis=0)
+    return Boxes(((low + high) / 2)[None], np.eye(3)[None], ((high - low) / 2)[None])
+
+
+@dataclass(frozen=True, eq=False)
+class Balls:
+    """Balls that cover bodies, in the frames of their links [m].
+
+    Attributes:
+        centers: (k, 3).
+        radii: (k,).
+        owners: (k,) number of the body that each covers.
+        starts: (b,) number of each body's first ball.
+    """
+
+    centers: FloatArray
+    radii: FloatArray
+    owners: NDArray[np.int64]
+    starts: NDArray[np.int64]
+
+
+def balls_of(bodies: Sequence[Body]) -> Balls:
+    """The balls that cover each body."""
+    counts = np.array([len(body.balls) for body in bodies], dtype=np.int64)
+    return Balls(
+        np.concatenate([np.empty((0, 3)), *(body.balls for body in bodies)]),
+        np.repeat(np.array([body.radius for body in bodies], dtype=np.float64), counts),
+        np.repeat(np.arange(len(bodies)), counts),
+        np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64),
+    )
+
+
+def least_distances(balls: Balls, placements: FloatArray, boxes: Boxes) -> FloatArray:
+    """No body is nearer to what is in a box than this [m].
+
+    Args:
+        placements: (m, a, 4, 4) of the bodies that the balls cover, m times, to the site.
+
+    Returns:
+        (m, a, b), 0 where they may touch.
+    """
+    of_balls = placements[:, balls.owners]
+    centers = np.einsum("mkij,kj->mki", of_balls[..., :3, :3], balls.centers) + of_balls[..., :3, 3]
+    # In each box's own axes, one by one: less memory than all three at once.
+    squares = np.zeros((*centers.shape[:2], len(boxes.centers)))
+    for axis in range(3):
+        along = boxes.axes[:, :, axis]
+        beyond = centers @ along.T - np.einsum("bi,bi->b", boxes.centers, along)
+        np.abs(beyond, out=beyond)
+        beyond -= boxes.halves[:, axis]
+        np.maximum(beyond, 0.0, out=beyond)
+        squares += beyond * beyond
+    gaps = np.sqrt(squares, out=squares) - balls.radii[:, None]
+    least: FloatArray = np.maximum(np.minimum.reduceat(gaps, balls.starts, axis=1), 0.0)
+    return least
+
+
+def joined_boxes(parts: Sequence[Boxes]) -> Boxes:
+    """All of them, in order."""
+    return Boxes(
+        np.concatenate([part.centers for part in parts]),
+        np.concatenate([part.axes for part in parts]),
+        np.concatenate([part.halves for part in parts]),
+    )

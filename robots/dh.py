@@ -1,0 +1,298 @@
+"""A robot by URDF as D-H rows: what the page of definitions edits, and `robot import --dh` writes.
+
+The chain from the base to the tool becomes rows; what each joint moves becomes one link, its shapes
+placed anew in the row's frame. The tool, the named frames and every shape stand where they stood, at all
+joint positions. What D-H rows cannot say is told in notes.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import degrees
+from typing import Any
+
+import numpy as np
+
+from robots.dh_rows import Row, axis_to_z, base_frame, row_placement, rows_as_made, rows_of_axes
+from robots.errors import DescriptionError
+from robots.joints import Joints, joints_of
+from robots.poses import FloatArray, inverse, rotation_rpy
+from robots.schema import BASE_LINK, TOOL_FRAME, JointType, UrdfDescription
+from robots.tree import BASE, Shape, Tree, chain_to, named_frames, tree_of
+from robots.urdf.read import moved
+
+# Digits after the point that are kept of degrees and millimetres: 90 stays 90, and nothing moves by 1e-13 m.
+_DIGITS = 12
+# A tool that the rows put elsewhere by more than this is told [m], [rad].
+_TOLD = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class DhForm:
+    """A robot as D-H rows.
+
+    Attributes:
+        values: Of its robot.toml, in degrees and millimetres, without meshes.
+        shapes: Of each link by name, "base" first, in the link's frame [m].
+        notes: What changed on the way, a sentence each.
+    """
+
+    values: dict[str, Any]
+    shapes: Mapping[str, tuple[Shape, ...]]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Chain:
+    """The chain to the tool at position zero: everything in the URDF's base frame.
+
+    Attributes:
+        numbers: Joints of the chain.
+        joints: (4, 4) every joint's frame.
+        rows: One a joint of the chain.
+        frames: (4, 4) of frame 0 to n.
+        link_names: Of the rows' links.
+    """
+
+    tree: Tree
+    numbers: tuple[int, ...]
+    joints: list[FloatArray]
+    rows: tuple[Row, ...]
+    frames: list[FloatArray]
+    link_names: tuple[str, ...]
+
+    def place(self, joint: int) -> int:
+        """Which of the frames carries what a joint moves: 0 for the base's."""
+        while joint != BASE and joint not in self.numbers:
+            joint = self.tree.joints[joint].parent
+        return 0 if joint == BASE else self.numbers.index(joint) + 1
+
+
+def dh_form(description: UrdfDescription) -> DhForm:
+    """The robot's chain to its tool as D-H rows.
+
+    Raises:
+        DescriptionError: If a joint of the chain follows another, which rows cannot say.
+    """
+    tree, joints = tree_of(description), joints_of(description)
+    frames = named_frames(description)
+    chain = _chain(description, tree, joints, frames[TOOL_FRAME][0])
+    links = {link.name: link for link in tree.links}
+
+    def on_row(link: str, frame_to_link: FloatArray) -> tuple[int, FloatArray]:
+        place = chain.place(links[link].joint)
+        link_to_base = _joint_frame(chain, links[link].joint) @ links[link].link_to_joint
+        return place, inverse(chain.frames[place]) @ link_to_base @ frame_to_link
+
+    names = (BASE_LINK, *chain.link_names)
+    values: dict[str, Any] = {"name": description.name, "title": description.title}
+    values["provenance"] = description.provenance
+    values["joint"] = list(_joint_values(chain, joints))
+    _, tool_to_last = on_row(*frames[TOOL_FRAME])
+    values["tool"] = _pose_values(tool_to_last)
+    values["frame"] = list(_frame_values(tree, frames, names, on_row))
+    places = {name: chain.place(link.joint) for name, link in links.items()}
+    values |= _whole_robot_values(description, chain, names, places)
+    shapes: dict[str, list[Shape]] = {name: [] for name in names}
+    for each in tree.links:
+        place, placement = on_row(each.name, np.eye(4))
+        for shape in each.shapes:
+            shapes[names[place]].append(replace(shape, shape_to_link=placement @ shape.shape_to_link))
+    return DhForm(
+        {key: value for key, value in values.items() if value not in ("", [], {})},
+        {name: tuple(found) for name, found in shapes.items()},
+        tuple(_notes(chain, joints, tool_to_last)),
+    )
+
+
+def _frame_values(
+    tree: Tree,
+    frames: Mapping[str, tuple[str, FloatArray]],
+    names: Sequence[str],
+    on_row: Callable[[str, FloatArray], tuple[int, FloatArray]],
+) -> Iterator[dict[str, Any]]:
+    """The named frames, and the links without a shape, each on the link of its row."""
+    taken = {*names, TOOL_FRAME}
+    bare = {link.name: (link.name, np.eye(4)) for link in tree.links if not link.shapes}
+    # Of our own writer, which needs them where a row's link does not stand on its joint's axis.
+    made_for_rows = {
+        link.name
+        for link in tree.links
+        if link.joint != BASE
+        and link.name.rstrip("_") == f"{tree.joints[link.joint].name}_axis"
+        and np.array_equal(link.link_to_joint, np.eye(4))
+        and not link.shapes
+    }
+    for name, (link, frame_to_link) in {**bare, **frames}.items():
+        place, placement = on_row(link, frame_to_link)
+        # A bare link that stands where its row's does is that row's own: nothing is lost without it.
+        at_row = np.allclose(placement, np.eye(4), rtol=0, atol=1e-12)
+        if name == TOOL_FRAME or name in made_for_rows or (at_row and name in bare):
+            continue
+        yield {"name": _unused(name, taken), "link": names[place], **_pose_values(placement)}
+
+
+def _chain(description: UrdfDescription, tree: Tree, joints: Joints, tool_link: str) -> _Chain:
+    end = next(link for link in tree.links if link.name == tool_link)
+    numbers = chain_to(tree, end.joint)
+    if not numbers:
+        raise DescriptionError(description.source, [f"tool link {tool_link!r}: no joint moves it"])
+    for number in numbers:
+        if tree.joints[number].mimic is not None:
+            name = tree.joints[number].name
+            text = f"joint {name!r} follows another on the way to {tool_link!r}: D-H rows cannot say that"
+            raise DescriptionError(description.source, [text])
+    homes = dict(zip(joints.names, joints.home.tolist(), strict=True))
+    placed: list[FloatArray] = []
+    for number, joint in enumerate(tree.joints):
+        parent = np.eye(4) if joint.parent == BASE else placed[joint.parent]
+        # What is beside the chain stands at home, for ever.
+        position = 0.0 if number in numbers else _home(tree, number, homes)
+        placed.append(parent @ joint.joint_to_parent @ moved(joint.type, joint.axis, position))
+    made = rows_as_made(tree, numbers)
+    axes = [placed[number] @ axis_to_z(tree.joints[number]) for number in numbers]
+    base = np.eye(4) if made else base_frame(axes[0])
+    rows = tuple(row for row, _ in made) if made else rows_of_axes(base, axes)
+    frames = [base]
+    for row in rows:
+        frames.append(frames[-1] @ row_placement(row))
+    taken = {BASE_LINK, TOOL_FRAME}
+    names = tuple(
+        _unused(made[place][1].name if made else _first_link(tree, number), taken)
+        for place, number in enumerate(numbers)
+    )
+    return _Chain(tree, numbers, placed, rows, frames, names)
+
+
+def _home(tree: Tree, number: int, homes: Mapping[str, float]) -> float:
+    joint = tree.joints[number]
+    if joint.mimic is None:
+        return homes[joint.name]
+    return joint.mimic.multiplier * homes[tree.joints[joint.mimic.leader].name] + joint.mimic.offset
+
+
+def _first_link(tree: Tree, number: int) -> str:
+    found = (link.name for link in tree.links if link.joint == number)
+    return next(found, tree.joints[number].name)
+
+
+def _joint_frame(chain: _Chain, joint: int) -> FloatArray:
+    return np.eye(4) if joint == BASE else chain.joints[joint]
+
+
+def _unused(name: str, taken: set[str]) -> str:
+    name = name if name not in taken else f"{name}_frame"
+    while name in taken:
+        name += "_"
+    taken.add(name)
+    return name
+
+
+def _joint_values(chain: _Chain, joints: Joints) -> Iterator[dict[str, Any]]:
+    rows = zip(chain.numbers, chain.rows, chain.link_names, strict=True)
+    for number, row, link in rows:
+        joint = chain.tree.joints[number]
+        index = joints.names.index(joint.name)
+        factor = degrees(1.0) if joint.type is JointType.ROTARY else 1000.0
+        yield {
+            "name": joint.name,
+            "type": str(joint.type),
+            "a": _mm(row.a),
+            "alpha": _deg(row.alpha),
+            "d": _mm(row.d),
+            "theta": _deg(row.theta),
+            "limits": [_said(joints.lower[index] * factor), _said(joints.upper[index] * factor)],
+            "max_speed": _said(joints.max_speed[index] * factor),
+            "max_acceleration": _said(joints.max_acceleration[index] * factor),
+            "max_jerk": _said(joints.max_jerk[index] * factor),
+            "home": _said(joints.home[index] * factor),
+            "link": {"name": link},
+        }
+
+
+def _whole_robot_values(
+    description: UrdfDescription, chain: _Chain, names: Sequence[str], places: Mapping[str, int]
+) -> dict[str, Any]:
+    """Constraints, views and pairs of links, as far as they still mean something."""
+    on_chain = {chain.tree.joints[number].name for number in chain.numbers}
+    said = description.model_dump(mode="json", by_alias=True)
+    if description.units.length != "mm" or description.units.angle != "deg":
+        said["constraint"], said["view"] = [], {}
+    pairs = []
+    for one, other in description.collision.ignore:
+        pair = sorted({places[one], places[other]})
+        if len(pair) == 2 and pair not in pairs:
+            pairs.append(pair)
+    return {
+        "constraint": [each for each in said["constraint"] if set(each["joints"]) <= on_chain],
+        "view": {name: _moved_view(view, chain.frames[0]) for name, view in said["view"].items()},
+        "collision": {"ignore": [[names[one], names[other]] for one, other in pairs]} if pairs else {},
+    }
+
+
+def _moved_view(view: dict[str, Any], base: FloatArray) -> dict[str, Any]:
+    turn, shift = base[:3, :3].T, 1000.0 * base[:3, 3]
+    points = {key: [_clean(x) for x in turn @ (np.array(view[key]) - shift)] for key in ("eye", "target")}
+    return {**view, **points, "up": [_clean(x) for x in turn @ np.array(view["up"])]}
+
+
+def _notes(chain: _Chain, joints: Joints, tool_to_last: FloatArray) -> Iterator[str]:
+    base = chain.frames[0]
+    if not np.array_equal(base, np.eye(4)):
+        pose = _pose_values(base)
+        yield (
+            "the first joint's axis is not the base's z: the base frame moves to "
+            f"xyz = {_listed(pose['xyz'])} mm, rpy = {_listed(pose['rpy'])}°; place the robot so"
+        )
+    beside = [joint.name for number, joint in enumerate(chain.tree.joints) if number not in chain.numbers]
+    if beside:
+        named = ", ".join(beside[:6]) + (f" and {len(beside) - 6} more" if len(beside) > 6 else "")
+        yield f"not on the way to the tool, so no joints here, and still at home: {named}"
+    distance, angle = _deviation(chain, joints, tool_to_last)
+    if distance > _TOLD or angle > _TOLD:
+        far = f"{distance * 1000:.2g} mm and {degrees(angle):.2g}°"
+        yield f"axes that are nearly parallel are taken as parallel: the tool is up to {far} elsewhere"
+
+
+def _deviation(chain: _Chain, joints: Joints, tool_to_last: FloatArray) -> tuple[float, float]:
+    """How far the rows' tool gets from where the tree has it [m] and [rad], over some positions."""
+    tree, random = chain.tree, np.random.default_rng(0)
+    last_to_joint = inverse(chain.joints[chain.numbers[-1]]) @ chain.frames[-1]
+    distance = angle = 0.0
+    for _ in range(20):
+        positions = dict(zip(joints.names, random.uniform(joints.lower, joints.upper), strict=True))
+        by_tree, by_rows = np.eye(4), chain.frames[0]
+        for number, row in zip(chain.numbers, chain.rows, strict=True):
+            joint, position = tree.joints[number], float(positions[tree.joints[number].name])
+            by_tree = by_tree @ joint.joint_to_parent @ moved(joint.type, joint.axis, position)
+            by_rows = by_rows @ moved(joint.type, np.array([0.0, 0.0, 1.0]), position) @ row_placement(row)
+        apart = (by_tree @ last_to_joint - by_rows) @ tool_to_last
+        distance = max(distance, float(np.linalg.norm(apart[:3, 3])))
+        # The chord of a small turn is the turn.
+        angle = max(angle, float(np.linalg.norm(apart[:3, :3])) / np.sqrt(2.0))
+    return distance, angle
+
+
+def _pose_values(placement: FloatArray) -> dict[str, list[float]]:
+    xyz = [_mm(value) for value in placement[:3, 3]]
+    return {"xyz": xyz, "rpy": [_deg(angle) for angle in rotation_rpy(placement[:3, :3])]}
+
+
+def _mm(metres: float) -> float:
+    return _clean(metres * 1000.0)
+
+
+def _deg(radians: float) -> float:
+    return _clean(degrees(radians))
+
+
+def _clean(number: float) -> float:
+    return round(float(number), _DIGITS) + 0.0  # no minus zero
+
+
+def _said(number: float) -> float:
+    """A limit without what the URDF's own rounding left on it: 360, not 360.000000000024."""
+    return round(float(number), 9) + 0.0
+
+
+def _listed(values: Sequence[float]) -> str:
+    return f"[{', '.join(f'{value:.6g}' for value in values)}]"

@@ -1,0 +1,15 @@
+"""Inverse kinematics: joint positions for a tool's pose, each put back through the forward kinematics."""
+
+from robots.inverse.solver import InverseResult, InverseSolver, build_solver, follow, solve
+from robots.inverse.tasks import Task, natural_task, tool_pose
+
+__all__ = [
+    "InverseResult",
+    "InverseSolver",
+    "Task",
+    "build_solver",
+    "follow",
+    "natural_task",
+    "solve",
+    "tool_pose",
+]

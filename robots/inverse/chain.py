@@ -1,0 +1,114 @@
+"""The joints that move a tool, without all that hangs beside them, in Pinocchio's terms."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from robots.inverse.tasks import misses
+from robots.joints import FloatArray, Joints, joints_of
+from robots.model import joint_motion
+from robots.schema import JointType, RobotDescription
+from robots.tree import chain_to, position_factors, tool_frame, tree_of
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """The joints between the base and the tool. One thread at a time: its workspace is reused.
+
+    `x` below is (m,): positions of those of the robot's joints that move the tool, [rad] or [m].
+
+    Attributes:
+        joints: All of the robot's.
+        moving: (m,) numbers of those that move the tool, in the robot's order.
+        lower, upper, home: (m,).
+        limits: Lower and upper limit of each, and the weight of its squared difference: 1 / range^2.
+        rotary: Whether all of the chain turn.
+        serial: Whether each joint of the chain is one of the robot's own: none follows another.
+        axes, origins: (c, 3) of the chain's joints in the base frame, all positions 0, [m].
+        tool_to_base: (4, 4) with all positions 0.
+        reach: How far from the first joint the tool can be at most, its limits aside where they turn [m].
+    """
+
+    joints: Joints
+    moving: NDArray[np.intp]
+    lower: FloatArray
+    upper: FloatArray
+    home: FloatArray
+    limits: tuple[tuple[float, float, float], ...]
+    rotary: bool
+    serial: bool
+    axes: FloatArray
+    origins: FloatArray
+    tool_to_base: FloatArray
+    reach: float
+    _model: Any
+    _data: Any
+    _frame: int
+    _placement: Any
+    _factors: FloatArray | None
+    _offsets: FloatArray
+
+
+def build_chain(description: RobotDescription) -> Chain:
+    """The chain of a description's tool."""
+    tree, joints = tree_of(description), joints_of(description)
+    on_link, tool_to_link = tool_frame(description)
+    link = next(link for link in tree.links if link.name == on_link)
+    numbers = chain_to(tree, link.joint)
+    factors, offsets = (each[list(numbers)] for each in position_factors(tree))
+    own = np.flatnonzero((factors != 0).any(axis=0))
+    factors = factors[:, own]
+    model = pin.Model()
+    parent = 0
+    for joint in (tree.joints[number] for number in numbers):
+        parent = model.addJoint(parent, joint_motion(joint), pin.SE3(joint.joint_to_parent), joint.name)
+    tool = pin.Frame("tool", parent, 0, pin.SE3(link.link_to_joint @ tool_to_link), pin.FrameType.OP_FRAME)
+    frame = model.addFrame(tool)
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, np.zeros(len(numbers)))
+    placed = [np.array(data.oMi[row + 1].homogeneous) for row in range(len(numbers))]
+    tool_to_base = np.array(data.oMf[frame].homogeneous)
+    lower, upper = joints.lower[own], joints.upper[own]
+    origins = np.array([placement[:3, 3] for placement in placed]).reshape(-1, 3)
+    rotary = np.array([tree.joints[number].type is JointType.ROTARY for number in numbers], dtype=bool)
+    strokes = np.abs(factors) @ np.maximum(np.abs(lower), np.abs(upper)) + np.abs(offsets)
+    links = np.linalg.norm(np.diff([*origins, tool_to_base[:3, 3]], axis=0), axis=1)
+    serial = np.array_equal(factors, np.eye(len(numbers)))
+    weights = 1.0 / np.maximum(upper - lower, 1e-9) ** 2
+    return Chain(
+        joints=joints,
+        moving=own,
+        lower=lower,
+        upper=upper,
+        home=joints.home[own],
+        limits=tuple(zip(lower.tolist(), upper.tolist(), weights.tolist(), strict=True)),
+        rotary=bool(rotary.all()),
+        serial=serial,
+        axes=np.array(
+            [p[:3, :3] @ tree.joints[n].axis for p, n in zip(placed, numbers, strict=True)]
+        ).reshape(-1, 3),
+        origins=origins,
+        tool_to_base=tool_to_base,
+        reach=float(links.sum() + strokes[~rotary].sum()),
+        _model=model,
+        _data=data,
+        _frame=frame,
+        _placement=data.oMf[frame],
+        _factors=None if serial else factors,
+        _offsets=offsets,
+    )
+
+
+def placement_misses(chain: Chain, x: FloatArray, target: Any, rows: int) -> tuple[float, float]:
+    """How far the tool is from a target at x: [m] and [rad].
+
+    Args:
+        target: A pin.SE3, tool to base.
+        rows: What counts, as `misses` has it.
+    """
+    q = x if chain._factors is None else chain._factors @ x + chain._offsets
+    pin.framesForwardKinematics(chain._model, chain._data, q)
+    return misses(chain._placement.actInv(target).homogeneous.ravel().tolist(), rows)

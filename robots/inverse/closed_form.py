@@ -1,0 +1,142 @@
+"""Every way to hold the arm, in closed form, for the families of arms that EAIK knows.
+
+Source: Ostermeier, Kuelz, Althoff 2025, "Automatic geometric decomposition for analytical inverse
+kinematics".
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import inf, pi
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from eaik.pybindings import EAIK
+
+from robots.inverse.chain import Chain, placement_misses
+from robots.inverse.tasks import Task
+from robots.joints import FloatArray
+
+_TURN = 2 * pi
+# A limit met but for rounding [rad].
+_ROUNDING = 1e-9
+# What an exact solution may miss by [m] and [rad]; worse ones are no solutions, or made better first.
+EXACT = 1e-9
+_TRIALS = 8
+
+Windows = tuple[tuple[float, float, float, float], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedForm:
+    """An arm whose solutions are known in closed form.
+
+    Attributes:
+        rolls: The last joint turns about the tool's own z axis: the five-dimensional task leaves it free.
+        from_home: Its windows about home.
+    """
+
+    chain: Chain
+    rolls: bool
+    from_home: Windows
+    _eaik: Any
+
+    def covers(self, task: Task) -> bool:
+        """Whether it tells all solutions of a task."""
+        return task is Task.POSE_6D or (task is Task.POSITION_AND_AXIS_5D and self.rolls)
+
+
+def closed_form(chain: Chain) -> ClosedForm | None:
+    """The closed form of a chain; None: there is none, or it does not stand a trial."""
+    if not (chain.serial and chain.rotary and len(chain.moving) in (5, 6)):
+        return None
+    joints_and_tool = np.vstack([np.zeros(3), chain.origins, chain.tool_to_base[:3, 3]])
+    arm = EAIK.Robot(chain.axes.T, np.diff(joints_and_tool, axis=0).T, chain.tool_to_base[:3, :3], [], True)
+    if not arm.has_known_decomposition():
+        return None
+    axis, away = chain.tool_to_base[:3, 2], chain.tool_to_base[:3, 3] - chain.origins[-1]
+    beside = np.abs([*np.cross(chain.axes[-1], axis), *np.cross(axis, away)]).max()
+    form = ClosedForm(chain, bool(beside < 1e-9), windows(chain, chain.home), arm)
+    random = np.random.default_rng(0)
+    return (
+        form
+        if all(_proves(form, random.uniform(-np.pi, np.pi, len(chain.moving))) for _ in range(_TRIALS))
+        else None
+    )
+
+
+def _proves(form: ClosedForm, x: FloatArray) -> bool:
+    """Whether it finds its way back to x."""
+    placement_misses(form.chain, x, pin.SE3.Identity(), 6)
+    exact, _ = candidates(form, np.array(form.chain._placement.homogeneous))
+    apart = [np.abs(np.remainder(found - x + np.pi, _TURN) - np.pi).max() for found in exact]
+    return min(apart, default=np.inf) < 1e-6
+
+
+def candidates(form: ClosedForm, tool_to_base: FloatArray) -> tuple[list[list[float]], list[list[float]]]:
+    """Positions (m,) [rad], limits aside, turns as they come: solutions, and nearest guesses."""
+    found = form._eaik.calculate_IK(tool_to_base)
+    exact: list[list[float]] = []
+    guesses: list[list[float]] = []
+    for x, guess in zip(found.Q.tolist(), found.is_LS.tolist(), strict=True):
+        (guesses if guess else exact).append(x)
+    return exact, guesses
+
+
+def windows(chain: Chain, start: FloatArray) -> Windows:
+    """For each joint the whole turn within limits that has start in its middle, as far as limits let it.
+
+    Returns:
+        Where it begins and the upper limit [rad], both with room for rounding, start, and the weight of a
+        squared difference from it.
+    """
+    return tuple(
+        (
+            max(lower - _ROUNDING, min(middle - pi, upper + _ROUNDING - _TURN)),
+            upper + _ROUNDING,
+            middle,
+            weight,
+        )
+        for middle, (lower, upper, weight) in zip(start.tolist(), chain.limits, strict=True)
+    )
+
+
+def turned(found: Sequence[list[float]], within: Windows) -> Iterator[list[float]]:
+    """Those that are within limits but for rounding, each joint by the turn that is nearest to start's.
+
+    The nearest first, before the others are looked at: squared differences, as shares of the joints' ranges.
+    """
+    nearer = _inside(found, within, nearer_only=True)
+    if nearer:
+        yield nearer[-1][1]
+        others = sorted(_inside(found, within, nearer_only=False))
+        others.remove(nearer[-1])
+        for _, here in others:
+            yield here
+
+
+def _inside(
+    found: Sequence[list[float]], within: Windows, *, nearer_only: bool
+) -> list[tuple[float, list[float]]]:
+    """Those within limits, with their distance from start; or only each that is nearer than all before it.
+
+    In plain numbers, because for so few an array's every operation costs as much as all of this.
+    """
+    kept = []
+    least_distance = inf
+    for each in found:
+        here, distance = [], 0.0
+        for position, (least, most, middle, weight) in zip(each, within):  # noqa: B905, a tenth of the time
+            turn = (position - least) % _TURN + least
+            if not turn <= most:  # nor is it a number
+                break
+            here.append(turn)
+            turn -= middle
+            distance += weight * turn * turn
+            if distance > least_distance:
+                break
+        else:
+            kept.append((distance, here))
+            if nearer_only:
+                least_distance = distance
+    return kept

@@ -1,0 +1,116 @@
+"""What is asked of the tool, which pose counts as one, and how near is there."""
+
+from enum import StrEnum
+from math import atan2, hypot, sqrt
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from robots.errors import PoseError
+from robots.joints import Joints
+from robots.poses import FloatArray, inverse
+
+# What two decimals leave of degrees and millimetres, which is all that controllers of the paper's kind are
+# told: nearer than this, a solution is one. What can be reached at all is reached far closer.
+TOLERANCE_M = 1e-5
+TOLERANCE_RAD = 2e-4
+
+# Written by hand with four decimals, a rotation is not quite one.
+_ROUNDING = 2e-3
+_EXACT = 1e-12
+_FARTHEST_M = 1e6
+
+
+class Task(StrEnum):
+    """What of the tool's pose counts; for the five, its roll about its own z axis is free."""
+
+    POSE_6D = "6d"
+    POSITION_AND_AXIS_5D = "5d"
+    POSITION_3D = "3d"
+
+    @property
+    def rows(self) -> int:
+        """How many numbers it fixes."""
+        return int(self[0])
+
+
+def natural_task(joints: Joints) -> Task:
+    """What an arm of that many joints can do anywhere: the whole pose from six joints on."""
+    return Task.POSE_6D if len(joints) >= 6 else Task.POSITION_AND_AXIS_5D
+
+
+def tool_pose(values: ArrayLike) -> FloatArray:
+    """A tool's pose as (4, 4), its rotation made exact.
+
+    Args:
+        values: (4, 4), or its 16 numbers by rows: tool to base [m].
+
+    Raises:
+        PoseError: If it is none: the text says what is wrong.
+    """
+    try:
+        pose = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise PoseError("takes 16 numbers, 4 rows of 4, tool to base in metres") from None
+    if pose.shape not in ((4, 4), (16,)):
+        has = f"{pose.size} numbers" if pose.ndim == 1 else f"numbers of shape {pose.shape}"
+        raise PoseError(f"has {has}; 16 are right, 4 rows of 4")
+    pose = pose.reshape(4, 4)
+    # Most poses come from programs and are exact, and this is half of the time that an answer may take.
+    return pose if _exact(pose.ravel().tolist()) else _mended(pose)
+
+
+def _exact(numbers: list[float]) -> bool:
+    a, b, c, x, d, e, f, y, g, h, i, z, *last = numbers
+    return (
+        abs(a * a + b * b + c * c - 1.0) < _EXACT
+        and abs(d * d + e * e + f * f - 1.0) < _EXACT
+        # The third row is the cross product of the others.
+        and abs(b * f - c * e - g) < _EXACT
+        and abs(c * d - a * f - h) < _EXACT
+        and abs(a * e - b * d - i) < _EXACT
+        and abs(a * d + b * e + c * f) < _EXACT
+        and abs(x) + abs(y) + abs(z) < _FARTHEST_M
+        and last == [0.0, 0.0, 0.0, 1.0]
+    )
+
+
+def _mended(pose: FloatArray) -> FloatArray:
+    if not np.isfinite(pose).all():
+        raise PoseError(f"holds {pose[~np.isfinite(pose)][0]}; every number is to be finite")
+    if pose[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
+        raise PoseError(f"has the last row {' '.join(f'{x:g}' for x in pose[3])}; 0 0 0 1 is right")
+    if np.abs(pose[:3, 3]).sum() >= _FARTHEST_M:
+        raise PoseError(f"is {np.abs(pose[:3, 3]).max():.3g} m away; less than {_FARTHEST_M:g} m is right")
+    rotation = pose[:3, :3]
+    if np.abs(rotation).max() > 2 or np.abs(rotation @ rotation.T - np.eye(3)).max() > _ROUNDING:
+        lengths = " ".join(f"{length:.4g}" for length in np.hypot.reduce(rotation, axis=1))
+        raise PoseError(
+            "has no rotation in its first 3 rows and columns: the rows are to be of length 1 and at right "
+            f"angles, these have the lengths {lengths}"
+        )
+    if np.linalg.det(rotation) < 0:
+        raise PoseError("is mirrored: the determinant of its first 3 rows and columns is -1; 1 is right")
+    left, _, right = np.linalg.svd(rotation)
+    pose[:3, :3] = left @ right
+    return pose
+
+
+def tool_misses(tool: FloatArray, wanted: FloatArray, task: Task) -> tuple[float, float]:
+    """How far a tool (4, 4) is from where it is wanted: [m] and [rad]."""
+    return misses((inverse(tool) @ wanted).ravel().tolist(), task.rows)
+
+
+def misses(placement: list[float], rows: int) -> tuple[float, float]:
+    """How far a target is from the tool: [m] and [rad].
+
+    Args:
+        placement: The 16 numbers of target to tool, by rows.
+        rows: What counts: 6 for the pose, 5 for position and axis, 3 for the position alone.
+    """
+    xx, xy, xz, x, yx, yy, yz, y, zx, zy, zz, z, *_ = placement
+    away = sqrt(x * x + y * y + z * z)
+    if rows < 6:
+        return away, atan2(hypot(xz, yz), zz) if rows == 5 else 0.0
+    a, b, c = zy - yz, xz - zx, yx - xy
+    return away, atan2(sqrt(a * a + b * b + c * c), xx + yy + zz - 1.0)

@@ -1,0 +1,274 @@
+"""DXF files to meshes, parsed by ezdxf: what is drawn in the model space, blocks unfolded.
+
+    3DFACE, SOLID, TRACE, POLYLINE (polyface, polygon mesh), MESH     triangles
+    LINE, LWPOLYLINE, POLYLINE, CIRCLE, ARC, ELLIPSE, SPLINE, POINT   wires
+    INSERT                                                            its block, placed, row by row
+    3DSOLID, BODY, REGION, SURFACE                                    named in a warning: they are ACIS
+
+Colours: an entity's own (true colour, or the index), its layer's (BYLAYER), its INSERT's (BYBLOCK).
+"""
+
+import importlib
+import logging
+import os
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from robots.errors import MeshError
+from robots.meshes.claims import content
+from robots.meshes.mesh import Color, FloatArray, IndexArray, Material, Mesh, Part, Wire, welded
+from robots.meshes.normals import creased
+from robots.meshes.polygons import Effort, ears
+
+MAX_ENTITIES = 1_000_000
+MAX_COPIES = 20_000  # of blocks: each takes ezdxf near a millisecond
+MAX_DEPTH = 32
+_CREASE = np.radians(30)
+_BYBLOCK, _BYLAYER = 0, 256
+_CURVES = {"LINE", "LWPOLYLINE", "POLYLINE", "CIRCLE", "ARC", "ELLIPSE", "SPLINE"}
+_FLAT = {"3DFACE", "SOLID", "TRACE"}
+_ACIS = {"3DSOLID", "BODY", "REGION", "SURFACE", "EXTRUDEDSURFACE", "LOFTEDSURFACE", "REVOLVEDSURFACE"}
+# $INSUNITS [m]; 0 says nothing.
+UNITS_M = {1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 6: 1.0, 7: 1000.0, 8: 2.54e-8, 9: 2.54e-5, 10: 0.9144}
+UNITS_M |= {11: 1e-10, 12: 1e-9, 13: 1e-6, 14: 0.1}
+
+
+@dataclass(frozen=True)
+class _Look:
+    """What an INSERT hands down to its block: a colour for BYBLOCK, a layer for layer 0."""
+
+    layer: str = "0"
+    color: Color = (0.8, 0.8, 0.8)
+    transparency: float = 0.0
+
+    @property
+    def material(self) -> Material:
+        return Material(self.layer, diffuse=self.color, transparency=self.transparency)
+
+
+@dataclass
+class _Found:
+    polygons: dict[_Look, list[FloatArray]] = field(default_factory=dict)
+    lines: dict[_Look, list[FloatArray]] = field(default_factory=dict)
+    points: dict[_Look, list[FloatArray]] = field(default_factory=dict)
+    left_out: Counter[str] = field(default_factory=Counter)
+    entities: int = 0
+    copies: int = 0
+
+
+def read_dxf(path: Path) -> Mesh:
+    """The faces, lines and points of a .dxf file, in its own units and axes.
+
+    Raises:
+        MeshError: If it is not a DXF file, or one past mending.
+    """
+    content(path)
+    try:
+        drawing, warnings = open_drawing(path)
+        found = _Found()
+        for entity in drawing.modelspace():
+            _walk(path, drawing, entity, _Look(), found, 0)
+        effort = Effort(sum(len(polygon) for polygons in found.polygons.values() for polygon in polygons))
+        parts = [_part(look, polygons, effort) for look, polygons in found.polygons.items()]
+        wires = [_lines(look, runs) for look, runs in found.lines.items()]
+        wires += [_points(look, points) for look, points in found.points.items()]
+        units = int(drawing.header.get("$INSUNITS", 0) or 0)
+    except MeshError:
+        raise
+    except MemoryError as error:
+        raise MeshError(path, "needs more memory than there is") from error
+    # ezdxf raises whatever its code runs into on broken files.
+    except Exception as error:
+        first = next(iter(str(error).splitlines()), "")[:200]
+        raise MeshError(path, f"is no DXF that can be read: {first or type(error).__name__}") from error
+    shapes: list[Part | Wire] = [*parts, *wires]
+    for shape in shapes:
+        if not np.isfinite(shape.vertices).all():
+            raise MeshError(path, f"layer {shape.name!r} has a point that is not finite")
+    warnings += _left_out(found.left_out)
+    if effort.spent:
+        warnings.append("concave faces take too much work to cut; some are drawn beyond their outline")
+    if not shapes:
+        warnings.append("holds nothing that can be drawn")
+    return Mesh(
+        tuple(part for part in parts if len(part.triangles)),
+        tuple(wires),
+        warnings=tuple(warnings),
+        unit_m=UNITS_M.get(units),
+        up="z",
+    )
+
+
+def open_drawing(path: Path) -> tuple[Any, list[str]]:
+    """The drawing as ezdxf has it, and what was wrong with the file; raises whatever ezdxf runs into."""
+    ezdxf = _ezdxf()
+    errors: Any = importlib.import_module("ezdxf.lldxf.const")
+    logging.getLogger("ezdxf").setLevel(logging.CRITICAL)
+    try:
+        return ezdxf.readfile(path), []
+    except (errors.DXFError, UnicodeDecodeError, ValueError, KeyError):
+        recover: Any = importlib.import_module("ezdxf.recover")
+        drawing, _ = recover.readfile(path)
+        return drawing, ["was broken; what ezdxf could save of it is here"]
+
+
+def _ezdxf() -> Any:
+    """The library, which at its first import lists the machine's fonts in the user's cache: not there."""
+    if "ezdxf" in sys.modules:
+        return sys.modules["ezdxf"]
+    before = os.environ.get("XDG_CACHE_HOME")
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["XDG_CACHE_HOME"] = folder
+        try:
+            return importlib.import_module("ezdxf")
+        finally:
+            if before is None:
+                del os.environ["XDG_CACHE_HOME"]
+            else:
+                os.environ["XDG_CACHE_HOME"] = before
+
+
+def _left_out(counts: Counter[str]) -> list[str]:
+    warnings = []
+    solids = {name: count for name, count in counts.items() if name in _ACIS}
+    if solids:
+        listed = ", ".join(f"{count} {name}" for name, count in sorted(solids.items()))
+        warnings.append(f"{listed} left out: their shape is ACIS, which is not read; export STEP or STL")
+    others = sorted(set(counts) - set(solids))
+    if others:
+        warnings.append(f"left out: {', '.join(f'{counts[name]} {name}' for name in others[:20])}")
+    return warnings
+
+
+def _walk(path: Path, drawing: Any, entity: Any, above: _Look, found: _Found, depth: int) -> None:
+    found.entities += 1
+    if found.entities > MAX_ENTITIES:
+        raise MeshError(path, f"draws more than {MAX_ENTITIES} entities, blocks unfolded")
+    if depth > MAX_DEPTH:
+        raise MeshError(path, f"INSERT {entity.dxf.name!r} is nested deeper than {MAX_DEPTH}, or in a circle")
+    kind = entity.dxftype()
+    look = _look(drawing, entity, above)
+    if kind == "INSERT":
+        for one in _copies(path, entity, found):
+            for child in one.virtual_entities(skipped_entity_callback=lambda e, _: _skip(e, found)):
+                _walk(path, drawing, child, look, found, depth + 1)
+    elif kind in _FLAT:
+        found.polygons.setdefault(look, []).append(_array(entity.wcs_vertices()))
+    elif kind == "MESH":
+        corners = _array(entity.vertices)
+        for face in entity.faces:
+            found.polygons.setdefault(look, []).append(corners[list(face)])
+    elif kind == "POLYLINE" and (entity.is_poly_face_mesh or entity.is_polygon_mesh):
+        for face in entity.virtual_entities():
+            found.polygons.setdefault(look, []).append(_array(face.wcs_vertices()))
+    elif kind in _CURVES:
+        curve = importlib.import_module("ezdxf.path").make_path(entity)
+        corners = _array(curve.control_vertices())
+        size = max(_size(corners), 1e-9)
+        # Flattened by halves until it is near enough: that never ends where nothing is near.
+        if not np.isfinite(size):
+            raise MeshError(path, f"{kind} on layer {look.layer!r} has a point that is not finite")
+        found.lines.setdefault(look, []).append(_array(curve.flattening(size / 200)))
+    elif kind == "POINT":
+        found.points.setdefault(look, []).append(_array([entity.dxf.location]))
+    else:
+        found.left_out[kind] += 1
+
+
+def _skip(entity: Any, found: _Found) -> None:
+    found.left_out[entity.dxftype()] += 1
+
+
+def _copies(path: Path, insert: Any, found: _Found) -> Iterator[Any]:
+    count = insert.mcount
+    found.copies += count
+    if found.copies > MAX_COPIES:
+        raise MeshError(
+            path, f"INSERT {insert.dxf.name!r}: {found.copies} copies of blocks; up to {MAX_COPIES} are read"
+        )
+    return iter(insert.multi_insert()) if count > 1 else iter([insert])
+
+
+def _look(drawing: Any, entity: Any, above: _Look) -> _Look:
+    layer = above.layer if entity.dxf.layer == "0" else entity.dxf.layer
+    index = entity.dxf.get("color", _BYLAYER)
+    if entity.dxf.hasattr("true_color"):
+        color = _rgb(entity.dxf.true_color)
+    elif index == _BYBLOCK:
+        color = above.color
+    else:
+        color = _layer_color(drawing, layer) if index == _BYLAYER else _indexed(index)
+    transparency = float(entity.transparency)
+    if getattr(entity, "is_transparency_by_block", False):
+        transparency = above.transparency
+    return _Look(layer, color, min(max(transparency, 0.0), 1.0))
+
+
+def _layer_color(drawing: Any, name: str) -> Color:
+    if not drawing.layers.has_entry(name):
+        return 0.8, 0.8, 0.8
+    layer = drawing.layers.get(name)
+    if layer.dxf.hasattr("true_color"):
+        return _rgb(layer.dxf.true_color)
+    return _indexed(abs(layer.dxf.color))  # negative: the layer is off
+
+
+def _indexed(index: int) -> Color:
+    colors: Any = importlib.import_module("ezdxf.colors")
+    # 7 is "black or white", whatever the page is not: neither shows a shape.
+    if not 0 < index < 256 or index == 7:
+        return 0.8, 0.8, 0.8
+    red, green, blue = colors.aci2rgb(index)
+    return red / 255, green / 255, blue / 255
+
+
+def _rgb(value: int) -> Color:
+    return (value >> 16 & 255) / 255, (value >> 8 & 255) / 255, (value & 255) / 255
+
+
+def _array(points: Any) -> FloatArray:
+    return np.array([(p[0], p[1], p[2]) for p in points], dtype=np.float64).reshape(-1, 3)
+
+
+def _size(points: FloatArray) -> float:
+    return float(np.ptp(points, axis=0).max()) if len(points) else 0.0
+
+
+def _part(look: _Look, polygons: list[FloatArray], effort: Effort) -> Part:
+    corners, triangles, count = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], 0
+    for polygon in polygons:
+        if len(polygon) < 3:
+            continue
+        if len(polygon) == 3:
+            cut = np.array([[0, 1, 2]])
+        elif np.isfinite(polygon).all():
+            cut = ears(polygon, effort)
+        else:
+            cut = np.zeros((0, 3), dtype=np.int64)
+        corners.append(polygon)
+        triangles.append(cut + count)
+        count += len(polygon)
+    made = creased(*welded(np.concatenate(corners), np.concatenate(triangles)), _CREASE)
+    # A drawing's faces have no outside that is agreed on.
+    return Part(look.layer, look.material, *made, two_sided=True)
+
+
+def _lines(look: _Look, runs: list[FloatArray]) -> Wire:
+    pairs: list[IndexArray] = []
+    start = 0
+    for run in runs:
+        steps = np.arange(start, start + len(run) - 1, dtype=np.int64)
+        pairs.append(np.column_stack([steps, steps + 1]))
+        start += len(run)
+    return Wire(look.layer, look.material, np.concatenate(runs), np.concatenate(pairs))
+
+
+def _points(look: _Look, points: list[FloatArray]) -> Wire:
+    return Wire(look.layer, look.material, np.concatenate(points), np.zeros((0, 2), dtype=np.int64))

@@ -1,0 +1,143 @@
+"""Faces with normals and colours of their own to triangles of vertices: what a graphics card takes.
+
+A face has any number of corners; each corner has a point, and may have a normal and a colour by
+number. Corners with the same three become one vertex.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.meshes.mesh import FloatArray, IndexArray, unit
+from robots.meshes.normals import corner_keys, crease_normals
+from robots.meshes.polygons import Effort, area_vectors, bent_inwards, ears, fans, starts_of
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Rows of values, and which of them each corner has."""
+
+    values: FloatArray
+    chosen: IndexArray
+
+
+@dataclass(frozen=True, eq=False)
+class Faces:
+    """Polygons.
+
+    Attributes:
+        points: (n, 3).
+        corners: (c,) point numbers, face after face.
+        sizes: (f,) corners of each face.
+        normals: (m, 3) unit vectors by corner; none: made from the faces.
+        colors: (m, 3) by corner.
+        ccw: Corners run counter-clockwise, seen from outside.
+        crease: Faces that meet at less [rad] are drawn as one smooth surface.
+    """
+
+    points: FloatArray
+    corners: IndexArray
+    sizes: IndexArray
+    normals: Table | None = None
+    colors: Table | None = None
+    ccw: bool = True
+    solid: bool = True
+    convex: bool = True
+    crease: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Triangles; not solid: seen from both sides; colours (v, 3) or none.
+
+    Attributes:
+        rough: Concave faces took too much work, and some triangles lie outside of their face.
+    """
+
+    vertices: FloatArray
+    normals: FloatArray
+    triangles: IndexArray
+    colors: FloatArray | None = None
+    solid: bool = True
+    rough: bool = False
+
+
+def kept_faces(faces: Faces, kept: NDArray[np.bool_]) -> Faces:
+    """Only some of the faces, (f,)."""
+    if kept.all():
+        return faces
+    corners = np.repeat(kept, faces.sizes)
+
+    def table(one: Table | None) -> Table | None:
+        return None if one is None else Table(one.values, one.chosen[corners])
+
+    return replace(
+        faces,
+        corners=faces.corners[corners],
+        sizes=faces.sizes[kept],
+        normals=table(faces.normals),
+        colors=table(faces.colors),
+    )
+
+
+def surface(faces: Faces) -> Surface:
+    """The triangles of faces; those of less than three corners are left out."""
+    faces = kept_faces(faces, faces.sizes >= 3)
+    triangles, rough = _triangles(faces)
+    normals = _generated(faces) if faces.normals is None else faces.normals
+    colors = faces.colors
+    # Flat facets share no vertex; else the corners of one point, normal and colour are one.
+    kept = np.arange(len(faces.corners))
+    if faces.normals is not None or faces.crease > 0:
+        kept, triangles = _joined(faces, normals, triangles)
+    if not faces.ccw:
+        triangles = triangles[:, ::-1]
+    return Surface(
+        vertices=faces.points[faces.corners[kept]],
+        normals=normals.values[normals.chosen[kept]],
+        triangles=triangles,
+        colors=None if colors is None else colors.values[colors.chosen[kept]],
+        solid=faces.solid,
+        rough=rough,
+    )
+
+
+def _generated(faces: Faces) -> Table:
+    """Normals of faces that have none."""
+    owners = np.repeat(np.arange(len(faces.sizes)), faces.sizes)
+    areas = area_vectors(faces.points, faces.corners, faces.sizes)
+    areas = areas if faces.ccw else -areas
+    if faces.crease <= 0:
+        return Table(unit(areas), owners)
+    by_corner = crease_normals(faces.corners, owners, areas, faces.crease)
+    return Table(by_corner, np.arange(len(owners)))
+
+
+def _triangles(faces: Faces) -> tuple[IndexArray, bool]:
+    """(t, 3) corners of the triangles, and whether some are rough."""
+    if not len(faces.sizes):
+        return np.zeros((0, 3), dtype=np.int64), False
+    triangles, _ = fans(faces.sizes)
+    if faces.convex or not (faces.sizes > 3).any():
+        return triangles, False
+    many = np.flatnonzero(bent_inwards(faces.points, faces.corners, faces.sizes) & (faces.sizes > 3))
+    starts = starts_of(faces.sizes)
+    first = starts_of(faces.sizes - 2)
+    effort = Effort(int(faces.sizes[many].sum()))
+    for face in many.tolist():
+        start, size = int(starts[face]), int(faces.sizes[face])
+        cut = ears(faces.points[faces.corners[start : start + size]], effort)
+        triangles[first[face] : first[face] + size - 2] = start + cut
+    return triangles, effort.spent
+
+
+def _joined(faces: Faces, normals: Table, triangles: IndexArray) -> tuple[IndexArray, IndexArray]:
+    """Which corners stay as vertices, and the triangles of those."""
+    keys = corner_keys(faces.corners, normals.values[normals.chosen])
+    if faces.colors is not None:
+        # Numbered first: a point, a normal and a colour do not fit into one key.
+        _, keys = np.unique(keys, return_inverse=True)
+        keys = keys * len(faces.colors.values) + faces.colors.chosen
+    _, kept, vertex = np.unique(keys, return_index=True, return_inverse=True)
+    return kept, vertex[triangles].astype(np.int64)

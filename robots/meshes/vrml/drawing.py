@@ -1,0 +1,240 @@
+"""What each node of a VRML scene draws, and where.
+
+Source: ISO/IEC 14772-1:1997, clause 6.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from robots.meshes.faces import Surface
+from robots.meshes.mesh import Color, FloatArray, Material, Part, Wire, placed, transformed
+from robots.meshes.vrml.files import Files
+from robots.meshes.vrml.geometry import GEOMETRY
+from robots.meshes.vrml.lines import STROKES, Strokes
+from robots.meshes.vrml.parser import MAX_DEPTH, Node
+from robots.meshes.vrml.protos import node_of, resolved
+from robots.meshes.vrml.transform import transform_matrix
+from robots.meshes.vrml.values import color, nodes_of, number, strings
+
+# A few USEs of USEs can make billions of nodes.
+MAX_NODES = 200_000
+MAX_TRIANGLES = 10_000_000
+# Larger ones are made again at each USE: kept ones would double the memory.
+_MOST_KEPT = 10_000
+
+# Of scales of scales: far below what overflows.
+_FARTHEST = 1e60
+
+_IDENTITY = np.eye(4)
+# The last four are of H-Anim, for files that leave out its PROTOs.
+_MOVING = {"Transform", "Joint", "Humanoid", "Site"}
+_GROUPS = {"Group", "Anchor", "Billboard", "Collision", "Segment", *_MOVING}
+_NOT_DRAWN = {
+    "AudioClip",
+    "Background",
+    "ColorInterpolator",
+    "CoordinateInterpolator",
+    "CylinderSensor",
+    "DirectionalLight",
+    "Fog",
+    "NavigationInfo",
+    "NormalInterpolator",
+    "OrientationInterpolator",
+    "PlaneSensor",
+    "PointLight",
+    "PositionInterpolator",
+    "ProximitySensor",
+    "ScalarInterpolator",
+    "Script",
+    "Sound",
+    "SphereSensor",
+    "SpotLight",
+    "TimeSensor",
+    "TouchSensor",
+    "Viewpoint",
+    "VisibilitySensor",
+    "WorldInfo",
+}
+
+
+@dataclass
+class Drawing:
+    """Collects what nodes draw."""
+
+    files: Files
+    parts: list[Part] = field(default_factory=list)
+    wires: list[Wire] = field(default_factory=list)
+    _drawn: int = 0
+    _triangles: int = 0
+    _read_over: dict[str, Node] = field(default_factory=dict)
+    _geometry: dict[Node, Surface | Strokes] = field(default_factory=dict)
+    _materials: dict[Node, Material] = field(default_factory=dict)
+
+    def draw(self, node: Node, placement: FloatArray, inside: tuple[Path, ...], depth: int = 0) -> None:
+        """Draw a node and what is in it.
+
+        Args:
+            placement: (4, 4) from the node's coordinates to the mesh's.
+            inside: The files that are being drawn, the node's own last.
+
+        Raises:
+            MeshError: If a field of it cannot be what it is, or too much is drawn.
+        """
+        self._drawn += 1
+        if self._drawn > MAX_NODES:
+            raise node.error(f"the scene draws more than {MAX_NODES} nodes")
+        if depth > MAX_DEPTH:
+            raise node.error(f"nested deeper than {MAX_DEPTH}")
+        found = resolved(node)
+        if found is None:
+            return
+        if found.type == "Shape":
+            self._shape(found, placement, node.name)
+        elif found.type == "Inline":
+            self._inline(found, placement, inside, depth)
+        else:
+            below = placement
+            if found.type in _MOVING:
+                below = placement @ transform_matrix(found)
+                if np.abs(below).max() > _FARTHEST:
+                    raise node.error("goes with those around it beyond all sizes")
+            for child in self._children(found):
+                self.draw(child, below, inside, depth + 1)
+
+    def _children(self, node: Node) -> list[Node]:
+        if node.type in _GROUPS:
+            return nodes_of(node, "children") + nodes_of(node, "humanoidBody")
+        if node.type == "LOD":
+            return (nodes_of(node, "level") or nodes_of(node, "children"))[:1]
+        if node.type == "Switch":
+            choices = nodes_of(node, "choice") or nodes_of(node, "children")
+            if not choices and "level" in node.fields:
+                node.warn("has 'level', as LOD; it is taken for its 'choice'", once="level of a Switch")
+                choices = nodes_of(node, "level")
+            which = number(node, "whichChoice", -1.0)
+            return choices[int(which) : int(which) + 1] if 0 <= which < len(choices) else []
+        self._read_over.setdefault(node.type, node)
+        return []
+
+    def _shape(self, node: Node, placement: FloatArray, name: str) -> None:
+        shape = node_of(node, "geometry")
+        if shape is None:
+            return
+        drawn = self._geometry.get(shape) or self._made(shape)
+        if drawn is None:
+            return
+        material = self._material(node)
+        name = shape.name or node.name or name
+        if isinstance(drawn, Strokes):
+            if len(drawn.vertices):
+                colors = _with_opacity(drawn.colors, material)
+                wire = Wire(name, material, drawn.vertices, drawn.segments, colors)
+                self.wires.append(placed(wire, placement))
+            return
+        self._triangles += len(drawn.triangles)
+        if self._triangles > MAX_TRIANGLES:
+            raise node.error(f"the scene draws more than {MAX_TRIANGLES} triangles")
+        if not len(drawn.triangles):
+            return
+        part = Part(
+            name,
+            material,
+            drawn.vertices,
+            drawn.normals,
+            drawn.triangles,
+            two_sided=not drawn.solid,
+            colors=_with_opacity(drawn.colors, material),
+        )
+        still = np.array_equal(placement, _IDENTITY)
+        self.parts.append(part if still else transformed(part, placement))
+
+    def _made(self, shape: Node) -> Surface | Strokes | None:
+        drawn: Surface | Strokes
+        if shape.type in GEOMETRY:
+            drawn = GEOMETRY[shape.type](shape)
+            if drawn.rough:
+                shape.warn("concave faces take too much work to cut; some are drawn beyond their outline")
+        elif shape.type in STROKES:
+            drawn = STROKES[shape.type](shape)
+        else:
+            known = shape.type == "Text"
+            shape.warn(
+                "is not drawn" if known else "is no geometry of VRML 2.0; left out", once=f"no {shape.type}"
+            )
+            return None
+        if len(drawn.vertices) <= _MOST_KEPT:
+            self._geometry[shape] = drawn
+        return drawn
+
+    def _material(self, shape: Node) -> Material:
+        """A Shape's material; ambientIntensity, which glTF has no place for, is dropped."""
+        appearance = node_of(shape, "appearance")
+        if appearance is None:
+            return _material(None, "")
+        if appearance not in self._materials:
+            self._materials[appearance] = _material(
+                node_of(appearance, "material"), self._texture(appearance)
+            )
+        return self._materials[appearance]
+
+    def _texture(self, appearance: Node) -> str:
+        texture = node_of(appearance, "texture")
+        addresses = strings(texture, "url") if texture is not None else []
+        if texture is None or not addresses:
+            return ""
+        if self.files.find(texture.source, addresses) is None:
+            texture.warn(f"{addresses[0][:200]!r}: no such file", once=f"texture {addresses[0]}")
+        return addresses[0]
+
+    def _inline(self, node: Node, placement: FloatArray, inside: tuple[Path, ...], depth: int) -> None:
+        addresses = strings(node, "url")
+        found = self.files.find(node.source, addresses)
+        if found is None:
+            if addresses:
+                node.warn(
+                    f"{addresses[0][:200]!r}: no such file; it is left out", once=f"inline {addresses[0]}"
+                )
+            return
+        if found in inside:
+            raise node.error(f"{addresses[0][:200]!r} leads back to itself")
+        for root in self.files.scene(found).nodes:
+            self.draw(root, placement, (*inside, found), depth + 1)
+
+    def tell(self) -> None:
+        """Warn, once each, of the nodes that were read over."""
+        known = [name for name in self._read_over if name in _NOT_DRAWN]
+        if known:
+            node = self._read_over[known[0]]
+            node.source.warn(node.position, f"nothing is drawn of: {', '.join(known)}")
+        for name, node in self._read_over.items():
+            if name not in _NOT_DRAWN:
+                node.warn("no node of VRML 2.0; read over", once=f"unknown {name}")
+
+
+def _material(node: Node | None, texture: str) -> Material:
+    if node is None:
+        # White, by 6.3 and 6.41; and unlit there, but shape is what a robot's mesh has to show.
+        return Material(diffuse=(1.0, 1.0, 1.0), texture=texture)
+    none: Color = (0.0, 0.0, 0.0)
+    return Material(
+        name=node.name,
+        diffuse=color(node, "diffuseColor", (0.8, 0.8, 0.8)),
+        specular=color(node, "specularColor", none),
+        emissive=color(node, "emissiveColor", none),
+        shininess=_clipped(number(node, "shininess", 0.2)),
+        transparency=_clipped(number(node, "transparency", 0.0)),
+        texture=texture,
+    )
+
+
+def _with_opacity(colors: FloatArray | None, material: Material) -> FloatArray | None:
+    """(v, 4) of (v, 3)."""
+    if colors is None:
+        return None
+    return np.column_stack([colors, np.full(len(colors), 1.0 - material.transparency)])
+
+
+def _clipped(value: float) -> float:
+    return min(max(value, 0.0), 1.0)

@@ -1,0 +1,233 @@
+"""VRML97 text to tokens.
+
+    numbers     number *( blank number )
+    number      [+-] [blanks] ( digits [. digits] | . digits ) [e [+-] digits] | 0x hex
+    string      " ... "   with \\" and \\\\ inside
+    word        anything else without blanks and { } [ ] " # (an IS or a field's name)
+    mark        { } [ ]
+    blank       space, tab, line end, comma; # to the end of the line
+
+Number lists are most of a file: they are taken whole, by NumPy, not token by token.
+
+Source: ISO/IEC 14772-1:1997, annex A.
+"""
+
+import re
+import warnings
+from collections.abc import Callable
+from enum import Enum
+
+import numpy as np
+
+from robots.errors import MeshError
+from robots.meshes.mesh import FloatArray
+from robots.meshes.vrml.source import Source
+
+
+class Kind(Enum):
+    """What a token is."""
+
+    NUMBERS = "numbers"
+    STRING = "string"
+    WORD = "word"
+    MARK = "mark"
+    END = "end of the file"
+
+
+# Possessive (*+): blanks that were skipped once are never tried again in another way.
+_BLANKS = r"(?:[\s,]++|\#[^\n\r]*+)*+"
+_DIGITS = r"(?:0[xX][0-9a-fA-F]++|(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]++)?)"
+_NUMBER = rf"""(?:[+-][ \t]*+)?{_DIGITS}(?=[\s,\[\]{{}}"\#]|$)"""
+_TOKEN = re.compile(
+    rf"""{_BLANKS}
+    (?: (?P<MARK>[\[\]{{}}])
+      | (?P<NUMBERS>{_NUMBER}(?:[\s,]++{_NUMBER})*+)
+      | (?P<WORD>[^\s,\[\]{{}}"\#]++)
+      | "(?P<STRING>(?:[^"\\]++|\\.)*+)"
+      | (?P<OPEN>")
+      | (?P<END>$) )""",
+    re.VERBOSE | re.DOTALL,
+)
+_KINDS = {kind.name: kind for kind in Kind}
+_LIST_OF_NUMBERS = re.compile(rf"{_BLANKS}(?=[-+.0-9\]])", re.VERBOSE)
+_BLANK = re.compile(r"[\s,]")
+_SPLIT_SIGN = re.compile(r"([+-])[ \t]+(?=[0-9.])")
+_ESCAPE = re.compile(r"\\(.)", re.DOTALL)
+# "1.#QNAN" is what a Microsoft compiler prints for what is no number; the # begins no comment there.
+_NO_NUMBER = re.compile(r"[0-9]\.#(?:IND|QNAN|SNAN|INF)")
+# VRML's floats are of single precision; larger ones would overflow where they are multiplied.
+_LARGEST = float(np.finfo(np.float32).max)
+_PIECE = 1 << 20
+# Below, a list of numbers is not worth the calls that set NumPy's faster way up.
+_SHORT = 500
+
+
+class Lexer:
+    """Stands at a token; `advance` goes to the next.
+
+    Attributes:
+        kind, text, start: Of the token; a string's text is without quotes and escapes.
+    """
+
+    def __init__(self, source: Source, progress: Callable[[float], None] | None = None) -> None:
+        self.source = source
+        self.kind = Kind.END
+        self.text = ""
+        self.start = 0
+        self._all = source.text
+        self._end = 0
+        self._progress = progress
+        self.advance()
+
+    def advance(self) -> None:
+        """Go to the next token; after the last, stay at the end.
+
+        Raises:
+            MeshError: At a string that does not end.
+        """
+        match = _TOKEN.match(self._all, self._end)
+        name = match.lastgroup if match is not None else None
+        if match is None or name is None:  # cannot be: any character begins one of them
+            raise self.source.error(self._end, "text that is no VRML")
+        self.start, self._end = match.start(name), match.end()
+        if name == "OPEN":
+            raise self.source.error(self.start, "a string that does not end: a '\"' is missing")
+        self.kind, self.text = _KINDS[name], match[name]
+        if name == "STRING":
+            self.start -= 1
+            if "\\" in self.text:
+                self.text = _ESCAPE.sub(r"\1", self.text)
+
+    def is_mark(self, mark: str) -> bool:
+        """Whether the token is this one of { } [ ]."""
+        return self.text == mark and self.kind is Kind.MARK
+
+    def is_word(self, *words: str) -> bool:
+        """Whether the token is one of these words."""
+        return self.kind is Kind.WORD and self.text in words
+
+    def found(self) -> str:
+        """The token in words, for an error."""
+        if self.kind is Kind.END:
+            return "the end of the file"
+        text = self.text.split()[0] if self.kind is Kind.NUMBERS else self.text
+        return repr(text if len(text) <= 40 else text[:40] + "…")
+
+    def expected(self, what: str) -> MeshError:
+        """An error: something else was to stand here."""
+        return self.source.error(self.start, f"{what} was expected, not {self.found()}")
+
+    def numbers(self) -> list[float]:
+        """The numbers of a NUMBERS token, and of those that follow after a comment; goes on behind them.
+
+        Raises:
+            MeshError: At a number that is too large.
+        """
+        values: list[float] = []
+        while self.kind is Kind.NUMBERS:
+            values += self._run()
+            self.advance()
+        return values
+
+    def _run(self) -> list[float]:
+        text = self.text
+        if "+" in text or "-" in text:
+            text = self._joined_signs(text, self.start)
+        words = text.replace(",", " ").split()
+        try:
+            values = [float(word) for word in words]
+        except ValueError:
+            values = [float(_whole(word)) if "x" in word.lower() else float(word) for word in words]
+        for word, value in zip(words, values, strict=True):
+            if abs(value) > _LARGEST:
+                position = self.source.text.find(word, self.start)
+                raise self.source.error(position, f"{word[:40]} is too large for a number")
+        return values
+
+    def number_list(self) -> FloatArray | None:
+        """At "[": what stands up to "]" if it begins with a number, and go on behind it; otherwise None."""
+        first = _LIST_OF_NUMBERS.match(self._all, self._end)
+        if first is None:
+            return None
+        start = first.end()
+        end = self._all.find("]", start)
+        pieces = self._fast_pieces(start, end) if end >= 0 else None
+        if pieces is None:
+            return self._slow_list()
+        self._end = end + 1
+        self.advance()
+        return np.concatenate(pieces) if pieces else np.zeros(0)
+
+    def _fast_pieces(self, start: int, end: int) -> list[FloatArray] | None:
+        """The numbers in a span; None if there is anything but numbers and blanks."""
+        pieces = []
+        while start < end:
+            blank = _BLANK.search(self._all, min(start + _PIECE, end), end)
+            stop = blank.start() if blank is not None else end
+            piece = self._all[start:stop]
+            if "#" in piece:
+                return None
+            if "," in piece:
+                piece = piece.replace(",", " ")
+            piece = piece.strip()
+            if piece:
+                values = _parsed(piece)
+                if values is None:
+                    return None
+                pieces.append(values)
+            start = stop
+            if self._progress is not None:
+                self._progress(stop / len(self._all))
+        return pieces
+
+    def _slow_list(self) -> FloatArray:
+        """A list with comments, signs apart or mistakes in it; goes on behind it."""
+        opening = self.start
+        self.advance()
+        values: list[float] = []
+        while self.kind is Kind.NUMBERS:
+            bad = _NO_NUMBER.match(self._all, self._end - 2)
+            if bad is not None:
+                raise self.source.error(self._end - 2, f"a number was expected, not {bad[0]!r}")
+            values += self._run()
+            self.advance()
+        if self.kind is Kind.END:
+            raise self.source.error(opening, "a '[' that is never closed")
+        if not self.is_mark("]"):
+            raise self.expected("a number or ']'")
+        self.advance()
+        return np.array(values)
+
+    def _joined_signs(self, text: str, start: int) -> str:
+        split = _SPLIT_SIGN.search(text)
+        if split is None:
+            return text
+        # Chen, Zhang, Xue 2001 prints "- 25.08"; files like that exist.
+        self.source.warn(
+            start + split.start(), "a sign stands apart from its digits; read as one number", once="sign"
+        )
+        return _SPLIT_SIGN.sub(r"\1", text)
+
+
+def _parsed(text: str) -> FloatArray | None:
+    """The numbers of a text without commas; None if one of them is none."""
+    try:
+        if len(text) < _SHORT:
+            values = np.array([float(word) for word in text.split()])
+        else:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                # Vertex numbers, half of most files, parse three times as fast as whole numbers.
+                whole = not any(mark in text for mark in ".eE")
+                values = np.fromstring(text, dtype=np.int64 if whole else np.float64, sep=" ").astype(
+                    np.float64, copy=False
+                )
+    except (ValueError, DeprecationWarning):
+        return None
+    # NumPy takes "nan", "inf" and 1e999; VRML has no such numbers.
+    return values if (np.abs(values) <= _LARGEST).all() else None
+
+
+def _whole(word: str) -> int:
+    sign = -1 if word[0] == "-" else 1
+    return sign * int(word.lstrip("+-"), 16)

@@ -1,0 +1,182 @@
+"""Meshes to GLB: triangles, lines and points, colours of materials and of vertices, axes as they are.
+
+glTF's own axes are y up; a robot's are z up and are not turned: `asset.extras` says so to our reader.
+The same mesh gives the same bytes. Source: glTF 2.0, Khronos Group.
+"""
+
+import json
+import struct
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.meshes.claims import OWN_MARK
+from robots.meshes.mesh import Color, FloatArray, Material, Mesh, Part, Wire
+
+_JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
+_FLOAT, _UINT = 5126, 5125
+_VERTICES, _INDICES = 34962, 34963
+_POINTS, _LINES, _TRIANGLES = 0, 1, 4
+# How some materials reflect (metallic, roughness); mesh files of this age cannot say it.
+_FINISHES = {"paint": (0.0, 0.45), "casting": (0.25, 0.6), "steel": (0.85, 0.3), "rubber": (0.0, 0.9)}
+
+
+@dataclass
+class _Document:
+    accessors: list[dict[str, Any]] = field(default_factory=list)
+    views: list[dict[str, Any]] = field(default_factory=list)
+    materials: list[dict[str, Any]] = field(default_factory=list)
+    meshes: list[dict[str, Any]] = field(default_factory=list)
+    nodes: list[dict[str, Any]] = field(default_factory=list)
+    binary: bytearray = field(default_factory=bytearray)
+
+    def accessor(self, array: NDArray[Any], kind: str, target: int, *, bounded: bool = False) -> int:
+        self.views.append(
+            {"buffer": 0, "byteOffset": len(self.binary), "byteLength": array.nbytes, "target": target}
+        )
+        self.binary += array.tobytes()
+        found: dict[str, Any] = {
+            "bufferView": len(self.views) - 1,
+            "componentType": _FLOAT if array.dtype == np.float32 else _UINT,
+            "count": len(array) if kind != "SCALAR" else array.size,
+            "type": kind,
+        }
+        if bounded:
+            found |= {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
+        self.accessors.append(found)
+        return len(self.accessors) - 1
+
+
+def glb_of(mesh: Mesh) -> bytes:
+    """A mesh as binary glTF, in metres if the mesh is; a mesh a material, lines and points after them."""
+    document = _Document()
+    for part in merged(mesh.parts):
+        if len(part.triangles):
+            _add(document, part, part.triangles, _TRIANGLES, part.two_sided)
+    for wire in mesh.wires:
+        if len(wire.vertices):
+            _add(document, wire, wire.segments, _LINES if len(wire.segments) else _POINTS, False)
+    return _packed(document)
+
+
+def merged(parts: Iterable[Part]) -> list[Part]:
+    """Parts of one material joined: fewer to draw."""
+    groups: dict[tuple[Material, bool, bool], list[Part]] = {}
+    for part in parts:
+        groups.setdefault((part.material, part.two_sided, part.colors is not None), []).append(part)
+    return [_joined(group) if len(group) > 1 else group[0] for group in groups.values()]
+
+
+def _joined(parts: Sequence[Part]) -> Part:
+    offsets = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    colors = [part.colors for part in parts if part.colors is not None]
+    return replace(
+        parts[0],
+        vertices=np.concatenate([part.vertices for part in parts]),
+        normals=np.concatenate([part.normals for part in parts]),
+        triangles=np.concatenate(
+            [part.triangles + offset for part, offset in zip(parts, offsets, strict=False)]
+        ),
+        colors=np.concatenate(colors) if colors else None,
+    )
+
+
+def _add(document: _Document, shape: Part | Wire, indices: NDArray[np.int64], mode: int, both: bool) -> None:
+    attributes = {
+        "POSITION": document.accessor(_floats(shape.vertices), "VEC3", _VERTICES, bounded=True),
+    }
+    if isinstance(shape, Part):
+        attributes["NORMAL"] = document.accessor(_floats(_unit(shape.normals)), "VEC3", _VERTICES)
+    blended = shape.material.transparency > 0
+    if shape.colors is not None:
+        colors = np.column_stack([linear(shape.colors[:, :3]), shape.colors[:, 3:]])
+        attributes["COLOR_0"] = document.accessor(_floats(colors), "VEC4", _VERTICES)
+        blended = bool((shape.colors[:, 3] < 1).any())
+    primitive: dict[str, Any] = {"attributes": attributes, "mode": mode}
+    if len(indices):
+        primitive["indices"] = document.accessor(
+            np.ascontiguousarray(indices, dtype="<u4"), "SCALAR", _INDICES
+        )
+    primitive["material"] = len(document.materials)
+    document.materials.append(_material(shape, len(document.materials), both, blended))
+    name = f"{len(document.meshes)} {shape.name}".strip()
+    document.nodes.append({"name": name, "mesh": len(document.meshes)})
+    document.meshes.append({"name": name, "primitives": [primitive]})
+
+
+def _material(shape: Part | Wire, number: int, both: bool, blended: bool) -> dict[str, Any]:
+    material = shape.material
+    metallic, roughness = _FINISHES.get(material.name, (0.0, 0.55))
+    # Colours of vertices take the material's place: its own must not darken them.
+    base = (
+        [1.0, 1.0, 1.0, 1.0]
+        if shape.colors is not None
+        else [*linear_color(material.diffuse), 1.0 - material.transparency]
+    )
+    found: dict[str, Any] = {
+        "name": material.name or f"material {number}",
+        "pbrMetallicRoughness": {
+            "baseColorFactor": base,
+            "metallicFactor": metallic,
+            "roughnessFactor": roughness,
+        },
+        "doubleSided": both,
+    }
+    if any(material.emissive):
+        found["emissiveFactor"] = linear_color(material.emissive)
+    if blended:
+        found["alphaMode"] = "BLEND"
+    if material.texture:
+        found["extras"] = {"texture": material.texture}
+    return found
+
+
+def _packed(document: _Document) -> bytes:
+    asset = {"version": "2.0", "generator": "robomesh", "extras": {OWN_MARK: {"up": "z"}}}
+    content: dict[str, Any] = {
+        "asset": asset,
+        "scene": 0,
+        "scenes": [{"nodes": list(range(len(document.nodes)))} if document.nodes else {}],
+    }
+    # glTF allows no empty lists.
+    for key, items in (
+        ("nodes", document.nodes),
+        ("meshes", document.meshes),
+        ("materials", document.materials),
+        ("accessors", document.accessors),
+        ("bufferViews", document.views),
+        ("buffers", [{"byteLength": len(document.binary)}] if document.binary else []),
+    ):
+        if items:
+            content[key] = items
+    text = json.dumps(content, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<II", len(text), _JSON_CHUNK) + text
+    if document.binary:
+        chunks += struct.pack("<II", len(document.binary), _BINARY_CHUNK) + document.binary
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def _floats(array: FloatArray) -> NDArray[np.float32]:
+    return np.ascontiguousarray(array, dtype="<f4")
+
+
+def _unit(normals: FloatArray) -> FloatArray:
+    """glTF wants length one: where a triangle without area has no normal, z serves."""
+    none = ~np.isfinite(normals).all(axis=1) | (np.abs(normals).max(axis=1, initial=0.0) == 0)
+    return np.where(none[:, None], [0.0, 0.0, 1.0], normals) if none.any() else normals
+
+
+def linear(colors: FloatArray) -> FloatArray:
+    """sRGB, 0 to 1, as linear light: what glTF holds."""
+    result: FloatArray = np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
+    return result
+
+
+def linear_color(color: Color) -> list[float]:
+    """One sRGB colour as linear light."""
+    found: list[float] = linear(np.array(color, dtype=np.float64)).tolist()
+    return found

@@ -1,0 +1,285 @@
+"""A motion is gone through before it is made: how long it takes, and all that is wrong with it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from robots.collision import Cell, unshaped
+from robots.errors import ProgramError
+from robots.inverse import InverseSolver, build_solver
+from robots.joints import FloatArray, Joints, as_positions, violations
+from robots.motion import HOMING_REST_S, HOMING_SPEED, straight_motion
+from robots.programs.path import PathSamples
+from robots.programs.plan import plan_program
+from robots.programs.runs import Runs
+from robots.programs.steps import (
+    INTERPOLATION,
+    CheckResult,
+    Plan,
+    Step,
+    StepKind,
+    Violation,
+    ViolationKind,
+)
+from robots.programs.stretches import Looker, Stretch
+from robots.programs.text import parse_program
+
+# Timings of different motions: what a repeat comes to again is not timed again.
+_MOST_KEPT = 1_000
+# Times at which a motion's progress is tabled, closer where it is slow: at its ends.
+_TABLE = (1 - np.cos(np.linspace(0.0, np.pi, 129))) / 2
+
+
+def check_program(
+    text: str,
+    cell: Cell,
+    robot: str,
+    start: FloatArray,
+    *,
+    others: Mapping[str, FloatArray] | None = None,
+    solver: InverseSolver | None = None,
+    far: bool = True,
+) -> CheckResult:
+    """Read, plan and check a program; a text that cannot be read gets violations of kind "program".
+
+    Args:
+        start: (n,) where the arm stands [rad] or [m].
+        others, far: As of `check_plan`.
+        solver: Of this arm; built unless given.
+
+    Raises:
+        JointCountError: If some positions do not have one value a joint.
+    """
+    arm = cell.arms[robot]
+    start = as_positions(arm.joints, start)
+    try:
+        program = parse_program(text, arm.joints)
+    except ProgramError as error:
+        return _unread(error, start)
+    solver = build_solver(arm.description) if solver is None else solver
+    plan = plan_program(program, arm, solver, start)
+    # A plan begins with the speed that it counts on.
+    if not plan.violations and all(step.kind is StepKind.SPEED for step in plan.steps):
+        return _unread(ProgramError([(1, "the program has no statement that does anything")]), start)
+    return check_plan(cell, robot, start, plan, others={} if others is None else others, far=far)
+
+
+def check_plan(
+    cell: Cell,
+    robot: str,
+    start: FloatArray,
+    plan: Plan | Sequence[Step],
+    *,
+    others: Mapping[str, FloatArray],
+    far: bool = True,
+) -> CheckResult:
+    """Check steps against limits, promises, the arm itself and all that is around it.
+
+    Args:
+        start: (n,) where the arm stands, at rest [rad] or [m].
+        plan: A plan, or its steps; before the first SPEED the arm moves at 100 %.
+        others: (k, n) straight joint path of each other robot of the cell that counts, from where it is to
+            where it has been told to go (k = 1: it stands): the whole of it, whenever the robot passes.
+        far: Whether the path's clearances are asked for also where nothing is near; without them a check is
+            sooner done.
+
+    Raises:
+        JointCountError: If some positions do not have one value a joint.
+    """
+    arm = cell.arms[robot]
+    start = as_positions(arm.joints, start)
+    for name, way in others.items():
+        for positions in np.atleast_2d(way):
+            as_positions(cell.arms[name].joints, positions)
+    if not isinstance(plan, Plan):
+        plan = Plan(tuple(plan))
+    checker = _Checker(arm.joints)
+    ways = {name: np.atleast_2d(way) for name, way in others.items() if name != robot}
+    looker = Looker(cell, robot, ways, far=far)
+    for step, stretch in looker.stretches(start, (*plan.steps, _standing(start, plan.steps))):
+        checker.take(step, stretch)
+    ends = [replace(each, time_s=checker.time_s, until_s=checker.time_s) for each in plan.violations]
+    found = (*_start_violations(arm.joints, start), *checker.limits, *checker.runs.violations())
+    notes = (*_cover_notes(cell, robot, others), *_untold(checker.runs), *plan.notes)
+    return _result(
+        checker.time_s,
+        (*sorted(found, key=lambda each: each.time_s), *ends),
+        plan.steps,
+        notes,
+        checker.path,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Timing:
+    """When a stretch's samples are reached [s], and how fast its shares pass then [1/s]."""
+
+    duration_s: float
+    times_s: FloatArray
+    rates: FloatArray
+
+
+class _Checker:
+    """Goes through the steps; keeps time, and what was found."""
+
+    def __init__(self, joints: Joints) -> None:
+        self.time_s = 0.0
+        self.runs = Runs()
+        self.limits: list[Violation] = []
+        self.path = PathSamples(len(joints))
+        self._joints = joints
+        self._speed = 1.0
+        self._sample = 0
+        self._line, self._line_began = 0, 0
+        self._timings: dict[tuple[bytes, bytes, float], _Timing] = {}
+
+    def take(self, step: Step, stretch: Stretch | None) -> None:
+        match step.kind:
+            case StepKind.SPEED:
+                assert step.percent is not None
+                self._speed = step.percent / 100
+            case StepKind.WAIT:
+                assert step.seconds is not None
+                self.time_s += step.seconds
+            case StepKind.MOVE | StepKind.HOME:
+                assert stretch is not None
+                homing = step.kind is StepKind.HOME
+                self._go(step, stretch, self._speed * (HOMING_SPEED if homing else 1.0))
+                self.time_s += HOMING_REST_S if homing else 0.0
+            case StepKind.TRACE:
+                pass
+
+    def _go(self, step: Step, stretch: Stretch, speed: float) -> None:
+        timing = self._timing(stretch, speed)
+        if step.line != self._line:
+            self._line, self._line_began = step.line, self._sample
+        times = self.time_s + timing.times_s
+        speeds = stretch.rates * timing.rates
+        self.path.add(times, stretch.positions, stretch.tools, speeds, stretch.clearances, step.line)
+        if stretch.limits and timing.duration_s > 0:
+            self.limits.append(_beyond(step.line, stretch.limits, self.time_s, times[-1]))
+        for index, finding in stretch.findings:
+            self.runs.met(
+                line=step.line,
+                sample=self._sample + index,
+                time_s=float(times[index]),
+                kind=finding.kind,
+                value=finding.value,
+                limit=finding.limit,
+                pair=finding.pair,
+                points=finding.points,
+                stops=finding.stops,
+            )
+        if step.tool_speed is not None:
+            self._promise(step, speeds, times, step.tool_speed)
+        self._sample += len(times) - 1
+        self.time_s = float(times[-1])
+
+    def _promise(self, step: Step, speeds: FloatArray, times: FloatArray, most: float) -> None:
+        # Rounding alone breaks no promise. A line's parts each begin and end at rest: that is one violation.
+        for index in np.flatnonzero(speeds > most * (1 + 1e-6)).tolist():
+            sample = self._sample + index
+            self.runs.met(
+                line=step.line,
+                sample=sample,
+                time_s=float(times[index]),
+                kind=ViolationKind.SPEED,
+                value=-float(speeds[index]),
+                limit=-most,
+                within=max(sample - self._line_began, 1),
+            )
+
+    def _timing(self, stretch: Stretch, speed: float) -> _Timing:
+        start, target = stretch.positions[0], stretch.positions[-1]
+        key = (start.tobytes(), target.tobytes(), speed)
+        timing = self._timings.get(key)
+        if timing is None:
+            timing = _timing(self._joints, start, target, speed, len(stretch.positions))
+            if len(self._timings) < _MOST_KEPT:
+                self._timings[key] = timing
+        return timing
+
+
+def _standing(start: FloatArray, steps: Sequence[Step]) -> Step:
+    """The end: where the arm stands after the last step, for no time."""
+    ends = [step.target for step in steps if step.target is not None]
+    line = steps[-1].line if steps else 0
+    return Step(line=line, kind=StepKind.MOVE, target=ends[-1] if ends else start)
+
+
+def _beyond(line: int, limits: Sequence[str], begin_s: float, until_s: float) -> Violation:
+    return Violation(
+        line=line,
+        time_s=begin_s,
+        until_s=until_s,
+        kind=ViolationKind.LIMIT,
+        points=np.zeros((0, 3)),
+        text="; ".join(limits),
+    )
+
+
+def _timing(joints: Joints, start: FloatArray, target: FloatArray, speed: float, samples: int) -> _Timing:
+    motion = straight_motion(joints, start, target, speed=speed)
+    if motion is None:
+        return _Timing(0.0, np.zeros(1), np.zeros(1))
+    table = motion.duration * _TABLE
+    times = np.interp(np.linspace(0.0, 1.0, samples), motion.progress(table)[0], table)
+    times[0], times[-1] = 0.0, motion.duration
+    return _Timing(motion.duration, times, motion.progress(times)[1])
+
+
+def _start_violations(joints: Joints, start: FloatArray) -> tuple[Violation, ...]:
+    """An arm that stands beyond a limit may go back: that warns."""
+    found = violations(joints, start)
+    if not found:
+        return ()
+    text = f"at the start: {'; '.join(found)}"
+    return (Violation(line=0, kind=ViolationKind.LIMIT, points=np.zeros((0, 3)), text=text, refuses=False),)
+
+
+def _cover_notes(cell: Cell, robot: str, others: Mapping[str, FloatArray]) -> tuple[str, ...]:
+    notes = []
+    bare = unshaped(cell, robot)
+    if bare:
+        notes.append(f"without a shape, so never found to touch anything: {', '.join(bare)}")
+    notes += [
+        f"{name} is left out: nobody knows where it is now"
+        for name in cell.arms
+        if name != robot and name not in others
+    ]
+    if not len(cell.fixtures) and len(cell.arms) == 1:
+        notes.append("nothing stands around the arm: its cell has no fixture and no other robot")
+    return tuple(notes)
+
+
+def _untold(runs: Runs) -> tuple[str, ...]:
+    return (f"{runs.untold} more violations are not told",) if runs.untold else ()
+
+
+def _unread(error: ProgramError, start: FloatArray) -> CheckResult:
+    found = tuple(
+        Violation(line=line, kind=ViolationKind.PROGRAM, points=np.zeros((0, 3)), text=text)
+        for line, text in error.problems
+    )
+    more = error.found - len(found)
+    notes = (f"{more} more problems are not told",) if more else ()
+    return _result(0.0, found, (), notes, PathSamples(len(start)))
+
+
+def _result(
+    duration_s: float,
+    found: tuple[Violation, ...],
+    steps: tuple[Step, ...],
+    notes: tuple[str, ...],
+    path: PathSamples,
+) -> CheckResult:
+    return CheckResult(
+        ok=not found,
+        duration_s=duration_s,
+        violations=found,
+        steps=steps,
+        interpolation=INTERPOLATION,
+        notes=notes,
+        path=path.sampled(),
+    )

@@ -1,0 +1,183 @@
+"""From a program to the steps that a controller takes: repeats unrolled, lines cut into joint moves."""
+
+from collections.abc import Mapping, Sequence
+from math import degrees, radians
+
+import numpy as np
+
+from robots.collision import Arm
+from robots.inverse import InverseSolver, natural_task, solve
+from robots.joints import FloatArray
+from robots.model import tool_placement
+from robots.programs.lines import UnreachableError, follow_line, line_to
+from robots.programs.statements import (
+    Home,
+    JointTarget,
+    MoveJoints,
+    MoveLine,
+    PoseTarget,
+    Program,
+    Repeat,
+    Speed,
+    Statement,
+    Target,
+    ToolSpeed,
+    Trace,
+    Wait,
+)
+from robots.programs.steps import LINE_DEG, Plan, Step, StepKind, Violation, ViolationKind
+from robots.programs.text import MOST_STEPS
+
+# Positions are planned to 1e-9 rad and m: what a repeat comes back to is then the same to the last bit.
+_DECIMALS = 9
+# Of different lines: those that come again are not cut again.
+_MOST_KEPT = 1_000
+
+
+def plan_program(program: Program, arm: Arm, solver: InverseSolver | None, start: FloatArray) -> Plan:
+    """The steps of a program from where the arm stands.
+
+    It begins with a SPEED step, of 100 % unless the program says otherwise: what a controller was set to
+    before is nothing that a check could know. It ends where a place cannot be reached.
+
+    Args:
+        solver: Of this arm; None will do for a program without poses and lines.
+        start: (n,) joint positions [rad] or [m].
+    """
+    planner = _Planner(arm, solver, start)
+    violations: tuple[Violation, ...] = ()
+    notes: tuple[str, ...] = ()
+    try:
+        planner.take(program.statements)
+    except _CannotGoOnError as end:
+        violations = (end.violation,)
+        notes = (f"nothing behind line {end.violation.line} is checked: the program cannot get there",)
+    return Plan(tuple(planner.steps), violations, (*_bent_notes(planner.bent), *notes))
+
+
+def _bent_notes(bent: Mapping[int, float]) -> tuple[str, ...]:
+    if not bent:
+        return ()
+    lines = ", ".join(str(line) for line in sorted(bent)[:10]) + (", ..." if len(bent) > 10 else "")
+    most = degrees(max(bent.values()))
+    what = f"between its ends the tool's axis is up to {most:.1f}° from an even turn"
+    return (f"line{'s' if len(bent) > 1 else ''} {lines}: {what}: this arm cannot hold it there",)
+
+
+class _CannotGoOnError(Exception):
+    """The plan ends here."""
+
+    def __init__(self, violation: Violation) -> None:
+        self.violation = violation
+        super().__init__(violation.text)
+
+
+class _Planner:
+    def __init__(self, arm: Arm, solver: InverseSolver | None, start: FloatArray) -> None:
+        self.steps: list[Step] = []
+        self.bent: dict[int, float] = {}
+        self._arm, self._solver = arm, solver
+        self._task = natural_task(arm.joints)
+        self._at = start
+        self._speed_told = False
+        self._tool_speed: float | None = None
+        self._cut: dict[tuple[bytes, bytes], list[FloatArray]] = {}
+
+    def take(self, statements: Sequence[Statement]) -> None:
+        for statement in statements:
+            match statement:
+                case Home(line):
+                    self._move(line, self._arm.joints.home, kind=StepKind.HOME)
+                case MoveJoints(line, JointTarget(positions)):
+                    self._move(line, positions)
+                case MoveJoints(line, PoseTarget() as target):
+                    self._move(line, self._solved(line, target))
+                case MoveLine(line, target):
+                    for positions in self._line(line, self._pose(target)):
+                        self._move(line, positions, along_line=True)
+                case Speed(line, percent):
+                    self._speed_told = True
+                    self._add(Step(line=line, kind=StepKind.SPEED, percent=percent))
+                case ToolSpeed(most=most):
+                    self._tool_speed = most
+                case Wait(line, seconds):
+                    self._add(Step(line=line, kind=StepKind.WAIT, seconds=seconds))
+                case Trace(line, on):
+                    self._add(Step(line=line, kind=StepKind.TRACE, on=on))
+                case Repeat(count=count, body=body):
+                    for _ in range(count if body else 0):
+                        self.take(body)
+
+    def _add(self, step: Step) -> None:
+        # One more: the speed that it begins with.
+        if len(self.steps) > MOST_STEPS:
+            text = f"the program comes to more than {MOST_STEPS} steps here, its lines cut"
+            raise _CannotGoOnError(_violation(step.line, ViolationKind.PROGRAM, text))
+        self.steps.append(step)
+
+    def _move(
+        self, line: int, target: FloatArray, *, kind: StepKind = StepKind.MOVE, along_line: bool = False
+    ) -> None:
+        if not self._speed_told:
+            self._speed_told = True
+            self._add(Step(line=line, kind=StepKind.SPEED, percent=100.0))
+        self._add(
+            Step(line=line, kind=kind, target=target, along_line=along_line, tool_speed=self._tool_speed)
+        )
+        self._at = target
+
+    def _solved(self, line: int, target: PoseTarget) -> FloatArray:
+        """Joint positions of a pose, those nearest to where the arm stands."""
+        assert self._solver is not None
+        result = solve(self._solver, target.tool_to_base, task=self._task, near=self._at)
+        if not len(result.solutions):
+            place = target.tool_to_base[:3, 3]
+            raise self._unreachable(line, f"{_named(target)} cannot be reached", result.reason, place)
+        return _rounded(result.solutions[0])
+
+    def _pose(self, target: Target) -> FloatArray:
+        if isinstance(target, PoseTarget):
+            return target.tool_to_base
+        return tool_placement(self._arm.model, target.positions)
+
+    def _line(self, number: int, end: FloatArray) -> Sequence[FloatArray]:
+        assert self._solver is not None
+        key = (self._at.tobytes(), end.tobytes())
+        if key in self._cut:
+            return self._cut[key]
+        line = line_to(tool_placement(self._arm.model, self._at), end, self._task)
+        try:
+            followed = follow_line(self._arm.model, self._solver, line, self._at)
+        except UnreachableError as error:
+            what = "the line cannot be followed"
+            if line.length_m > 1e-6:
+                what += f" beyond {error.done_m * 1000:.1f} of its {line.length_m * 1000:.1f} mm"
+            raise self._unreachable(number, what, error.reason, error.place) from None
+        if followed.bent_rad > radians(LINE_DEG):
+            self.bent[number] = max(followed.bent_rad, self.bent.get(number, 0.0))
+        ends = [_rounded(each) for each in followed.ends]
+        if len(self._cut) < _MOST_KEPT:
+            self._cut[key] = ends
+        return ends
+
+    def _unreachable(self, line: int, what: str, reason: str, place: FloatArray) -> _CannotGoOnError:
+        in_site = self._arm.base_to_site[:3, :3] @ place + self._arm.base_to_site[:3, 3]
+        return _CannotGoOnError(
+            _violation(line, ViolationKind.UNREACHABLE, f"{what}: {reason}", in_site[None])
+        )
+
+
+def _violation(line: int, kind: ViolationKind, text: str, points: FloatArray | None = None) -> Violation:
+    return Violation(line=line, kind=kind, text=text, points=np.zeros((0, 3)) if points is None else points)
+
+
+def _rounded(positions: FloatArray) -> FloatArray:
+    rounded: FloatArray = positions.round(_DECIMALS) + 0.0
+    return rounded
+
+
+def _named(target: PoseTarget) -> str:
+    if target.name:
+        return f"point {target.name}"
+    x, y, z = (target.tool_to_base[:3, 3] * 1000).tolist()
+    return f"the pose at {x:.1f} {y:.1f} {z:.1f} mm"

@@ -1,0 +1,131 @@
+"""An arm at many joint positions at once: where its tool is, how it moves, how far any link may get.
+
+Pinocchio answers for one position a call; a program asks for tens of thousands.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from robots.collision import Arm
+from robots.collision.path import SAMPLE_M
+from robots.joints import FloatArray, JointType
+from robots.poses import axis_rotation
+from robots.singularity import reach_of
+from robots.tree import Tree, TreeLink, chain_to, position_factors, tool_frame, tree_of
+
+
+@dataclass(frozen=True, eq=False)
+class ToolChain:
+    """The joints between base and tool, and what is needed of their arm.
+
+    Attributes:
+        reach_m: The length of the arm stretched out.
+        travel: (b, n) how far any point of a body of the arm, or of its tool, may move with each joint:
+            [m/rad] or [m/m], however the arm stands.
+    """
+
+    reach_m: float
+    travel: FloatArray
+    # Of the joints between base and tool: (4, 4) each at position 0 in the one before, axes, kinds.
+    _placements: FloatArray
+    _axes: FloatArray
+    _rotary: tuple[bool, ...]
+    _tool_to_joint: FloatArray
+    # Positions of those joints from the robot's own.
+    _factors: FloatArray
+    _offsets: FloatArray
+
+
+def tool_chain(arm: Arm) -> ToolChain:
+    """The chain of an arm's tool, worked out once."""
+    tree = tree_of(arm.description)
+    on_link, tool_to_link = tool_frame(arm.description)
+    link = next(link for link in tree.links if link.name == on_link)
+    numbers = list(chain_to(tree, link.joint))
+    factors, offsets = position_factors(tree)
+    balls = [
+        (tree.links[number], body.center, float(np.linalg.norm(body.half)))
+        for body, number in zip(arm.bodies, arm.links.tolist(), strict=True)
+    ]
+    strokes = _strokes(arm, tree, factors, offsets)
+    travel = np.array([_travel(tree, *ball, strokes) for ball in (*balls, (link, tool_to_link[:3, 3], 0.0))])
+    return ToolChain(
+        reach_m=reach_of(arm.description),
+        travel=travel @ np.abs(factors),
+        _placements=np.array([tree.joints[number].joint_to_parent for number in numbers]).reshape(-1, 4, 4),
+        _axes=np.array([tree.joints[number].axis for number in numbers]).reshape(-1, 3),
+        _rotary=tuple(tree.joints[number].type is JointType.ROTARY for number in numbers),
+        _tool_to_joint=link.link_to_joint @ tool_to_link,
+        _factors=factors[numbers],
+        _offsets=offsets[numbers],
+    )
+
+
+def _strokes(arm: Arm, tree: Tree, factors: FloatArray, offsets: FloatArray) -> FloatArray:
+    """(all joints,) how far each prismatic joint may move what it carries from its frame [m]."""
+    farthest = np.abs(factors) @ np.maximum(np.abs(arm.joints.lower), np.abs(arm.joints.upper))
+    prismatic = [joint.type is JointType.PRISMATIC for joint in tree.joints]
+    return np.where(prismatic, farthest + np.abs(offsets), 0.0)
+
+
+def _travel(tree: Tree, link: TreeLink, center: FloatArray, radius: float, strokes: FloatArray) -> FloatArray:
+    """(all joints,) bound of the movement of a ball on a link with each joint: its farthest point's.
+
+    The way from a joint to the ball is no longer than its parts; of the first part, which the joint
+    turns as a whole, only what is across the axis counts.
+    """
+    travel = np.zeros(len(tree.joints))
+    beyond = radius
+    after = link.link_to_joint[:3, :3] @ center + link.link_to_joint[:3, 3]
+    for number in reversed(chain_to(tree, link.joint)):
+        joint = tree.joints[number]
+        across = float(np.linalg.norm(np.cross(joint.axis, after)))
+        travel[number] = across + beyond if joint.type is JointType.ROTARY else 1.0
+        beyond += float(np.linalg.norm(after)) + float(strokes[number])
+        after = joint.joint_to_parent[:3, 3]
+    return travel
+
+
+def samples_between(chain: ToolChain, start: FloatArray, target: FloatArray) -> int:
+    """In how many equal parts to cut a straight joint motion: no link moves more than SAMPLE_M in one."""
+    farthest = float((chain.travel @ np.abs(target - start)).max())
+    return max(int(np.ceil(farthest / SAMPLE_M)), 1)
+
+
+def tools_and_jacobians(chain: ToolChain, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Where the tool is, and how it moves with the joints.
+
+    Args:
+        positions: (m, n) [rad] or [m].
+
+    Returns:
+        (m, 4, 4) tool to base, and (m, 6, n) Jacobians: linear, then angular, along the base's axes.
+    """
+    along_chain = positions @ chain._factors.T + chain._offsets
+    count = len(positions)
+    rotation, origin = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
+    axes, origins = [], []
+    for number, rotary in enumerate(chain._rotary):
+        placement, axis = chain._placements[number], chain._axes[number]
+        origin = origin + rotation @ placement[:3, 3]
+        rotation = rotation @ placement[:3, :3]
+        along = rotation @ axis
+        axes.append(along)
+        if rotary:
+            rotation = rotation @ axis_rotation(np.broadcast_to(axis, (count, 3)), along_chain[:, number])
+        else:
+            origin = origin + along_chain[:, number, None] * along
+        origins.append(origin)
+    tools = np.zeros((count, 4, 4))
+    tools[:, :3, :3] = rotation @ chain._tool_to_joint[:3, :3]
+    tools[:, :3, 3] = origin + rotation @ chain._tool_to_joint[:3, 3]
+    tools[:, 3, 3] = 1.0
+    jacobians = np.zeros((count, 6, len(axes)))
+    for number, rotary in enumerate(chain._rotary):
+        if rotary:
+            jacobians[:, :3, number] = np.cross(axes[number], tools[:, :3, 3] - origins[number])
+            jacobians[:, 3:, number] = axes[number]
+        else:
+            jacobians[:, :3, number] = axes[number]
+    return tools, jacobians @ chain._factors

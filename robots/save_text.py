@@ -1,0 +1,120 @@
+"""A description's values as robot.toml text: the order and form in which people write one.
+
+A table a thing, an inline table a pose, one line a value; what an existing file says in comments stays.
+"""
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import AoT, Table
+
+_VALUES = ("name", "title", "provenance", "units", "urdf", "packages")
+# Tables of their own; every other table is written inline.
+_TABLES = ("base", "tool", "collision")
+_ARRAYS = ("joint", "link", "frame", "constraint")
+_ORDER = (*_VALUES, "base", "joint", "link", "tool", "frame", "constraint", "view", "collision")
+_LONGEST_LINE = 110
+
+
+def description_text(values: Mapping[str, Any], before: str = "") -> str:
+    """The text of a robot.toml.
+
+    Args:
+        values: By the file's own key names; what is None is left out, numbers become floats.
+        before: The text that it replaces: its comments and its order are kept where they still apply.
+    """
+    wanted = as_saved(values)
+    fresh = _fresh(wanted)
+    if not before:
+        return fresh
+    try:
+        document = tomlkit.parse(before)
+        _merge(document, tomlkit.parse(fresh))
+        merged = tomlkit.dumps(document)
+        # Trust in comments has its limits: what is saved must be what was meant.
+        return merged if tomllib.loads(merged) == wanted else fresh
+    except (TOMLKitError, tomllib.TOMLDecodeError):
+        return fresh
+
+
+def as_saved(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The values that a saved description gives back: without what is None, numbers as floats."""
+    known = [key for key in _ORDER if key in values]
+    # TOML has plain values before tables; a key that nobody knows is one until its check refuses it.
+    return _floats({key: values[key] for key in [*known, *(set(values) - set(known))]})  # type: ignore[no-any-return]
+
+
+def _floats(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _floats(each) for key, each in value.items() if each is not None}
+    if isinstance(value, list | tuple):
+        return [_floats(each) for each in value]
+    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+def _fresh(values: Mapping[str, Any]) -> str:
+    blocks: list[list[str]] = [[]]
+    for key, value in values.items():
+        if key in _TABLES and isinstance(value, dict):
+            blocks.append([f"[{key}]", *_lines(value)])
+        elif key == "view" and isinstance(value, dict):
+            blocks += [[f"[view.{_key(name)}]", *_lines(view)] for name, view in value.items()]
+        elif key in _ARRAYS and isinstance(value, list):
+            blocks += [[f"[[{key}]]", *_lines(row)] for row in value]
+        else:
+            blocks[0] += _lines({key: value})
+    return "\n".join("\n".join(block) + "\n" for block in blocks if block)
+
+
+def _lines(table: Mapping[str, Any]) -> Iterable[str]:
+    for key, value in table.items():
+        line = f"{_key(key)} = {_inline(value)}"
+        if len(line) > _LONGEST_LINE and isinstance(value, list):
+            line = f"{_key(key)} = [\n" + "".join(f"  {_inline(each)},\n" for each in value) + "]"
+        yield line
+
+
+def _inline(value: Any) -> str:
+    if isinstance(value, dict):
+        inside = ", ".join(f"{_key(key)} = {_inline(each)}" for key, each in value.items())
+        return f"{{ {inside} }}" if inside else "{}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_inline, value))}]"
+    return str(tomlkit.item(value).as_string())
+
+
+def _key(name: str) -> str:
+    return str(tomlkit.key(name).as_string())
+
+
+def _merge(old: Any, new: Any) -> None:
+    """Bring a parsed table to what another holds, leaving untouched what is the same."""
+    for key in [key for key in old if key not in new]:
+        del old[key]
+    for key, value in new.items():
+        before = old.get(key)
+        if before is None:
+            old.append(key, value)
+        elif isinstance(value, AoT) and isinstance(before, AoT):
+            _merge_rows(before, value)
+        elif isinstance(value, Table) and isinstance(before, Table):
+            _merge(before, value)
+        elif before.unwrap() != value.unwrap():
+            old[key] = value
+
+
+def _merge_rows(old: AoT, new: AoT) -> None:
+    """[[joint]] by name, [[constraint]] by place: a row keeps its comments wherever it moves."""
+    named = {row["name"]: row for row in old if "name" in row}
+    rows = []
+    for number, row in enumerate(new):
+        kept = named.get(row["name"]) if "name" in row else old[number] if number < len(old) else None
+        if kept is not None:
+            _merge(kept, row)
+        rows.append(row if kept is None else kept)
+    del old[:]
+    for row in rows:
+        old.append(row)

@@ -1,0 +1,1 @@
+"""URDF: robots read from it, and written as it."""

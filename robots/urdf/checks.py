@@ -1,0 +1,75 @@
+"""What a description by URDF must hold: its keys fit the URDF's joints and links."""
+
+from collections import Counter
+from collections.abc import Iterator
+
+from robots.checks import JointFacts, Problem, common_problems, enumerated, limit_problems
+from robots.joints import joints_of
+from robots.schema import TOOL_FRAME, JointSettings, Pose, UrdfDescription, nearest
+from robots.tree import TreeJoint, tree_of
+from robots.units import position_factor
+
+
+def urdf_problems(description: UrdfDescription) -> Iterator[Problem]:
+    """Every contradiction between a description and its URDF, and inside it."""
+    tree = tree_of(description)
+    links = tuple(link.name for link in tree.links)
+    free = {tree.joints[number].name: tree.joints[number] for number in tree.free}
+    known = _rows(description, free)
+    yield from known
+    if not known:
+        # Only rows that name joints can be brought together with them.
+        joints = joints_of(description.model_copy(update={"constraints": ()}))
+        homes = {}
+        for name, kind, home in zip(joints.names, joints.types, joints.home.tolist(), strict=True):
+            homes[name] = JointFacts(kind, home / position_factor(kind, description.units))
+        yield from common_problems(description, links=links, joints=homes)
+    named = ((place, row.name) for place, row in enumerated("link", description.links))
+    for place, name in (*named, (("tool",), description.tool.link)):
+        if name is not None and name not in links:
+            key = "name" if place[0] == "link" else "link"
+            yield Problem(
+                (*place, key), f"{place[0]} {key} = {name!r}: the URDF has no such link{nearest(name, links)}"
+            )
+    moved = description.tool.link not in (None, TOOL_FRAME) or _is_moved(description.tool)
+    if TOOL_FRAME in links and moved:
+        yield Problem(("tool",), "tool: the URDF has a link named 'tool', and that is where the tool is")
+
+
+def _rows(description: UrdfDescription, free: dict[str, TreeJoint]) -> list[Problem]:
+    counts = Counter(row.name for row in description.joints)
+    found = []
+    for place, row in enumerated("joint", description.joints):
+        joint = free.get(row.name)
+        if joint is None:
+            text = f"joint {row.name!r}: the URDF has no such joint that moves{nearest(row.name, free)}"
+            found.append(Problem((*place, "name"), text))
+        elif counts[row.name] > 1:
+            text = f"joint {row.name!r}: {counts[row.name]} tables have that name; one is right"
+            found.append(Problem((*place, "name"), text))
+        else:
+            found += _row(description, place, row, joint)
+    return found
+
+
+def _row(
+    description: UrdfDescription, place: tuple[str | int, ...], row: JointSettings, joint: TreeJoint
+) -> Iterator[Problem]:
+    factor = position_factor(joint.type, description.units)
+    unit = description.units.angle if joint.type == "rotary" else description.units.length
+    limits = row.limits or (joint.lower / factor, joint.upper / factor)
+    yield from limit_problems(place, row.name, limits, row.home, unit)
+    if row.limits and not joint.continuous:
+        # To the rounding of a number that people write.
+        slack = 1e-6 * (joint.upper - joint.lower)
+        if row.limits[0] * factor < joint.lower - slack or row.limits[1] * factor > joint.upper + slack:
+            lower, upper = joint.lower / factor, joint.upper / factor
+            text = (
+                f"joint {row.name!r} limits = [{limits[0]:g}, {limits[1]:g}]: "
+                f"must be within the URDF's {lower:g} to {upper:g} {unit}"
+            )
+            yield Problem((*place, "limits"), text)
+
+
+def _is_moved(pose: Pose) -> bool:
+    return any((*pose.xyz, *pose.rpy))

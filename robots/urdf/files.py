@@ -1,0 +1,61 @@
+"""Where the files are that a URDF names: `package://`, `file://`, or a path beside it."""
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from urllib.parse import unquote
+
+Resolve = Callable[[str], Path | None]
+
+
+def files_of(urdf: Path, packages: Sequence[Path] = (), *, confined: Path | None = None) -> Resolve:
+    """A function from an address in the URDF to the file, None where there is none.
+
+    A package is looked for in the folders given (each may hold it, or be it), in ROS_PACKAGE_PATH and
+    AMENT_PREFIX_PATH, and in the folders above the URDF.
+
+    Args:
+        confined: Only what lies in this folder is found; the environment is not asked.
+    """
+
+    def resolve(address: str) -> Path | None:
+        for path in _candidates(
+            unquote(address), urdf.absolute(), packages, ask_environment=confined is None
+        ):
+            if _is_file(path) and (confined is None or path.resolve().is_relative_to(confined.resolve())):
+                return path
+        return None
+
+    return resolve
+
+
+def _candidates(
+    address: str, urdf: Path, packages: Sequence[Path], *, ask_environment: bool
+) -> Iterator[Path]:
+    scheme, colon, rest = address.partition("://")
+    if not colon:
+        yield urdf.parent / address.removeprefix("file:")
+    elif scheme == "file":
+        yield urdf.parent / rest
+    elif scheme in ("package", "model"):
+        package, _, inside = rest.partition("/")
+        for folder in (*packages, *(_from_environment() if ask_environment else ()), *urdf.parents):
+            yield folder / package / inside
+            if folder.name == package:
+                yield folder / inside
+
+
+def _from_environment() -> Iterator[Path]:
+    for folder in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep):
+        if folder:
+            yield Path(folder)
+    for folder in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
+        if folder:
+            yield Path(folder) / "share"
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # too long, or with a zero byte
+        return False

@@ -1,0 +1,309 @@
+"""Reading URDF: its joints and links as a tree.
+
+What it means is ROS's `urdf` and Pinocchio's reading of it; names are made safe for keys and files,
+and what is odd but usable is told in a note. Inertia, transmissions and plug-ins are read over.
+
+Source: https://wiki.ros.org/urdf/XML.
+"""
+
+import re
+import xml.etree.ElementTree as Xml
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from math import pi
+from pathlib import Path
+
+import numpy as np
+
+from robots.errors import DescriptionError
+from robots.poses import FloatArray, axis_rotation
+from robots.schema import JointType
+from robots.tree import BASE, Mimic, Tree, TreeJoint, TreeLink
+from robots.urdf.files import Resolve
+from robots.urdf.shapes import Shapes
+from robots.urdf.values import WrongElement, numbers, origin, said
+
+_MOST_CHARACTERS = 20_000_000
+_MOST_LINKS = 2_000
+_TYPES = {"revolute": JointType.ROTARY, "continuous": JointType.ROTARY, "prismatic": JointType.PRISMATIC}
+# A continuous joint gets limits, for sliders, planners and controllers want some: every direction can be
+# reached either way round, and a cable lives.
+_CONTINUOUS = 2 * pi
+# Where a file gives no speed [rad/s], [m/s].
+_SPEEDS = {JointType.ROTARY: pi / 2, JointType.PRISMATIC: 0.25}
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfRobot:
+    """What a URDF holds.
+
+    Attributes:
+        name: As the file has it.
+        notes: What was odd and how it was taken, a sentence each.
+        missing: Mesh files that were not found, as the URDF names them.
+    """
+
+    name: str
+    tree: Tree
+    notes: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
+
+
+def read_urdf(text: str, source: Path, *, resolve: Resolve) -> UrdfRobot:
+    """The robot in a URDF's text.
+
+    Args:
+        source: For messages.
+        resolve: The file that an address in the URDF stands for; None: there is none.
+
+    Raises:
+        DescriptionError: If it is no URDF of an arm; the text names the element and what would be right.
+    """
+    try:
+        return _Reading(_root(text), resolve).robot()
+    except WrongElement as error:
+        raise DescriptionError(source, [str(error)]) from None
+
+
+def _root(text: str) -> Xml.Element:
+    if len(text) > _MOST_CHARACTERS:
+        raise WrongElement(f"has {len(text):,} characters; at most {_MOST_CHARACTERS:,} are read")
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise WrongElement("has a DOCTYPE or ENTITY, which no URDF needs; take it out")
+    try:
+        root = Xml.fromstring(text.lstrip("\ufeff \t\r\n"))
+    except (Xml.ParseError, ValueError) as error:
+        if "<xacro:" in text:
+            raise WrongElement(_XACRO) from None
+        raise WrongElement(f"is not XML: {error}") from None
+    if any("xacro" in element.tag or any("${" in value for value in element.attrib.values())
+           for element in root.iter() if isinstance(element.tag, str)):  # fmt: skip
+        raise WrongElement(_XACRO)
+    if root.tag != "robot":
+        raise WrongElement(f"<{root.tag}>: a URDF's outermost element is <robot>")
+    return root
+
+
+_XACRO = "is xacro, from which a URDF is made first: xacro robot.xacro > robot.urdf"
+
+
+class _Reading:
+    """One file while it is read."""
+
+    def __init__(self, root: Xml.Element, resolve: Resolve) -> None:
+        self.root = root
+        self.notes: list[str] = []
+        self.links = _by_name(root, "link")
+        self.joints = _by_name(root, "joint")
+        self.link_names = self._safe_names("link", self.links)
+        self.joint_names = self._safe_names("joint", self.joints)
+        self.shapes = Shapes(root, resolve)
+        self.tree_joints: list[TreeJoint] = []
+        self.tree_links: list[TreeLink] = []
+        # Joints that stand still, at this position; joints that follow, by the followed one's name.
+        self.still: dict[str, float] = {}
+        self.numbers: dict[str, int] = {}
+
+    def robot(self) -> UrdfRobot:
+        children = self._children()
+        child_links = {child for joints in children.values() for _, child in joints}
+        roots = [name for name in self.links if name not in child_links]
+        if not self.links:
+            raise WrongElement("has no <link>")
+        if len(self.links) > _MOST_LINKS:
+            raise WrongElement(f"has {len(self.links):,} links; at most {_MOST_LINKS:,} are read")
+        if len(roots) > 1:
+            raise WrongElement(
+                f"links {_listed(roots)}: more than one has no joint above it; a robot has one root"
+            )
+        if not roots:
+            raise WrongElement(
+                f"joint {next(iter(self.joints))!r}: the links run in a circle; a robot has one root"
+            )
+        self._walk(roots[0], children)
+        if len(self.tree_links) < len(self.links):
+            reached = {link.name for link in self.tree_links}
+            lost = [name for name in self.links if self.link_names[name] not in reached]
+            raise WrongElement(f"links {_listed(lost)}: run in a circle; a robot is a tree")
+        tree = Tree(tuple(self._followers()), tuple(self.tree_links))
+        if not tree.free:
+            raise WrongElement("has no joint that moves; an arm has at least one")
+        notes = (*self.notes, *self.shapes.notes)
+        name = self.root.get("name") or "robot"
+        return UrdfRobot(name, tree, notes, tuple(self.shapes.missing))
+
+    def _safe_names(self, kind: str, elements: Mapping[str, Xml.Element]) -> dict[str, str]:
+        """Names that may stand in keys, files and frames; most are so already."""
+        safe: dict[str, str] = {}
+        for name in elements:
+            changed = re.sub(r"[^A-Za-z0-9_.-]", "_", name)
+            changed = changed if changed[0].isalnum() else f"{kind}{changed}"
+            while changed != name and (changed in elements or changed in safe.values()):
+                changed += "_"
+            if changed != name:
+                self.notes.append(f"{kind} {name!r} is called {changed!r} here")
+            safe[name] = changed
+        return safe
+
+    def _children(self) -> dict[str, list[tuple[str, str]]]:
+        """Joints below each link, with the link that each carries, in the file's order."""
+        children: dict[str, list[tuple[str, str]]] = {}
+        carried: dict[str, str] = {}
+        for name, joint in self.joints.items():
+            ends = []
+            for end in ("parent", "child"):
+                link = _child(joint, end, f"joint {name!r}").get("link", "")
+                if link not in self.links:
+                    raise WrongElement(f"joint {name!r} {end} link {link!r}: no such link")
+                ends.append(link)
+            if ends[1] in carried:
+                raise WrongElement(
+                    f"joint {name!r} child link {ends[1]!r}: joint {carried[ends[1]]!r} carries it already"
+                )
+            carried[ends[1]] = name
+            children.setdefault(ends[0], []).append((name, ends[1]))
+        return children
+
+    def _walk(self, root: str, children: Mapping[str, list[tuple[str, str]]]) -> None:
+        """Links and joints from the root outwards, a chain to its end before the next."""
+        waiting: list[tuple[str, str | None, int, FloatArray]] = [(root, None, BASE, np.eye(4))]
+        while waiting:
+            link, joint, number, link_to_joint = waiting.pop()
+            if joint is not None:
+                number, link_to_joint = self._step(joint, number, link_to_joint)
+            shapes = self.shapes.of(self.links[link], link)
+            self.tree_links.append(TreeLink(self.link_names[link], number, link_to_joint, shapes))
+            waiting += [
+                (child, name, number, link_to_joint) for name, child in reversed(children.get(link, []))
+            ]
+
+    def _step(self, name: str, parent: int, link_to_joint: FloatArray) -> tuple[int, FloatArray]:
+        """The joint's number and the link's frame there; a joint that stands still is none."""
+        element = self.joints[name]
+        what = f"joint {name!r}"
+        placement = link_to_joint @ origin(element, what)
+        kind = element.get("type", "")
+        if kind == "fixed":
+            return parent, placement
+        if kind not in _TYPES:
+            known = "revolute, continuous, prismatic and fixed are"
+            raise WrongElement(f"{what} type {kind!r}: is not one that an arm has; {known}")
+        axis = self._axis(element, what)
+        lower, upper, speed = self._limits(element, what, kind)
+        if lower == upper and element.find("mimic") is None:
+            self.notes.append(f"{what}: its limits leave it no way, so it stands still at {lower:g}")
+            self.still[name] = lower
+            return parent, placement @ moved(_TYPES[kind], axis, lower)
+        joint = TreeJoint(
+            name=self.joint_names[name],
+            type=_TYPES[kind],
+            parent=parent,
+            joint_to_parent=placement,
+            axis=axis,
+            lower=lower,
+            upper=upper,
+            max_speed=speed,
+            continuous=kind == "continuous",
+        )
+        self.numbers[name] = len(self.tree_joints)
+        self.tree_joints.append(joint)
+        return self.numbers[name], np.eye(4)
+
+    def _axis(self, element: Xml.Element, what: str) -> FloatArray:
+        axis = element.find("axis")
+        vector = np.array(
+            [1.0, 0.0, 0.0] if axis is None else numbers(axis, "xyz", 3, f"{what} axis", "1 0 0")
+        )
+        length = float(np.linalg.norm(vector))
+        if length < 1e-9:
+            raise WrongElement(f"{what} axis xyz = {said(axis, 'xyz')}: is zero; it must point somewhere")
+        # One that is of length one as exactly as its file's digits say stays as it is.
+        return vector if length == 1.0 else vector / length
+
+    def _limits(self, element: Xml.Element, what: str, kind: str) -> tuple[float, float, float]:
+        limit = element.find("limit")
+        if limit is None and kind != "continuous":
+            raise WrongElement(f"{what}: has no <limit lower upper velocity>; a {kind} joint needs one")
+        unit = "m" if kind == "prismatic" else "rad"
+        (lower,), (upper,), (speed,) = (
+            numbers(limit, key, 1, f"{what} limit", "0") for key in ("lower", "upper", "velocity")
+        )
+        unsaid = speed <= 0
+        if unsaid:
+            speed = _SPEEDS[_TYPES[kind]]
+            self.notes.append(f"{what}: no speed is given, {speed:.4g} {unit}/s is taken")
+        if kind == "revolute" and lower == upper == 0 and unsaid:
+            kind = "continuous"
+            self.notes.append(f"{what}: its limits are all zero, so nobody filled them in; none are taken")
+        if kind == "continuous":
+            return -_CONTINUOUS, _CONTINUOUS, speed
+        if lower > upper:
+            raise WrongElement(
+                f"{what} limit lower = {lower:g}, upper = {upper:g}: the lower must be below the upper"
+            )
+        return lower, upper, speed
+
+    def _followers(self) -> Iterator[TreeJoint]:
+        """The joints, each that mimics another with the free one that it follows in the end."""
+        free = [name for name in self.numbers if self.joints[name].find("mimic") is None]
+        for name, number in self.numbers.items():
+            joint = self.tree_joints[number]
+            if self.joints[name].find("mimic") is None:
+                yield joint
+                continue
+            leader, multiplier, offset = self._followed(name)
+            if leader in self.still and free:
+                leader, multiplier, offset = free[0], 0.0, multiplier * self.still[leader] + offset
+            yield replace(joint, mimic=Mimic(self.numbers[leader], multiplier, offset))
+
+    def _followed(self, name: str) -> tuple[str, float, float]:
+        what, multiplier, offset = f"joint {name!r} mimic", 1.0, 0.0
+        seen = {name}
+        while (mimic := self.joints[name].find("mimic")) is not None:
+            leader = mimic.get("joint", "")
+            if leader not in self.numbers and leader not in self.still:
+                raise WrongElement(f"{what} joint {leader!r}: no such joint that moves")
+            if leader in seen:
+                raise WrongElement(f"{what} joint {leader!r}: follows itself")
+            (factor,) = numbers(mimic, "multiplier", 1, what, "1")
+            (shift,) = numbers(mimic, "offset", 1, what, "0")
+            multiplier, offset = multiplier * factor, multiplier * shift + offset
+            seen.add(leader)
+            name = leader
+            if leader in self.still:
+                break
+        return name, multiplier, offset
+
+
+def moved(kind: JointType, axis: FloatArray, position: float) -> FloatArray:
+    """(4, 4) of what a joint does to its link at a position [rad] or [m]."""
+    placement = np.eye(4)
+    if kind is JointType.PRISMATIC:
+        placement[:3, 3] = position * axis
+        return placement
+    placement[:3, :3] = axis_rotation(axis, position)
+    return placement
+
+
+def _by_name(root: Xml.Element, kind: str) -> dict[str, Xml.Element]:
+    elements = root.findall(kind)
+    for number, element in enumerate(elements):
+        if not element.get("name"):
+            raise WrongElement(f"<{kind}> number {number + 1}: has no name")
+    for name, count in Counter(element.get("name", "") for element in elements).items():
+        if count > 1:
+            raise WrongElement(f"{kind} {name!r}: {count} have that name; each needs its own")
+    return {element.get("name", ""): element for element in elements}
+
+
+def _child(element: Xml.Element, tag: str, what: str) -> Xml.Element:
+    child = element.find(tag)
+    if child is None:
+        raise WrongElement(f"{what}: has no <{tag}>")
+    return child
+
+
+def _listed(names: list[str]) -> str:
+    more = f" and {len(names) - 4} more" if len(names) > 4 else ""
+    return ", ".join(map(repr, names[:4])) + more

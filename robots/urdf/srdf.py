@@ -1,0 +1,59 @@
+"""Reading what SRDF adds to a URDF: a home position, and pairs of links that need no collision check.
+
+Source: https://wiki.ros.org/srdf.
+"""
+
+import xml.etree.ElementTree as Xml
+from pathlib import Path
+
+from robots.errors import DescriptionError
+from robots.tree import Tree
+from robots.urdf.values import WrongElement, numbers
+
+# What a robot's own people call the position that it starts from, the best first.
+_HOMES = ("home", "default", "arm_up", "half_sitting", "standing")
+
+
+def read_srdf(text: str, source: Path, tree: Tree) -> tuple[dict[str, float], list[tuple[str, str]]]:
+    """Home of some joints [rad] or [m] by name, and the pairs, of what the tree has.
+
+    Raises:
+        DescriptionError: If it is no SRDF.
+    """
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise DescriptionError(source, ["has a DOCTYPE or ENTITY, which no SRDF needs; take it out"])
+    try:
+        root = Xml.fromstring(text.strip())
+        return _home(root, tree), _ignored(root, tree)
+    except (Xml.ParseError, ValueError) as error:
+        raise DescriptionError(source, [f"is not XML: {error}"]) from None
+    except WrongElement as error:
+        raise DescriptionError(source, [str(error)]) from None
+
+
+def _home(root: Xml.Element, tree: Tree) -> dict[str, float]:
+    states = {state.get("name", ""): state for state in root.findall("group_state")}
+    state = next((states[name] for name in _HOMES if name in states), None)
+    if state is None:
+        return {}
+    free = {tree.joints[number].name: tree.joints[number] for number in tree.free}
+    home = {}
+    for element in state.findall("joint"):
+        joint = free.get(element.get("name", ""))
+        # A free-flying base's seven numbers are no joint's position.
+        if joint is None or len(element.get("value", "").split()) != 1:
+            continue
+        (position,) = numbers(element, "value", 1, f"group_state joint {joint.name!r}", "")
+        if joint.lower <= position <= joint.upper:
+            home[joint.name] = position
+    return home
+
+
+def _ignored(root: Xml.Element, tree: Tree) -> list[tuple[str, str]]:
+    links = {link.name for link in tree.links}
+    pairs = []
+    for element in root.findall("disable_collisions"):
+        one, other = element.get("link1", ""), element.get("link2", "")
+        if one in links and other in links and one != other:
+            pairs.append((one, other))
+    return pairs

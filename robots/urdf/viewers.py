@@ -1,0 +1,139 @@
+"""URDFs of a mesh's robots as one, for viewers: links named as the frames are, meshes by address.
+
+Plain text work: whoever shows robots needs no kinematics.
+"""
+
+import math
+import xml.etree.ElementTree as Xml
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+MeshUri = Callable[[str], str | None]
+
+# What the frames of several sites hang in.
+WORLD = "robomesh"
+
+
+@dataclass(frozen=True)
+class Fixture:
+    """What stands in a robot's cell.
+
+    Attributes:
+        pose: Fixture to site, 16, by rows.
+        uri: Where its mesh is; None: it has none.
+    """
+
+    name: str
+    pose: Sequence[float]
+    uri: str | None
+
+
+@dataclass(frozen=True)
+class Viewed:
+    """A robot to be shown.
+
+    Attributes:
+        urdf: As its description tells it, links without a prefix.
+        base_to_site: 16, by rows.
+        mesh_uri: Where a link's mesh is, by the link's name; None: it has none.
+        fixtures: Of its cell; the other robots of it have the same.
+    """
+
+    site: str
+    robot: str
+    urdf: str
+    base_to_site: Sequence[float]
+    mesh_uri: MeshUri
+    fixtures: tuple[Fixture, ...] = ()
+
+
+def prefixed(urdf: str, prefix: str, mesh_uri: MeshUri, *, joints: bool = False) -> Xml.Element:
+    """A URDF whose links are named as the frames are, each with its mesh and nothing else to be seen.
+
+    Args:
+        prefix: Of its links: `<site>/<robot>/`.
+        joints: Its joints get the prefix too.
+
+    Raises:
+        ValueError: If it is not XML.
+    """
+    try:
+        root = Xml.fromstring(urdf)
+    except Xml.ParseError as error:
+        raise ValueError(f"no URDF: {error}") from None
+    for link in root.iter("link"):
+        name = link.get("name", "")
+        link.set("name", prefix + name)
+        for shape in (*link.findall("visual"), *link.findall("collision")):
+            link.remove(shape)
+        _show(link, mesh_uri(name))
+    for end in (*root.iter("parent"), *root.iter("child")):
+        end.set("link", prefix + end.get("link", ""))
+    if joints:
+        for joint in root.findall("joint"):
+            joint.set("name", prefix + joint.get("name", ""))
+            for mimic in joint.findall("mimic"):
+                mimic.set("joint", prefix + mimic.get("joint", ""))
+    return root
+
+
+def together(robots: Iterable[Viewed], *, plain_joints: bool) -> str:
+    """The robots as one URDF, each where it stands in its site; what is no URDF is left out.
+
+    The root is the site's frame; with several sites, which lie to each other nobody knows how, `WORLD`.
+
+    Args:
+        plain_joints: Joints keep their own names: only where there is one robot.
+    """
+    whole = Xml.Element("robot", name=WORLD)
+    known = list(robots)
+    sites = sorted({robot.site for robot in known})
+    if len(sites) > 1:
+        Xml.SubElement(whole, "link", name=WORLD)
+    for site in sites:
+        Xml.SubElement(whole, "link", name=site)
+        if len(sites) > 1:
+            _fixed(whole, WORLD, site)
+    fixtures = {(robot.site, each.name): each for robot in known for each in robot.fixtures}
+    for (site, name), fixture in sorted(fixtures.items(), key=lambda each: each[0]):
+        _show(Xml.SubElement(whole, "link", name=f"{site}/{name}"), fixture.uri)
+        _fixed(whole, site, f"{site}/{name}", fixture.pose)
+    for robot in known:
+        prefix = f"{robot.site}/{robot.robot}/"
+        try:
+            root = prefixed(robot.urdf, prefix, robot.mesh_uri, joints=not plain_joints)
+        except ValueError:
+            continue
+        children = {end.get("link") for end in root.iter("child")}
+        whole.extend(element for element in root if element.tag in ("link", "joint"))
+        for link in root.findall("link"):
+            if link.get("name") not in children:
+                _fixed(whole, robot.site, link.get("name", ""), robot.base_to_site)
+    return Xml.tostring(whole, encoding="unicode")
+
+
+def _show(link: Xml.Element, uri: str | None) -> None:
+    if uri:
+        geometry = Xml.SubElement(Xml.SubElement(link, "visual"), "geometry")
+        Xml.SubElement(geometry, "mesh", filename=uri)
+
+
+def _fixed(whole: Xml.Element, parent: str, child: str, pose: Sequence[float] = ()) -> None:
+    joint = Xml.SubElement(whole, "joint", name=f"{child}_in_{parent}", type="fixed")
+    if len(pose) == 16:
+        x, y, z = pose[3], pose[7], pose[11]
+        roll, pitch, yaw = _rpy(pose)
+        Xml.SubElement(
+            joint, "origin", xyz=f"{x:.9g} {y:.9g} {z:.9g}", rpy=f"{roll:.9g} {pitch:.9g} {yaw:.9g}"
+        )
+    Xml.SubElement(joint, "parent", link=parent)
+    Xml.SubElement(joint, "child", link=child)
+
+
+def _rpy(pose: Sequence[float]) -> tuple[float, float, float]:
+    """URDF's fixed-axis angles of a placement, 16 by rows [rad]."""
+    across = math.hypot(pose[0], pose[4])
+    pitch = math.atan2(-pose[8], across)
+    if across < 1e-9:  # straight up or down: yaw can take all of the turning
+        return 0.0, pitch, math.atan2(-pose[1], pose[5])
+    return math.atan2(pose[9], pose[10]), pitch, math.atan2(pose[4], pose[0])

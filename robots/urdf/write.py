@@ -1,0 +1,156 @@
+"""Descriptions as URDF.
+
+URDF puts a link's frame on its joint's axis; a D-H link's frame is elsewhere. So each such joint moves
+a bare link "<joint>_axis", and the link proper hangs on that by a fixed joint: every link, the tool
+and the named frames keep the names and the frames that they have everywhere else. A robot that came
+from a URDF keeps its links and joints; those that were fixed together hang on the first of them.
+"""
+
+import xml.etree.ElementTree as Xml
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from robots.joints import joints_of
+from robots.poses import FloatArray, inverse, rotation_rpy
+from robots.schema import JointType, RobotDescription
+from robots.tree import BASE, Tree, TreeJoint, TreeLink, named_frames, tree_of
+
+
+def glb_beside(link: str) -> str:
+    """The mesh of a link, as a file in the folder meshes beside the URDF."""
+    return f"meshes/{link}.glb"
+
+
+def to_urdf(description: RobotDescription, *, mesh_uri: Callable[[str], str] = glb_beside) -> str:
+    """The description as URDF text, with the meshes that `robots.glb.link_meshes` gives.
+
+    Limits and speeds are the description's, which may be tighter than those of the URDF that it is of.
+
+    Args:
+        mesh_uri: Address of a link's GLB by the link's name.
+    """
+    tree = tree_of(description)
+    joints = joints_of(description)
+    for number, lower, upper, speed in zip(
+        tree.free, joints.lower, joints.upper, joints.max_speed, strict=True
+    ):
+        tree = _with_limits(tree, number, float(lower), float(upper), float(speed))
+    return tree_urdf(description.name, tree, named_frames(description), mesh_uri=mesh_uri)
+
+
+def tree_urdf(
+    name: str,
+    tree: Tree,
+    frames: Mapping[str, tuple[str, FloatArray]] | None = None,
+    *,
+    mesh_uri: Callable[[str], str] = glb_beside,
+) -> str:
+    """A tree of joints and links as URDF text.
+
+    Args:
+        frames: Bare frames by name: the link that carries each, and where it is there (4, 4) [m].
+        mesh_uri: Address of the GLB of a link that has a shape, by the link's name.
+    """
+    robot = Xml.Element("robot", name=name)
+    robot.append(
+        Xml.Comment(" Efforts are not known: 0. Meshes are in metres, z upwards, in their link's frame. ")
+    )
+    # What is there already keeps its name; links and joints that are made for URDF get others.
+    links = {link.name for link in tree.links}
+    bare = {frame: place for frame, place in (frames or {}).items() if frame not in links}
+    taken = {*links, *bare}
+    taken_joints = {joint.name for joint in tree.joints}
+    carriers: dict[int, tuple[str, FloatArray]] = {}
+    for number in (BASE, *range(len(tree.joints))):
+        joint = None if number == BASE else tree.joints[number]
+        here = [link for link in tree.links if link.joint == number]
+        # The element that the joint moves: the first link, where it stands in the joint's own frame.
+        first = here[0].name if here and (here[0].link_to_joint == np.eye(4)).all() else None
+        carrier = first or _unused(f"{joint.name if joint else 'base'}_axis", taken)
+        if first is None:
+            Xml.SubElement(robot, "link", name=carrier)
+        if joint is not None:
+            _add_joint(robot, tree, joint, carriers[joint.parent], carrier)
+        for link in here:
+            _add_link(robot, link, mesh_uri)
+            if link.name != carrier:
+                on, on_to_joint = carriers.get(number, (carrier, np.eye(4)))
+                _add_fixed(robot, on, link.name, inverse(on_to_joint) @ link.link_to_joint, taken_joints)
+            carriers.setdefault(number, (link.name, link.link_to_joint))
+        carriers.setdefault(number, (carrier, np.eye(4)))
+    for frame, (on_link, frame_to_link) in bare.items():
+        Xml.SubElement(robot, "link", name=frame)
+        _add_fixed(robot, on_link, frame, frame_to_link, taken_joints)
+    Xml.indent(robot)
+    return '<?xml version="1.0"?>\n' + Xml.tostring(robot, encoding="unicode") + "\n"
+
+
+def _with_limits(tree: Tree, number: int, lower: float, upper: float, max_speed: float) -> Tree:
+    joints = list(tree.joints)
+    old = joints[number]
+    kept = old.continuous and (lower, upper) == (old.lower, old.upper)
+    joints[number] = replace(old, lower=lower, upper=upper, max_speed=max_speed, continuous=kept)
+    return replace(tree, joints=tuple(joints))
+
+
+def _unused(name: str, taken: set[str]) -> str:
+    while name in taken:
+        name += "_"
+    taken.add(name)
+    return name
+
+
+def _add_link(robot: Xml.Element, link: TreeLink, mesh_uri: Callable[[str], str]) -> None:
+    element = Xml.SubElement(robot, "link", name=link.name)
+    if link.shapes:
+        for use in ("visual", "collision"):
+            geometry = Xml.SubElement(Xml.SubElement(element, use), "geometry")
+            Xml.SubElement(geometry, "mesh", filename=mesh_uri(link.name))
+
+
+def _add_joint(
+    robot: Xml.Element, tree: Tree, joint: TreeJoint, parent: tuple[str, FloatArray], child: str
+) -> None:
+    rotary = joint.type is JointType.ROTARY
+    kind = "continuous" if joint.continuous else "revolute" if rotary else "prismatic"
+    element = Xml.SubElement(robot, "joint", name=joint.name, type=kind)
+    parent_link, parent_link_to_joint = parent
+    _add_origin(element, inverse(parent_link_to_joint) @ joint.joint_to_parent)
+    Xml.SubElement(element, "parent", link=parent_link)
+    Xml.SubElement(element, "child", link=child)
+    Xml.SubElement(element, "axis", xyz=" ".join(map(_exact, joint.axis)))
+    limits = {} if joint.continuous else {"lower": _exact(joint.lower), "upper": _exact(joint.upper)}
+    Xml.SubElement(element, "limit", limits, velocity=_exact(joint.max_speed), effort="0")
+    if joint.mimic is not None:
+        Xml.SubElement(
+            element,
+            "mimic",
+            joint=tree.joints[joint.mimic.leader].name,
+            multiplier=_exact(joint.mimic.multiplier),
+            offset=_exact(joint.mimic.offset),
+        )
+
+
+def _add_fixed(
+    robot: Xml.Element, parent: str, child: str, child_to_parent: FloatArray, taken: set[str]
+) -> None:
+    joint = Xml.SubElement(robot, "joint", name=_unused(f"{child}_fixed", taken), type="fixed")
+    _add_origin(joint, child_to_parent)
+    Xml.SubElement(joint, "parent", link=parent)
+    Xml.SubElement(joint, "child", link=child)
+
+
+def _add_origin(element: Xml.Element, placement: FloatArray) -> None:
+    Xml.SubElement(
+        element,
+        "origin",
+        xyz=" ".join(_exact(value) for value in placement[:3, 3]),
+        rpy=" ".join(_exact(value) for value in rotation_rpy(placement[:3, :3])),
+    )
+
+
+def _exact(value: float) -> str:
+    """All of a double's digits, so that nothing is lost on the way back."""
+    return f"{float(value):.17g}"

@@ -1,0 +1,29 @@
+"""What the watches of all sites hold, and which sites they say are gone."""
+
+from collections.abc import Iterable
+
+from bus.keys import ROOT, WHOLE_SITE
+from bus.last_values import last_values
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import Session
+
+_GONE = "site.gone"
+
+
+async def lists(session: Session) -> list[schema.AlarmList]:
+    """Every site's alarms, sorted by site."""
+    found = await last_values(session, f"{ROOT}/*/{WHOLE_SITE}/alarms")
+    return [each for each in found.values() if isinstance(each, schema.AlarmList)]
+
+
+def gone_sites(found: Iterable[schema.AlarmList]) -> dict[str, schema.Alarm]:
+    """The sites that are gone, each with the alarm that says so for the longest time."""
+    gone: dict[str, schema.Alarm] = {}
+    for each in found:
+        for alarm in each.alarms:
+            if alarm.code != _GONE or alarm.state == schema.Alarm.RETURNED:
+                continue
+            name = alarm.values["site"]
+            if name not in gone or alarm.since.ToNanoseconds() < gone[name].since.ToNanoseconds():
+                gone[name] = alarm
+    return gone

@@ -1,0 +1,163 @@
+"""`robomesh list` for people: a table of robots, a table of services, a line a site."""
+
+from collections.abc import Iterable
+from datetime import datetime
+from typing import TYPE_CHECKING, Any
+
+from bus.keys import WHOLE_SITE
+
+if TYPE_CHECKING:
+    from rich.console import Group
+    from rich.table import Table
+
+# The longest word of a column.
+_LEAST = {"mode": len("automatic"), "in control": len("control")}
+# Below this a terminal has no room for all that there is.
+_WIDE = 96
+_CLOCK_OFF_S = 0.5
+
+
+def picture(found: dict[str, Any], width: int) -> "Group":
+    """Everything that was found.
+
+    Args:
+        found: As `--json` prints it.
+        width: Of the terminal, in characters.
+    """
+    from rich.console import Group
+    from rich.text import Text
+
+    parts: list[Any] = [_robots(found, width)] if any(not row["replay"] for row in found["robots"]) else []
+    parts += [
+        Text(f" {row['site']}/{row['robot']}   replay {_replay(row['replay'])}", style="magenta")
+        for row in found["robots"]
+        if row["replay"] is not None
+    ]
+    parts.append(_services(found["services"], width))
+    parts += [Text(f" {_site(row)}", style=_alarm_style(row)) for row in found["sites"]]
+    return Group(*parts)
+
+
+def _robots(found: dict[str, Any], width: int) -> "Table":
+    table = _table(("robot", "link", "mode", "state", "age", "in control"), width)
+    for row in found["robots"]:
+        if row["replay"] is not None:
+            continue
+        age = "-" if row["age_s"] is None else f"{row['age_s']:.1f} s"
+        link = row["link"] + (f", {row['rate_hz']:.0f} Hz" if row["rate_hz"] else "")
+        holder = row["holder"] or "nobody"
+        name = f"{row['site']}/{row['robot']}"
+        table.add_row(name, link, row["mode"], _state(row), age, holder, style=_robot_style(row))
+    return table
+
+
+def _services(services: Iterable[dict[str, Any]], width: int) -> "Table":
+    """A row a process; one of many robots is one."""
+    rows: dict[str, dict[str, Any]] = {}
+    robots: dict[str, list[str]] = {}
+    for each in services:
+        rows.setdefault(each["id"], each)
+        robots.setdefault(each["id"], []).append(each["robot"])
+    names = ["service", "of", "at", "version", "age", "round trip", "clock", "CPU", "memory", "lost"]
+    if width < _WIDE:
+        names = ["service", "of", "age", "round trip", "clock", "lost"]
+    table = _table(names, width, right=("age", "round trip", "clock", "CPU", "memory", "lost"))
+    for identity, row in sorted(
+        rows.items(), key=lambda each: (each[1]["site"], each[1]["service"], each[0])
+    ):
+        cells = {
+            "service": row["service"],
+            "of": _of(row["site"], robots[identity]),
+            "at": row["host"] or "-",
+            "version": row["version"] or "-",
+            "age": _number(row["age_s"], "{:.1f} s"),
+            "round trip": _number(row["round_trip_s"], "{:.1f} ms", 1000),
+            "clock": _clock(row),
+            "CPU": _number(row["cpu"], "{:.0f} %", 100),
+            "memory": _number(row["memory_bytes"], "{:.0f} MB", 1e-6),
+            "lost": "-" if row["lost"] is None else f"{row['lost']}",
+        }
+        off = abs(row["clock_offset_s"] or 0.0) - (row["round_trip_s"] or 0.0) / 2 > _CLOCK_OFF_S
+        table.add_row(*(cells[name] for name in names), style="yellow" if off else None)
+    return table
+
+
+def _table(names: Iterable[str], width: int, *, right: tuple[str, ...] = ("age",)) -> "Table":
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for name in names:
+        # What has no room goes on in the next line, whole.
+        table.add_column(
+            name,
+            no_wrap=name in ("robot", "service") and width >= _WIDE,
+            overflow="fold",
+            min_width=_LEAST.get(name),
+            justify="right" if name in right else "left",
+        )
+    return table
+
+
+def _of(site: str, robots: list[str]) -> str:
+    names = sorted(set(robots) - {WHOLE_SITE})
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return f"{site}/{', '.join(names[:3])}{more}" if names else site
+
+
+def _number(value: float | None, form: str, factor: float = 1.0) -> str:
+    return "-" if value is None else form.format(value * factor)
+
+
+def _clock(row: dict[str, Any]) -> str:
+    """How far ahead its clock is, and how sure that is."""
+    if row["clock_offset_s"] is None:
+        return "-"
+    offset_ms, about_ms = 1000 * row["clock_offset_s"], 500 * row["round_trip_s"]
+    if abs(offset_ms) <= about_ms:
+        return f"same ±{about_ms:.1f} ms"
+    return f"{offset_ms:+.0f} ±{about_ms:.0f} ms" if abs(offset_ms) < 1e4 else f"{offset_ms / 1000:+.1f} s"
+
+
+def _site(row: dict[str, Any]) -> str:
+    if row["gone_since"] is not None:
+        return f"{row['site']} — gone since {since(row['gone_since'])}"
+    words = "no watch: nobody holds alarms"
+    if row["alarms"] is not None:
+        counts = [f"{count} {state}" for state, count in sorted(row["alarms"].items())]
+        words = f"alarms: {', '.join(counts)}" if counts else "no alarms"
+        urgent = row["most_urgent"]
+        words += f" ({urgent['id']}: {urgent['text']})" if urgent is not None else ""
+    watched = f", watched by {row['monitors']}" if row["monitors"] else ""
+    return f"{row['site']}   {words}{watched}"
+
+
+def since(at_s: float) -> str:
+    """A time of today as a clock shows it, else with its date."""
+    at = datetime.fromtimestamp(at_s).astimezone()
+    today = at.date() == datetime.now().astimezone().date()
+    return f"{at:%H:%M:%S}" if today else f"{at:%Y-%m-%d %H:%M}"
+
+
+def _alarm_style(row: dict[str, Any]) -> str:
+    wrong = row["gone_since"] is not None or (row["alarms"] or {}).get("unacknowledged")
+    return "bold red" if wrong else ""
+
+
+def _robot_style(row: dict[str, Any]) -> str | None:
+    return None if row["link"] == "up" else "yellow"
+
+
+def _replay(row: dict[str, Any]) -> str:
+    how = f"{row['speed']:g} x" if row["playing"] else "paused"
+    return f"of {row['of']}, {row['position_s']:.0f} of {row['duration_s']:.0f} s, {how}"
+
+
+def _state(row: dict[str, Any]) -> str:
+    """What the robot does, and what keeps it from doing it."""
+    words = [row["activity"]]
+    if row["stop_id"] is not None:
+        words.append(f"stop {row['stop_id']} latched")
+    if row["read_only"]:
+        words.append("read-only")
+    return ", ".join(words)

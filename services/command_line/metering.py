@@ -1,0 +1,55 @@
+"""`robomesh up --metrics`: every process of a site serves Prometheus, on ports one after the other."""
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
+from functools import partial
+
+from services.errors import ListenError
+from services.supervisor import Following, Program
+
+_MOST = 65535
+
+
+def with_metrics(programs: Sequence[Program], listen: tuple[str, int] | None) -> tuple[Program, ...]:
+    """The same programs; the first that is a service serves at the port, the next at the next.
+
+    A simulated controller has none. The log says which service has which address.
+
+    Args:
+        listen: Host and first port; port 0: each takes a free one. None: nobody serves.
+
+    Raises:
+        ListenError: If there are not so many ports.
+    """
+    if listen is None:
+        return tuple(programs)
+    host, first = listen
+    services = [program for program in programs if program.arguments[0] != "simulate"]
+    if first and first + len(services) - 1 > _MOST:
+        raise ListenError(
+            f"--metrics {host}:{first}: {len(services)} services take a port each from there: "
+            f"at most {_MOST - len(services) + 1} is right"
+        )
+    shown = f"[{host}]" if ":" in host else host
+    at = {each.name: f"{shown}:{first + number if first else 0}" for number, each in enumerate(services)}
+    return tuple(
+        replace(program, arguments=(*program.arguments, "--metrics", at[program.name]))
+        if program.name in at
+        else program
+        for program in programs
+    )
+
+
+def following_with_metrics(following: Following, listen: tuple[str, int] | None) -> Following:
+    """What comes while the site runs serves at free ports: nobody knows beforehand how many come."""
+    if listen is None:
+        return following
+    free = (listen[0], 0)
+
+    def started(make: Callable[[], Sequence[Program]]) -> tuple[Program, ...]:
+        return with_metrics(make(), free)
+
+    def wanted() -> dict[Hashable, Callable[[], Sequence[Program]]]:
+        return {key: partial(started, make) for key, make in following().items()}
+
+    return wanted

@@ -1,0 +1,167 @@
+"""What `robomesh monitor` says beside the joints: how near things are, what is checked, what runs."""
+
+from collections.abc import Iterable
+from datetime import datetime
+from typing import Any
+
+from bus.keys import WHOLE_SITE
+from bus.schemas import robomesh_pb2 as schema
+
+_State = schema.ControllerState
+_Program = schema.ProgramState
+_Alarm = schema.Alarm
+_MOST_ALARMS = 4
+
+_CHECKS = {
+    _State.OFF: "not checked",
+    _State.WARN: "checked, warned of",
+    _State.REQUIRE: "checked, refused unless free",
+}
+_STYLES = ("", "bold yellow", "bold red")
+
+# A text, and its style.
+Words = tuple[str, str]
+OLD = "dim strike"
+
+
+def is_replay(robot: str) -> bool:
+    """Whether a robot is a recording being played: no site may call one of its own so."""
+    return robot.startswith("replay-")
+
+
+def replay_words(state: schema.ReplayState | None) -> str:
+    """What is played, and where in it we are; None: its player has not told yet."""
+    if state is None:
+        return "REPLAY"
+    how = f"{state.speed:g} x" if state.playing else "paused"
+    return (
+        f"REPLAY of {state.of_site}/{state.of_robot}   recorded {_recorded(state):%Y-%m-%d %H:%M:%S}, "
+        f"{state.position_s:.0f} of {state.duration_s:.0f} s, {how}"
+    )
+
+
+def replay_record(state: schema.ReplayState | None) -> dict[str, Any]:
+    """What is played, and where in it we are, for programs; empty: its player has not told yet."""
+    if state is None:
+        return {}
+    return {
+        "of": f"{state.of_site}/{state.of_robot}",
+        "file": state.file,
+        "recorded": _recorded(state).isoformat(timespec="milliseconds"),
+        "position_s": state.position_s,
+        "duration_s": state.duration_s,
+        "speed": state.speed,
+        "playing": state.playing,
+    }
+
+
+def _recorded(state: schema.ReplayState) -> datetime:
+    """When what is shown now was so, local time."""
+    return datetime.fromtimestamp(state.start.ToNanoseconds() * 1e-9 + state.position_s).astimezone()
+
+
+def near_words(
+    state: schema.KinematicState, description: schema.Description | None, robot: str
+) -> list[Words]:
+    """How near an arm is to things, each with its style.
+
+    Args:
+        robot: `<site>/<robot>`.
+    """
+    words = []
+    if state.HasField("clearance"):
+        distance = state.clearance.distance
+        warning, stop = (
+            (0.0, 0.0) if description is None else (description.warning_distance, description.stop_distance)
+        )
+        level = 2 if distance <= 0 or distance < stop else 1 if distance < warning else 0
+        words.append((f"clearance {_distance(state.clearance, robot)}", _STYLES[level]))
+    if state.HasField("own_clearance"):
+        touching = state.own_clearance.distance <= 0
+        words.append((f"own links {_distance(state.own_clearance, robot)}", _STYLES[2 * touching]))
+    if state.HasField("singularity_margin"):
+        words.append((f"singularity margin {state.singularity_margin:.3f}", ""))
+    if state.not_counted:
+        words.append((f"not counted, nobody knows where: {', '.join(state.not_counted)}", _STYLES[1]))
+    return words
+
+
+def alarm_words(alarms: Iterable[schema.Alarm], robot: str) -> list[Words]:
+    """The most urgent alarms of a robot and of its whole site that nobody put aside, a line each."""
+    own = [each for each in alarms if each.robot in (robot, WHOLE_SITE) and each.state != _Alarm.SHELVED]
+    words = []
+    for alarm in own[:_MOST_ALARMS]:
+        level = 2 if alarm.priority >= _Alarm.HIGH else 1
+        quiet = alarm.state != _Alarm.UNACKNOWLEDGED
+        state = f", {_Alarm.State.Name(alarm.state).lower()}" if quiet else ""
+        priority = _Alarm.Priority.Name(alarm.priority)
+        words.append((f"ALARM {priority}{state}: {alarm.text}", "" if quiet else _STYLES[level]))
+    if len(own) > _MOST_ALARMS:
+        words.append((f"and {len(own) - _MOST_ALARMS} more alarms: robomesh alarms list", ""))
+    return words
+
+
+def check_words(state: schema.ControllerState) -> Words | None:
+    """Whether motions are checked before they are made; None: the gateway does not say."""
+    if state.check not in _CHECKS:
+        return None
+    if state.check_text:
+        refused = "refused" if state.check == _State.REQUIRE else "not checked"
+        return f"motions: {refused} now: {state.check_text}", _STYLES[1]
+    return f"motions: {_CHECKS[state.check]}", ""
+
+
+def program_words(state: schema.ProgramState, *, stale: bool = False) -> Words | None:
+    """The program that runs, or ran last; None: none was run."""
+    where = f"line {state.line}: {state.statement}"
+    match state.outcome:
+        case _Program.RUNNING:
+            gone_s = (state.timestamp.ToNanoseconds() - state.since.ToNanoseconds()) * 1e-9
+            of = f" of {clock(state.duration_s)}" if state.duration_s > 0 else ""
+            return (
+                f"program {state.name}: step {state.step} of {state.steps}, {where}; "
+                f"by {state.operator}, {clock(gone_s)}{of}"
+            ), OLD if stale else "bold"
+        case _Program.DONE:
+            return f"program {state.name}: done, by {state.operator}", ""
+        case _Program.ENDED:
+            return f"program {state.name}, by {state.operator}: ended at {where}: {state.text}", _STYLES[1]
+    return None
+
+
+def clearance_record(state: schema.KinematicState | None, robot: str) -> dict[str, Any] | None:
+    """What is nearest to an arm, for programs; None: nobody knows, or nothing stands around.
+
+    Args:
+        robot: `<site>/<robot>`.
+    """
+    if state is None or not state.HasField("clearance"):
+        return None
+    near = state.clearance
+    site = robot.partition("/")[0]
+    pair = [frame.removeprefix(f"{site}/") for frame in (near.first, near.second)]
+    return {"distance_m": near.distance, "pair": pair}
+
+
+def program_record(state: schema.ProgramState | None) -> dict[str, Any] | None:
+    """The program that runs, or ran last, for programs; None: none was run, or nobody says so."""
+    if state is None or state.outcome == _Program.OUTCOME_UNSPECIFIED:
+        return None
+    outcome = _Program.Outcome.Name(state.outcome).lower()
+    told = {name: getattr(state, name) for name in ("name", "operator", "line", "step", "steps", "text")}
+    return {"outcome": outcome, **told}
+
+
+def _distance(clearance: schema.Clearance, robot: str) -> str:
+    site = robot.partition("/")[0]
+    first, second = (
+        frame.removeprefix(f"{robot}/").removeprefix(f"{site}/").replace("/", " ")
+        for frame in (clearance.first, clearance.second)
+    )
+    far = "touching" if clearance.distance <= 0 else f"{1000 * clearance.distance:.1f} mm"
+    return f"{far} ({first} - {second})"
+
+
+def clock(seconds: float) -> str:
+    """A duration as a clock shows it: 00:12."""
+    return f"{int(seconds) // 60:02d}:{int(seconds) % 60:02d}"

@@ -1,0 +1,1 @@
+"""`robomesh record` and `robomesh recordings`: what is recorded, played back, exported."""

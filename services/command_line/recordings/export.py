@@ -1,0 +1,82 @@
+"""`robomesh recordings export`: a recording as a table, video or plots, by the name's ending."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from mcap_files.reading import RecordingFile
+from services.command_line import find
+from services.command_line.recordings.errors import ExportError
+from services.command_line.recordings.fetch import here
+from services.command_line.recordings.output import whole_file
+from services.command_line.recordings.span import Span, span_of
+
+_PLOTS = (".png", ".pdf", ".svg")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted:
+    """What is to be made of a recording.
+
+    Attributes:
+        begin_s: From the recording's start.
+        end_s: None: to its end.
+        view: Rendered afresh.
+        size: Of the video [px].
+        samples: Of anti-aliasing.
+        recorded: Whose recorded video is taken as it is; empty: rendered afresh.
+    """
+
+    begin_s: float = 0.0
+    end_s: float | None = None
+    view: str = "free"
+    size: tuple[int, int] = (1280, 720)
+    fps: float = 30.0
+    samples: int = 4
+    recorded: str = ""
+
+
+def run(source: str, out: Path, wanted: Wanted, router: str, as_json: bool) -> None:
+    """Export a file of this machine, or a recording of a site.
+
+    Raises:
+        ExportError: If it cannot be.
+        RecordingError: If the recording cannot be read.
+    """
+    kind = out.suffix.lower()
+    if kind not in (".csv", ".mp4", *_PLOTS):
+        raise ExportError(
+            f"{out}: a name ends in .csv (joints and tool), .mp4 (video), {', '.join(_PLOTS)} (plots)"
+        )
+    with here(source, router) as path, RecordingFile(path) as file:
+        span = span_of(file, wanted.begin_s, wanted.end_s)
+        with whole_file(out) as partial:
+            words, values = _write(file, span, partial, kind, wanted)
+    if as_json:
+        find.print_json({"file": str(out), "bytes": out.stat().st_size, **values})
+    else:
+        print(f"{out}: {words}, {out.stat().st_size / 1e6:.2f} MB")
+
+
+def _write(
+    file: RecordingFile, span: Span, target: Path, kind: str, wanted: Wanted
+) -> tuple[str, dict[str, float]]:
+    if kind == ".csv":
+        from services.command_line.recordings.tables import write_table
+
+        rows = write_table(file, span, target)
+        return f"{rows} states", {"rows": rows}
+    if kind in _PLOTS:
+        from services.command_line.recordings.plots import write_plots
+
+        panels = write_plots(file, span, target)
+        return f"{panels} plots", {"plots": panels}
+    if wanted.recorded:
+        from services.command_line.recordings.recorded_video import write_recorded
+
+        pictures, duration_s = write_recorded(file, span, target, wanted.recorded)
+    else:
+        from services.command_line.recordings.rendered_video import Rendering, write_rendered
+
+        rendering = Rendering(view=wanted.view, size=wanted.size, fps=wanted.fps, samples=wanted.samples)
+        pictures, duration_s = write_rendered(file, span, target, rendering)
+    return f"{pictures} pictures, {duration_s:.1f} s", {"pictures": pictures, "duration_s": duration_s}

@@ -1,0 +1,99 @@
+"""`robomesh recordings fetch`: a recording from its site's recorder, over the mesh, with resume."""
+
+import contextlib
+import hashlib
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from bus.errors import NoAnswerError
+from bus.keys import WHOLE_SITE, robot_key
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import Session
+from services.command_line import find
+from services.command_line.recordings.errors import ExportError
+from services.command_line.recordings.listing import attached_for, found
+from services.command_line.recordings.output import progress
+
+_PIECE = 1 << 20
+_TIMEOUT_S, _TRIES = 10.0, 2
+
+
+def run(what: str, out: Path, router: str, as_json: bool) -> None:
+    """Fetch `[SITE/]NAME` or `[SITE/]FILE`; what was broken off goes on, if it is still the same.
+
+    Raises:
+        ExportError: If there is none, it cannot be written, or changes meanwhile.
+    """
+    done = _run(what, out, router)
+    if as_json:
+        find.print_json({"file": str(done.file), "bytes": done.total, "resumed_at": done.begun})
+    else:
+        begun = f", from byte {done.begun} on" if done.begun else ""
+        print(f"{done.file}: {done.total / 1e6:.2f} MB{begun}")
+
+
+@contextlib.contextmanager
+def here(what: str, router: str) -> Iterator[Path]:
+    """A file of this machine, or a site's recording, fetched for as long as the block lasts.
+
+    Raises:
+        ExportError: If there is none.
+    """
+    if Path(what).is_file():
+        yield Path(what)
+        return
+    with tempfile.TemporaryDirectory(prefix="robomesh-") as folder:
+        yield _run(what, Path(folder), router).file
+
+
+class _Fetched(NamedTuple):
+    file: Path
+    begun: int
+    total: int
+
+
+def _run(what: str, out: Path, router: str) -> _Fetched:
+    try:
+        return find.run(_fetch(what, out, router, into=out.is_dir()))
+    except OSError as error:
+        raise ExportError(f"{out}: cannot be written: {error.strerror or error}") from None
+
+
+async def _fetch(what: str, out: Path, router: str, *, into: bool) -> _Fetched:
+    async with attached_for(what, router) as session:
+        site, recording = await found(session, what)
+        name = recording.file
+        out = out / name if into else out
+        key = robot_key(site, WHOLE_SITE, "recordings/piece")
+        first = await _piece(session, key, schema.PieceRequest(file=name, length=1))
+        # Its version in the name: what belongs to another is never gone on with.
+        version = hashlib.sha256(first.version.encode()).hexdigest()[:12]
+        partial = out.with_name(f".{out.name}.{version}.part")
+        begun = partial.stat().st_size if partial.exists() else 0
+        with partial.open("ab") as stream, progress(name) as tell:
+            at = begun
+            while at < first.total:
+                length = min(_PIECE, first.total - at)
+                piece = await _piece(session, key, schema.PieceRequest(file=name, offset=at, length=length))
+                if piece.version != first.version or not piece.data:
+                    raise ExportError(f"{name} was written again meanwhile: fetch it once more")
+                stream.write(piece.data)
+                at += len(piece.data)
+                tell(at / first.total)
+        partial.replace(out)
+        return _Fetched(out, begun, first.total)
+
+
+async def _piece(session: Session, key: str, asked: schema.PieceRequest) -> schema.Piece:
+    for _ in range(_TRIES):
+        with contextlib.suppress(NoAnswerError):
+            return await _once(session, key, asked)
+    return await _once(session, key, asked)
+
+
+async def _once(session: Session, key: str, asked: schema.PieceRequest) -> schema.Piece:
+    piece = await session.ask(key, asked, timeout_s=_TIMEOUT_S)
+    assert isinstance(piece, schema.Piece)
+    return piece

@@ -1,0 +1,213 @@
+"""`robomesh recordings list` and `info`: what is recorded, and what a file holds."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from datetime import datetime
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from bus.errors import SessionError
+from bus.keys import WHOLE_SITE, robot_key
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import Session
+from services.command_line import find
+from services.command_line.recordings.errors import ExportError
+
+
+def list_all(router: str, as_json: bool) -> None:
+    """Print every recording of every site."""
+
+    async def main() -> list[Listed]:
+        async with find.attached(router) as session:
+            return await listed(session)
+
+    recordings = find.run(main())
+    for site, recording in recordings:
+        # Where it is, also of a file that says nothing of itself.
+        recording.site = recording.site or site
+        if as_json:
+            show(recording, as_json)
+    if not as_json:
+        _print_table([recording for _, recording in recordings])
+
+
+def _print_table(recordings: list[schema.Recording]) -> None:
+    if not recordings:
+        print("nothing is recorded")
+        return
+    rows = [("recorded", "length", "size", "robot", "name", "")]
+    for each in recordings:
+        rows.append(
+            (
+                f"{_start(each):%Y-%m-%d %H:%M:%S}" if each.HasField("start") else "-",
+                f"{each.duration.ToNanoseconds() * 1e-9:.1f} s",
+                f"{each.bytes / 1e6:.1f} MB",
+                f"{each.site}/{each.robot}",
+                (each.name or each.file) + (f" part {each.part}" if each.part else ""),
+                _state(each),
+            )
+        )
+    whole, length, size, robot, name, _ = (max(map(len, column)) for column in zip(*rows, strict=True))
+    for row in rows:
+        columns = (
+            row[0].ljust(whole),
+            row[1].rjust(length),
+            row[2].rjust(size),
+            row[3].ljust(robot),
+            row[4].ljust(name),
+            row[5],
+        )
+        print("  ".join(columns).rstrip())
+    print("robomesh recordings info NAME tells what is in one")
+
+
+class Listed(NamedTuple):
+    """A recording, and the site whose recorder has it."""
+
+    site: str
+    recording: schema.Recording
+
+
+async def listed(session: Session) -> list[Listed]:
+    """The recordings of every site, the newest first."""
+    sites = {key.site for key in await session.present() if key.service == "recorder"}
+    found: list[Listed] = []
+    for site in sorted(sites):
+        answer = await session.ask(robot_key(site, WHOLE_SITE, "recordings/list"), timeout_s=10.0)
+        assert isinstance(answer, schema.RecordingList)
+        found += [Listed(site, recording) for recording in answer.recordings]
+    return sorted(found, key=lambda each: each.recording.start.ToNanoseconds(), reverse=True)
+
+
+async def found(session: Session, what: str, *, closed: bool = False) -> Listed:
+    """The newest recording that `[SITE/]NAME` or `[SITE/]FILE` means.
+
+    Args:
+        closed: None that is being recorded now.
+
+    Raises:
+        ExportError: If there is none.
+    """
+    site, _, name = what.rpartition("/")
+    for each in await listed(session):
+        recording = each.recording
+        means = name in (recording.name, recording.file) and site in ("", each.site)
+        if means and not (closed and recording.open):
+            return each
+    raise ExportError(f"no recording {what!r}, neither a file here nor in robomesh recordings list")
+
+
+@asynccontextmanager
+async def attached_for(what: str, router: str) -> AsyncIterator[Session]:
+    """A session to look for a recording that is no file of this machine.
+
+    Raises:
+        ExportError: If there is no mesh either.
+    """
+    try:
+        async with find.attached(router) as session:
+            yield session
+    except SessionError as error:
+        raise ExportError(f"{what}: no such file here, and no site to ask: {error}") from None
+
+
+def info(what: str, router: str, as_json: bool) -> None:
+    """Print what a file of this machine, or a recording of a site, holds."""
+
+    async def ask() -> schema.Recording:
+        async with attached_for(what, router) as session:
+            site, recording = await found(session, what)
+            key = robot_key(site, WHOLE_SITE, "recordings/info")
+            answer = await session.ask(key, schema.RecordingQuery(file=recording.file), timeout_s=10.0)
+            assert isinstance(answer, schema.Recording)
+            return answer
+
+    show(_described(Path(what)) if Path(what).is_file() else find.run(ask()), as_json)
+
+
+def _described(file: Path) -> schema.Recording:
+    from mcap_files.capture import is_being_written
+    from mcap_files.files import describe_file
+
+    recording = describe_file(file)
+    if recording.problem and is_being_written(file):
+        recording.open, recording.problem = True, ""
+    return recording
+
+
+def show(recording: schema.Recording, as_json: bool) -> None:
+    """Print one recording, a line and what is in it."""
+    values = _values(recording)
+    if as_json:
+        find.print_json(values)
+        return
+    state = _state(recording)
+    part = f" part {recording.part}" if recording.part else ""
+    print(
+        f"{recording.name or recording.file}{part}  {recording.site}/{recording.robot}  "
+        f"{_start(recording):%Y-%m-%d %H:%M:%S}, {values['duration_s']:.1f} s, {recording.bytes / 1e6:.2f} MB"
+        + (f"  ({state})" if state else "")
+    )
+    print(f"    file: {recording.file}")
+    if recording.HasField("audit_head"):
+        print(f"    audit log: entry {values['audit_head']['number']}, {values['audit_head']['hash']}")
+    if recording.cause:
+        print(f"    saved because of: {recording.cause}")
+    if recording.attachments:
+        print(f"    attached: {', '.join(recording.attachments)}")
+    for topic in recording.topics:
+        lost = f", {topic.lost} lost" if topic.lost else ""
+        print(f"    {topic.topic}: {topic.messages}{_rate(topic, values['duration_s'])}{lost}")
+
+
+def _state(recording: schema.Recording) -> str:
+    if recording.open:
+        return "recording now"
+    return recording.problem or ("recovered" if recording.recovered else "")
+
+
+def _rate(topic: schema.Recording.TopicCount, duration_s: float) -> str:
+    """How many pictures a second its video has."""
+    return (
+        f", {topic.messages / duration_s:.1f} pictures/s" if "/video/" in topic.topic and duration_s else ""
+    )
+
+
+def _start(recording: schema.Recording) -> datetime:
+    return datetime.fromtimestamp(recording.start.ToNanoseconds() * 1e-9).astimezone()
+
+
+def summary(recording: schema.Recording) -> str:
+    """One line for who has just recorded it: how long, how much, what is missing, where."""
+    lost = sum(topic.lost for topic in recording.topics)
+    part = f" part {recording.part}" if recording.part else ""
+    return (
+        f"{recording.name}{part}: {recording.duration.ToNanoseconds() * 1e-9:.1f} s, "
+        f"{recording.bytes / 1e6:.2f} MB, {f'{lost} messages lost' if lost else 'nothing lost'}, "
+        f"{recording.site}/{recording.file}"
+    )
+
+
+def _values(recording: schema.Recording) -> dict[str, Any]:
+    return {
+        "name": recording.name,
+        "site": recording.site,
+        "robot": recording.robot,
+        "file": recording.file,
+        "start": _start(recording).isoformat(timespec="milliseconds"),
+        "duration_s": recording.duration.ToNanoseconds() * 1e-9,
+        "bytes": recording.bytes,
+        "open": recording.open,
+        "problem": recording.problem,
+        "cause": recording.cause,
+        "part": recording.part,
+        "recovered": recording.recovered,
+        "attachments": list(recording.attachments),
+        "audit_head": {"number": recording.audit_head.number, "hash": recording.audit_head.hash.hex()}
+        if recording.HasField("audit_head")
+        else None,
+        "topics": [
+            {"topic": topic.topic, "messages": topic.messages, "lost": topic.lost}
+            for topic in recording.topics
+        ],
+    }

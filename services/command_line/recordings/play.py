@@ -1,0 +1,113 @@
+"""`robomesh recordings play`: a replay on the mesh until Ctrl-C."""
+
+import asyncio
+import contextlib
+import secrets
+import signal
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+from bus.errors import BusError
+from bus.keys import WHOLE_SITE, robot_key
+from bus.presence import OPERATOR
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import Session
+from services.command_line import find
+from services.command_line.recordings.errors import ExportError
+from services.command_line.recordings.listing import attached_for, found
+from services.command_line.recordings.output import progress
+
+_OPEN_WITHIN_S = 20.0
+
+
+def run(what: str, asked: schema.PlayRequest, router: str) -> None:
+    """Play a file of this machine, or a recording of a site by its name, and tell how far it is."""
+    find.run(_play(what, Path(what) if Path(what).is_file() else None, asked, router))
+
+
+async def _play(what: str, path: Path | None, asked: schema.PlayRequest, router: str) -> None:
+    async with attached_for(what, router) as session:
+        opened = _of_file(session, path, asked) if path is not None else _of_site(session, what, asked)
+        async with opened as (site, state):
+            print(f"playing {state.file} as {site}/{state.robot}; Ctrl-C ends it", flush=True)
+            print(
+                f"watch it: robomesh monitor {site}/{state.robot}, or the page, #/{site}/{state.robot}",
+                flush=True,
+            )
+            await _until_ended(session, robot_key(site, state.robot, "replay"))
+
+
+@asynccontextmanager
+async def _of_file(
+    session: Session, path: Path, asked: schema.PlayRequest
+) -> AsyncIterator[tuple[str, schema.ReplayState]]:
+    """Played by this process: the file need not be in any recorder's folder."""
+    from services.player.player import open_replay
+
+    site = await _site_for(session, path)
+    # Longer than a player's, so that the two never meet.
+    identity = secrets.token_hex(3)
+    replay = await asyncio.to_thread(open_replay, session, site, path, asked, identity=identity)
+    running = asyncio.create_task(replay.run())
+    try:
+        yield site, replay.describe()
+    finally:
+        replay.close()
+        await running
+
+
+async def _site_for(session: Session, path: Path) -> str:
+    """Its own site where somebody is; else one where somebody can see it."""
+    from mcap_files.files import describe_file
+
+    own = (await asyncio.to_thread(describe_file, path)).site
+    sites = {who.site for who in await session.present()}
+    return own if own in sites or not sites else min(sites)
+
+
+@asynccontextmanager
+async def _of_site(
+    session: Session, what: str, asked: schema.PlayRequest
+) -> AsyncIterator[tuple[str, schema.ReplayState]]:
+    """Played by the site's player, for as long as this process is there."""
+    site, newest = await found(session, what, closed=True)
+    asked.file, asked.session = newest.file, session.identity
+    token = session.declare_presence_of(site, WHOLE_SITE, OPERATOR, session.identity)
+    try:
+        key = robot_key(site, WHOLE_SITE, "player/open")
+        state = await session.ask(key, asked, timeout_s=_OPEN_WITHIN_S)
+        assert isinstance(state, schema.ReplayState)
+        try:
+            yield site, state
+        finally:
+            with contextlib.suppress(BusError):
+                end = schema.ReplayRequest(action=schema.ReplayRequest.CLOSE)
+                await session.ask(robot_key(site, state.robot, "replay/request"), end)
+    finally:
+        token.undeclare()
+
+
+async def _until_ended(session: Session, key: str) -> None:
+    """Until Ctrl-C, or the end of what is not played again and again."""
+    ended = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, ended.set)
+    subscription = session.subscribe(key)
+    with progress("playing") as tell:
+
+        async def follow() -> None:
+            async for sample in subscription:
+                state = sample.message()
+                assert isinstance(state, schema.ReplayState)
+                tell(state.position_s / state.duration_s if state.duration_s else 1.0)
+                if state.text:
+                    raise ExportError(state.text)
+
+        following = asyncio.create_task(follow())
+        waiting = asyncio.create_task(ended.wait())
+        await asyncio.wait([following, waiting], return_when=asyncio.FIRST_COMPLETED)
+        waiting.cancel()
+        subscription.close()
+        await following

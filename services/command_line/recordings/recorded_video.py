@@ -1,0 +1,35 @@
+"""Recorded video as MP4: the packets as they were recorded, without a second encode."""
+
+from pathlib import Path
+
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+
+from mcap_files.reading import RecordingFile
+from mcap_files.video import is_key_frame
+from renderer.mp4 import FragmentedMp4
+from services.command_line.recordings.errors import ExportError
+from services.command_line.recordings.output import progress
+from services.command_line.recordings.span import Span, decoded, needed
+
+
+def write_recorded(file: RecordingFile, span: Span, target: Path, view: str) -> tuple[int, float]:
+    """Write a view's recorded video, from the key frame before the beginning; pictures, and seconds.
+
+    Raises:
+        ExportError: If none is recorded.
+        Mp4Error: If it is no H.264, or changes on the way.
+    """
+    topic = needed(file, f"video/{view}")
+    first = file.newest(topic, span.start_ns, is_key_frame)
+    start_ns = span.start_ns if first is None else first.received_ns
+    mp4 = FragmentedMp4()
+    with target.open("wb") as stream, progress("video") as tell:
+        for message in file.messages([topic], start_ns=start_ns, end_ns=span.end_ns + 1):
+            picture = decoded(CompressedVideo, message.data)
+            if picture is None:
+                continue
+            stream.write(mp4.add(picture.data, message.received_ns))
+            tell(span.share(message.received_ns))
+    if not mp4.pictures:
+        raise ExportError(f"{file.path.name}: no picture of {view!r} in that time")
+    return mp4.pictures, mp4.duration_s

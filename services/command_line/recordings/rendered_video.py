@@ -1,0 +1,170 @@
+"""Video of a recording, rendered afresh from its joints: any view, size and rate."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+
+from bus.schemas import robomesh_pb2 as schema
+from mcap_files.errors import RecordingError
+from mcap_files.reading import RecordedMessage, RecordingFile
+from renderer.cache import cache_folder, stored_glb
+from renderer.composing import Known, composed
+from renderer.encoder import open_encoder
+from renderer.look import look_of, mesh_name, placements_at
+from renderer.mp4 import FragmentedMp4
+from renderer.overlay import write_over
+from renderer.requested import Shot
+from renderer.span import draw_span
+from renderer.state import Ages, RobotState
+from renderer.studio import Studio
+from services.command_line.recordings.errors import ExportError
+from services.command_line.recordings.output import progress
+from services.command_line.recordings.span import Span, decoded, needed, topics_of
+from services.command_line.recordings.tables import description_of
+
+_KEY_FRAME_EACH_S = 2.0
+_LARGEST_PX, _SMALLEST_PX = 4096, 64
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rendering:
+    """How it is drawn.
+
+    Attributes:
+        samples: Of anti-aliasing; 0: none.
+    """
+
+    view: str
+    size: tuple[int, int]
+    fps: float
+    samples: int
+
+
+def write_rendered(file: RecordingFile, span: Span, target: Path, rendering: Rendering) -> tuple[int, float]:
+    """Draw and write it; pictures, and seconds.
+
+    Raises:
+        ExportError: If the recording does not tell what the robot is, or how it looks.
+        RendererError: If there is no such view, or nothing that draws or encodes here.
+    """
+    _check(rendering)
+    state = _robot(file)
+    assert state.look is not None
+    shot = Shot(name=rendering.view, of=rendering.view, size=rendering.size, fps=rendering.fps)
+    studio = Studio(
+        rendering.size, samples=rendering.samples, shading="full", device=None, folder=cache_folder()
+    )
+    mp4, key_each = FragmentedMp4(), max(round(_KEY_FRAME_EACH_S * rendering.fps), 1)
+    try:
+        _take_meshes(file, state.look.description, studio)
+        encoder = open_encoder(rendering.size, rendering.fps)
+        with target.open("wb") as stream, progress("video") as tell:
+            for number, (time_ns, ages) in enumerate(_pictures(file, span, state, rendering.fps)):
+                composition = composed(shot, state.look, Known(state, ages), ())
+                drawn = studio.draw(
+                    composition.scene,
+                    composition.camera,
+                    size=rendering.size,
+                    close_up_of=rendering.view if composition.follow else None,
+                )
+                if composition.span is not None:
+                    draw_span(drawn.picture, drawn.camera, composition.span, labelled=True)
+                write_over(drawn.picture, composition.overlay)
+                packet = encoder.encode(drawn.picture, key_frame=number % key_each == 0)
+                stream.write(mp4.add(packet.data, time_ns, usual_s=1 / rendering.fps))
+                tell(span.share(time_ns))
+    finally:
+        studio.close()
+    return mp4.pictures, mp4.duration_s
+
+
+def _check(rendering: Rendering) -> None:
+    width, height = rendering.size
+    if not all(_SMALLEST_PX <= side <= _LARGEST_PX and side % 2 == 0 for side in (width, height)):
+        raise ExportError(f"--size {width}x{height}: even, and from {_SMALLEST_PX} to {_LARGEST_PX} a side")
+    if not 1.0 <= rendering.fps <= 120.0:
+        raise ExportError(f"--fps {rendering.fps:g}: from 1 to 120 is right")
+    if rendering.samples not in (0, 2, 4, 8):
+        raise ExportError(f"--samples {rendering.samples}: 0, 2, 4 or 8 is right")
+
+
+def _robot(file: RecordingFile) -> RobotState:
+    description = description_of(file)
+    if description is None or not description.urdf:
+        raise ExportError(f"{file.path.name}: it does not tell what the robot is: no description in it")
+    _, site, robot, _ = needed(file, "joints").split("/", 3)
+    # What is drawn was recorded, whatever the time now.
+    description.replay.SetInParent()
+    return RobotState(site, robot, look=look_of(description))
+
+
+def _take_meshes(file: RecordingFile, description: schema.Description, studio: Studio) -> None:
+    bodies: list[schema.Description.Link | schema.Description.Fixture] = [
+        *description.links,
+        *description.fixtures,
+    ]
+    for body in bodies:
+        if not body.mesh:
+            continue
+        try:
+            glb: bytes | None = file.attachment(f"mesh/{body.mesh}")
+        except RecordingError:
+            glb = stored_glb(body.mesh_sha256, cache_folder())
+        if glb is None:
+            raise ExportError(
+                f"{file.path.name}: how {body.name} looks is not in it, nor was it ever drawn here"
+            )
+        studio.take_mesh(mesh_name(body), glb, body.color)
+
+
+def _pictures(file: RecordingFile, span: Span, state: RobotState, fps: float) -> Iterator[tuple[int, Ages]]:
+    """The times of the pictures; the robot is then as it was recorded."""
+    topics = topics_of(file)
+    needed(file, "joints")
+    names = {topics[name]: name for name in ("joints", "controller", "kinematics") if name in topics}
+    received: dict[str, int] = {}
+
+    def take(message: RecordedMessage) -> None:
+        name = names[message.topic]
+        if name == "joints":
+            if (joints := decoded(JointStates, message.data)) is None:
+                return
+            state.take_joints(joints)
+            assert state.look is not None
+            state.link_placements = placements_at(state.look, state.positions)
+            state.source_time_ns = message.source_ns
+        elif name == "controller":
+            if (controller := decoded(schema.ControllerState, message.data)) is None:
+                return
+            state.take_controller(controller)
+        else:
+            if (kinematics := decoded(schema.KinematicState, message.data)) is None:
+                return
+            state.take_kinematics(kinematics, {state.name: state})
+        received[name] = message.received_ns
+
+    for message in file.state_at([*names], span.start_ns).values():
+        take(message)
+    coming = file.messages([*names], start_ns=span.start_ns + 1, end_ns=span.end_ns + 1)
+    held = next(coming, None)
+    count = max(math.floor((span.end_ns - span.start_ns) * 1e-9 * fps) + 1, 1)
+    for number in range(count):
+        time_ns = span.start_ns + round(number / fps * 1e9)
+        while held is not None and held.received_ns <= time_ns:
+            take(held)
+            held = next(coming, None)
+        age = {
+            name: (time_ns - received[name]) * 1e-9 if name in received else None for name in names.values()
+        }
+        yield (
+            time_ns,
+            Ages(
+                frames=age.get("joints"),
+                joints=age.get("joints"),
+                controller=age.get("controller"),
+                kinematics=age.get("kinematics"),
+            ),
+        )

@@ -1,0 +1,71 @@
+"""Which part of a recording, and which of its topics."""
+
+from typing import NamedTuple, TypeVar
+
+from google.protobuf.message import DecodeError, Message
+
+from bus.errors import KeyNameError
+from bus.keys import parse_key
+from mcap_files.reading import RecordingFile
+from services.command_line.recordings.errors import ExportError
+
+M = TypeVar("M", bound=Message)
+
+
+class Span(NamedTuple):
+    """A part of a recording [ns since the Unix epoch], the end included."""
+
+    start_ns: int
+    end_ns: int
+
+    def share(self, time_ns: int) -> float:
+        """How far in it a time is, from 0 to 1."""
+        return min(max((time_ns - self.start_ns) / max(self.end_ns - self.start_ns, 1), 0.0), 1.0)
+
+
+def span_of(file: RecordingFile, begin_s: float, end_s: float | None) -> Span:
+    """The part between two times, counted from the recording's start.
+
+    Raises:
+        ExportError: If there is nothing between them.
+    """
+    first, last = file.layout.start_ns, file.layout.end_ns
+    duration_s = (last - first) * 1e-9
+    until_s = duration_s if end_s is None else min(end_s, duration_s)
+    if not 0.0 <= begin_s <= until_s:
+        asked = f"--from {begin_s:g}" + ("" if end_s is None else f" --to {end_s:g}")
+        raise ExportError(f"{asked}: {file.path.name} goes from 0 to {duration_s:.3f} s")
+    return Span(first + round(begin_s * 1e9), last if end_s is None else first + round(until_s * 1e9))
+
+
+def topics_of(file: RecordingFile) -> dict[str, str]:
+    """A robot's topics, as they are named below it, and their names in the file."""
+    found: dict[str, str] = {}
+    for topic in sorted(file.topics):
+        try:
+            found.setdefault(parse_key(topic).topic, topic)
+        except KeyNameError:
+            continue
+    return found
+
+
+def needed(file: RecordingFile, topic: str) -> str:
+    """A topic's name in the file.
+
+    Raises:
+        ExportError: If nothing of it is recorded.
+    """
+    topics = topics_of(file)
+    if topic not in topics:
+        raise ExportError(
+            f"{file.path.name}: no {topic} in it; it has {', '.join(topics) or 'no robot topic'}"
+        )
+    return topics[topic]
+
+
+def decoded(kind: type[M], data: bytes) -> M | None:
+    """A recorded message; None: one that somebody wrote wrong, which spoils no other."""
+    try:
+        return kind.FromString(data)
+    except DecodeError:
+        return None

@@ -1,0 +1,275 @@
+"""`robomesh doctor --security`: every role against every key, tried on the live mesh.
+
+It is tried on keys of a robot that does not exist, of its replay, and by a wildcard that means it, with
+messages that nobody takes: what is published has no header, and answers are empty. Presence is not tried,
+because everybody would see that robot. What should be comes from the table, what is from the site's routers.
+"""
+
+import json
+import time
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import chain, product
+from pathlib import Path
+from threading import Condition
+
+import zenoh
+
+from bus.access import NOBODYS_ROBOT, Act, Principal
+from bus.endpoints import bundle, client_config, first_line
+from bus.keys import has_wildcard
+from bus.topics import Role, Topic
+from services.command_line.security_table import ROBOTS, ROWS, names, should, tried
+from services.keys import Folder, deeds
+from services.keys.errors import KeysError
+from services.keys.principals import Principals
+
+_TIMEOUT_S = 10.0
+_QUIET_S = 0.3
+_WORDS: dict[Act, str] = {
+    "put": "publish",
+    "declare_subscriber": "read",
+    "declare_queryable": "answer",
+    "query": "ask",
+}
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Somebody's act on a key, and whether it went through."""
+
+    who: str
+    act: Act
+    key: str
+
+
+@dataclass
+class Person:
+    """Who tries."""
+
+    principal: Principal
+    session: zenoh.Session
+    heard: set[str] = field(default_factory=set)
+
+
+def run(folder: Path, connect: tuple[str, ...], as_json: bool) -> int:
+    """Print the matrix; 1: something differs from the table.
+
+    Raises:
+        KeysError: If there are no keys, or no router takes them.
+    """
+    keys = Folder(folder)
+    principals = deeds.principals_of(keys)
+    routers = connect or principals.routers
+    if not routers:
+        raise KeysError(f"{keys.principals} names no routers: --connect tls/HOST:PORT says where they are")
+    with ExitStack() as opened:
+        people = [
+            Person(entry, opened.enter_context(_open(routers, file)))
+            for entry, file in _with_files(keys, principals)
+        ]
+        done = _try(people, principals.site)
+    roles = {person.principal.name: person.principal for person in people}
+    trials = _trials(people, principals.site)
+    allowed = {trial for trial in trials if should(roles[trial.who], trial.act, trial.key)}
+    wrong = sorted(done ^ allowed, key=lambda trial: (trial.who, trial.act, trial.key))
+    if as_json:
+        for trial in sorted(done | allowed, key=lambda trial: (trial.who, trial.act, trial.key)):
+            row = {"who": trial.who, "act": _WORDS[trial.act], "key": trial.key}
+            print(json.dumps(row | {"should": trial in allowed, "does": trial in done}))
+        return 1 if wrong else 0
+    _print([*roles.values()], principals.site, done)
+    for trial in wrong:
+        does, should_ = ("can", "should not") if trial in done else ("cannot", "should")
+        print(f"WRONG: {trial.who} {does} {_WORDS[trial.act]} {trial.key}, and {should_}")
+    print(
+        f"{len(trials)} acts of {len(people)} certificates tried: "
+        + (f"{len(wrong)} wrong" if wrong else "all as the table says")
+    )
+    absent = sorted({role.value for role in Role} - {each.role.value for each in roles.values()})
+    if absent:
+        print(f"not tried, without a certificate here: {', '.join(absent)}")
+    return 1 if wrong else 0
+
+
+def _with_files(keys: Folder, principals: Principals) -> Iterable[tuple[Principal, Path]]:
+    """Everybody of the site whose certificate lies here and is good."""
+    now = deeds.now()
+    for entry in principals.entries:
+        file = Path(deeds.file_of(keys, principals.site, entry))
+        good = entry.revoked is None and entry.expires is not None and entry.expires > now
+        if good and not entry.sites and file.is_file():
+            yield entry.principal, file
+
+
+def _open(routers: tuple[str, ...], file: Path) -> zenoh.Session:
+    config = client_config(routers, bundle(file))
+    # One link: what is tried and the question that ends it keep their order.
+    config.insert_json5("connect/endpoints", json.dumps(list(routers)))
+    try:
+        return zenoh.open(config)
+    except zenoh.ZError as error:
+        raise KeysError(f"no router at {', '.join(routers)} takes {file}: {first_line(error)}") from None
+
+
+# -------------------------------------------------------------- what is tried
+
+
+def _trials(people: list[Person], site: str) -> set[Trial]:
+    trials = set()
+    for person in people:
+        who = person.principal
+        for row, robot in product(ROWS, ROBOTS):
+            for name, act in product(names(row, who), tried(row, robot)):
+                trials.add(Trial(who.name, act, f"robomesh/{site}/{robot}/{name}"))
+    return trials
+
+
+def _try(people: list[Person], site: str) -> set[Trial]:
+    """What went through."""
+    witness = next((each for each in people if each.principal.role is Role.ROUTER), None)
+    if witness is None:
+        raise KeysError("the router's own certificate is needed to see what goes through: keys/router.pem")
+    trials = _trials(people, site)
+    keys = {act: sorted({trial.key for trial in trials if trial.act == act}) for act in _WORDS}
+    by_name = {each.principal.name: each for each in people}
+    done: set[Trial] = set()
+
+    def of(person: Person, act: Act) -> list[str]:
+        return sorted(
+            trial.key for trial in trials if trial.who == person.principal.name and trial.act == act
+        )
+
+    # Published: the witness hears it, with the name of who did.
+    def hear(sample: zenoh.Sample) -> None:
+        if sample.attachment is not None and (name := sample.attachment.to_string()) in by_name:
+            done.add(Trial(name, "put", str(sample.key_expr)))
+
+    with ExitStack() as declared:
+        for robot in ROBOTS:
+            declared.enter_context(witness.session.declare_subscriber(f"robomesh/{site}/{robot}/**", hear))
+        _settle(witness, site)
+        for person in people:
+            for key in of(person, "put"):
+                person.session.put(key, b"", attachment=person.principal.name)
+            _settle(person, site)
+        time.sleep(_QUIET_S)
+    done -= {trial for trial in done if trial not in trials}
+    # Read: the witness publishes everything once.
+    with ExitStack() as declared:
+        for person in people:
+
+            def note(sample: zenoh.Sample, person: Person = person) -> None:
+                if sample.attachment is not None and sample.attachment.to_string() == "witness":
+                    person.heard.add(str(sample.key_expr))
+
+            for key in of(person, "declare_subscriber"):
+                declared.enter_context(person.session.declare_subscriber(key, note))
+            _settle(person, site)
+        for key in keys["declare_subscriber"]:
+            witness.session.put(key, b"", attachment="witness")
+        for person in people:
+            wanted = set(of(person, "declare_subscriber"))
+            _wait(partial(wanted.issubset, person.heard))
+            done |= {Trial(person.principal.name, "declare_subscriber", key) for key in person.heard}
+    # Answered: the witness asks. By a wildcard alone: a session with both would answer as either.
+    answered = keys["declare_queryable"]
+    for vague in (False, True):
+        with ExitStack() as declared:
+            for person in people:
+                for key in of(person, "declare_queryable"):
+                    if has_wildcard(key) is vague:
+                        declared.enter_context(_answering(person, key))
+                _settle(person, site)
+            asked = _ask(witness, (key for key in answered if not has_wildcard(key)))
+            done |= {Trial(name, "declare_queryable", key) for name, key in chain(*asked.values())}
+    # Asked: the witness answers.
+    with ExitStack() as declared:
+        for key in keys["query"]:
+            declared.enter_context(_answering(witness, key))
+        _settle(witness, site)
+        for person in people:
+            asked = _ask(person, of(person, "query"))
+            done |= {Trial(person.principal.name, "query", key) for key, by in asked.items() if by}
+    return done & trials
+
+
+def _answering(person: Person, key: str) -> zenoh.Queryable[None]:
+    def reply(query: zenoh.Query) -> None:
+        with query:
+            query.reply(str(query.key_expr), b"", attachment=f"{person.principal.name} {key}")
+
+    return person.session.declare_queryable(key, reply)
+
+
+def _settle(person: Person, site: str) -> None:
+    """Until the router has judged what was sent: a question that everybody may ask comes back behind it."""
+    list(person.session.get(f"robomesh/{site}/{NOBODYS_ROBOT}/recordings/list", timeout=_TIMEOUT_S))
+
+
+def _ask(person: Person, keys: Iterable[str]) -> dict[str, set[tuple[str, str]]]:
+    """Who answered each key, and as what; all are asked at once."""
+    answers: dict[str, set[tuple[str, str]]] = {key: set() for key in keys}
+    left, done = len(answers), Condition()
+
+    def ended() -> None:
+        nonlocal left
+        with done:
+            left -= 1
+            done.notify_all()
+
+    for key, by in answers.items():
+
+        def on_reply(reply: zenoh.Reply, by: set[tuple[str, str]] = by) -> None:
+            if reply.ok is not None and reply.ok.attachment is not None:
+                name, _, own = reply.ok.attachment.to_string().partition(" ")
+                by.add((name, own))
+
+        person.session.get(
+            key,
+            zenoh.handlers.Callback(on_reply, ended),
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=_TIMEOUT_S,
+        )
+    with done:
+        done.wait_for(lambda: left == 0, 2 * _TIMEOUT_S)
+    return answers
+
+
+def _wait(there: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 1.0
+    while not there() and time.monotonic() < deadline:
+        time.sleep(0.01)
+
+
+# ------------------------------------------------------------------- printed
+
+
+def _print(people: list[Principal], site: str, done: set[Trial]) -> None:
+    """A row a topic or request, a column a certificate: what each can do."""
+    heads = [each.name.rpartition(".")[0] for each in people]
+    width = max(len(row.name) for row in ROWS) + 2
+    columns = [max(len(name), 2) + 1 for name in heads]
+    print("p: publishes, r: reads, o: answers as its owner, a: asks\n")
+    print(" " * width + "".join(f"{name:<{size}}" for name, size in zip(heads, columns, strict=True)))
+    for row in ROWS:
+        letters: dict[Act, str] = (
+            {"put": "p", "declare_subscriber": "r"}
+            if isinstance(row, Topic)
+            else {"declare_queryable": "o", "query": "a"}
+        )
+        cells = []
+        for who in people:
+            keys = {f"robomesh/{site}/{robot}/{topic}" for robot in ROBOTS for topic in names(row, who)}
+            cells.append(
+                "".join(
+                    letter if any(Trial(who.name, act, key) in done for key in keys) else "-"
+                    for act, letter in letters.items()
+                )
+            )
+        line = "".join(f"{cell:<{size}}" for cell, size in zip(cells, columns, strict=True))
+        print(f"{row.name:<{width}}{line}")
+    print()

@@ -1,0 +1,67 @@
+"""What the table of topics gives a certificate, act by act: what `doctor --security` expects.
+
+Written apart from the rules' generator (`bus/access.py`), which it judges.
+"""
+
+from bus import topics
+from bus.access import NOBODYS_ROBOT, Act, Principal
+from bus.errors import UnknownTopicError
+from bus.keys import REPLAY, has_wildcard, parse_key
+from bus.topics import REQUESTS, TOPICS, Request, Role, Topic
+
+ROWS: tuple[Topic | Request, ...] = (*TOPICS.values(), *REQUESTS.values())
+# Means the robot that nobody has, and would mean another's whose name begins so.
+VAGUE = f"{NOBODYS_ROBOT}$*"
+ROBOTS = (NOBODYS_ROBOT, f"{REPLAY}{NOBODYS_ROBOT}", VAGUE)
+
+
+def names(row: Topic | Request, who: Principal) -> list[str]:
+    """A row's names as somebody might use them: in the own name, in another's, in a request's."""
+    if isinstance(row, Request) and row.in_name:
+        stem = row.name.rpartition("/")[0]
+        called = [each.name for each in REQUESTS.values() if each.wildcard]
+        return [f"{stem}/{each}" for each in (who.name, f"nobody.{who.site}x", *called)]
+    if row.name == "events/*":
+        return [f"events/{who.role.value}"]
+    if row.name == "health/*":
+        return [f"health/{who.role.value}.{NOBODYS_ROBOT}"]
+    return [row.name.replace("*", NOBODYS_ROBOT)]
+
+
+def tried(row: Topic | Request, robot: str) -> tuple[Act, ...]:
+    """What is tried on a row; by a wildcard only what would be said for robots of others."""
+    if isinstance(row, Request):
+        return ("declare_queryable",) if has_wildcard(robot) else ("query", "declare_queryable")
+    if has_wildcard(robot):
+        return ("put", "declare_queryable")
+    return ("put", "declare_subscriber", "declare_queryable")
+
+
+def should(who: Principal, act: Act, key: str) -> bool:
+    """Whether somebody may do that."""
+    _, robot, name = parse_key(key)
+    if who.role is Role.ROUTER:
+        return True  # it brings what it has let in
+    if act == "query":
+        row = topics.request(name)
+        return who.role in row.askers and (not row.in_name or _own_name(who, name.rpartition("/")[2]))
+    if act == "declare_subscriber":
+        return who.role in topics.topic(name).subscribers
+    speak = who.role in _speakers(name)
+    if who.role is Role.GATEWAY:
+        return speak and robot == NOBODYS_ROBOT
+    if who.role is Role.PLAYER:
+        return speak and robot.startswith(REPLAY)
+    return speak
+
+
+def _speakers(name: str) -> frozenset[Role]:
+    """Who publishes a topic, or answers a request."""
+    try:
+        return topics.topic(name).publishers
+    except UnknownTopicError:
+        return topics.request(name).owners
+
+
+def _own_name(who: Principal, name: str) -> bool:
+    return name.endswith(f".{who.site}") if who.role is Role.CONSOLE else name == who.name

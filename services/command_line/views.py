@@ -1,0 +1,62 @@
+"""A view of a robot, for a command that saves what it shows."""
+
+import contextlib
+from typing import NamedTuple
+
+from bus.errors import BusError, NoAnswerError
+from bus.keys import check_chunk, robot_key
+from bus.schemas.robomesh_pb2 import KeyFrameRequest, ViewAnswer, ViewRequest
+from bus.session import Session
+from services.command_line import find
+from services.errors import ServiceError
+
+# The first view on a busy machine opens an encoder.
+_TIMEOUT_S = 5.0
+_RATE_TIMEOUT_S = 1.0
+
+
+class NoRendererError(ServiceError):
+    """Nobody draws the robot."""
+
+
+class View(NamedTuple):
+    """The keys of a view's video and stills; its highest rate [1/s], 0: it is not told."""
+
+    video: str
+    image: str
+    fps: float = 0.0
+
+
+async def view_of(
+    session: Session, robot: find.Robot, name: str, *, width: int = 0, height: int = 0, fps: float = 0.0
+) -> View:
+    """A view by its name, in a size and at a rate of one's own where they are named.
+
+    Raises:
+        RefusedError: If there is none of that name, or not of that size; the text says what there is.
+        NoRendererError: If nobody draws the robot.
+    """
+    check_chunk(name, "view")
+    try:
+        if width or height or fps:
+            request = ViewRequest(of=name, width=width, height=height, fps=fps)
+            answer = await session.ask(robot_key(*robot, "views"), request, timeout_s=_TIMEOUT_S)
+            assert isinstance(answer, ViewAnswer)
+            return View(robot_key(*robot, answer.topic), robot_key(*robot, answer.image), answer.fps)
+        view = View(robot_key(*robot, f"video/{name}"), robot_key(*robot, f"image/{name}"))
+        # Who draws no such view says which there are.
+        await session.ask(f"{view.video}/keyframe", KeyFrameRequest(), timeout_s=_TIMEOUT_S)
+        return view._replace(fps=await _rate(session, robot, name))
+    except NoAnswerError:
+        raise NoRendererError(f"nobody draws {robot}: is the renderer of {robot.site} running?") from None
+
+
+async def _rate(session: Session, robot: find.Robot, name: str) -> float:
+    """A view's highest rate [1/s]; 0: no renderer has it, it is a recording's."""
+    with contextlib.suppress(BusError):
+        answer = await session.ask(
+            robot_key(*robot, "views"), ViewRequest(of=name), timeout_s=_RATE_TIMEOUT_S
+        )
+        assert isinstance(answer, ViewAnswer)
+        return answer.fps
+    return 0.0

@@ -1,0 +1,86 @@
+"""What may be asked through a page, by whoever is signed in there: the topic table's rights of its role."""
+
+from google.protobuf.message import DecodeError
+
+from bus import keys, topics
+from bus.errors import BusError, RefusedError
+from bus.schemas.robomesh_pb2 import StopRequest
+from bus.topics import Role
+from services.console.accounts.file import Account
+from services.console.accounts.sessions import SignedIn
+
+PASSWORD_AGAIN = "give your password again first: the right to command rests"
+
+
+def operator_name(account: str, site: str) -> str:
+    """The operator that an account is: the one name it asks in."""
+    return f"{account}.{site}"
+
+
+def lacks_right(account: Account, what: str) -> str:
+    """Why an account that only watches may not ask for something, in words."""
+    return f"{account.name} is a {account.role.value}: {what} needs an operator"
+
+
+def check_ask(key: str) -> topics.Request:
+    """The row of a key that a page may ask on.
+
+    Raises:
+        RefusedError: If it is no request of the table, or has a wildcard.
+    """
+    try:
+        parsed = keys.parse_key(key)
+        keys.check_name(parsed.site, "site")
+        if parsed.robot != keys.WHOLE_SITE:
+            keys.check_name(parsed.robot, "robot")
+        row = topics.request(parsed.topic)
+        for chunk in parsed.topic.split("/"):
+            keys.check_chunk(chunk)
+        if row.in_name:
+            topics.check_operator(chunk)
+    except BusError as error:
+        raise RefusedError(str(error)) from None
+    if Role.CONSOLE not in row.askers:
+        raise RefusedError(f"the console has no right to ask {row.name}")
+    return row
+
+
+def check_right(row: topics.Request, key: str, who: SignedIn, site: str) -> None:
+    """Whether an account may ask that now.
+
+    Raises:
+        RefusedError: Which right is missing.
+    """
+    if who.ended:
+        raise RefusedError("nobody is signed in here any more")
+    if Role.MONITOR in row.askers:
+        return
+    account = who.account
+    if not account.may_command:
+        raise RefusedError(lacks_right(account, row.name.removesuffix("/*")))
+    check_own_name(row, key, operator_name(account.name, site), who=account.name)
+    if who.resting:
+        raise RefusedError(PASSWORD_AGAIN)
+
+
+def check_own_name(row: topics.Request, key: str, own: str, *, who: str = "this page") -> None:
+    """Whether a request that is made in a name is made in that one.
+
+    Raises:
+        RefusedError: If it is another's.
+    """
+    chunk = key.rpartition("/")[2]
+    if row.in_name and chunk != own:
+        raise RefusedError(f"{who} asks in the name {own} only, not as {chunk}")
+
+
+def in_own_name(key: str, payload: bytes, operator: str) -> bytes:
+    """A stop with the page's own name, whatever the page says; all else as it is."""
+    if not key.endswith("/stop"):
+        return payload
+    try:
+        stop = StopRequest.FromString(payload)
+    except DecodeError:
+        return payload  # a stop that cannot be read is a stop
+    stop.by = operator
+    return stop.SerializeToString()

@@ -1,0 +1,207 @@
+"""What the worker does: each job takes a draft's folder and a request, and returns what JSON can hold.
+
+Knowledge of robots and meshes is `robots`'s; this turns it into the page's form.
+"""
+
+import zipfile
+import zlib
+from collections.abc import Callable, Mapping
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from robots.checks import named_files
+from robots.collision import sample_pairs
+from robots.description import DESCRIPTION_FILE, Problem, RobotDescription, from_values, robot_name
+from robots.errors import DescriptionError, MeshError
+from robots.importing import as_rows
+from robots.inspect_meshes import mesh_findings
+from robots.joints import joints_of
+from robots.meshes.guess import guess
+from robots.meshes.mesh import Mesh
+from robots.meshes.read import read_mesh
+from robots.meshes.write_glb import glb_of
+from robots.model import RobotModel, build_model, link_placements, tool_placement
+from robots.save import read_robot, refused_path
+from robots.save_text import as_saved
+from robots.schema import UrdfDescription
+from robots.summary import mesh_summary
+from robots.units import position_factor
+from services.console.define.errors import RefusedRequest
+from services.console.define.store import MOST_FILES, Store, put
+
+Json = dict[str, Any]
+
+_MOST_UNZIPPED = 500_000_000
+
+
+def mesh(store: Store, folder: Path, request: Json) -> Json:
+    """A mesh file as GLB in the store, in its own units and axes, and what is in it.
+
+    Where all of it is in files that are not there yet, it is empty and names them.
+    """
+    try:
+        found = read_mesh(folder / request["file"], within=folder)
+    except MeshError as error:
+        if not error.missing:
+            raise
+        found = Mesh(warnings=(error.reason,), missing=(error.missing,))
+    guessed = guess(found)
+    return {
+        "glb": put(store, glb_of(found)),
+        **mesh_summary(found),
+        "missing": list(found.missing),
+        "scale": guessed.scale_m,
+        "up": guessed.up,
+        "guess": guessed.sentence,
+    }
+
+
+def check(_: Store, folder: Path, request: Json) -> Json:
+    """Every problem of a description, and where its links and its tool are."""
+    values = as_saved(request["description"])
+    description, problems = from_values(values, folder=folder, confined=True)
+    if description is None:
+        # A mesh that is still missing keeps nobody from seeing where the links are.
+        description, _ignored = from_values(_without_meshes(values), folder=folder, confined=True)
+    answer: Json = {"problems": [_problem(each) for each in problems], "tool": None, "links": {}}
+    if description is not None:
+        model = build_model(description)
+        positions = _positions(model, description, request.get("joints"))
+        answer["tool"] = tool_placement(model, positions).tolist()
+        placements = link_placements(model, positions)
+        answer["links"] = dict(zip(model.link_names, placements.tolist(), strict=True))
+    return answer
+
+
+def meshes(_: Store, folder: Path, request: Json) -> Json:
+    """Every mesh of a right description that could not be drawn, as a problem where it is named."""
+    values = request["description"]
+    places = {folder / name: place for place, name in named_files(values)}
+    found, _odd = mesh_findings(_description(folder, values))
+    problems = []
+    for finding in found:
+        file = Path(finding.file)
+        name = file.relative_to(folder) if file.is_relative_to(folder) else file.name
+        problems.append(_problem(Problem(places.get(file, ()), f"{name}: {finding.text}")))
+    return {"problems": problems}
+
+
+def joint_count(_: Store, folder: Path, request: Json) -> Json:
+    """How many joints a description has."""
+    return {"joints": len(joints_of(_description(folder, request["description"])))}
+
+
+def collisions(_: Store, folder: Path, request: Json) -> Json:
+    """How often each pair of links touches, over random positions."""
+    sampling = sample_pairs(_description(folder, request["description"]))
+    rows = [{"links": list(pair.links), "kind": str(pair.contact)} for pair in sampling.pairs]
+    return {"samples": sampling.tried, "pairs": rows}
+
+
+def unzip(store: Store, folder: Path, request: Json) -> Json:
+    """The files of a zip archive, put into the store."""
+    files = {}
+    try:
+        with zipfile.ZipFile(folder / request["file"]) as archive:
+            entries = [entry for entry in archive.infolist() if not entry.is_dir()]
+            size = sum(entry.file_size for entry in entries)
+            if len(entries) > MOST_FILES or size > _MOST_UNZIPPED:
+                raise RefusedRequest(
+                    422,
+                    f"holds {len(entries)} files of {size / 1e6:.0f} MB: "
+                    f"{MOST_FILES} files and {_MOST_UNZIPPED / 1e6:.0f} MB at most",
+                )
+            for entry in entries:
+                if reason := refused_path(entry.filename):
+                    raise RefusedRequest(422, f"{entry.filename!r}: {reason}")
+                # What an entry holds beyond the size that it states is an error of zipfile's.
+                files[entry.filename] = put(store, archive.read(entry))
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, zlib.error, EOFError) as error:
+        raise RefusedRequest(422, f"is no zip archive that can be read: {error}") from None
+    return {"files": files}
+
+
+def import_robot(store: Store, folder: Path, request: Json) -> Json:
+    """A URDF as a draft of D-H rows, each link's shapes as one GLB in the link's frame.
+
+    A robot.toml with its files, as Download zip makes it, is a draft already, unless it names a URDF.
+    """
+    file = request.get("file", "")
+    values = request.get("description")
+    if PurePosixPath(file).name == DESCRIPTION_FILE:
+        inside = PurePosixPath(file).parent
+        folder = folder / inside
+        values, _ = read_robot(folder)
+        if "urdf" not in values:
+            files = {
+                PurePosixPath(path).relative_to(inside).as_posix(): sha
+                for path, sha in request.get("files", {}).items()
+                if path != file and PurePosixPath(path).is_relative_to(inside)
+            }
+            return {"description": values, "files": files, "notes": [], "missing": []}
+    values = values or {"name": robot_name(Path(file).stem), "urdf": file}
+    description = _description(folder, values)
+    if not isinstance(description, UrdfDescription):
+        raise RefusedRequest(422, f"{file} is no robot's URDF")
+    found = as_rows(description)
+    return {
+        "description": found.values,
+        "files": {path: put(store, content) for path, content in found.files.items()},
+        "notes": list(found.notes),
+        "missing": list(found.missing),
+    }
+
+
+def _description(folder: Path, values: Json) -> RobotDescription:
+    """A description in which nothing is wrong.
+
+    Raises:
+        DescriptionError: Otherwise.
+    """
+    description, problems = from_values(as_saved(values), folder=folder, confined=True)
+    if description is None:
+        raise DescriptionError(folder / DESCRIPTION_FILE, [problem.text for problem in problems])
+    return description
+
+
+def _without_meshes(values: Mapping[str, Any]) -> Json:
+    without = dict(values)
+    if isinstance(values.get("base"), dict):
+        without["base"] = {key: each for key, each in values["base"].items() if key != "mesh"}
+    if isinstance(values.get("joint"), list):
+        without["joint"] = [
+            {**row, "link": {key: each for key, each in row["link"].items() if key != "mesh"}}
+            if isinstance(row, dict) and isinstance(row.get("link"), dict)
+            else row
+            for row in values["joint"]
+        ]
+    return without
+
+
+def _positions(model: RobotModel, description: RobotDescription, given: Any) -> Any:
+    """Joint positions in SI: those given in the file's units, or home."""
+    if given is None:
+        return model.joints.home
+    count = len(model.joints)
+    numbers = [each for each in given if isinstance(each, int | float)] if isinstance(given, list) else []
+    if len(numbers) != count or len(given) != count or not np.isfinite(numbers).all():
+        raise RefusedRequest(422, f"joints: one finite number a joint is asked for, {count} in all")
+    factors = [position_factor(kind, description.units) for kind in model.joints.types]
+    return np.multiply(numbers, factors)
+
+
+def _problem(problem: Problem) -> Json:
+    return {"path": list(problem.path), "text": problem.text}
+
+
+JOBS: Mapping[str, Callable[[Store, Path, Json], Json]] = {
+    "mesh": mesh,
+    "check": check,
+    "meshes": meshes,
+    "joint_count": joint_count,
+    "collisions": collisions,
+    "import": import_robot,
+    "unzip": unzip,
+}

@@ -1,0 +1,204 @@
+"""Files of drafts, kept by their SHA-256, and drafts laid out as folders of them.
+
+All of it may be deleted at any time: the page sends again what is missing.
+"""
+
+import contextlib
+import hashlib
+import os
+import re
+import secrets
+import shutil
+import tempfile
+import time
+from collections.abc import AsyncIterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from robots.save import refused_path
+from services.console.define.errors import RefusedRequest
+
+MOST_BYTES = 2 * 1024**3
+MOST_DRAFTS = 64
+MOST_FILES = 2000
+MOST_DRAFT_BYTES = 500_000_000
+_DRAFTS_KEPT = 4
+_LEFT_BEHIND_S = 7 * 24 * 3600.0
+_SHA = re.compile(r"[0-9a-f]{64}")
+
+
+@dataclass(frozen=True)
+class Store:
+    """A folder of files by content, and of drafts made of links to them.
+
+    Attributes:
+        folder: Its owner's alone.
+        most_bytes: Of all files; the least recently used go first.
+    """
+
+    folder: Path
+    most_bytes: int = MOST_BYTES
+
+    @property
+    def files(self) -> Path:
+        """Where the files are, each named by its SHA-256."""
+        return self.folder / "files"
+
+    @property
+    def drafts(self) -> Path:
+        """Where drafts are laid out."""
+        return self.folder / "drafts"
+
+
+def open_store(folder: Path, *, most_bytes: int = MOST_BYTES) -> Store:
+    """The store in a folder, made if need be; in a temporary one where it cannot be, or is another's."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        usable = (
+            folder.stat().st_uid == os.getuid() and os.access(folder, os.W_OK) and not folder.is_symlink()
+        )
+    except OSError:
+        usable = False
+    store = Store(folder if usable else Path(tempfile.mkdtemp(prefix="robomesh-define-")), most_bytes)
+    store.folder.chmod(0o700)
+    store.files.mkdir(exist_ok=True)
+    store.drafts.mkdir(exist_ok=True)
+    for left in store.folder.glob("tmp*"):
+        # Of a console that was killed; a young one may be of another that runs.
+        if time.time() - left.stat().st_mtime > _LEFT_BEHIND_S:
+            shutil.rmtree(left) if left.is_dir() else left.unlink()
+    return store
+
+
+def put(store: Store, content: bytes) -> str:
+    """Keep a file; its SHA-256."""
+    sha = hashlib.sha256(content).hexdigest()
+    if not _touch(store.files / sha):
+        with _new_file(store) as path:
+            path.write_bytes(content)
+            path.replace(store.files / sha)
+        _make_room(store)
+    return sha
+
+
+async def put_stream(store: Store, chunks: AsyncIterable[bytes], *, most_bytes: int) -> tuple[str, int]:
+    """Keep a file that comes in pieces; its SHA-256 and size.
+
+    Raises:
+        RefusedRequest: If it is too large.
+    """
+    digest, size = hashlib.sha256(), 0
+    with _new_file(store) as path:
+        with path.open("wb") as file:
+            async for chunk in chunks:
+                size += len(chunk)
+                if size > most_bytes:
+                    raise RefusedRequest(413, f"the file is larger than {most_bytes / 1e6:g} MB")
+                digest.update(chunk)
+                file.write(chunk)
+        path.replace(store.files / digest.hexdigest())
+    _make_room(store)
+    return digest.hexdigest(), size
+
+
+def stored(store: Store, sha: str) -> Path | None:
+    """The file with that SHA-256; None where it is not (or no longer) there."""
+    path = store.files / sha
+    return path if _SHA.fullmatch(sha) and _touch(path) else None
+
+
+def lay_out(store: Store, files: Mapping[str, str]) -> Path:
+    """A folder that holds a draft's files under their names, each linked to the stored one.
+
+    The same files give the same folder, so that typing in a form costs no disk.
+
+    Raises:
+        RefusedRequest: If a name leads out of the folder, or a file is not in the store.
+    """
+    if len(files) > MOST_FILES:
+        raise RefusedRequest(413, f"{len(files)} files: {MOST_FILES} at most")
+    problems = [f"{path!r}: {reason}" for path in files if (reason := refused_path(path))]
+    if problems:
+        raise RefusedRequest(422, problems[0])
+    recipe = "\n".join(f"{sha} {path}" for path, sha in sorted(files.items()))
+    folder = store.drafts / hashlib.sha256(recipe.encode()).hexdigest()
+    if _touch(folder):
+        return folder
+    sources = {path: stored(store, sha) for path, sha in files.items()}
+    if missing := [path for path, source in sources.items() if source is None]:
+        raise RefusedRequest(
+            410, f"{', '.join(missing[:5])}: not here (any more); drop the file on the page again"
+        )
+    # One file under a thousand names is one here, and a thousand where it is saved.
+    size = sum(source.stat().st_size for source in sources.values() if source is not None)
+    if size > MOST_DRAFT_BYTES:
+        most = MOST_DRAFT_BYTES / 1e6
+        raise RefusedRequest(413, f"{len(files)} files of {size / 1e6:.0f} MB: {most:.0f} MB at most")
+    fresh = Path(tempfile.mkdtemp(dir=store.drafts))
+    try:
+        for path, source in sources.items():
+            assert source is not None
+            place = fresh.joinpath(*PurePosixPath(path).parts)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            # A hard link, not a symbolic one: nothing in a draft leads out of it.
+            os.link(source, place)
+        fresh.rename(folder)
+    except FileExistsError:
+        raise RefusedRequest(422, "a file's name is another file's folder") from None
+    except OSError as error:
+        if not folder.is_dir():  # else somebody else laid the same draft out meanwhile
+            raise RefusedRequest(507, f"the files cannot be laid out: {error.strerror}") from None
+    finally:
+        shutil.rmtree(fresh, ignore_errors=True)
+    _oldest_out(store, MOST_DRAFTS)
+    return folder
+
+
+@contextlib.contextmanager
+def _new_file(store: Store) -> Iterator[Path]:
+    """A file of its own in the store, gone unless it was moved away."""
+    descriptor, name = tempfile.mkstemp(dir=store.folder)
+    os.close(descriptor)
+    try:
+        yield Path(name)
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
+def _touch(path: Path) -> bool:
+    """Mark it as used now; False: it is not there."""
+    try:
+        os.utime(path)
+    except FileNotFoundError:
+        return False
+    return True
+
+
+def _make_room(store: Store) -> None:
+    found = []
+    for path in store.files.iterdir():
+        with contextlib.suppress(FileNotFoundError):
+            stat = path.stat()
+            found.append((stat.st_mtime_ns, stat.st_size, path))
+    total = sum(size for _, size, _ in found)
+    if total > store.most_bytes:
+        # Their links would keep what goes.
+        _oldest_out(store, _DRAFTS_KEPT)
+    for _, size, path in sorted(found)[:-1]:
+        if total <= store.most_bytes:
+            return
+        path.unlink(missing_ok=True)
+        total -= size
+
+
+def _oldest_out(store: Store, most: int) -> None:
+    drafts = []
+    for path in store.drafts.iterdir():
+        with contextlib.suppress(FileNotFoundError):
+            drafts.append((path.stat().st_mtime_ns, path))
+    for _, path in sorted(drafts)[: max(len(drafts) - most, 0)]:
+        # Gone in one step: nobody takes what is half removed for a draft.
+        going = store.folder / f"tmp-{secrets.token_hex(8)}"
+        with contextlib.suppress(FileNotFoundError):
+            path.rename(going)
+            shutil.rmtree(going, ignore_errors=True)

@@ -1,0 +1,89 @@
+"""Whoever has control through a page is present on the mesh for as long as the page's connection lasts.
+
+The gateway ends a lease whose session is gone: a browser that was killed loses control at once, and
+not only when its lease's time is over. So does a player with a replay that a page has opened.
+"""
+
+import secrets
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import zenoh
+from google.protobuf.message import DecodeError
+
+from bus import keys
+from bus.errors import BusError, RefusedError
+from bus.presence import OPERATOR
+from bus.schemas.robomesh_pb2 import LeaseRequest
+from bus.session import Session
+
+_ACTION = LeaseRequest.Action
+_GIVES_CONTROL = frozenset({_ACTION.ACQUIRE, _ACTION.ACCEPT, _ACTION.TAKE})
+_KEEPS_CONTROL = _GIVES_CONTROL | {_ACTION.RENEW}
+_HELD_S = 6.0  # no lease is given for longer
+_REQUEST = "lease/request/"
+_OPENS = "player/open"
+
+
+class OperatorPresence:
+    """The presence of one page's operator: a token for each robot under control, one for replays.
+
+    Attributes:
+        id: Of the page's connection; the page puts it into its lease requests as `session`.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self.id = secrets.token_hex(8)
+        self._session = session
+        self._tokens: dict[tuple[str, str], zenoh.LivelinessToken] = {}
+        self._held_at = -_HELD_S
+
+    @property
+    def in_control(self) -> bool:
+        """Whether control of a robot was given or renewed just now."""
+        return time.monotonic() - self._held_at < _HELD_S
+
+    @contextmanager
+    def asking(self, key: str, payload: bytes) -> Iterator[None]:
+        """Around a request: present before control can be had, and no longer once it is not.
+
+        Raises:
+            RefusedError: If it is asked for a lease with something else.
+        """
+        site, robot, topic = keys.parse_key(key)
+        if topic == _OPENS and (site, robot) not in self._tokens:
+            self._tokens[site, robot] = self._session.declare_presence_of(site, robot, OPERATOR, self.id)
+        if not topic.startswith(_REQUEST):
+            yield
+            return
+        try:
+            action = LeaseRequest.FromString(payload).action
+        except DecodeError:
+            raise RefusedError("this is no LeaseRequest") from None
+        new = action in _GIVES_CONTROL and (site, robot) not in self._tokens
+        if new:
+            self._tokens[site, robot] = self._session.declare_presence_of(site, robot, OPERATOR, self.id)
+        try:
+            yield
+        except BusError:
+            # Refused, or not answered: if control was given all the same, nobody knows of it.
+            if new:
+                self._end(site, robot)
+            raise
+        if action == _ACTION.RELEASE:
+            self._end(site, robot)
+            self._held_at = -_HELD_S
+        elif action in _KEEPS_CONTROL:
+            self._held_at = time.monotonic()
+
+    def close(self) -> None:
+        """The page is gone, or may have control no longer."""
+        self._held_at = -_HELD_S
+        for site, robot in tuple(self._tokens):
+            self._end(site, robot)
+
+    def _end(self, site: str, robot: str) -> None:
+        token = self._tokens.pop((site, robot), None)
+        if token is not None:
+            token.undeclare()

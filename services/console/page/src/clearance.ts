@@ -1,0 +1,40 @@
+// How near a robot is to what stands around it, and to itself: level and words.
+
+import { fixed } from "./format";
+import { DescriptionSchema } from "./gen/robomesh_pb";
+import type { Clearance } from "./gen/robomesh_pb";
+import type { Level } from "./robot-state";
+import { t } from "./texts";
+import { useTopic } from "./topics";
+
+/** How much a robot's distance to fixtures and other robots asks to be looked at: of two robots, the larger counts. */
+export function useClearanceLevel(robotKey: string, clearance: Clearance | undefined): Level {
+  const [site, robot, link] = clearance?.second.split("/") ?? [];
+  const ownKey = `${robotKey}/description`;
+  const own = useTopic(DescriptionSchema, ownKey)?.message;
+  const other = useTopic(DescriptionSchema, link ? `robomesh/${site}/${robot}/description` : ownKey)?.message;
+  const within = (of: "stopDistance" | "warningDistance") =>
+    clearance !== undefined && clearance.distance < Math.max(own?.[of] ?? 0, other?.[of] ?? 0);
+  if (clearance && (clearance.distance <= 0 || within("stopDistance"))) return "alarm";
+  return within("warningDistance") ? "warning" : "normal";
+}
+
+/** Two links of one arm: only touching counts. */
+export function ownLevel(clearance: Clearance): Level {
+  return clearance.distance <= 0 ? "alarm" : "normal";
+}
+
+/** "flange – table", "forearm – pt600-2 wrist": frame ids `<site>/<robot>/<link>`, `<site>/<fixture>` in words. */
+export function pairText({ first, second }: Clearance, robotKey: string): string {
+  const [, site = "", robot = ""] = robotKey.split("/");
+  const name = (frame: string) => {
+    const chunks = frame.split("/").slice(frame.startsWith(`${site}/`) ? 1 : 0);
+    return (chunks.length > 1 && chunks[0] === robot ? chunks.slice(1) : chunks).join(" ");
+  };
+  return `${name(first)} – ${name(second)}`;
+}
+
+/** "12.3 mm", or that they touch. */
+export function distanceText({ distance }: Clearance): string {
+  return distance <= 0 ? t("touching") : `${fixed(distance * 1000, 1)}\u202fmm`;
+}

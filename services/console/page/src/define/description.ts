@@ -1,0 +1,227 @@
+// A robot's description as Define holds it: robot.toml's values, complete, in the file's own units.
+
+export type Triple = [number, number, number];
+export type Range = [number, number];
+export type JointType = "rotary" | "prismatic";
+
+export interface Pose {
+  xyz: Triple;
+  rpy: Triple;
+}
+
+/** How a link looks; an empty mesh or colour: none. */
+export interface Body {
+  mesh: string;
+  mesh_scale: number;
+  mesh_pose: Pose;
+  color: string;
+}
+
+export interface Joint {
+  name: string;
+  type: JointType;
+  a: number;
+  alpha: number;
+  d: number;
+  theta: number;
+  limits: Range;
+  max_speed: number;
+  max_acceleration: number;
+  max_jerk: number;
+  home: number;
+  /** Its name is the joint's where it is empty. */
+  link: Body & { name: string };
+}
+
+export interface NamedFrame extends Pose {
+  name: string;
+  link: string;
+}
+
+export interface Constraint {
+  joints: Record<string, number>;
+  limits: Range;
+}
+
+export interface View {
+  eye: Triple;
+  target: Triple;
+  up: Triple;
+  projection: "orthographic" | "perspective";
+}
+
+export interface Units {
+  length: "mm" | "m";
+  angle: "deg" | "rad";
+}
+
+export interface Description {
+  name: string;
+  title: string;
+  provenance: string;
+  units: Units;
+  base: Body;
+  joint: Joint[];
+  tool: Pose;
+  frame: NamedFrame[];
+  constraint: Constraint[];
+  view: Record<string, View>;
+  collision: { ignore: [string, string][] };
+}
+
+/** What the server sends: every key may be left out, as in the file. */
+export type Partly<T> = T extends readonly unknown[]
+  ? T
+  : T extends object
+    ? { [K in keyof T]?: Partly<T[K]> }
+    : T;
+export type GivenDescription = Omit<Partly<Description>, "joint" | "frame" | "view"> & {
+  joint?: Partly<Joint>[];
+  frame?: Partly<NamedFrame>[];
+  view?: Record<string, Partly<View>>;
+};
+
+export const BASE = "base";
+const ORIGIN: Triple = [0, 0, 0];
+
+function pose(given: Partly<Pose> | undefined): Pose {
+  return { xyz: [...(given?.xyz ?? ORIGIN)], rpy: [...(given?.rpy ?? ORIGIN)] };
+}
+
+function body(given: Partly<Body> | undefined): Body {
+  return {
+    mesh: given?.mesh ?? "",
+    mesh_scale: given?.mesh_scale ?? 0.001,
+    mesh_pose: pose(given?.mesh_pose),
+    color: given?.color ?? "",
+  };
+}
+
+/** A description with every key that its file left out. */
+export function complete(given: GivenDescription): Description {
+  const units: Units = { length: "mm", angle: "deg", ...given.units };
+  return {
+    name: given.name ?? "",
+    title: given.title ?? "",
+    provenance: given.provenance ?? "",
+    units,
+    base: body(given.base),
+    joint: (given.joint ?? []).map((row) => ({
+      ...newJoint(row.name ?? "", row.type ?? "rotary", units),
+      ...row,
+      link: { ...body(row.link), name: row.link?.name ?? "" },
+    })) as Joint[],
+    tool: pose(given.tool),
+    frame: (given.frame ?? []).map((row) => ({ ...pose(row), name: row.name ?? "", link: row.link ?? BASE })),
+    constraint: structuredClone((given.constraint ?? []) as Constraint[]),
+    view: Object.fromEntries(
+      Object.entries(given.view ?? {}).map(([name, view]) => [
+        name,
+        { eye: [1, 0, 0], target: ORIGIN, up: [0, 0, 1], projection: "perspective", ...view } as View,
+      ]),
+    ),
+    collision: { ignore: structuredClone((given.collision?.ignore ?? []) as [string, string][]) },
+  };
+}
+
+/** A description without what says nothing: what is checked and saved. */
+export function concise(from: Description): object {
+  const isZero = (at: Pose) => [...at.xyz, ...at.rpy].every((value) => value === 0);
+  const shape = (of: Body) => ({
+    ...(of.mesh && { mesh: of.mesh, mesh_scale: of.mesh_scale }),
+    ...(of.mesh && !isZero(of.mesh_pose) && { mesh_pose: of.mesh_pose }),
+    ...(of.color && { color: of.color }),
+  });
+  return {
+    name: from.name,
+    ...(from.title && { title: from.title }),
+    ...(from.provenance && { provenance: from.provenance }),
+    units: from.units,
+    base: shape(from.base),
+    joint: from.joint.map((row) => ({
+      ...row,
+      link: { ...(row.link.name && { name: row.link.name }), ...shape(row.link) },
+    })),
+    tool: from.tool,
+    ...(from.frame.length && { frame: from.frame }),
+    ...(from.constraint.length && { constraint: from.constraint }),
+    ...(Object.keys(from.view).length && { view: from.view }),
+    ...(from.collision.ignore.length && { collision: from.collision }),
+  };
+}
+
+/** A description of nothing but a name, which one will want to change. */
+export function empty(): Description {
+  return complete({ name: "my-arm" });
+}
+
+/** Metres in the description's unit of length. */
+export function metres(units: Units): number {
+  return units.length === "mm" ? 0.001 : 1;
+}
+
+/** Radians in the description's unit of angle. */
+export function radians(units: Units): number {
+  return units.angle === "deg" ? Math.PI / 180 : 1;
+}
+
+/** The sign of a joint's own unit: of an angle or a length. */
+export function jointUnit(type: JointType, units: Units): string {
+  return type === "rotary" ? angleUnit(units) : units.length;
+}
+
+export function angleUnit(units: Units): string {
+  return units.angle === "deg" ? "°" : "rad";
+}
+
+export function linkName(joint: Joint): string {
+  return joint.link.name || joint.name;
+}
+
+/** Names of the links, base first. */
+export function linkNames(of: Description): string[] {
+  return [BASE, ...of.joint.map(linkName)];
+}
+
+/** How each link looks, base first. */
+export function bodies(of: Description): Body[] {
+  return [of.base, ...of.joint.map((joint) => joint.link)];
+}
+
+// What a joint of this kind usually has, in degrees or millimetres, so that only what differs is typed.
+const USUAL = {
+  rotary: { limits: [-180, 180], max_speed: 90, max_acceleration: 360, max_jerk: 3600 },
+  prismatic: { limits: [0, 500], max_speed: 250, max_acceleration: 1000, max_jerk: 10000 },
+} as const;
+
+/** A joint with nothing moved or turned, and usual limits. */
+export function newJoint(name: string, type: JointType, units: Units): Joint {
+  return {
+    name,
+    type,
+    a: 0,
+    alpha: 0,
+    d: 0,
+    theta: 0,
+    ...usualLimits(type, units),
+    home: 0,
+    link: { ...body(undefined), name: "" },
+  };
+}
+
+export function usualLimits(type: JointType, units: Units) {
+  const usual = USUAL[type];
+  const one = type === "rotary" ? radians(units) / (Math.PI / 180) : metres(units) / 0.001;
+  const scaled = (value: number) => tidy(value * one);
+  return {
+    limits: usual.limits.map(scaled) as Range,
+    max_speed: scaled(usual.max_speed),
+    max_acceleration: scaled(usual.max_acceleration),
+    max_jerk: scaled(usual.max_jerk),
+  };
+}
+
+/** Without the last digits, which only binary fractions made. */
+export function tidy(value: number): number {
+  return Number(value.toPrecision(12)) || 0; // nor a minus zero
+}

@@ -1,0 +1,107 @@
+// Changes of a description that touch more than one value. Each changes the copy that it is given.
+
+import { linkName, linkNames, metres, newJoint, radians, tidy, usualLimits } from "./description";
+import type { Description, Joint, JointType, Pose, Triple, Units } from "./description";
+
+/** A name that is not taken: "joint3". */
+export function freshName(stem: string, taken: readonly string[]): string {
+  for (let number = 1; ; number++) if (!taken.includes(`${stem}${number}`)) return `${stem}${number}`;
+}
+
+/** What may be a link's or a joint's name, from a file's. */
+export function nameFromFile(path: string): string {
+  const stem = path.replace(/^.*\//, "").replace(/\.[^.]*$/, "");
+  return stem.replace(/[^A-Za-z0-9_.-]+/g, "_").replace(/^[^A-Za-z0-9]+/, "") || "link";
+}
+
+/** Puts a joint and its link in at a place of the chain, and tells it. */
+export function insertJoint(into: Description, at: number): Joint {
+  const names = into.joint.map((joint) => joint.name);
+  const joint = newJoint(freshName("joint", [...names, ...linkNames(into)]), "rotary", into.units);
+  into.joint.splice(at, 0, joint);
+  return joint;
+}
+
+/** Takes a joint and its link out, and all that names them. */
+export function removeJoint(from: Description, at: number): void {
+  const [gone] = from.joint.splice(at, 1);
+  if (!gone) return;
+  const link = linkName(gone);
+  from.frame = from.frame.filter((frame) => frame.link !== link);
+  from.collision.ignore = from.collision.ignore.filter((pair) => !pair.includes(link));
+  for (const constraint of from.constraint) delete constraint.joints[gone.name];
+  from.constraint = from.constraint.filter((constraint) => Object.keys(constraint.joints).length > 0);
+}
+
+export function moveJoint(of: Description, from: number, to: number): void {
+  const [moved] = of.joint.splice(from, 1);
+  if (moved) of.joint.splice(to, 0, moved);
+}
+
+/** Another kind of joint has other units: its limits begin anew. */
+export function setType(of: Description, at: number, type: JointType): void {
+  const joint = of.joint[at];
+  if (joint) Object.assign(joint, { type, ...usualLimits(type, of.units), home: 0 });
+}
+
+/** Names a joint; constraints follow, and all that names a link called after it. */
+export function renameJoint(of: Description, at: number, name: string): void {
+  const joint = of.joint[at];
+  if (!joint) return;
+  const [old, oldLink] = [joint.name, linkName(joint)];
+  joint.name = name;
+  linkRenamed(of, oldLink, linkName(joint));
+  for (const constraint of of.constraint) {
+    constraint.joints = Object.fromEntries(
+      Object.entries(constraint.joints).map(([key, factor]) => [key === old ? name : key, factor]),
+    );
+  }
+}
+
+export function renameLink(of: Description, at: number, name: string): void {
+  const joint = of.joint[at];
+  if (!joint) return;
+  const old = linkName(joint);
+  joint.link.name = name === joint.name ? "" : name;
+  linkRenamed(of, old, linkName(joint));
+}
+
+function linkRenamed(of: Description, old: string, name: string): void {
+  for (const frame of of.frame) if (frame.link === old) frame.link = name;
+  of.collision.ignore = of.collision.ignore.map(
+    (pair) => pair.map((link) => (link === old ? name : link)) as [string, string],
+  );
+}
+
+/** The same robot in other units. */
+export function setUnits(of: Description, units: Units): void {
+  const length = (value: number) => tidy((value * metres(of.units)) / metres(units));
+  const angle = (value: number) => tidy((value * radians(of.units)) / radians(units));
+  const lengths = (values: Triple) => values.map(length) as Triple;
+  const place = (pose: Pose) => {
+    pose.xyz = lengths(pose.xyz);
+    pose.rpy = pose.rpy.map(angle) as Triple;
+  };
+  const kinds = new Map(of.joint.map((joint) => [joint.name, joint.type]));
+  for (const joint of of.joint) {
+    const own = joint.type === "rotary" ? angle : length;
+    joint.a = length(joint.a);
+    joint.d = length(joint.d);
+    joint.alpha = angle(joint.alpha);
+    joint.theta = angle(joint.theta);
+    joint.limits = [own(joint.limits[0]), own(joint.limits[1])];
+    for (const key of ["max_speed", "max_acceleration", "max_jerk", "home"] as const) joint[key] = own(joint[key]);
+    place(joint.link.mesh_pose);
+  }
+  for (const constraint of of.constraint) {
+    const first = kinds.get(Object.keys(constraint.joints)[0] ?? "");
+    const own = first === "prismatic" ? length : angle;
+    constraint.limits = [own(constraint.limits[0]), own(constraint.limits[1])];
+  }
+  for (const pose of [of.base.mesh_pose, of.tool, ...of.frame]) place(pose);
+  for (const view of Object.values(of.view)) {
+    view.eye = lengths(view.eye);
+    view.target = lengths(view.target);
+  }
+  of.units = units;
+}

@@ -1,0 +1,43 @@
+// The bytes of dropped files, kept in the browser: sent again when the server has forgotten them.
+
+const DATABASE = "robomesh.define";
+const STORE = "files";
+
+function opened(): Promise<IDBDatabase> {
+  return new Promise((resolve, reject) => {
+    const request = indexedDB.open(DATABASE, 1);
+    request.onupgradeneeded = () => request.result.createObjectStore(STORE);
+    request.onsuccess = () => resolve(request.result);
+    request.onerror = () => reject(request.error ?? new Error(DATABASE));
+  });
+}
+
+async function within<T>(mode: IDBTransactionMode, work: (store: IDBObjectStore) => IDBRequest<T>): Promise<T> {
+  const database = await opened();
+  try {
+    return await new Promise<T>((resolve, reject) => {
+      const request = work(database.transaction(STORE, mode).objectStore(STORE));
+      request.onsuccess = () => resolve(request.result);
+      request.onerror = () => reject(request.error ?? new Error(STORE));
+    });
+  } finally {
+    database.close();
+  }
+}
+
+/** Keeps a file; a browser without room, or in private mode, keeps none. */
+export async function keep(sha: string, bytes: Blob): Promise<void> {
+  await within("readwrite", (store) => store.put(bytes, sha)).catch(() => undefined);
+}
+
+export async function keptFile(sha: string): Promise<Blob | undefined> {
+  return within("readonly", (store) => store.get(sha) as IDBRequest<Blob | undefined>).catch(() => undefined);
+}
+
+/** Drops every file that is not wanted any more. */
+export async function keepOnly(wanted: ReadonlySet<string>): Promise<void> {
+  const keys = await within("readonly", (store) => store.getAllKeys()).catch(() => []);
+  for (const key of keys) {
+    if (!wanted.has(String(key))) await within("readwrite", (store) => store.delete(key)).catch(() => undefined);
+  }
+}

@@ -1,0 +1,85 @@
+// What is in each mesh file of the draft: read by the server, once for each content.
+
+import { effect, signal } from "@preact/signals";
+import { bodies } from "./description";
+import { draft } from "./draft";
+import { mesh } from "./server";
+import type { MeshInfo } from "./server";
+
+export type Shape = { info: MeshInfo } | { error: string } | "reading";
+
+/** By `shapeKey`. */
+export const shapes = signal<ReadonlyMap<string, Shape>>(new Map());
+
+/** A mesh file and all files that it may refer to. */
+export function shapeKey(path: string, files: Readonly<Record<string, string>>): string {
+  return `${path} ${files[path] ?? ""}`;
+}
+
+export function shapeOf(path: string, files: Readonly<Record<string, string>>): Shape | undefined {
+  return shapes.value.get(shapeKey(path, files));
+}
+
+export function setShape(path: string, files: Readonly<Record<string, string>>, shape: Shape): void {
+  shapes.value = new Map([...shapes.value, [shapeKey(path, files), shape]]);
+}
+
+/** Has a mesh file read, whatever is known of it. */
+export async function readShape(path: string, files: Readonly<Record<string, string>>): Promise<Shape> {
+  let shape: Shape;
+  try {
+    shape = { info: await mesh(path, files) };
+  } catch (error) {
+    shape = { error: error instanceof Error ? error.message : String(error) };
+  }
+  setShape(path, files, shape);
+  return shape;
+}
+
+/** Has every mesh file of the draft read until the returned function is called. */
+export function keepReading(): () => void {
+  return effect(() => {
+    const now = draft.value;
+    if (!now) return;
+    for (const { mesh: path } of bodies(now.description)) {
+      if (!path || !now.files[path] || shapes.peek().has(shapeKey(path, now.files))) continue;
+      setShape(path, now.files, "reading");
+      void readShape(path, now.files);
+    }
+  });
+}
+
+export interface Missing {
+  /** The mesh file that refers to it. */
+  of: string;
+  /** As that file names it. */
+  name: string;
+  /** Where it belongs in the description's folder. */
+  path: string;
+}
+
+/** Files that the draft's mesh files refer to and that are not there. */
+export function missingFiles(): Missing[] {
+  const now = draft.value;
+  if (!now) return [];
+  const found = new Map<string, Missing>();
+  for (const { mesh: of } of bodies(now.description)) {
+    const shape = shapeOf(of, now.files);
+    if (typeof shape !== "object" || !("info" in shape)) continue;
+    for (const name of shape.info.missing) {
+      const path = beside(of, name);
+      if (!now.files[path]) found.set(path, { of, name, path });
+    }
+  }
+  return [...found.values()];
+}
+
+/** Where a name that stands in a file leads. */
+export function beside(file: string, name: string): string {
+  const steps = file.split("/").slice(0, -1);
+  for (const step of name.replaceAll("\\", "/").split("/")) {
+    if (step === "..") steps.pop();
+    else if (step && step !== ".") steps.push(step);
+  }
+  return steps.join("/");
+}

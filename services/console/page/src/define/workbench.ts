@@ -1,0 +1,79 @@
+// What is looked at while a draft is edited: the chosen part, the open tab, where the joints stand.
+
+import { computed, signal } from "@preact/signals";
+import { linkName } from "./description";
+import type { Body, Description, Joint } from "./description";
+import { draft } from "./draft";
+
+/** The base, a joint with its link by its place in the chain, or the tool. */
+export type Part = "base" | "tool" | number;
+export const TABS = ["details", "robot", "frames", "constraints", "collisions", "views"] as const;
+export type Tab = (typeof TABS)[number];
+
+export const chosen = signal<Part>("base");
+export const tab = signal<Tab>("details");
+/** Slider positions by joint name, in the description's units; a joint without one is at home. */
+export const slid = signal<ReadonlyMap<string, number>>(new Map());
+
+export function choose(part: Part): void {
+  chosen.value = part;
+  tab.value = "details";
+}
+
+/** Begins anew with another robot. */
+export function resetWorkbench(): void {
+  chosen.value = "base";
+  tab.value = "details";
+  slid.value = new Map();
+}
+
+/** The joint that is chosen; undefined: none. */
+export function chosenJoint(of: Description): Joint | undefined {
+  return typeof chosen.value === "number" ? of.joint[chosen.value] : undefined;
+}
+
+/** The chosen link's looks; undefined: the tool is chosen. */
+export function chosenBody(of: Description): Body | undefined {
+  return chosen.value === "base" ? of.base : chosenJoint(of)?.link;
+}
+
+export function chosenLinkName(of: Description): string {
+  const joint = chosenJoint(of);
+  return joint ? linkName(joint) : String(chosen.value);
+}
+
+export function positionOf(joint: Joint): number {
+  const position = slid.value.get(joint.name) ?? joint.home;
+  return Math.max(joint.limits[0], Math.min(joint.limits[1], position));
+}
+
+/** Positions of all joints, in the description's units. */
+export const positions = computed<readonly number[]>(() => draft.value?.description.joint.map(positionOf) ?? []);
+
+/** Goes to where a problem is: opens its part and tab, and puts the focus into the nearest field. */
+export function goTo(path: readonly (string | number)[]): void {
+  const [first, second] = path;
+  const tabs: Record<string, Tab> = { frame: "frames", constraint: "constraints", collision: "collisions", view: "views" };
+  if (first === "joint" && typeof second === "number") {
+    choose(Math.min(second, (draft.value?.description.joint.length ?? 1) - 1));
+  } else if (first === "base" || first === "tool") {
+    choose(first);
+  } else {
+    tab.value = tabs[String(first)] ?? "robot";
+  }
+  requestAnimationFrame(() => requestAnimationFrame(() => focusNearest(path)));
+}
+
+function focusNearest(path: readonly (string | number)[]): void {
+  for (let length = path.length; length > 0; length--) {
+    const place = path.slice(0, length).join("/");
+    const found = [...document.querySelectorAll<HTMLElement>("[data-path]")].find(({ dataset }) => {
+      return dataset["path"] === place || dataset["path"]?.startsWith(`${place}/`);
+    });
+    if (found) {
+      found.scrollIntoView({ block: "nearest" });
+      found.focus();
+      return;
+    }
+  }
+}

@@ -1,0 +1,14 @@
+// What needs a person, what happened and who asked for what, of every robot and service of every site.
+
+import { AlarmPanel } from "./alarm-panel";
+import { Journal } from "./journal";
+import "./events.css";
+
+export function Events() {
+  return (
+    <div class="events-page">
+      <AlarmPanel />
+      <Journal />
+    </div>
+  );
+}

@@ -1,0 +1,45 @@
+// A list of thousands of lines of one height, of which only those in sight are there.
+
+import type { ComponentChildren } from "preact";
+import { useEffect, useRef, useState } from "preact/hooks";
+
+const OVER = 8; // lines beyond either edge
+
+export function VirtualList<Item>(props: {
+  label: string;
+  items: readonly Item[];
+  /** px. */
+  lineHeight: number;
+  line: (item: Item, index: number) => ComponentChildren;
+}) {
+  const { items, lineHeight } = props;
+  const place = useRef<HTMLDivElement>(null);
+  const [seen, setSeen] = useState({ top: 0, height: 400 });
+  const look = () => {
+    const element = place.current;
+    if (element) setSeen({ top: element.scrollTop, height: element.clientHeight });
+  };
+  useEffect(() => {
+    const observer = new ResizeObserver(look);
+    if (place.current) observer.observe(place.current);
+    return () => observer.disconnect();
+  }, []);
+  const first = Math.max(0, Math.min(items.length, Math.floor(seen.top / lineHeight)) - OVER);
+  const last = Math.min(items.length, Math.ceil((seen.top + seen.height) / lineHeight) + OVER);
+  return (
+    <div ref={place} class="virtual-list" tabIndex={0} role="group" aria-label={props.label} onScroll={look}>
+      <ol style={{ height: `${items.length * lineHeight}px` }}>
+        {items.slice(first, last).map((item, i) => (
+          <li
+            key={first + i}
+            style={{ transform: `translateY(${(first + i) * lineHeight}px)`, height: `${lineHeight}px` }}
+            aria-setsize={items.length}
+            aria-posinset={first + i + 1}
+          >
+            {props.line(item, first + i)}
+          </li>
+        ))}
+      </ol>
+    </div>
+  );
+}

@@ -1,0 +1,33 @@
+// Whether a tile is on the screen, or about to be: only then it is watched and drawn.
+
+import type { RefObject } from "preact";
+import { useEffect, useState } from "preact/hooks";
+
+// Scrolled past is not looked at: nobody is asked for it.
+const COMES_AFTER_MS = 120;
+const GOES_AFTER_MS = 400;
+
+const hears = new WeakMap<Element, (visible: boolean) => void>();
+const observer = new IntersectionObserver(
+  (entries) => entries.forEach((entry) => hears.get(entry.target)?.(entry.isIntersecting)),
+  { rootMargin: "160px 0px" },
+);
+
+export function useVisible(place: RefObject<Element | null>): boolean {
+  const [visible, setVisible] = useState(false);
+  useEffect(() => {
+    const element = place.current;
+    if (!element) return;
+    let timer: ReturnType<typeof setTimeout> | undefined;
+    hears.set(element, (shown) => {
+      clearTimeout(timer);
+      timer = setTimeout(() => setVisible(shown), shown ? COMES_AFTER_MS : GOES_AFTER_MS);
+    });
+    observer.observe(element);
+    return () => {
+      clearTimeout(timer);
+      observer.unobserve(element);
+    };
+  }, []);
+  return visible;
+}

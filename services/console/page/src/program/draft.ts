@@ -1,0 +1,177 @@
+// The draft: one a robot, kept in the browser as it is typed, with undo and redo of its own.
+//
+// The text field's own undo would take seconds for a file of a thousand lines, and forgets what the page writes.
+
+import { computed, effect, signal } from "@preact/signals";
+
+export interface Draft {
+  robotKey: string;
+  /** Shown to everybody while it runs, and the file's name. */
+  name: string;
+  text: string;
+}
+
+interface Step {
+  text: string;
+  cursor: number;
+}
+
+const KEPT = "robomesh.program/";
+const FIRST_NAME = "program";
+export const FILE_ENDING = ".prog";
+const MOST_STEPS = 200;
+const TOGETHER_MS = 800; // what is typed without a longer pause is one step
+export const LINE_PX = 20;
+
+export const draft = signal<Draft | null>(null);
+/** Why the browser could not keep it, in its words; "" when it did. */
+export const keepingFailed = signal("");
+const past = signal<readonly Step[]>([]);
+const future = signal<readonly Step[]>([]);
+export const canUndo = computed(() => past.value.length > 0);
+export const canRedo = computed(() => future.value.length > 0);
+
+let field: HTMLTextAreaElement | null = null;
+let typedAt = 0;
+
+/** Opens a robot's draft; false: there is none yet, and an empty one was begun. */
+export function open(robotKey: string): boolean {
+  const kept = keptOf(robotKey);
+  draft.value = kept ?? { robotKey, name: FIRST_NAME, text: "" };
+  past.value = future.value = [];
+  return kept !== null;
+}
+
+function keptOf(robotKey: string): Draft | null {
+  try {
+    const { name, text } = JSON.parse(localStorage.getItem(KEPT + robotKey) ?? "null") as Partial<Draft>;
+    return typeof name === "string" && typeof text === "string" ? { robotKey, name, text } : null;
+  } catch {
+    return null; // none, or written by hand
+  }
+}
+
+effect(() => {
+  const now = draft.value;
+  // An empty one is not kept: the example is for who has none.
+  if (!now?.text) return;
+  try {
+    localStorage.setItem(KEPT + now.robotKey, JSON.stringify({ name: now.name, text: now.text }));
+    keepingFailed.value = "";
+  } catch (error) {
+    keepingFailed.value = String(error);
+  }
+});
+
+/** The field that the text stands in; null: it is gone. */
+export function setField(element: HTMLTextAreaElement | null): void {
+  field = element;
+}
+
+/** What a person typed into the field. */
+export function typed(): void {
+  if (!field) return;
+  const now = performance.now();
+  change(field.value, now - typedAt < TOGETHER_MS);
+  typedAt = now;
+}
+
+export function rename(name: string): void {
+  if (draft.value) draft.value = { ...draft.value, name };
+}
+
+/** Begins with a text: nothing to undo, no cursor taken from where it is. */
+export function begin(text: string): void {
+  if (field) field.value = text;
+  if (draft.value) draft.value = { ...draft.value, text };
+}
+
+/** Replaces the whole text as one step of undo, and puts the cursor at the end of a line. */
+export function replace(text: string, line = 1): void {
+  if (!field) return;
+  change(text, false);
+  typedAt = 0;
+  show({ text, cursor: text.split("\n").slice(0, line).join("\n").length });
+}
+
+/** Puts a text where the cursor is, instead of what is selected. */
+export function insert(text: string): void {
+  if (!field) return;
+  const { value, selectionStart, selectionEnd } = field;
+  const before = value.slice(0, selectionStart) + text;
+  change(before + value.slice(selectionEnd), false);
+  show({ text: before + value.slice(selectionEnd), cursor: before.length });
+}
+
+/** `together`: part of the step before. */
+function change(text: string, together: boolean): void {
+  const before = draft.value;
+  if (!before || text === before.text) return;
+  if (!together || !canUndo.value) {
+    past.value = [...past.value, { text: before.text, cursor: field?.selectionStart ?? 0 }].slice(-MOST_STEPS);
+  }
+  future.value = [];
+  draft.value = { ...before, text };
+}
+
+export function undo(): void {
+  step(past, future);
+}
+
+export function redo(): void {
+  step(future, past);
+}
+
+function step(from: typeof past, to: typeof past): void {
+  const after = from.value.at(-1);
+  if (!field || !draft.value || !after) return;
+  from.value = from.value.slice(0, -1);
+  to.value = [...to.value, { text: draft.value.text, cursor: field.selectionStart }];
+  draft.value = { ...draft.value, text: after.text };
+  typedAt = 0;
+  show(after);
+}
+
+function show({ text, cursor }: Step): void {
+  if (!field) return;
+  field.value = text;
+  field.focus({ preventScroll: true });
+  field.setSelectionRange(cursor, cursor);
+  requestAnimationFrame(() => scrollTo(cursorLine())); // once its lines are painted
+}
+
+/** Saves the draft as a file. */
+export function download(): void {
+  const now = draft.value;
+  if (!now?.text) return;
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([now.text], { type: "text/plain" }));
+  link.download = `${now.name.trim() || FIRST_NAME}${FILE_ENDING}`;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+/** The line of the cursor, from 1. */
+export function cursorLine(): number {
+  if (!field) return 1;
+  return field.value.slice(0, field.selectionEnd).split("\n").length;
+}
+
+/** Puts the cursor on a line, and selects it. */
+export function goToLine(line: number): void {
+  if (!field) return;
+  const lines = field.value.split("\n");
+  const start = lines.slice(0, line - 1).reduce((sum, each) => sum + each.length + 1, 0);
+  field.focus({ preventScroll: true });
+  field.setSelectionRange(start, start + (lines[line - 1]?.length ?? 0));
+  scrollTo(line);
+}
+
+function scrollTo(line: number): void {
+  const editor = field?.closest(".editor");
+  if (!editor) return;
+  editor.scrollIntoView({ block: "nearest" });
+  const top = (line - 1) * LINE_PX;
+  const room = editor.clientHeight - 3 * LINE_PX;
+  editor.scrollTo({ left: 0, top: Math.min(Math.max(editor.scrollTop, top - room), top) });
+}

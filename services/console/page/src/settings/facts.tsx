@@ -1,0 +1,18 @@
+// Names with what they are, in two columns.
+
+import type { ComponentChildren } from "preact";
+
+export type Fact = [name: string, value: ComponentChildren];
+
+export function Facts({ of: facts }: { of: readonly Fact[] }) {
+  return (
+    <dl class="setting-facts">
+      {facts.map(([name, value]) => (
+        <div key={name}>
+          <dt>{name}</dt>
+          <dd>{value}</dd>
+        </div>
+      ))}
+    </dl>
+  );
+}

@@ -1,0 +1,37 @@
+"""A JPEG as PNG: what the renderer published, in a form that loses no more."""
+
+import contextlib
+import io
+from fractions import Fraction
+from importlib import import_module
+
+from services.console.errors import PictureError
+
+
+def prepare() -> None:
+    """Reads what PNG is made with, so that the first picture does not wait for it."""
+    with contextlib.suppress(ImportError):
+        import_module("av")
+
+
+def png(jpeg: bytes) -> bytes:
+    """The same picture as PNG.
+
+    Raises:
+        PictureError: If this console cannot, or it is no picture.
+    """
+    try:
+        import av
+    except ImportError:
+        raise PictureError(503, "this console has no PyAV to make PNG with: ask for .jpg") from None
+    try:
+        with av.open(io.BytesIO(jpeg), "r", format="mjpeg") as container:
+            frame = next(container.decode(video=0))
+        encoder = av.CodecContext.create("png", "w")
+        assert isinstance(encoder, av.VideoCodecContext)
+        picture = frame.reformat(format="rgb24")
+        encoder.width, encoder.height, encoder.pix_fmt = picture.width, picture.height, "rgb24"
+        encoder.framerate = Fraction(1)
+        return b"".join(bytes(packet) for packet in (*encoder.encode(picture), *encoder.encode(None)))
+    except (av.FFmpegError, StopIteration) as error:
+        raise PictureError(502, f"the newest picture cannot be read: {error}") from None

@@ -1,0 +1,88 @@
+"""Views of one's own, asked of the renderer: another size or rate, and less of a view for a slow line."""
+
+from collections import OrderedDict
+
+from bus import keys
+from bus.errors import RefusedError
+from bus.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
+from bus.session import Session
+
+TIMEOUT_S = 3.0
+_MOST_KNOWN = 512
+_SMALLEST_PX = 64
+
+# What each step down from what was asked for keeps: of width and height, of the rate; and at most so
+# many bits a second.
+_STEPS = ((1.0, 1.0, 0.0), (0.5, 0.5, 800e3), (0.375, 0.25, 250e3))
+LOWEST_STEP = len(_STEPS) - 1
+
+
+class Views:
+    """What the renderer was asked for, and what came of it."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._known: OrderedDict[str, tuple[ViewRequest, ViewAnswer]] = OrderedDict()
+
+    async def ask(self, robot_key: str, request: ViewRequest) -> ViewAnswer:
+        """The topics of a view of one's own.
+
+        Raises:
+            RefusedError: With the renderer's reason.
+            NoAnswerError: If no renderer answers.
+        """
+        answer = await self._session.ask(f"{robot_key}/views", request, timeout_s=TIMEOUT_S)
+        if not isinstance(answer, ViewAnswer) or not answer.topic:
+            raise RefusedError(f"{robot_key}/views was answered with no view")
+        self.learn(robot_key, request, answer)
+        return answer
+
+    def learn(self, robot_key: str, request: ViewRequest, answer: ViewAnswer) -> None:
+        """Keeps what a view is, so that there can be less of it."""
+        key = f"{robot_key}/{answer.topic}"
+        self._known[key] = (request, answer)
+        self._known.move_to_end(key)
+        while len(self._known) > _MOST_KNOWN:
+            self._known.popitem(last=False)
+
+    async def reduced(self, key: str, step: int) -> str:
+        """The key of a view's video, reduced by so many steps; all slow browsers share it.
+
+        Raises:
+            RefusedError: If there is no less of it: it is a recording's.
+            NoAnswerError: If no renderer answers.
+        """
+        if step == 0:
+            return key
+        robot_key, _, view = key.rpartition("/video/")
+        known = self._known.get(key)
+        if known is None:
+            request = ViewRequest(of=view)
+            known = request, await self.ask(robot_key, request)
+        answer = await self.ask(robot_key, less(*known, step))
+        return f"{robot_key}/{answer.topic}"
+
+
+def less(request: ViewRequest, answer: ViewAnswer, step: int) -> ViewRequest:
+    """A request for the same view with less of everything; `answer` tells how much that was."""
+    share, rate, bits = _STEPS[step]
+    smaller = ViewRequest()
+    smaller.CopyFrom(request)
+    smaller.width, smaller.height = even(answer.width * share), even(answer.height * share)
+    smaller.fps = max(answer.fps * rate, 1.0)
+    smaller.most_bits_per_s = min(bits, request.most_bits_per_s or bits)
+    return smaller
+
+
+def even(pixels: float) -> int:
+    """The nearest size that a picture can have [px]: H.264 halves the resolution of colour."""
+    return max(2 * round(pixels / 2), _SMALLEST_PX)
+
+
+def robot_key(site: str, robot: str) -> str:
+    """`robomesh/<site>/<robot>`.
+
+    Raises:
+        KeyNameError: If a name cannot be one.
+    """
+    return keys.robot_key(site, robot, "views").removesuffix("/views")

@@ -1,0 +1,254 @@
+"""Commands as Foxglove's services: stop for everybody who may attach, the others in one operator's name.
+
+A client has control only while it watches the robot: who closes the panel, or whose line breaks, has let go,
+and the robot's own gateway stops what is running.
+"""
+
+import asyncio
+import json
+import logging
+import time
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import foxglove
+from foxglove import MessageSchema, Schema, ServiceRequest, ServiceSchema
+
+from bus.errors import BusError, MessageError, RefusedError
+from bus.keys import robot_key
+from bus.lease import Control, control
+from bus.messages import JSON, decode_request
+from bus.schemas.robomesh_pb2 import (
+    CommandAnswer,
+    CommandRequest,
+    ControllerState,
+    Lease,
+    StopAnswer,
+    StopRequest,
+)
+from bus.session import Session
+
+log = logging.getLogger(__name__)
+
+_Place = tuple[str, str]
+_Watches = Callable[[int, str, str], bool]
+
+_COMMANDS = ("home", "hold", "resume", "reset", "speed", "move_absolute", "move_relative")
+_MOTIONS = (
+    CommandRequest.HOME,
+    CommandRequest.RESUME,
+    CommandRequest.MOVE_ABSOLUTE,
+    CommandRequest.MOVE_RELATIVE,
+)
+_NUMBERS = {"type": "array", "items": {"type": "number"}, "description": "rad, or m for a prismatic joint"}
+# What a request holds; anything else in it is refused.
+_FIELDS: dict[str, dict[str, Any]] = {
+    "stop": {"reason": {"type": "string"}},
+    "speed": {"speed_percent": {"type": "number"}},
+    "move_absolute": {"joint_positions": _NUMBERS},
+    "move_relative": {"joint_positions": _NUMBERS},
+}
+_ANSWER = {"accepted": {"type": "boolean"}, "text": {"type": "string"}}
+_LATEST_NS = 3_000_000_000
+_ANSWER_S = 5.0
+# `lease` beats each second: without it the gateway is gone.
+_SILENCE_S = 5.0
+_LOOK_EACH_S = 0.2
+
+
+@dataclass
+class _Holding:
+    """Control that a client has while a motion runs that it asked for."""
+
+    client: int
+    own: Control
+    commands: int = 0
+    since_ns: int = field(default_factory=time.monotonic_ns)
+
+    def stamp(self, request: CommandRequest) -> None:
+        """Make a command one of this lease's; late ones must not move an arm."""
+        self.commands += 1
+        request.lease, request.id = self.own.lease, self.commands
+        now_ns = self.own.now_ns + time.monotonic_ns() - self.since_ns
+        request.not_after.FromNanoseconds(now_ns + _LATEST_NS)
+
+
+class Commands:
+    """The services of every robot.
+
+    Args:
+        operator: In whose name commands are asked; empty: stop alone is offered.
+        watches: Whether a client watches anything of a robot.
+    """
+
+    def __init__(self, session: Session, operator: str, watches: _Watches) -> None:
+        self._session, self._operator, self._watches = session, operator, watches
+        self._loop = asyncio.get_running_loop()
+        self._holding: dict[_Place, _Holding] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def of(self, site: str, robot: str) -> list[foxglove.Service]:
+        """A robot's services, by name `robomesh/<site>/<robot>/<command>`."""
+        names = ("stop", *(_COMMANDS if self._operator else ()))
+        return [self._service(site, robot, name) for name in names]
+
+    def _service(self, site: str, robot: str, name: str) -> foxglove.Service:
+        work = self._stop if name == "stop" else partial(self._command, name=name)
+
+        def handle(request: ServiceRequest) -> bytes:
+            """On a thread of the SDK's."""
+            answering = asyncio.run_coroutine_threadsafe(
+                _answered(work(site, robot, request.client_id, request.payload)), self._loop
+            )
+            return answering.result()
+
+        schemas = ServiceSchema(
+            f"robomesh.{name}", request=_json(name, _FIELDS.get(name, {})), response=_json("answer", _ANSWER)
+        )
+        return foxglove.Service(robot_key(site, robot, name), schema=schemas, handler=handle)
+
+    async def _stop(self, site: str, robot: str, client: int, payload: bytes) -> tuple[bool, str]:
+        try:
+            reason = str(_values("stop", payload).get("reason", ""))
+        except RefusedError:
+            reason = ""  # a stop is a stop
+        request = StopRequest(by=self._operator or "foxglove", reason=reason or "stop in Foxglove")
+        answer = await self._session.ask(robot_key(site, robot, "stop"), request)
+        assert isinstance(answer, StopAnswer)
+        return answer.sent, answer.text
+
+    async def _command(
+        self, site: str, robot: str, client: int, payload: bytes, *, name: str
+    ) -> tuple[bool, str]:
+        values = _values(name, payload) | {"command": name.upper()}
+        request = decode_request(CommandRequest, json.dumps(values).encode(), JSON)
+        if request.command == CommandRequest.RESET:
+            request.stop_id = await self._latched_stop(site, robot)
+        holding = self._holding.get((site, robot))
+        if holding is not None and holding.client == client:
+            return await self._sent(site, robot, holding, request)
+        if request.command in _MOTIONS and not self._watches(client, site, robot):
+            return False, f"this client watches nothing of {site}/{robot}: open its joints before it moves"
+        answered: asyncio.Future[tuple[bool, str]] = self._loop.create_future()
+        task = self._loop.create_task(self._in_control(site, robot, client, request, answered))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return await answered
+
+    async def _in_control(
+        self,
+        site: str,
+        robot: str,
+        client: int,
+        request: CommandRequest,
+        answered: "asyncio.Future[tuple[bool, str]]",
+    ) -> None:
+        """Take control, send, answer, and keep it until the motion ends or the client lets go."""
+        try:
+            async with control(self._session, site, robot, self._operator) as own:
+                holding = _Holding(client, own)
+                answer = await self._sent(site, robot, holding, request)
+                moves = answer[0] and request.command in _MOTIONS
+                if moves:
+                    self._holding[site, robot] = holding
+                answered.set_result(answer)
+                if moves:
+                    await self._until_over(site, robot, holding)
+        except BusError as error:
+            if answered.done():
+                log.warning("%s/%s: %s", site, robot, error)
+            else:
+                answered.set_exception(error)
+        finally:
+            self._holding.pop((site, robot), None)
+            if not answered.done():
+                answered.cancel()
+
+    async def _sent(
+        self, site: str, robot: str, holding: _Holding, request: CommandRequest
+    ) -> tuple[bool, str]:
+        holding.stamp(request)
+        key = robot_key(site, robot, f"command/{self._operator}")
+        answer = await self._session.ask(key, request, timeout_s=_ANSWER_S)
+        assert isinstance(answer, CommandAnswer)
+        return answer.accepted, answer.text
+
+    async def _until_over(self, site: str, robot: str, holding: _Holding) -> None:
+        over = asyncio.create_task(self._motion_over(site, robot))
+        try:
+            while not over.done() and not holding.own.renewing.done():
+                await asyncio.wait((over, holding.own.renewing), timeout=_LOOK_EACH_S)
+                if not self._watches(holding.client, site, robot):
+                    log.warning(
+                        "%s/%s: the client that moves it has gone: control is given back", site, robot
+                    )
+                    return
+        finally:
+            over.cancel()
+
+    async def _motion_over(self, site: str, robot: str) -> None:
+        """Ends when the gateway tells that the holder's motion does, or tells nothing any more."""
+        leases = self._session.subscribe(robot_key(site, robot, "lease"), newest=20)
+        try:
+            while True:
+                async with asyncio.timeout(_SILENCE_S):
+                    sample = await anext(leases)
+                lease = sample.message()
+                assert isinstance(lease, Lease)
+                if sample.live and not (lease.motion and lease.holder == self._operator):
+                    return
+        except (TimeoutError, BusError) as error:
+            log.warning("%s/%s: the gateway fell silent: %s", site, robot, error or "no lease is told")
+        finally:
+            leases.close()
+
+    async def _latched_stop(self, site: str, robot: str) -> int:
+        state = await self._session.last(robot_key(site, robot, "controller"))
+        return state.stop.id if isinstance(state, ControllerState) else 0
+
+    async def close(self) -> None:
+        """Give back all control; the gateways stop what runs."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+
+async def _answered(work: Awaitable[tuple[bool, str]]) -> bytes:
+    try:
+        accepted, text = await work
+    except (RefusedError, MessageError) as error:
+        accepted, text = False, str(error)
+    return json.dumps({"accepted": accepted, "text": text}).encode()
+
+
+def _values(name: str, payload: bytes) -> dict[str, Any]:
+    """What a request holds.
+
+    Raises:
+        RefusedError: If it is no JSON object, or holds something that this command does not take.
+    """
+    try:
+        values = json.loads(payload or b"{}", parse_constant=_not_finite)
+    except (ValueError, RecursionError) as error:
+        raise RefusedError(f"not JSON: {error}") from None
+    if not isinstance(values, dict):
+        raise RefusedError("a JSON object is right, as in {}")
+    known = _FIELDS.get(name, {})
+    for key in values:
+        if key not in known:
+            raise RefusedError(f"{name} takes no {key!r}; it takes {', '.join(known) or 'nothing: {}'}")
+    return values
+
+
+def _not_finite(word: str) -> None:
+    raise RefusedError(f"{word} is not finite")
+
+
+def _json(name: str, fields: dict[str, Any]) -> MessageSchema:
+    described = {"type": "object", "properties": fields}
+    data = json.dumps(described).encode()
+    return MessageSchema(
+        encoding="json", schema=Schema(name=f"robomesh.{name}", encoding="jsonschema", data=data)
+    )

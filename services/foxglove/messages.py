@@ -1,0 +1,91 @@
+"""What comes from the mesh as Foxglove has it: messages with their own times, events as logs, schemas."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from foxglove import Schema
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from google.protobuf.message import Message
+
+from bus.schemas import robomesh_pb2 as schema
+from bus.subscription import Sample
+from bus.topics import History, Topic
+
+# A message's bytes, and when what it tells was so [ns since the Unix epoch].
+Timed = tuple[bytes, int]
+
+
+def protobuf_schema(message: type[Message]) -> Schema:
+    """A message's schema, with all that it needs."""
+    described = FileDescriptorSet()
+    seen: set[str] = set()
+
+    def add(file: Any) -> None:
+        if file.name not in seen:
+            seen.add(file.name)
+            for needed in file.dependencies:
+                add(needed)
+            file.CopyToProto(described.file.add())
+
+    add(message.DESCRIPTOR.file)
+    return Schema(name=message.DESCRIPTOR.full_name, encoding="protobuf", data=described.SerializeToString())
+
+
+def text_message(text: str) -> bytes:
+    """A text as ROS 2 has it (std_msgs/msg/String, CDR)."""
+    data = text.encode() + b"\0"
+    return b"\0\1\0\0" + len(data).to_bytes(4, "little") + data
+
+
+TEXT_SCHEMA = Schema(name="std_msgs/msg/String", encoding="ros2msg", data=b"string data\n")
+
+
+def timed(row: Topic, sample: Sample) -> Iterator[Timed]:
+    """What a sample holds, message by message; nothing of what ages and is of nobody knows when.
+
+    Raises:
+        MessageError: If it cannot be read.
+    """
+    if sample.live:
+        yield sample.payload, sample.header.source_time_ns
+        return
+    match row.history:
+        case History.LAST_100:
+            answer: Any = sample.message()
+            ((_, entries),) = answer.ListFields() or ((None, ()),)
+            for entry in entries:
+                yield entry.SerializeToString(), entry.timestamp.ToNanoseconds()
+        case History.KEY_FRAME:
+            frames: Any = sample.message()
+            for frame in frames.frames:
+                yield frame.data, frame.source_time_ns
+        case _:
+            # A last value may be hours old; of what beats it is a beat old at most.
+            if row.stale_after_s is None or row.heartbeat_s is not None:
+                yield sample.payload, sample.header.source_time_ns
+
+
+_LEVELS = {
+    schema.Event.DEBUG: Log.DEBUG,
+    schema.Event.INFO: Log.INFO,
+    schema.Event.WARNING: Log.WARNING,
+    schema.Event.ERROR: Log.ERROR,
+    schema.Event.CRITICAL: Log.FATAL,
+}
+
+
+def log_of(event: bytes, robot: str) -> bytes:
+    """An event as Foxglove's log panel has it.
+
+    Raises:
+        DecodeError: If it is none.
+    """
+    told = schema.Event.FromString(event)
+    log = Log(
+        timestamp=told.timestamp,
+        level=_LEVELS.get(told.severity, Log.UNKNOWN),
+        message=f"{told.text} [{told.code}]",
+        name=f"{robot} {told.source}".strip(),
+    )
+    return log.SerializeToString()

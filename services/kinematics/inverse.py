@@ -1,0 +1,44 @@
+"""Joint positions for a tool's pose as an answer of the mesh: a pure function."""
+
+from bus.errors import RefusedError
+from bus.schemas import robomesh_pb2 as schema
+from robots.errors import JointCountError, PoseError
+from robots.inverse import InverseSolver, Task, solve
+
+_TASKS = {
+    schema.InverseRequest.POSE_6D: Task.POSE_6D,
+    schema.InverseRequest.POSITION_AND_AXIS_5D: Task.POSITION_AND_AXIS_5D,
+}
+
+
+def inverse_answer(solver: InverseSolver, request: schema.InverseRequest) -> schema.InverseAnswer:
+    """The solutions, or why there is none.
+
+    Raises:
+        RefusedError: If the request cannot be answered: the text says what is wrong with which field.
+    """
+    task = _TASKS.get(request.task)
+    if task is None:
+        raise RefusedError(f"task {request.task}: POSE_6D or POSITION_AND_AXIS_5D is right")
+    try:
+        result = solve(
+            solver,
+            list(request.pose),
+            task=task,
+            near=list(request.near) or None,
+            all_solutions=request.all_solutions,
+            seed=request.seed,
+        )
+    except PoseError as error:
+        raise RefusedError(str(error)) from None
+    except JointCountError as error:
+        raise RefusedError(f"near: {error}") from None
+    answer = schema.InverseAnswer(
+        residual_m=result.residual_m,
+        residual_rad=result.residual_rad,
+        reason=result.reason,
+        analytic=result.analytic,
+    )
+    for positions in result.solutions.tolist():
+        answer.solutions.add(joint_positions=positions)
+    return answer

@@ -1,0 +1,47 @@
+"""What takes long, in a process of its own: `python -m services.kinematics.worker`, asked by `bus.worker`."""
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+
+from bus.schemas import robomesh_pb2 as schema
+from bus.worker import answer_all
+from robots.cells import CellDescription
+from robots.collision import build_cell
+from robots.description import load
+from robots.inverse import InverseSolver, build_solver
+from services.kinematics.check import check_answer
+from services.kinematics.inverse import inverse_answer
+from services.kinematics.questions import InverseQuestion, Question
+
+
+def begin(cells: tuple[CellDescription, ...]) -> Callable[[Question], bytes]:
+    """What answers for the robots of these cells; of each as much is read as is asked for."""
+    cell_of = {robot.name: cell for cell in cells for robot in cell.robots}
+    built = cache(build_cell)
+
+    @cache
+    def solver(robot: str) -> InverseSolver:
+        (described,) = (each for each in cell_of[robot].robots if each.name == robot)
+        return build_solver(load(described.model, confined=described.confined))
+
+    def answer(question: Question) -> bytes:
+        if isinstance(question, InverseQuestion):
+            pose = schema.InverseRequest.FromString(question.request)
+            return inverse_answer(solver(question.robot), pose).SerializeToString()
+        request = schema.CheckRequest.FromString(question.request)
+        return check_answer(
+            request,
+            built(cell_of[question.robot], exact=request.exact),
+            question.robot,
+            question.start,
+            others={name: np.atleast_2d(there) for name, there in question.others.items()},
+            solver=solver(question.robot),
+        ).SerializeToString()
+
+    return answer
+
+
+if __name__ == "__main__":
+    answer_all(begin)

@@ -1,0 +1,96 @@
+"""Requests `recordings/*`, answered beside the recording, which never waits for them."""
+
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+from google.protobuf.message import Message
+
+from bus.errors import RefusedError
+from bus.keys import WHOLE_SITE
+from bus.requests import Request
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import Session
+from bus.worker import Worker, WorkerError
+from mcap_files.errors import RecordingError
+from services.recorder.answers import Question
+
+_MODULE = "services.recorder.reader"
+_NICE = 5
+# Who asked has given up by then; a long recording's values are looked through once.
+_WITHIN_S = 20.0
+_SERIES_WITHIN_S = 120.0
+
+
+class Serving:
+    """Answers what is asked of a site's recordings, from worker processes.
+
+    Values of a long recording take long, and are asked of a process of their own.
+
+    Args:
+        open_now: The captures that are being written, by their files' names.
+        flight: Whether the flight recorder keeps what comes.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        site: str,
+        folder: Path,
+        *,
+        open_now: Callable[[], dict[str, schema.Recording]],
+        flight: Callable[[], bool],
+    ) -> None:
+        self._open_now, self._flight = open_now, flight
+        self._quick, self._long = (Worker(_MODULE, folder, nice=_NICE) for _ in range(2))
+        answers = {"list": self._list, "info": self._info}
+        for name in ("list", "info", "range", "series", "piece"):
+            handler = answers.get(name) or self._handler(name)
+            session.answer(site, WHOLE_SITE, f"recordings/{name}", handler)
+
+    async def close(self) -> None:
+        """End the processes."""
+        await self._quick.close()
+        await self._long.close()
+
+    def _handler(self, name: str) -> Callable[[Request], Awaitable[Message]]:
+        schemas: dict[str, type[Message]] = {
+            "range": schema.RecordedMessages,
+            "series": schema.SeriesAnswer,
+            "piece": schema.Piece,
+        }
+
+        async def answer(request: Request) -> Message:
+            assert request.message is not None
+            return schemas[name].FromString(await self._ask(name, request.message))
+
+        return answer
+
+    async def _list(self, _: Request) -> schema.RecordingList:
+        listed = schema.RecordingList.FromString(await self._ask("list", schema.RecordingQuery()))
+        open_now = self._open_now()
+        known = {recording.file for recording in listed.recordings}
+        rows = [open_now.get(recording.file, recording) for recording in listed.recordings]
+        rows += [recording for file, recording in open_now.items() if file not in known]
+        rows.sort(key=lambda recording: recording.file, reverse=True)
+        return schema.RecordingList(recordings=rows, free_bytes=listed.free_bytes, flight=self._flight())
+
+    async def _info(self, request: Request) -> schema.Recording:
+        asked = request.message
+        assert isinstance(asked, schema.RecordingQuery)
+        if (open_now := self._open_now().get(asked.file)) is not None:
+            return open_now
+        return schema.Recording.FromString(await self._ask("info", asked))
+
+    async def _ask(self, name: str, request: Message) -> bytes:
+        """The worker's answer.
+
+        Raises:
+            RefusedError: Why there is none.
+        """
+        worker, within_s = (self._long, _SERIES_WITHIN_S) if name == "series" else (self._quick, _WITHIN_S)
+        try:
+            answer = await worker.ask(Question(name, request.SerializeToString()), timeout_s=within_s)
+        except (RecordingError, WorkerError, OSError) as error:
+            raise RefusedError(str(error)) from None
+        assert isinstance(answer, bytes)
+        return answer

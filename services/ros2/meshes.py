@@ -1,0 +1,53 @@
+"""The robots' meshes as files, because RViz takes them from nowhere on the mesh."""
+
+import asyncio
+import hashlib
+import logging
+from pathlib import Path
+
+from bus.errors import BusError
+from bus.keys import robot_key
+from bus.schemas.robomesh_pb2 import Description
+from bus.session import Session
+from services.viewed import meshes_of
+
+log = logging.getLogger(__name__)
+
+_WITHIN_S = 10.0
+
+
+class Meshes:
+    """A folder of GLB files, named by what is in them."""
+
+    def __init__(self, session: Session, folder: Path) -> None:
+        self._session, self._folder = session, folder
+
+    async def of(self, site: str, robot: str, description: Description) -> dict[str, str]:
+        """The address of each mesh, by the mesh's name; one that cannot be had has none."""
+        hashes = meshes_of(description).items()
+        paths = {mesh: await self._path(site, robot, mesh, sha256) for mesh, sha256 in hashes}
+        return {mesh: path.as_uri() for mesh, path in paths.items() if path}
+
+    async def _path(self, site: str, robot: str, mesh: str, sha256: str) -> Path | None:
+        path = self._folder / f"{sha256}.glb"
+        # The hash comes from the mesh too: what is no hash must not become a path.
+        if len(sha256) != 64 or not sha256.isalnum():
+            return None
+        if await asyncio.to_thread(path.exists):
+            return path
+        try:
+            data = await self._session.ask_bytes(robot_key(site, robot, f"mesh/{mesh}"), timeout_s=_WITHIN_S)
+            if hashlib.sha256(data).hexdigest() != sha256:
+                return None
+            await asyncio.to_thread(_save, path, data)
+        except (BusError, OSError) as error:
+            log.warning("no mesh %s of %s/%s: %s", mesh, site, robot, error)
+            return None
+        return path
+
+
+def _save(path: Path, data: bytes) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_suffix(".part")
+    unfinished.write_bytes(data)
+    unfinished.replace(path)

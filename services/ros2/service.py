@@ -1,0 +1,21 @@
+"""The service: ROS 2 nodes with rmw_zenoh see the mesh's robots."""
+
+import asyncio
+
+from bus.guest import be_present
+from bus.session import Session
+from services.ros2.bridge import Bridge
+from services.ros2.settings import Settings
+
+SERVICE = "ros2"
+
+
+async def serve(session: Session, settings: Settings) -> None:
+    """Serve until cancelled."""
+    bridge = Bridge(session, settings)
+    try:
+        async with asyncio.TaskGroup() as group:
+            group.create_task(be_present(session, SERVICE, site=settings.site, metrics=settings.metrics))
+            group.create_task(bridge.run())
+    finally:
+        bridge.close()

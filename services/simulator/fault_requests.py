@@ -1,0 +1,46 @@
+"""Faults begun and ended by request: `robomesh/<site>/<robot>/simulator/fault`."""
+
+import asyncio
+import time
+from dataclasses import dataclass
+
+from bus.errors import RefusedError
+from bus.health import Served, present
+from bus.requests import Request
+from bus.schemas.robomesh_pb2 import FaultAnswer, FaultRequest
+from bus.session import SessionSettings, open_session
+from bus.topics import Role
+from services.simulator.errors import SimulatorError
+from services.simulator.fault_table import FAULTS
+from services.simulator.faults import Faults
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mesh:
+    """For whom the simulator stands on the mesh, and how it gets there."""
+
+    site: str
+    robot: str
+    session: SessionSettings
+
+
+async def answer_requests(mesh: Mesh, faults: Faults) -> None:
+    """Answer until cancelled; while no router is there, wait for one."""
+
+    async def answer(request: Request) -> FaultAnswer:
+        message = request.message
+        assert isinstance(message, FaultRequest)
+        now_s = time.monotonic()
+        try:
+            if message.off:
+                faults.end(message.fault)
+            elif message.fault:
+                faults.begin(message.fault, now_s)
+        except SimulatorError as error:
+            raise RefusedError(str(error)) from None
+        return FaultAnswer(active=sorted(faults.active(now_s)), known=list(FAULTS))
+
+    served = Served(service=Role.SIMULATOR.value, present_for=((mesh.site, mesh.robot),))
+    async with open_session(mesh.session) as session, present(session, served):
+        session.answer(mesh.site, mesh.robot, "simulator/fault", answer)
+        await asyncio.Event().wait()

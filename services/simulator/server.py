@@ -1,0 +1,212 @@
+"""All clients of one simulated controller: what each is told at the rate, and what its units do."""
+
+import asyncio
+import itertools
+import logging
+import time
+from collections.abc import Callable
+
+from protocol_gateway.core.records import AbsolutePositions, Command, Error, RelativePositions, write_unit
+from protocol_gateway.core.stream import Malformed, StreamEvent, Unit
+from protocol_gateway.serving.client import Client
+from services.simulator import faults
+from services.simulator.controller import Controller
+from services.simulator.fault_table import FAULTS
+from services.simulator.faults import Faults
+from services.simulator.orders import MALFORMED, asks_to_stop
+
+logger = logging.getLogger(__name__)
+
+_TOO_MANY = Error(1, "too many clients")
+# Prime, so that the cut of a unit into two pieces wanders over all its places.
+_CUT_STEP = 37
+_DROP_EACH_S = 1.0
+_HOLD_BACK_S = 2.0
+_PAUSE_S = 0.001
+
+
+class Server:
+    """Serves one controller.
+
+    Args:
+        boot: A controller at a time; the first one, and after each restart one that moves by nobody's word.
+    """
+
+    def __init__(
+        self, controller: Controller, boot: Callable[[float], Controller], given: Faults, *, max_clients: int
+    ) -> None:
+        self._controller = controller
+        self._boot = boot
+        self._max_clients = max_clients
+        self._clients: list[Client] = []
+        self._connections: set[Client] = set()
+        self._empty = asyncio.Event()
+        self._faults = given
+        self._active: frozenset[str] = frozenset()
+        self._dropped_s = 0.0
+        self._held: list[bytes] = []
+        self._held_since_s = 0.0
+
+    def new_client(self) -> Client:
+        """The protocol of a connection that has just been accepted."""
+        return Client(self, self._controller.table)
+
+    async def run(self, rate_hz: float) -> None:
+        """Tell the state at the rate, for ever. A tick that comes late is left out, never made up for."""
+        period_s = 1.0 / rate_hz
+        noise = faults.garbage()
+        next_s = time.monotonic()
+        for number in itertools.count():
+            now_s = time.monotonic()
+            self._controller.tick(now_s)
+            self._turn(now_s)
+            if self._clients and "freeze" not in self._active:
+                before = next(noise) if "garbage" in self._active else b""
+                await self._tell(before + self._told(now_s), number, now_s)
+            next_s = max(next_s + period_s, now_s)
+            await asyncio.sleep(next_s - time.monotonic())
+
+    async def close(self) -> None:
+        """Close every connection."""
+        for client in tuple(self._connections):
+            client.abort()
+        if self._connections:
+            await self._empty.wait()
+
+    # ------------------------------------------------------------------------ clients
+
+    def joined(self, client: Client) -> None:
+        """Take a client in, or turn it away."""
+        self._connections.add(client)
+        self._empty.clear()
+        self._turn(time.monotonic())
+        if "restart" in self._active:
+            client.abort()
+            return
+        if len(self._clients) >= self._max_clients or "refuse" in self._active:
+            logger.warning("client %s turned away: too many clients", client.name)
+            client.close(write_unit((_TOO_MANY,), self._controller.table))
+            return
+        self._clients.append(client)
+        self._faults.first_client(time.monotonic())
+        logger.info("client %s has come, %d in all", client.name, len(self._clients))
+
+    def left(self, client: Client) -> None:
+        """Forget a client."""
+        if client in self._clients:
+            self._clients.remove(client)
+            logger.info("a client has gone, %d are left", len(self._clients))
+        self._connections.discard(client)
+        if not self._connections:
+            self._empty.set()
+
+    def gave_up(self, client: Client, why: str) -> None:
+        """A client is closed for its own fault."""
+        logger.warning("client %s %s: closed", client.name, why)
+
+    def heard(self, client: Client, events: list[StreamEvent]) -> None:
+        """Do what a client's units say, in their order; answer those that are refused."""
+        now_s = time.monotonic()
+        self._turn(now_s)
+        if client not in self._clients or "freeze" in self._active:
+            return
+        for event in events:
+            refusal = self._refusal_of(event, now_s)
+            if refusal is not None:
+                logger.info("refused: %s", refusal.text)
+                client.answer(write_unit((refusal,), self._controller.table))
+
+    def overheard(self, client: Client, events: list[StreamEvent]) -> None:
+        """Nothing: whom a controller turns away it does not hear."""
+
+    def outpaced(self, client: Client) -> None:
+        """Nothing: a client may send what it likes."""
+
+    def _refusal_of(self, event: StreamEvent, now_s: float) -> Error | None:
+        if isinstance(event, Malformed):
+            return Error(MALFORMED, f"malformed, {event.reason}")
+        if "deaf" in self._active and asks_to_stop(event.records):
+            return None
+        refusal = faults.refusal(event.records, self._active) if _asks(event) else None
+        if refusal is None:
+            refusal = self._controller.obey(event.records, now_s)
+            if "fault" in self._active and any(_resets(record) for record in event.records):
+                self._faults.end("fault")
+        return refusal
+
+    # ---------------------------------------------------------------------- what is told
+
+    def _told(self, now_s: float) -> bytes:
+        records = faults.disguised(self._controller.told(now_s), self._active, now_s)
+        return write_unit(records, self._controller.table)
+
+    async def _tell(self, unit: bytes, number: int, now_s: float) -> None:
+        if "burst" in self._active:
+            self._held.append(unit)
+            if now_s - self._held_since_s < _HOLD_BACK_S:
+                return
+        if self._held:
+            unit = b"".join(self._held)
+            self._held, self._held_since_s = [], now_s
+        if "split" in self._active:
+            await _tell_in_pieces(tuple(self._clients), unit)
+            return
+        unit *= faults.copies(self._active)
+        for client in tuple(self._clients):
+            client.tell(unit, number * _CUT_STEP % len(unit))
+
+    # ---------------------------------------------------------------------------- faults
+
+    def _turn(self, now_s: float) -> None:
+        """Do what a fault does when it begins, ends or is there."""
+        before, self._active = self._active, self._faults.active(now_s)
+        for name in self._active - before:
+            logger.warning("fault: %s, %s", name, FAULTS[name].what)
+            self._begin(name, now_s)
+        for name in before - self._active:
+            logger.warning("the fault %s is over", name)
+        if "freeze" in before - self._active:
+            for client in self._clients:
+                client.read_on()
+        if "freeze" in self._active:
+            for client in self._clients:
+                client.freeze()
+        if "drop" in self._active and now_s - self._dropped_s >= _DROP_EACH_S:
+            self._dropped_s = now_s
+            self._abort_all()
+
+    def _begin(self, name: str, now_s: float) -> None:
+        match name:
+            case "burst":
+                self._held_since_s = now_s
+            case "fault":
+                self._controller.obey((Command(("stop",)),), now_s)
+                unit = write_unit((faults.fault_error(),), self._controller.table)
+                for client in self._clients:
+                    client.answer(unit)
+            case "restart":
+                self._controller = self._boot(now_s)
+                self._abort_all()
+            case "refuse":
+                unit = write_unit((_TOO_MANY,), self._controller.table)
+                for client in tuple(self._clients):
+                    client.close(unit)
+
+    def _abort_all(self) -> None:
+        for client in tuple(self._clients):
+            client.abort()
+
+
+async def _tell_in_pieces(clients: tuple[Client, ...], unit: bytes) -> None:
+    for piece in faults.pieces(unit):
+        for client in clients:
+            client.answer(piece)
+        await asyncio.sleep(_PAUSE_S)
+
+
+def _asks(unit: Unit) -> bool:
+    return any(isinstance(each, Command | AbsolutePositions | RelativePositions) for each in unit.records)
+
+
+def _resets(record: object) -> bool:
+    return isinstance(record, Command) and "reset" in record.words

@@ -1,0 +1,235 @@
+"""What of the mesh should not be so: names used twice, clocks and versions that differ, who is gone.
+
+Each names both sides. Pure.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+
+from bus.keys import REPLAY, WHOLE_SITE, PresenceKey
+from bus.session import CERTIFICATE
+from services.watch.conditions import Condition
+from services.watch.mesh import Mesh, Process
+
+# Of these there is one for a robot, or for a site.
+_ONE = ("gateway", "kinematics", "watch")
+# A site is not whole without these. Others come and go as people like; a simulated controller that has gone
+# is a link that is down.
+_NEEDED = frozenset({*_ONE, "router", "recorder", "player", "renderer", "console"})
+# A restart is over by then: the old one's token is gone, the new one is there.
+SETTLED_S = 6.0
+_CLOCK_S, _CLOCK_OVER_S = 0.5, 0.4
+_LOSS, _LOSS_OVER, _LOSS_LEAST = 5e-3, 1e-3, 20
+_SILENT_S = 10.0
+_IS_GONE = " is gone"
+_UNLINKED_AFTER_S = 20.0
+_DAY_S = 86_400.0
+_EXPIRES_S = 10 * _DAY_S
+
+
+@dataclass
+class Expected:
+    """Who was there once, and so should be.
+
+    Attributes:
+        services: Of the own site, by service and robot (`-`: the whole site); the process's name.
+        sites: Other sites.
+        without_gateway: Robots whose gateway is gone, by the alarm that tells it.
+    """
+
+    services: dict[tuple[str, str], str] = field(default_factory=dict)
+    sites: set[str] = field(default_factory=set)
+    without_gateway: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def remember(self, conditions: Iterable[Condition]) -> None:
+        """Who was gone at the watch's own restart is gone still, until it is seen."""
+        for condition in conditions:
+            values = dict(condition.values)
+            match condition.code:
+                case "service.gone":
+                    for robot in values.get("robots", "").split():
+                        name = condition.text.removesuffix(_IS_GONE)
+                        self.expect(values.get("service", ""), robot, name)
+                case "site.gone":
+                    self.sites.add(values.get("site", ""))
+
+    def expect(self, service: str, robot: str, name: str) -> None:
+        """It is there, and should be from now on; a replay ends when its time has come."""
+        if service in _NEEDED and not robot.startswith(REPLAY):
+            self.services[service, robot] = name
+
+
+def mesh_conditions(
+    mesh: Mesh,
+    site: str,
+    *,
+    here: str,
+    expected: Expected,
+    begun: frozenset[str],
+    now_s: float,
+    settled_s: float = SETTLED_S,
+) -> Iterator[Condition]:
+    """Everything that is wrong between the mesh's processes.
+
+    Args:
+        here: This watch's own identity.
+        begun: Names of alarms that stand: what is near its threshold stays.
+        settled_s: So long who comes and goes must have come or gone.
+    """
+    tokens = mesh.services()
+    for condition in (
+        *_twice(mesh, [who for who in tokens if who.site == site]),
+        *_gone(mesh, tokens, site, expected),
+        *_versions(mesh),
+    ):
+        yield replace(condition, after_s=settled_s)
+    yield from _clocks(mesh, here, begun)
+    for process in mesh.processes.values():
+        if process.site == site:
+            yield from _of_process(process, begun, now_s)
+
+
+def _twice(mesh: Mesh, tokens: list[PresenceKey]) -> Iterator[Condition]:
+    owners: dict[tuple[str, str], list[PresenceKey]] = defaultdict(list)
+    for who in tokens:
+        if who.service in _ONE:
+            owners[who.service, who.robot].append(who)
+    for (service, robot), twins in owners.items():
+        if len(twins) < 2:
+            continue
+        names = " and ".join(_named(mesh, each) for each in twins)
+        if robot == WHOLE_SITE:
+            text = f"the name of site {twins[0].site} is used twice: {names}"
+        else:
+            text = f"robot {robot} has {len(twins)} {service} services: {names}"
+        yield Condition(
+            robot=robot,
+            code="mesh.twice",
+            text=text,
+            over=f"only one {service} answers to {twins[0].site}/{robot} again",
+            each=service,
+            values=tuple((f"id_{number}", each.id) for number, each in enumerate(twins, 1)),
+        )
+
+
+def _gone(mesh: Mesh, tokens: list[PresenceKey], site: str, expected: Expected) -> Iterator[Condition]:
+    here = {(who.service, who.robot) for who in tokens if who.site == site}
+    for who in tokens:
+        if who.site == site:
+            expected.expect(who.service, who.robot, _named(mesh, who))
+        else:
+            expected.sites.add(who.site)
+    # A gateway of a hundred robots is gone once.
+    gone: dict[str, list[str]] = defaultdict(list)
+    for (service, robot), name in expected.services.items():
+        if (service, robot) not in here:
+            gone[name].append(robot)
+    expected.without_gateway.clear()
+    for name, robots in gone.items():
+        service = name.split()[0]
+        first = sorted(robots)[0]
+        condition = Condition(
+            code="service.gone",
+            text=name + _IS_GONE,
+            over=f"{service} is there again",
+            each=service if first == WHOLE_SITE else f"{service}.{first}",
+            values=(("service", service), ("robots", " ".join(sorted(robots)[:20]))),
+            latching=True,
+        )
+        if service == "gateway":
+            expected.without_gateway[condition.id] = tuple(robots)
+        yield condition
+    for other in sorted(expected.sites - {who.site for who in tokens}):
+        yield Condition(
+            code="site.gone",
+            text=f"site {other} is gone: nothing of it is seen at {site} any more",
+            over=f"site {other} is there again",
+            each=other,
+            values=(("site", other),),
+            latching=True,
+        )
+
+
+def _clocks(mesh: Mesh, here: str, begun: frozenset[str]) -> Iterator[Condition]:
+    own = mesh.processes.get(here)
+    hosts: dict[str, list[tuple[float, float]]] = defaultdict(list)
+    for process in mesh.processes.values():
+        best = process.clock.best
+        if best is not None and process.health.id != here:
+            hosts[process.health.host].append((best.round_trip_s, best.offset_s))
+    for host, readings in hosts.items():
+        round_trip_s, offset_s = min(readings)
+        limit = _CLOCK_OVER_S if f"{WHOLE_SITE}:clock.off:{host}" in begun else _CLOCK_S
+        if abs(offset_s) - round_trip_s / 2 > limit:
+            way = "ahead of" if offset_s > 0 else "behind"
+            mine = own.health.host if own is not None else "the watch"
+            yield Condition(
+                code="clock.off",
+                text=f"the clock of {host} is {abs(offset_s):.1f} s {way} that of {mine} (the watch's)",
+                over=f"the clocks of {host} and {mine} agree again",
+                each=host,
+                values=(("offset_s", f"{offset_s:.3f}"), ("uncertainty_s", f"{round_trip_s / 2:.3f}")),
+            )
+
+
+def _versions(mesh: Mesh) -> Iterator[Condition]:
+    versions: dict[str, list[str]] = defaultdict(list)
+    for process in mesh.processes.values():
+        versions[process.health.version].append(process.name)
+    if len(versions) > 1:
+        sides = "; ".join(
+            f"{version}: {', '.join(sorted(names)[:3])}{' and more' if len(names) > 3 else ''}"
+            for version, names in sorted(versions.items())
+        )
+        yield Condition(
+            code="mesh.versions",
+            text=f"versions differ: {sides}",
+            over="all have one version again",
+        )
+
+
+def _of_process(process: Process, begun: frozenset[str], now_s: float) -> Iterator[Condition]:
+    health = process.health
+    if now_s - process.at_s > _SILENT_S:
+        yield Condition(
+            code="service.silent",
+            text=f"{process.name} is there and has said nothing for more than {_SILENT_S:g} s",
+            over=f"{process.name} says something again",
+            each=f"{health.service}.{health.id}",
+        )
+    received, lost = process.lost_lately
+    each = f"{health.service}.{health.id}"
+    share = lost / max(received + lost, 1)
+    standing = f"{WHOLE_SITE}:mesh.loss:{each}" in begun
+    if (lost >= _LOSS_LEAST and share > _LOSS) or (standing and share > _LOSS_OVER):
+        yield Condition(
+            code="mesh.loss",
+            text=f"{process.name} lost {100 * share:.1f} % of what was sent to it in the last minute",
+            over=f"{process.name} loses nothing worth telling any more",
+            each=each,
+            values=(("lost", str(lost)), ("received", str(received))),
+        )
+    links, wanted = (int(health.values.get(name, 0)) for name in ("links", "links_wanted"))
+    if links < wanted:
+        yield Condition(
+            code="router.unlinked",
+            text=f"{process.name} reaches {links} of the {wanted} routers that it is to link to",
+            over=f"{process.name} reaches every router that it is to link to",
+            each=health.id,
+            after_s=_UNLINKED_AFTER_S,
+        )
+    if CERTIFICATE in health.values and health.values[CERTIFICATE] < _EXPIRES_S:
+        left = health.values[CERTIFICATE]
+        when = f"expires in {left / _DAY_S:.0f} days" if left > 0 else "has expired"
+        yield Condition(
+            code="certificate.expires",
+            text=f"the certificate of {process.name} {when}",
+            over=f"the certificate of {process.name} is renewed",
+            each=each,
+        )
+
+
+def _named(mesh: Mesh, who: PresenceKey) -> str:
+    process = mesh.processes.get(who.id)
+    return process.name if process is not None else f"{who.service} of {who.site} ({who.id})"

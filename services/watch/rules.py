@@ -1,0 +1,161 @@
+"""Which events are alarms, how urgent, what ends them, and what to do: the rationalisation of ISA-18.2.
+
+An alarm asks a person to act. What asks nobody (a setting, what another alarm says already) is none, and
+stands here all the same, so that one sees that it was thought of.
+
+    ended by     events whose code ends it: "link.up"; also its own code or code + ".over" told as INFO
+    over after   over when it has not come again for so long
+    neither      stands until somebody acknowledges it: it happened, and nothing will say that it is over
+
+Source: ANSI/ISA-18.2-2016, clause 10 (rationalisation) and annex (latching alarms).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from bus.schemas.robomesh_pb2 import Alarm, Event
+
+LOW, MEDIUM, HIGH, CRITICAL = Alarm.LOW, Alarm.MEDIUM, Alarm.HIGH, Alarm.CRITICAL
+_MINUTE_S = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """What is done with events of one code, or with a state that has this code.
+
+    Attributes:
+        priority: None: it is no alarm.
+        advice: What to do, for people.
+        each: Of the event's values: an alarm for each; of "table/plate" the part before the slash.
+    """
+
+    priority: Alarm.Priority | None
+    advice: str = ""
+    ended_by: tuple[str, ...] = ()
+    over_after_s: float | None = None
+    each: str = ""
+
+
+_NONE = Rule(None)
+_LINK = "Look at the controller's power, its network cable and its address in the site file."
+_DISK = "Make room in the recorder's folder, or move it to a larger disk."
+_WHO = "Find out who moves the robot; keep away from it until you know."
+
+RULES: Mapping[str, Rule] = MappingProxyType(
+    {
+        # The controller's link and state: held by `conditions.py` for as long as they are so.
+        "link.down": Rule(HIGH, _LINK),
+        "link.silent": Rule(HIGH, _LINK),
+        "link.deluge": Rule(HIGH, "Something other than a controller sends there, or it is broken."),
+        "controller.joint_count": Rule(HIGH, "The site file names another model than the controller has."),
+        "link.flooding": Rule(MEDIUM, "Lower the controller's rate; only the newest of it is published."),
+        "controller.fault": Rule(HIGH, "Clear the fault at the controller, then reset."),
+        "controller.local": Rule(LOW, "People at the controller move the robot: ask them."),
+        "stop.latched": Rule(MEDIUM, "See why it was stopped; who has control resets it."),
+        "check.missing": Rule(HIGH, "Motions are not checked as they should be; see the gateway's log."),
+        "gateway.silent": Rule(HIGH, "The gateway hangs or its machine does: restart it."),
+        # What the gateway notices.
+        "joints.gone": Rule(
+            HIGH,
+            "The controller sends, but no positions: see what its own display says.",
+            ended_by=("joints.back", "link.up", "link.down", "link.silent"),
+        ),
+        "status.gone": Rule(
+            MEDIUM,
+            "The controller sends no status any more: see what its own display says.",
+            ended_by=("status.back", "link.up", "link.down", "link.silent"),
+        ),
+        "unit.malformed": Rule(LOW, "If it goes on, look at the cable and the protocol.", (), _MINUTE_S),
+        "controller.refused": Rule(LOW, "See what was asked for, and its reason.", (), _MINUTE_S),
+        "robot.read_only": _NONE,
+        "stop.remembered": _NONE,  # the state says so
+        "stop.sent": _NONE,
+        "stop.not_sent": Rule(CRITICAL, "The stop did not reach the controller: use its emergency stop."),
+        "stop.disobeyed": Rule(CRITICAL, "The robot moves on: use its emergency stop."),
+        "motion.foreign": Rule(HIGH, _WHO),
+        "lease.ended": Rule(LOW, "Control was not given back; see who had it.", (), 5 * _MINUTE_S),
+        "program.ended": Rule(
+            MEDIUM, "See at which line and why, then run it again.", ("program.started", "program.done")
+        ),
+        "check.warning": Rule(LOW, "It passes near something: slow down, or go around.", (), _MINUTE_S),
+        "audit.failed": Rule(
+            HIGH,
+            "Make room where the gateway keeps its audit log: no motion until it can be written.",
+            ("audit.mended",),
+        ),
+        "audit.damaged": Rule(HIGH, "Keep a copy of the log; robomesh audit verify tells where it breaks."),
+        "gateway.failed": Rule(HIGH, "The gateway's log says why; report it."),
+        "legacy.closed": Rule(LOW, "An old client program does not read: start it again.", (), 5 * _MINUTE_S),
+        "legacy.turned_away": Rule(LOW, "Too many old programs, or one that may not.", (), 5 * _MINUTE_S),
+        "legacy.malformed": Rule(LOW, "An old client program sends rubbish; look at it.", (), 5 * _MINUTE_S),
+        # Kinematics: each ends with ".over".
+        "kinematics.limit": Rule(LOW, "Move the joint back before it reaches its limit.", each="joint"),
+        "kinematics.clearance.warning": Rule(LOW, "Move away from it, or slow down.", each="second"),
+        "kinematics.clearance.stop": Rule(HIGH, "Too near: move away from it.", each="second"),
+        "kinematics.collision": Rule(HIGH, "They touch: look before anything moves.", each="second"),
+        "kinematics.not_counted": Rule(
+            MEDIUM, "Nobody knows where that robot is: clearance leaves it out.", each="robot"
+        ),
+        # The recorder.
+        "recorder.gives_up": Rule(HIGH, _DISK),
+        "recorder.disk_slow": Rule(MEDIUM, "The disk cannot keep up: find out what else uses it."),
+        "recorder.space": Rule(MEDIUM, _DISK),
+        "recorder.failed": Rule(MEDIUM, "See the recorder's log."),
+        "recorder.refused": Rule(MEDIUM, "The trace is not recorded; its text says why."),
+        "recorder.damaged": Rule(LOW, "A part of the last minutes cannot be read; the rest is kept."),
+        "recorder.not_saved": Rule(HIGH, "The last minutes are not saved. " + _DISK, ("recorder.saved",)),
+        "recorder.not_recovered": Rule(LOW, "Try robomesh recordings recover on the file."),
+        "recorder.ended": Rule(HIGH, _DISK),
+        "recorder.flight_ended": Rule(HIGH, _DISK),
+        # The renderer.
+        "renderer.slow": Rule(LOW, "Ask for fewer or smaller views.", ("renderer.keeps_up",)),
+        # The router and the console: who comes without a right.
+        "router.without_rights": Rule(
+            MEDIUM,
+            "Its certificate is revoked, or foreign: find out whose it is, and who uses it.",
+            (),
+            5 * _MINUTE_S,
+        ),
+        "router.imposter": Rule(HIGH, "See what stands at that address; then start the router again."),
+        "router.rules": Rule(MEDIUM, "The file of rules cannot be read: robomesh keys writes it anew."),
+        "account.refused": Rule(
+            LOW,
+            "Ask whose account it is whether it was they; if not, disable it or give it a new password.",
+            (),
+            5 * _MINUTE_S,
+        ),
+        "accounts.unreadable": Rule(MEDIUM, "Mend the accounts file; the accounts stay as they were."),
+        # The mesh itself: held by `quarrels.py`.
+        "service.gone": Rule(MEDIUM, "See its log; start it again.", each="service"),
+        "service.silent": Rule(
+            MEDIUM, "It hangs, or its line is full: see its log, then start it again.", each="id"
+        ),
+        "site.gone": Rule(MEDIUM, "The line to it is cut, or it is off: ask its people.", each="site"),
+        "router.unlinked": Rule(LOW, "See [router] connect, and whether that site's router runs.", each="id"),
+        "clock.off": Rule(MEDIUM, "Set the clocks by NTP; times in recordings disagree.", each="host"),
+        "mesh.versions": Rule(LOW, "Bring all to one version."),
+        "mesh.twice": Rule(HIGH, "Two answer to one name: end or rename one of them.", each="name"),
+        "mesh.loss": Rule(LOW, "The line loses messages: look for what fills it.", each="id"),
+        "certificate.expires": Rule(MEDIUM, "Renew it: robomesh keys renew.", each="id"),
+        "alarm.not_saved": Rule(MEDIUM, "Make room, or see who may write in the watch's folder."),
+        "alarm.flood": Rule(MEDIUM, "Begin with the oldest of the most urgent: others may follow from it."),
+    }
+)
+
+_UNKNOWN = {
+    Event.WARNING: Rule(LOW, over_after_s=5 * _MINUTE_S),
+    Event.ERROR: Rule(MEDIUM),
+    Event.CRITICAL: Rule(HIGH),
+}
+
+
+def rule_of(code: str, severity: Event.Severity) -> Rule:
+    """The rule of an event; what nobody rationalised goes by its severity, and never gets lost."""
+    return RULES.get(code) or _UNKNOWN.get(severity, _NONE)
+
+
+def ends(code: str) -> frozenset[str]:
+    """The codes of alarms that an event ends which is no alarm itself."""
+    by_table = {alarm for alarm, rule in RULES.items() if code in rule.ended_by}
+    return frozenset({code, code.removesuffix(".over"), *by_table})

@@ -1,0 +1,111 @@
+"""Define's page before a real site, and the hands that work it."""
+
+import base64
+import contextlib
+import json
+import os
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from playwright.sync_api import expect
+
+from robots.description import LIBRARY
+from services.console import build_page
+from tests.browser.conftest import CHROMIUM
+from tests.site import running_site
+
+SHAPES = LIBRARY / "pt500" / "meshes"
+
+
+@contextlib.contextmanager
+def define_site(tmp_path_factory):
+    """A site of real processes: its page, the folder of its robots, the store of Define's files."""
+    if not CHROMIUM.exists():
+        pytest.skip(f"no {CHROMIUM}: the page is not driven here")
+    build_page.build()
+    cache = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(os.environ, "XDG_CACHE_HOME", str(cache))
+        with running_site(tmp_path_factory.mktemp("site")) as site:
+            yield SimpleNamespace(
+                address=site.console.rstrip("/"),
+                robots=site.folder / "robots",
+                store=cache / "robomesh" / "define",
+            )
+
+
+def drop(page, *files):
+    """Files let go over the page, as from a file manager."""
+    expect(page.locator(".define")).to_have_count(1)
+    contents = [[name, base64.b64encode(content).decode()] for name, content in files]
+    page.evaluate(
+        """(files) => {
+            const data = new DataTransfer();
+            for (const [name, text] of files) {
+                const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+                data.items.add(new File([bytes], name));
+            }
+            for (const kind of ["dragover", "drop"]) {
+                const event = new DragEvent(kind, { dataTransfer: data, bubbles: true, cancelable: true });
+                document.querySelector("main").dispatchEvent(event);
+            }
+        }""",
+        contents,
+    )
+
+
+def shape(name):
+    return name, (SHAPES / name).read_bytes()
+
+
+def button(page, name):
+    return page.get_by_role("button", name=name, exact=True)
+
+
+def field(page, path):
+    return page.locator(f'[data-path="{path}"]')
+
+
+def tab(page, name):
+    page.get_by_role("tab", name=name).click()
+
+
+def choose(page, part):
+    page.locator(f'.chain-row[data-part="{part}"]').click()
+
+
+def opened(open_page, name, **settings):
+    page = open_page(f"#/define/{name}", **settings)
+    expect(page.locator(".dh-table")).to_have_count(1)
+    return page
+
+
+@contextlib.contextmanager
+def held(page, address):
+    """The first request to an address waits until the end of the block; others pass."""
+    waiting = []
+
+    def hold(route):
+        if waiting:
+            route.fallback()
+        else:
+            waiting.append(route)
+
+    page.route(address, hold)
+    yield
+    [route] = waiting
+    with page.expect_response(lambda answer: answer.request == route.request):
+        route.continue_()
+    page.unroute(address, hold)
+
+
+def settled(page):
+    expect(page.locator(".tool-at")).to_have_attribute("data-checking", "false", timeout=30_000)
+
+
+def tools(page):
+    """The tool's placement (4, 4) [m]: as drawn, and as the server says."""
+    settled(page)
+    drawn = np.reshape(json.loads(page.locator(".define-scene canvas").get_attribute("data-tool")), (4, 4))
+    return drawn, np.array(json.loads(page.locator(".tool-at").get_attribute("data-tool")))

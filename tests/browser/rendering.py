@@ -1,0 +1,35 @@
+"""The plant's moving arm, rendered."""
+
+import asyncio
+from contextlib import contextmanager
+
+import pytest
+
+from renderer import service
+from renderer.errors import NoEncoderError, NoOpenGLError
+
+
+@contextmanager
+def rendering(plant, folder, **settings):
+    """A renderer in the plant's thread; meshes are kept in the folder. Skips where nothing can be drawn."""
+
+    async def start():
+        chosen = service.Settings(site="hall", robots=("pt600",), folder=folder, **settings)
+        task = plant.loop.create_task(service.serve(plant.session, chosen))
+        await asyncio.wait([task], timeout=1.0)
+        if task.done():
+            task.result()
+        return task
+
+    async def end(task):
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+    try:
+        task = plant.call(start())
+    except (NoOpenGLError, NoEncoderError) as error:
+        pytest.skip(f"nothing is rendered here: {error}")
+    try:
+        yield
+    finally:
+        plant.call(end(task))

@@ -1,0 +1,110 @@
+"""Hands and eyes on a robot's page, for several test modules."""
+
+import re
+from contextlib import contextmanager, suppress
+
+from playwright.sync_api import Error, expect
+
+from bus.schemas.robomesh_pb2 import FaultRequest
+from services.console import build_page
+
+ARM = "#/hall/arm"
+HOME = ["0.00°", "90.00°", "−90.00°", "0.00°", "0.00°"]
+
+
+def button(page, name):
+    return page.get_by_role("button", name=name, exact=True)
+
+
+def take(page, name="li"):
+    page.get_by_label("Your name").fill(name)
+    button(page, "Take control").click()
+    expect(page.locator(".holder")).to_have_text("You are in control")
+
+
+def ready(page, name="li"):
+    """Control taken, no stop latched, at home."""
+    take(page, name)
+    reset = page.get_by_role("button", name=re.compile("^Reset"))
+    home, notice = button(page, "Home"), page.locator(".control .notice")
+    # What stands on the page is the newest that it has heard: a stop of just before may come yet.
+    for _ in range(100):
+        if reset.count() and reset.first.is_enabled():
+            reset.first.click()
+        with suppress(Error):
+            home.click(timeout=500)
+            expect(notice).to_have_text(re.compile("^(Sent|Done|Not sent)"))
+            if not notice.inner_text().startswith("Not sent"):
+                break
+        page.wait_for_timeout(200)
+    expect(page.locator("[data-joint]")).to_have_text(HOME, timeout=30_000)
+    expect(page.locator(".facts")).to_contain_text("· homed", timeout=30_000)
+    expect(page.locator(".headline .state")).to_have_text("Idle", timeout=30_000)
+
+
+def set_speed(page, percent):
+    page.get_by_label("Speed").fill(str(percent))
+    page.get_by_label("Speed").press("Enter")
+    expect(page.locator(".control .notice")).to_have_text(f"Sent: speed {percent} %")
+
+
+def move_slowly(page):
+    """A motion of many seconds runs: 5 degrees at 0.9 degrees a second, three times."""
+    set_speed(page, 1)
+    button(page, "5").click()
+    for _ in range(3):
+        button(page, "waist +5°").click()
+    expect(page.locator(".headline .state")).to_have_text("Moving")
+
+
+def clear_stop(page):
+    page.get_by_role("button", name="Reset stop").click()
+    expect(page.locator(".stopped")).to_have_count(0)
+    set_speed(page, 100)
+    button(page, "Release").click()
+
+
+@contextmanager
+def fault(plant, name):
+    """The arm's simulated controller has a fault."""
+    key = "robomesh/hall/arm/simulator/fault"
+    plant.call(plant.session.ask(key, FaultRequest(fault=name)))
+    try:
+        yield
+    finally:
+        plant.call(plant.session.ask(key, FaultRequest(fault=name, off=True)))
+
+
+def degrees(page, joint):
+    text = page.locator(f'[data-joint="{joint}"]').inner_text()
+    return float(text.replace("°", "").replace("−", "-"))
+
+
+def audited(plant, request):
+    """How many such requests the gateway wrote down."""
+    text = (plant.audit / "hall" / "arm.jsonl").read_text() if (plant.audit / "hall").exists() else ""
+    return text.count(f'"{request}"')
+
+
+def drag(page, joint, pixels, *, release=True):
+    slider = page.get_by_role("slider", name=f"Target of {joint}")
+    expect(slider).to_be_visible()
+    box = slider.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + pixels, y, steps=4)
+    if release:
+        page.mouse.up()
+
+
+def serious(page):
+    """What axe finds that keeps people from using the page."""
+    page.evaluate((build_page.MODULES / "axe-core" / "axe.min.js").read_text())
+    found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")
+    return [
+        (each["id"], node["html"][:120], node["failureSummary"])
+        for each in found["violations"]
+        if each["impact"] in ("serious", "critical")
+        for node in each["nodes"]
+    ]

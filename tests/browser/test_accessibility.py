@@ -1,0 +1,101 @@
+"""Every page, dark and light: axe finds nothing serious; in Chinese nothing of the page itself is English."""
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from bus.schemas import robomesh_pb2 as schema
+from tests.browser.robot_page import serious
+
+pytestmark = pytest.mark.browser
+
+PAGES = {
+    "#/": ".tile .state",
+    "#/hall/arm": '[data-joint="waist"]',
+    "#/wall": ".wall-tile",
+    "#/recordings": "h1",
+    "#/program/hall/arm": ".program, main h1",
+    "#/events": ".alarm-line",
+    "#/settings": ".panel.mesh",
+}
+# What the servers say stands in their own language, and says so.
+ENGLISH = """
+const own = (node) => {
+  for (let at = node.parentElement; at; at = at.parentElement) if (at.lang === "en") return false;
+  return !node.parentElement.closest("script, noscript, style, option, code, pre, textarea");
+};
+const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+const found = [];
+for (let node = walker.nextNode(); node; node = walker.nextNode())
+  if (/[A-Za-z]{2,} [a-z]{2,} [a-z]{2,}/.test(node.data) && own(node)) found.push(node.data.trim());
+found
+"""
+SMALL = """
+[...document.querySelectorAll("button, select, input:not([type=checkbox])")]
+  .filter(e => e.offsetParent && e.getBoundingClientRect().height < 44)
+  .map(e => e.outerHTML.slice(0, 80))
+"""
+
+
+@pytest.fixture
+def alarmed(raised):
+    """There is an alarm to be shown."""
+    raised("joints.gone", "no positions come from it")
+    yield
+    raised("joints.back", "positions come again", schema.Event.INFO)
+
+
+def visit(page, path):
+    page.evaluate("path => (location.hash = path)", path)
+    expect(page.locator(PAGES[path]).first).to_be_visible()
+
+
+@pytest.mark.parametrize(("theme", "language"), [("dark", "en"), ("light", "zh")])
+def test_axe_finds_nothing_serious_on_any_page_and_a_chinese_page_is_chinese(
+    open_page, alarmed, theme, language
+):
+    page = open_page(drawn=False)
+    page.evaluate(
+        "([theme, language]) => { localStorage.setItem('robomesh.theme', theme);"
+        " localStorage.setItem('robomesh.language', language) }",
+        [theme, language],
+    )
+    page.reload()
+    expect(page.locator("html")).to_have_attribute("lang", re.compile(f"^{language}"))
+    found = {}
+    for path in PAGES:
+        visit(page, path)
+        found[path] = serious(page)
+        if language == "zh":
+            found[path] += page.evaluate(ENGLISH)
+    assert found == {path: [] for path in PAGES}
+
+
+def test_no_page_scrolls_sideways_on_a_phone_and_everything_is_large_enough_for_a_thumb(open_page, alarmed):
+    page = open_page(width=360, height=740, has_touch=True, drawn=False)
+    found = {}
+    for path in ("#/", "#/events", "#/settings"):
+        visit(page, path)
+        found[path] = [page.evaluate("document.documentElement.scrollWidth"), *page.evaluate(SMALL)]
+    assert found == {path: [360] for path in found}
+
+
+def test_every_texts_table_has_both_languages():
+    """Read from the sources: each text has two, and fills in the same values."""
+    from services.console.build_page import PAGE
+
+    pair = re.compile(r'^  "?([\w.]+)"?: \[(".*?(?<!\\)"), (".*?(?<!\\)")\],$', re.MULTILINE)
+    wrong, count = [], 0
+    for path in sorted((PAGE / "src").rglob("*texts.ts")):
+        for name, english, chinese in pair.findall(path.read_text()):
+            count += 1
+            values = [sorted(re.findall(r"\{\w+\}", text)) for text in (english, chinese)]
+            words = re.sub(r"\{\w+\}", "", english)
+            translated = re.search(r"[\u4e00-\u9fff]", chinese) or not re.search(
+                r"[A-Za-z]{3,} [a-z]{3,}", words
+            )
+            if values[0] != values[1] or not translated:
+                wrong.append((path.name, name))
+    assert count > 500
+    assert wrong == []

@@ -1,0 +1,91 @@
+"""What the page says of an arm that does not do as it is told: stops not heeded, faults, local mode."""
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.robot_page import ARM, button, fault, ready, serious, set_speed
+
+pytestmark = pytest.mark.browser
+
+STATE = ".headline .state"
+
+
+def test_an_arm_that_does_not_heed_its_stop_is_an_alarm_that_nothing_hides(open_page, plant):
+    page, phone = open_page(ARM, drawn=False), open_page(ARM, 360, 740, drawn=False, has_touch=True)
+    fleet = open_page(drawn=False)
+    ready(page)
+    set_speed(page, 1)
+    for key in (*["PageUp"] * 5, "Enter"):
+        page.get_by_role("slider", name="Target of waist").press(key)
+    expect(page.locator(STATE)).to_have_text("Moving")
+    with fault(plant, "deaf"):
+        page.locator("button.stop").click()
+        for each in (page, phone):
+            expect(each.locator(".alarm-band")).to_have_text(
+                "It moves although it was told to stop: use the emergency stop at the robot."
+            )
+            expect(each.locator(".alarm-band")).to_be_in_viewport(ratio=1)
+            box = each.locator(".alarm-band").bounding_box()
+            assert box["width"] == each.viewport_size["width"]
+        phone.mouse.wheel(0, 2000)
+        expect(phone.locator(".alarm-band")).to_be_in_viewport(ratio=1)
+        expect(page.locator(STATE)).to_have_text("Does not stop")
+        expect(page.locator(".stopped")).to_contain_text(
+            re.compile(r"Stop sent by li at \S+: the arm still moves")
+        )
+        expect(page.locator("body")).not_to_contain_text("Stopped by")
+        expect(page.get_by_role("button", name="Reset stop")).to_be_disabled()
+        expect(page.locator(".stopped")).to_contain_text("It can be reset when the arm rests")
+        tile = fleet.locator(".tile").filter(has_text="arm")
+        expect(tile.locator(".tile-problem.alarm")).to_contain_text("use the emergency stop at the robot")
+        assert serious(page) == []
+    # The stop is sent again each 2 s; now it is heeded.
+    expect(page.locator(STATE)).to_have_text("Stopped")
+    expect(page.locator(".stopped")).to_contain_text("Stopped by li")
+    past = page.locator(".alarm-band.past")
+    expect(past).to_have_text(re.compile(r"At \S+ it moved on although it was told to stop"))
+    button(past, "Dismiss").click()
+    expect(past).to_have_count(0)
+    page.get_by_role("button", name="Reset stop").click()
+    expect(page.locator(".stopped")).to_have_count(0)
+    set_speed(page, 100)
+    button(page, "Release").click()
+
+
+def test_a_controllers_own_fault_can_be_reset_and_nothing_else_is_offered(open_page, plant):
+    page = open_page(ARM, drawn=False)
+    ready(page)
+    with fault(plant, "fault"):
+        expect(page.locator(STATE)).to_have_text("Fault")
+        expect(page.locator(".stopped")).to_contain_text("The controller has a fault")
+        expect(button(page, "Home")).to_be_disabled()
+        expect(button(page, "waist +1°")).to_be_disabled()
+        expect(page.locator(".joints .notice")).to_have_text("See to it, then reset: no motion until then.")
+        assert page.get_by_role("slider", name="Target of").count() == 0
+        assert serious(page) == []
+    button(page, "Reset").click()
+    expect(page.locator(".stopped")).to_have_count(0)
+    expect(button(page, "Home")).to_be_enabled()
+    button(page, "Release").click()
+
+
+def test_in_local_mode_the_page_says_so_and_offers_no_motion(open_page, plant):
+    page = open_page(ARM, drawn=False)
+    ready(page)
+    with fault(plant, "local"):
+        expect(page.locator(".joints .notice")).to_contain_text("the controller is in local mode")
+        expect(button(page, "Home")).to_be_disabled()
+    expect(button(page, "Home")).to_be_enabled()
+    button(page, "Release").click()
+
+
+def test_a_robot_that_is_not_there_is_said_with_those_that_are(open_page):
+    page = open_page("#/hall/nope", drawn=False)
+    expect(page.locator("h1")).to_have_text("There is no robot nope at hall.")
+    expect(page.locator(".missing li")).to_have_text(["hall / arm", "hall / pt600"])
+    expect(button(page, "Take control")).to_have_count(0)
+    assert serious(page) == []
+    page.get_by_role("link", name="hall / arm").click()
+    expect(page.locator(STATE)).to_be_visible()

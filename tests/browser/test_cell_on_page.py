@@ -1,0 +1,114 @@
+"""A robot's page in a cell, before a real site: what stands around it, how near, what is checked and run."""
+
+import asyncio
+import re
+import time
+from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
+
+import pytest
+from playwright.sync_api import expect
+
+from bus.session import open_session
+from services.console import build_page
+from tests.browser.conftest import CHROMIUM
+from tests.browser.robot_page import serious
+from tests.site import READY_S, running_site
+
+pytestmark = pytest.mark.browser
+
+PAGE = "#/test/arm"
+# At 25 degrees of the waist the wrist is some 20 mm from the post; the mate stands out of reach.
+SITE = """
+[[robot]]
+name = "arm"
+model = "pt600"
+cell = "a"
+check = "require"
+
+[[robot]]
+name = "mate"
+model = "pt600"
+cell = "a"
+check = "off"
+pose = { xyz = [1500.0, 0.0, 0.0] }
+
+[[fixture]]
+cell = "a"
+name = "post"
+cylinder = [40.0, 900.0]
+pose = { xyz = [300.0, 250.0, 450.0] }
+"""
+PROGRAM = """speed 20
+move_joints 0 80 -80 0 0
+move_joints 0 90 -90 0 0
+"""
+SLOWLY_MS = 40_000
+
+
+@pytest.fixture(scope="module")
+def plant(tmp_path_factory):
+    if not CHROMIUM.exists():
+        pytest.skip(f"no {CHROMIUM}: the page is not driven here")
+    build_page.build()
+    with running_site(tmp_path_factory.mktemp("cell"), robots=SITE) as site:
+        deadline = time.monotonic() + READY_S
+        while "still getting ready" in (homed := site.command("send", "arm", "home")).stdout:
+            assert time.monotonic() < deadline, homed.stdout
+        assert homed.returncode == 0, homed.stdout
+        yield SimpleNamespace(address=site.console.rstrip("/"), site=site)
+
+
+def told(plant, topic):
+    """The newest that the mesh says of the arm."""
+
+    async def heard():
+        async with open_session(plant.site.mesh) as session:
+            return await session.last(f"robomesh/test/arm/{topic}")
+
+    # Playwright's own loop runs in this thread.
+    with ThreadPoolExecutor() as threads:
+        return threads.submit(lambda: asyncio.run(heard())).result(20)
+
+
+def test_what_stands_around_an_arm_is_in_its_picture_with_the_line_to_what_is_nearest(open_page):
+    page = open_page(PAGE)
+    page.wait_for_selector('canvas[data-loaded="true"][data-fixtures="1"][data-neighbours="1"]')
+    expect(page.locator(".scene-label")).to_be_visible(timeout=SLOWLY_MS)
+    expect(page.locator(".scene-label")).to_have_text(re.compile(r"^\d+\.\d\smm$"), timeout=SLOWLY_MS)
+    expect(page.locator(".facts")).to_contain_text("motions are checked: required")
+    assert serious(page) == []
+
+
+def test_a_clearance_that_grows_short_turns_amber_with_its_number_and_an_event_says_so(open_page, plant):
+    page = open_page(PAGE, drawn=False)
+    row = page.locator('[data-margin="clearance"]')
+    expect(row).to_contain_text("forearm – post", timeout=SLOWLY_MS)
+    expect(row).to_have_class("margin normal")
+    sent = plant.site.command("send", "arm", "move", "25", "90", "-90", "0", "0")
+    assert sent.returncode == 0, sent.stderr
+    expect(row).to_have_class("margin warning", timeout=SLOWLY_MS)
+    distance = told(plant, "kinematics").clearance.distance
+    assert 0.01 < distance < 0.05
+    expect(row.locator(".margin-value")).to_have_text(f"{1000 * distance:.1f}\u202fmm")
+    expect(page.locator(".event-list")).to_contain_text(
+        re.compile(r"is \d+ mm from post, within the warning")
+    )
+
+
+def test_every_monitor_sees_the_line_of_the_program_that_runs_and_that_it_is_done(open_page, plant, tmp_path):
+    page = open_page(PAGE, drawn=False, width=360, height=740)
+    expect(page.locator(".facts")).to_contain_text("motions are checked: required", timeout=SLOWLY_MS)
+    (tmp_path / "to-and-fro.robo").write_text(PROGRAM, encoding="utf-8")
+    with ThreadPoolExecutor() as threads:
+        file = str(tmp_path / "to-and-fro.robo")
+        sent = threads.submit(plant.site.command, "send", "arm", "run", file)
+        line = page.locator(".program-line")
+        running = r"to-and-fro: step \d of 3, line 2: move_joints 0 80 -80 0 0; \w+; 00:\d\d of 00:\d\d"
+        expect(line).to_have_text(re.compile(running), timeout=SLOWLY_MS)
+        assert page.evaluate("document.documentElement.scrollWidth") == 360
+        expect(line).to_have_text(re.compile("to-and-fro: done"), timeout=SLOWLY_MS)
+    # Its sender gave control back when the arm rested, and stopped nothing.
+    assert sent.result().returncode == 0
+    expect(page.locator(".holder")).to_have_text("Nobody is in control")
+    expect(page.locator(".stopped")).to_have_count(0)

@@ -1,0 +1,204 @@
+"""Two browsers before one robot: who controls it, how control goes from one to the other, and steps."""
+
+import re
+from functools import partial
+
+import pytest
+from playwright.sync_api import Error, expect
+
+from tests.browser.robot_page import (
+    ARM,
+    audited,
+    button,
+    clear_stop,
+    degrees,
+    move_slowly,
+    ready,
+    serious,
+    take,
+)
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def open_arm(open_page):
+    return partial(open_page, ARM, drawn=False)
+
+
+def ask(page, name, reason=""):
+    page.get_by_label("Your name").fill(name)
+    button(page, "Ask for control").click()
+    page.get_by_label("Reason").fill(reason)
+    page.get_by_label("Reason").press("Enter")
+    expect(page.locator(".control .notice")).to_contain_text("is told that you ask")
+
+
+def take_over(page, name, loser, reason):
+    page.get_by_label("Your name").fill(name)
+    button(page, "Take over…").click()
+    page.get_by_label("Reason").fill(reason)
+    button(page, f"Take over from {loser}").click()
+
+
+def test_one_asks_and_is_handed_control(open_arm):
+    alice, bob, carol = open_arm(), open_arm(), open_arm(width=360, height=740)
+    take(alice, "alice")
+    expect(carol.locator(".since")).to_have_text(re.compile(r"since \d\d:\d\d:\d\d"))
+    ask(bob, "bob", "the gripper must be changed")
+    for page in (alice, carol):
+        expect(page.locator(".wish")).to_have_text(
+            re.compile("^bob asks for control: “the gripper must be changed”")
+        )
+    assert carol.locator(".wish button").count() == 0
+    assert serious(alice) == []
+    button(alice, "Hand over to bob").click()
+    expect(alice.locator(".wish")).to_contain_text("you are in control until bob accepts")
+    expect(carol.locator(".wish")).to_have_text("alice offers control to bob.")
+    expect(bob.locator(".wish")).to_contain_text("alice offers you control.")
+    assert serious(bob) == []
+    button(bob, "Accept").click()
+    expect(bob.locator(".holder")).to_have_text("You are in control")
+    expect(alice.locator(".holder")).to_have_text("bob is in control")
+    expect(alice.locator(".control .notice")).to_have_text("bob has accepted control.")
+    expect(button(alice, "Home")).to_be_disabled()
+    button(bob, "Release").click()
+
+
+def test_an_offer_can_be_put_off_and_withdrawn(open_arm):
+    alice, bob = open_arm(), open_arm()
+    take(alice, "alice")
+    ask(bob, "bob")
+    button(alice, "Hand over to bob").click()
+    button(bob, "Not now").click()
+    expect(bob.locator(".wish")).to_have_count(0)
+    expect(alice.locator(".wish")).to_contain_text("Offered to bob, no answer yet")
+    button(alice, "Withdraw").click()
+    expect(alice.locator(".control .notice")).to_have_text("Offer withdrawn.")
+    # She has answered him: his request does not come back. He sees how long ago he asked.
+    expect(alice.locator(".wish")).to_have_count(0)
+    expect(bob.locator(".wish")).to_have_text(
+        re.compile(r"You asked alice for control \d+\ss ago; no answer yet")
+    )
+    button(alice, "Release").click()
+
+
+def test_taking_over_needs_a_reason_which_the_loser_is_told(open_arm):
+    alice, bob = open_arm(), open_arm()
+    take(alice, "alice")
+    bob.get_by_label("Your name").fill("bob")
+    button(bob, "Take over…").click()
+    expect(bob.locator(".reason")).to_contain_text("alice loses control at once")
+    expect(button(bob, "Take over from alice")).to_be_disabled()
+    assert serious(bob) == []
+    bob.keyboard.press("Escape")
+    expect(button(bob, "Take over…")).to_be_focused()
+    take_over(bob, "bob", "alice", "smoke at the gripper")
+    expect(bob.locator(".holder")).to_have_text("You are in control")
+    expect(alice.locator(".control .notice")).to_have_text("Control lost: taken by bob: smoke at the gripper")
+    expect(alice.locator(".holder")).to_have_text("bob is in control")
+    assert serious(alice) == []
+    button(bob, "Release").click()
+
+
+def test_a_running_motion_is_not_handed_over_but_stopped_by_a_take_over(open_arm):
+    alice, bob = open_arm(), open_arm()
+    ready(alice, "alice")
+    move_slowly(alice)
+    ask(bob, "bob")
+    button(alice, "Hand over to bob").click()
+    button(bob, "Accept").click()
+    expect(bob.locator(".control .notice")).to_contain_text("Control not given: alice's motion still runs")
+    button(bob, "Take over…").click()
+    expect(bob.locator(".reason")).to_contain_text("alice's motion is running: it will be stopped")
+    take_over(bob, "bob", "alice", "wrong way")
+    expect(bob.locator(".stopped")).to_contain_text("taken by bob: wrong way")
+    expect(bob.locator(".headline .state")).to_have_text("Stopped")
+    clear_stop(bob)
+
+
+def test_a_killed_browser_loses_control_at_once_and_its_motion_is_stopped(open_arm):
+    alice, bob = open_arm(), open_arm()
+    ready(alice, "alice")
+    move_slowly(alice)
+    with pytest.raises(Error, match="crash"):
+        alice.goto("chrome://crash")
+    # Because its session is lost: its lease would have ended too, but later, and for another reason.
+    expect(bob.locator(".stopped")).to_contain_text("alice's page or program has gone")
+    expect(bob.locator(".holder")).to_have_text("Nobody is in control")
+    expect(bob.locator(".headline .state")).to_have_text("Stopped")
+    take(bob, "bob")
+    clear_stop(bob)
+
+
+def test_the_same_name_in_two_windows_is_in_control_in_one(open_arm):
+    first, second = open_arm(), open_arm()
+    take(first, "li")
+    second.get_by_label("Your name").fill("li")
+    expect(second.locator(".holder")).to_have_text("You (li) are in control in another window")
+    expect(button(second, "Ask for control")).to_have_count(0)
+    take_over(second, "li", "li", "I sit here now")
+    expect(second.locator(".holder")).to_have_text("You are in control")
+    expect(first.locator(".control .notice")).to_have_text("Control lost: taken by li: I sit here now")
+    expect(first.locator(".holder")).to_have_text("You (li) are in control in another window")
+    button(second, "Release").click()
+
+
+def test_each_press_is_one_step_in_order_none_lost_and_none_twice(open_arm, plant):
+    page = open_arm()
+    ready(page)
+    moves, waist, roll = audited(plant, "MOVE_RELATIVE"), degrees(page, "waist"), degrees(page, "roll")
+    for name in ("waist +1°", "waist +1°", "roll −1°", "waist +1°"):
+        button(page, name).click()
+    expect(page.locator('[data-joint="waist"]')).to_have_text(f"{waist + 3:.2f}°")
+    expect(page.locator('[data-joint="roll"]')).to_have_text(f"{roll - 1:.2f}°".replace("-", "−"))
+    button(page, "0.1").click()
+    # A key that is held down presses once.
+    button(page, "waist −0.1°").focus()
+    for _ in range(5):
+        page.keyboard.down("Enter")
+    page.keyboard.up("Enter")
+    expect(page.locator('[data-joint="waist"]')).to_have_text(f"{waist + 2.9:.2f}°")
+    expect(page.locator(".headline .state")).to_have_text("Idle")
+    assert audited(plant, "MOVE_RELATIVE") == moves + 5
+
+
+def test_a_step_beyond_a_limit_is_refused_at_its_row_with_value_and_limit(open_arm):
+    page = open_arm()
+    ready(page)
+    handle = page.get_by_role("slider", name="Target of elbow")
+    for key in ("PageDown", "PageDown", "Enter"):
+        handle.press(key)
+    expect(page.locator('[data-joint="elbow"]')).to_have_text("−110.00°", timeout=30_000)
+    expect(page.locator(".headline .state")).to_have_text("Idle")
+    button(page, "5").click()
+    button(page, "elbow −5°").click()
+    expect(page.locator(".joints .notice")).to_have_text(
+        "Not sent: joint elbow at -115.00° is beyond its limit -110.00°."
+    )
+    expect(page.locator(".limit.refused")).to_have_text("−110")
+    button(page, "Requests").click()
+    refusal = page.locator(".event-list li").filter(has_text="MOVE_RELATIVE").first
+    expect(refusal).to_contain_text("refused")
+    button(page, "elbow +5°").click()
+    expect(page.locator('[data-joint="elbow"]')).to_have_text("−105.00°")
+    expect(page.locator(".limit.refused")).to_have_count(0)
+
+
+def test_space_on_a_step_button_stops_and_steps_nothing(open_arm, plant):
+    page = open_arm()
+    ready(page)
+    moves = audited(plant, "MOVE_RELATIVE")
+    button(page, "waist +1°").focus()
+    page.keyboard.press("Space")
+    expect(page.locator(".headline .state")).to_have_text("Stopped")
+    expect(button(page, "waist +1°")).to_be_disabled()
+    assert audited(plant, "MOVE_RELATIVE") == moves
+    page.get_by_role("button", name="Reset stop").click()
+    expect(button(page, "waist +1°")).to_be_enabled()
+
+
+def test_without_control_no_step_can_be_pressed(open_arm):
+    page = open_arm()
+    page.wait_for_selector(".step")
+    assert page.locator(".step:enabled").count() == 0

@@ -1,0 +1,459 @@
+"""Define, as a user does it: from files to a robot that moves, before a real site's page."""
+
+import contextlib
+import math
+import re
+import shutil
+import tomllib
+
+import numpy as np
+import pytest
+from playwright.sync_api import expect
+
+from robots.description import load
+from robots.glb import link_meshes
+from robots.urdf.write import to_urdf
+from tests.browser.defining_page import (
+    SHAPES,
+    button,
+    choose,
+    define_site,
+    drop,
+    field,
+    opened,
+    settled,
+    shape,
+    tab,
+    tools,
+)
+
+pytestmark = pytest.mark.browser
+
+# Name, a, alpha, d, theta, limits: the library's Pt500, whose shapes these are.
+ROWS = [
+    ("waist", 0, 90, 300, 0, (-150, 150)),
+    ("shoulder", 250, 0, 0, 0, (-30, 130)),
+    ("elbow", 250, 0, 0, 0, (-110, 110)),
+    ("wrist_pitch", 0, 90, 0, 90, (-100, 100)),
+    ("roll", 0, 0, 0, 0, (-180, 180)),
+]
+
+
+@pytest.fixture(scope="module")
+def plant(tmp_path_factory):
+    with define_site(tmp_path_factory) as site:
+        yield site
+
+
+def test_an_arm_of_dropped_files_gets_rows_and_limits_is_saved_started_and_moves(open_page, plant):
+    page = open_page("#/define")
+    expect(page.locator(".robot-card")).to_have_count(3)
+    drop(page, *map(shape, ("base.wrl", "column.3ds", "forearm.3ds", "upper_arm.wrl", "wrist.wrl")))
+    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "5", timeout=60_000)
+    # The upper arm comes before the forearm, by keys; the flange by a button, with a joint of its own.
+    choose(page, 2)
+    page.keyboard.press("Alt+ArrowUp")
+    button(page, "+ Add joint").click()
+    page.locator(".mesh-row input[type=file]").set_input_files(SHAPES / "flange.3ds")
+    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "6", timeout=60_000)
+    assert page.locator(".chain-words .dim").all_inner_texts()[1:6] == [
+        "column · column.3ds",
+        "upper_arm · upper_arm.wrl",
+        "forearm · forearm.3ds",
+        "wrist · wrist.wrl",
+        "flange.3ds",
+    ]
+    for number, (name, a, alpha, d, theta, limits) in enumerate(ROWS):
+        choose(page, number)
+        field(page, f"joint/{number}/name").fill(name)
+        for column, value in (("a", a), ("alpha", alpha), ("d", d), ("theta", theta)):
+            field(page, f"joint/{number}/{column}").fill(str(value))
+        for which, value in enumerate(limits):
+            field(page, f"joint/{number}/limits/{which}").fill(str(value))
+    choose(page, "tool")
+    field(page, "tool/xyz/2").fill("100")
+    tab(page, "Robot")
+    field(page, "name").fill("five")
+    field(page, "title").fill("Five joints")
+    button(page, "Save and start simulated").click()
+    page.get_by_role("link", name="Watch it").click(timeout=60_000)
+
+    saved = load(plant.robots / "five")
+    assert [joint.name for joint in saved.joints] == [row[0] for row in ROWS]
+    assert [(joint.a, joint.alpha, joint.d, joint.theta, joint.limits) for joint in saved.joints] == [
+        row[1:] for row in ROWS
+    ]
+    assert sorted(path.name for path in (plant.robots / "five" / "meshes").iterdir()) == sorted(
+        path.name for path in SHAPES.iterdir()
+    )
+
+    expect(page.locator(".headline h1")).to_have_text("five")
+    path = page.url.partition("/#")[2]
+    page.close()
+    page = open_page(f"#{path}", drawn=False)  # drawn by the processor here, it would leave a lease no time
+    # It is being started: there is nobody yet to give control.
+    expect(page.locator(".headline .facts")).to_contain_text("remote · not homed", timeout=60_000)
+    expect(page.locator(".holder")).to_have_text("Nobody is in control", timeout=30_000)
+    page.get_by_label("Your name").fill("li")
+    button(page, "Take control").click(timeout=60_000)
+    expect(page.locator(".holder")).to_have_text("You are in control", timeout=30_000)
+    button(page, "Home").click()
+    expect(page.locator(".headline .facts")).to_contain_text("remote · homed", timeout=60_000)
+    handle = page.get_by_role("slider", name="Target of elbow")
+    handle.focus()
+    handle.press("PageUp")
+    handle.press("Enter")
+    expect(page.locator('[data-joint="elbow"]')).to_have_text("10.00°", timeout=30_000)
+    # Rows of the table: tool 0.1 m on from an elbow at 10°, base 0.3 m up, two links of 0.25 m.
+    reach = 250 + 350 * math.cos(math.radians(10))
+    expect(page.locator(".tool dd").first).to_have_text(f"{reach:.1f}mm", timeout=30_000)
+    button(page, "Release").click()
+    page.goto(f"{plant.address}/#/define/five")
+    button(page, "End simulation").click()
+    expect(button(page, "Start simulated")).to_be_enabled()
+
+
+def test_the_arm_is_drawn_where_the_server_says_that_it_is(open_page):
+    page = opened(open_page, "puma560")
+    drawn, said = tools(page)
+    assert np.allclose(drawn, said, atol=1e-9)
+    page.get_by_label("Position of shoulder").last.fill("-37.5")
+    page.get_by_label("Position of wrist_bend").last.fill("61")
+    choose(page, 2)
+    button(page, "Prismatic").click()
+    page.get_by_label("Position of elbow").last.fill("123")
+    choose(page, "tool")
+    field(page, "tool/rpy/0").fill("20")
+    field(page, "tool/rpy/1").fill("-30")
+    field(page, "tool/rpy/2").fill("40")
+    moved, said = tools(page)
+    assert np.allclose(moved, said, atol=1e-9)
+    assert np.linalg.norm(moved[:3, 3] - drawn[:3, 3]) > 0.05
+
+
+def test_a_wrong_limit_is_told_marked_and_found_again_by_a_click(open_page):
+    page = opened(open_page, "pt500")
+    settled(page)
+    expect(page.locator(".check-list")).to_have_text("Nothing is wrong with it.")
+    choose(page, 2)
+    field(page, "joint/2/limits/0").fill("120")
+    expect(page.locator(".problem")).to_contain_text(
+        "joint 'elbow' limits = [120, 110]: the lower must be below the upper"
+    )
+    expect(field(page, "joint/2/limits/0")).to_have_attribute("aria-invalid", "true")
+    expect(field(page, "joint/2/limits/1")).to_have_attribute("aria-invalid", "true")
+    expect(field(page, "joint/2/home")).to_have_attribute("aria-invalid", "false")
+    tab(page, "Robot")
+    page.locator(".problem").click()
+    expect(field(page, "joint/2/limits/0")).to_be_focused()
+    field(page, "joint/2/limits/0").fill("-110")
+    expect(page.locator(".problem")).to_have_count(0)
+
+
+@pytest.mark.parametrize("typed", ["1,234", "1.5in", "1/2", "0x10", "1e400", "abc", ""])
+def test_what_is_no_number_stays_marked_and_is_not_saved(open_page, typed):
+    page = opened(open_page, "pt500")
+    cell = field(page, "joint/1/a")
+    cell.fill(typed)
+    cell.blur()
+    expect(cell).to_have_value(typed)
+    expect(cell).to_have_attribute("aria-invalid", "true")
+    expect(page.locator(".checks")).to_contain_text("is no number: write it as 1234.5")
+    button(page, "Save").click()
+    expect(cell).to_be_focused()
+    page.keyboard.press("Escape")
+    expect(page.locator(".checks")).to_contain_text("Nothing is wrong with it.")
+    expect(cell).to_have_attribute("aria-invalid", "false")
+
+
+def test_a_shape_in_the_wrong_unit_is_told(open_page):
+    page = opened(open_page, "pt500")
+    choose(page, 0)
+    page.locator(".scale-row").get_by_role("button", name="m", exact=True).click()
+    expect(page.locator(".checks")).to_contain_text("column.3ds is 242 m large: is the file’s unit right?")
+
+
+def test_checks_go_on_when_the_console_is_there_again(chromium, plant):
+    with contextlib.closing(
+        chromium.new_context(locale="en-GB")
+    ) as context:  # a refused fetch is an error here
+        page = context.new_page()
+        page.goto(f"{plant.address}/#/define/pt500")
+        settled(page)
+        page.route("**/define/check", lambda route: route.abort())
+        field(page, "joint/1/a").fill("260")
+        expect(page.locator(".checks")).to_contain_text("Not checked: the console does not answer")
+        page.unroute("**/define/check")
+        expect(page.locator(".checks")).to_contain_text("Nothing is wrong with it.")
+
+
+def test_each_change_is_one_step_of_undo_and_comes_back_by_redo(open_page):
+    page = opened(open_page, "pt500")
+    expect(button(page, "Undo")).to_be_disabled()
+    for path, text in (("joint/0/d", "4125"), ("joint/1/a", "77")):
+        field(page, path).select_text()
+        page.keyboard.type(text)
+    choose(page, 4)
+    button(page, "Remove").click()
+    expect(page.locator(".dh-table tbody tr")).to_have_count(4)
+    page.keyboard.press("Control+z")
+    expect(page.locator(".dh-table tbody tr")).to_have_count(5)
+    button(page, "Undo").click()
+    expect(field(page, "joint/1/a")).to_have_value("250")
+    expect(field(page, "joint/0/d")).to_have_value("4125")
+    button(page, "Undo").click()
+    expect(field(page, "joint/0/d")).to_have_value("300")
+    expect(button(page, "Undo")).to_be_disabled()
+    expect(page.locator(".save-state")).to_have_text("No changes")
+    page.keyboard.press("Control+Shift+z")
+    button(page, "Redo").click()
+    expect(field(page, "joint/0/d")).to_have_value("4125")
+    expect(field(page, "joint/1/a")).to_have_value("77")
+
+
+def test_joints_are_reordered_by_dragging_and_removed_by_the_keyboard(open_page):
+    page = opened(open_page, "pt500")
+    names = page.locator(".chain-words strong")
+    page.locator('.chain-row[data-part="3"]').drag_to(page.locator('.chain-row[data-part="0"]'))
+    expect(names).to_have_text(["Base", "wrist", "waist", "shoulder", "elbow", "roll", "Tool"])
+    page.keyboard.press("Control+z")
+    expect(names).to_have_text(["Base", "waist", "shoulder", "elbow", "wrist", "roll", "Tool"])
+    page.locator('.chain-row[data-part="1"]').focus()
+    page.keyboard.press("Delete")
+    expect(names).to_have_text(["Base", "waist", "elbow", "wrist", "roll", "Tool"])
+    expect(page.locator('.chain-row[data-part="1"]')).to_be_focused()
+    choose(page, 1)
+    button(page, "Insert").click()
+    expect(names).to_have_text(["Base", "waist", "joint1", "elbow", "wrist", "roll", "Tool"])
+
+
+def test_a_shape_is_dragged_to_its_place_in_one_step(open_page):
+    page = opened(open_page, "pt500")
+    canvas = page.locator(".define-scene canvas")
+    expect(canvas).to_have_attribute("data-shapes", "6", timeout=60_000)
+    choose(page, "base")
+    button(page, "Top").click()
+    button(page, "Move").click()
+    expect(canvas).to_have_attribute("data-gizmo", "translate")
+    box = canvas.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 30, y, steps=4)
+    page.mouse.move(x + 60, y, steps=4)
+    page.mouse.up()
+    # The view stands three reaches away (0.9 m) and is as wide as a lens of 32° there.
+    metre_px = box["height"] / (2 * 3 * 0.9 * math.tan(math.radians(16)))
+    moved = float(field(page, "base/mesh_pose/xyz/0").input_value().replace("−", "-"))
+    assert moved == pytest.approx(60 / metre_px * 1000, rel=0.05)
+    button(page, "Undo").click()
+    expect(field(page, "base/mesh_pose/xyz/0")).to_have_value("0")
+    expect(button(page, "Undo")).to_be_disabled()
+
+
+def test_a_reload_keeps_unsaved_work_and_says_so_until_it_is_discarded(open_page):
+    page = open_page("#/define")
+    drop(page, shape("base.wrl"), shape("column.3ds"))
+    canvas = page.locator(".define-scene canvas")
+    expect(canvas).to_have_attribute("data-shapes", "2", timeout=60_000)
+    field(page, "joint/0/d").fill("312.5")
+    page.reload()
+    expect(page.get_by_text(re.compile(r"Unsaved draft from \d\d:\d\d:\d\d brought back"))).to_be_visible()
+    expect(field(page, "joint/0/d")).to_have_value("312.5")
+    expect(canvas).to_have_attribute("data-shapes", "2", timeout=60_000)
+    button(page, "Discard it").click()
+    button(page, "Discard it").click()
+    expect(page.get_by_text("From link files")).to_be_visible()
+    page.reload()
+    expect(page.get_by_text("From link files")).to_be_visible()
+
+
+def test_files_that_the_server_forgot_are_sent_again(chromium, plant):
+    with contextlib.closing(chromium.new_context(locale="en-GB")) as context:
+        page = context.new_page()
+        page.goto(f"{plant.address}/#/define")
+        drop(page, shape("base.wrl"), shape("wrist.wrl"))
+        canvas = page.locator(".define-scene canvas")
+        expect(canvas).to_have_attribute("data-shapes", "2", timeout=60_000)
+        settled(page)
+        for folder in ("files", "drafts"):
+            for path in (plant.store / folder).iterdir():
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
+        field(page, "joint/0/d").fill("77")
+        settled(page)
+        expect(page.locator(".check-list")).to_have_text("Nothing is wrong with it.", timeout=30_000)
+        page.reload()
+        expect(canvas).to_have_attribute("data-shapes", "2", timeout=60_000)
+
+
+def test_a_file_that_another_refers_to_is_asked_for_by_name(open_page):
+    page = open_page("#/define")
+    outer = b'#VRML V2.0 utf8\nInline { url "part.wrl" }\nShape { geometry Box { } }\n'
+    drop(page, ("outer.wrl", outer))
+    missing = page.locator(".missing")
+    expect(missing).to_contain_text("meshes/outer.wrl refers to part.wrl", timeout=60_000)
+    drop(page, ("part.wrl", b"#VRML V2.0 utf8\nShape { geometry Sphere { } }\n"))
+    expect(missing).to_have_count(0, timeout=60_000)
+    # It is a part of the base, not a link.
+    expect(page.locator(".chain-row")).to_have_count(2)
+
+
+def test_a_file_that_cannot_be_read_is_refused_by_name_and_the_others_are_taken(chromium, plant):
+    with contextlib.closing(chromium.new_context(locale="en-GB")) as context:
+        page = context.new_page()
+        page.goto(f"{plant.address}/#/define")
+        drop(page, shape("base.wrl"), ("bad.3ds", b"MM\x00"))
+        expect(page.locator(".outcome.refused")).to_contain_text("bad.3ds", timeout=60_000)
+        expect(page.locator(".chain-row")).to_have_count(2)
+        expect(page.locator(".chain-row").first).to_contain_text("base.wrl")
+
+
+def test_a_urdf_and_its_shapes_become_rows(open_page, tmp_path):
+    description = load("pt500")
+    shapes = link_meshes(description, cache=tmp_path)
+    page = open_page("#/define")
+    drop(page, ("pt500.urdf", to_urdf(description).encode()))
+    expect(page.locator(".missing")).to_contain_text("meshes/column.glb", timeout=60_000)
+    drop(page, *((f"{link}.glb", glb) for link, glb in shapes.items()))
+    expect(page.locator(".dh-table tbody tr")).to_have_count(5, timeout=60_000)
+    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "6", timeout=60_000)
+    drawn, said = tools(page)
+    # The home of a URDF is zero: the arm stretched out.
+    assert np.allclose(drawn[:3, 3], [0.6, 0.0, 0.3], atol=1e-6)
+    assert np.allclose(drawn, said, atol=1e-9)
+
+
+OPENHRP = b"""#VRML V2.0 utf8
+PROTO Joint [ exposedField SFVec3f translation 0 0 0 field SFString jointType "rotate"
+              field SFInt32 jointId -1 field SFVec3f jointAxis 0 0 1 field MFFloat ulimit []
+              field MFFloat llimit [] exposedField MFNode children [] ]
+{ Transform { translation IS translation children IS children } }
+PROTO Segment [ exposedField MFNode children [] ] { Group { children IS children } }
+PROTO Humanoid [ exposedField MFNode humanoidBody [] ] { Group { children IS humanoidBody } }
+DEF ARM Humanoid { humanoidBody [ DEF ROOT Joint { jointType "fixed" children [
+  DEF FOOT Segment { children [ Shape { geometry Box { size 0.2 0.2 0.1 } } ] }
+  DEF TURN Joint { jointId 0 translation 0 0 0.3 ulimit [ 1.5 ] llimit [ -1.5 ] children [
+    DEF TOP Segment { children [ Shape { geometry Box { size 0.1 0.1 0.1 } } ] } ] } ] } ] }
+"""
+
+
+def test_a_robot_of_openhrp_is_chosen_as_one(open_page, tmp_path):
+    file = tmp_path / "arm.wrl"
+    file.write_bytes(OPENHRP)
+    page = open_page("#/define")
+    page.get_by_label("From a URDF").locator("input[type=file]").set_input_files(file)
+    expect(page.locator(".dh-table tbody tr")).to_have_count(1, timeout=60_000)
+    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "2", timeout=60_000)
+    choose(page, 0)
+    limits = [field(page, f"joint/0/limits/{which}").input_value() for which in (0, 1)]
+    # 1.5 rad
+    assert limits == ["−85.943669", "85.943669"]
+
+
+def test_saving_over_a_robot_is_asked_first(chromium, plant):
+    with contextlib.closing(chromium.new_context(locale="en-GB")) as context:
+        page = context.new_page()
+        for title in ("First", "Second"):
+            page.goto(f"{plant.address}/")
+            page.goto(f"{plant.address}/#/define")
+            button(page, "Start empty").click()
+            tab(page, "Robot")
+            field(page, "name").fill("twice")
+            field(page, "title").fill(title)
+            button(page, "Save").click()
+            if title == "Second":
+                expect(page.get_by_role("alertdialog")).to_contain_text("Save over it?")
+                assert load(plant.robots / "twice").title == "First"
+                button(page, "Save over it").click()
+            expect(page.locator(".save-state")).to_have_text("Saved")
+            expect(page).to_have_url(f"{plant.address}/#/define/twice")
+        assert load(plant.robots / "twice").title == "Second"
+
+
+def test_a_zip_holds_the_description_and_its_shapes(open_page, tmp_path):
+    page = opened(open_page, "pt500")
+    with page.expect_download() as download:
+        button(page, "Download zip").click()
+    assert download.value.suggested_filename == "pt500-copy.zip"
+    shutil.unpack_archive(download.value.path(), tmp_path, "zip")
+    [text] = tmp_path.rglob("robot.toml")
+    assert [joint["name"] for joint in tomllib.loads(text.read_text())["joint"]] == [
+        joint.name for joint in load("pt500").joints
+    ]
+    assert len(list(text.parent.glob("meshes/*"))) == 6
+    again = open_page("#/define")
+    drop(again, ("pt500-copy.zip", download.value.path().read_bytes()))
+    expect(again.locator(".dh-table")).to_contain_text("shoulder")
+    expect(again.locator('.define-scene canvas[data-shapes="6"]')).to_have_count(1, timeout=30_000)
+    drawn, said = tools(again)
+    assert np.allclose(drawn, said, atol=1e-9)
+
+
+def test_pairs_are_sampled_and_ignored_frames_constraints_and_views_are_kept(open_page, plant):
+    page = opened(open_page, "pt500")
+    tab(page, "Frames")
+    button(page, "Add frame").click()
+    field(page, "frame/0/name").fill("camera")
+    field(page, "frame/0/link").select_option("column")
+    field(page, "frame/0/xyz/1").fill("100")
+    tab(page, "Constraints")
+    button(page, "Add constraint").click()
+    tab(page, "Collisions")
+    button(page, "Find out by sampling").click()
+    button(page, "Ignore all: adjacent").click(timeout=60_000)
+    tab(page, "Views")
+    button(page, "Top").click()
+    page.get_by_label("Name of a new view").fill("above")
+    button(page, "Add from the camera").click()
+    tab(page, "Robot")
+    field(page, "name").fill("kept")
+    settled(page)
+    button(page, "Save").click()
+    expect(page.locator(".save-state")).to_have_text("Saved", timeout=30_000)
+    saved = load(plant.robots / "kept")
+    assert [(frame.name, frame.link, frame.xyz) for frame in saved.frames] == [
+        ("camera", "column", (0, 100, 0))
+    ]
+    assert [row.joints for row in saved.constraints] == [{"shoulder": 1.0, "elbow": 1.0}]
+    assert {frozenset(pair) for pair in saved.collision.ignore} >= {frozenset(("base", "column"))}
+    view = saved.views["above"]
+    # The automatic view from above: three reaches (2.7 m) over 0.45 of one.
+    assert (view.target, view.projection) == ((0.0, 0.0, 405.0), "orthographic")
+    assert view.eye == pytest.approx((0.0, 0.0, 3105.0), abs=0.2)
+
+
+def test_renaming_a_joint_and_a_link_leaves_nothing_that_names_the_old(open_page):
+    page = opened(open_page, "pt500")
+    tab(page, "Constraints")
+    button(page, "Add constraint").click()
+    tab(page, "Frames")
+    button(page, "Add frame").click()
+    choose(page, 4)
+    field(page, "joint/4/link/name").fill("plate")
+    choose(page, 1)
+    field(page, "joint/1/name").fill("lift")
+    settled(page)
+    expect(page.locator(".check-list")).to_have_text("Nothing is wrong with it.")
+    tab(page, "Frames")
+    expect(field(page, "frame/0/link")).to_have_value("plate")
+    tab(page, "Constraints")
+    expect(field(page, "constraint/0/joints/lift")).to_have_value("1")
+
+
+def test_other_units_say_the_same_robot(open_page):
+    page = opened(open_page, "puma560")
+    before, _ = tools(page)
+    tab(page, "Robot")
+    field(page, "units/length").select_option("m")
+    field(page, "units/angle").select_option("rad")
+    expect(field(page, "joint/0/d")).to_have_value("0.6604")
+    after, said = tools(page)
+    assert np.allclose(after, before, atol=1e-9)
+    assert np.allclose(after, said, atol=1e-9)
+
+
+def test_a_robot_that_is_not_here_is_said(chromium, plant):
+    with contextlib.closing(chromium.new_context(locale="en-GB")) as context:
+        page = context.new_page()
+        page.goto(f"{plant.address}/#/define/nobody")
+        expect(page.locator(".outcome.refused")).to_contain_text("nobody cannot be opened: there is no robot")

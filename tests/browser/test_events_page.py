@@ -1,0 +1,124 @@
+"""Alarms and the journal on the page, from a real watch; what one page does every page shows."""
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from bus.keys import WHOLE_SITE
+from bus.schemas import robomesh_pb2 as schema
+from tests.browser.robot_page import button
+
+pytestmark = pytest.mark.browser
+
+EVENTS = "#/events"
+Event = schema.Event
+
+
+def line(page, text):
+    return page.locator(".alarm-line").filter(has_text=text)
+
+
+def test_who_acknowledges_an_alarm_on_one_page_has_done_so_on_every_page(open_page, raised):
+    fleet, mine, other = (open_page(path, drawn=False) for path in ("", EVENTS, EVENTS))
+    raised("joints.gone", "no positions come from it")
+    for page in (mine, other):
+        expect(line(page, "no positions come").locator(".alarm-state")).to_have_text("not acknowledged")
+        expect(line(page, "no positions come").locator(".priority")).to_have_text("high")
+    expect(fleet.locator(".alarm-badge .unseen")).to_have_text("Unacknowledged alarms: 1 high")
+    expect(fleet.locator(".tile", has_text="arm").locator(".tile-alarms")).to_have_text("high")
+    acknowledge = button(mine, "Acknowledge: no positions come from it")
+    expect(acknowledge).to_be_disabled()
+    mine.get_by_label("Your name").fill("li")
+    acknowledge.click()
+    expect(mine.locator(".alarms > .notice")).to_have_text("Acknowledged: 1")
+    expect(line(other, "no positions come").locator(".alarm-state")).to_have_text("acknowledged")
+    expect(line(other, "no positions come").locator(".alarm-more")).to_contain_text("acknowledged by li at")
+    expect(fleet.locator(".alarm-badge .unseen")).to_have_text("No unacknowledged alarm")
+    raised("joints.back", "positions come again", Event.INFO)
+    for page in (mine, other):
+        expect(line(page, "no positions come")).to_have_count(0)
+    expect(fleet.locator(".tile-alarms")).to_have_count(0)
+
+
+def test_an_alarm_is_shelved_with_a_reason_and_comes_back_when_it_is_asked_for(open_page, raised):
+    page = open_page(EVENTS, drawn=False)
+    raised("status.gone", "no status comes from it")
+    page.get_by_label("Your name").fill("li")
+    page.get_by_label("Select: no status comes from it").check()
+    button(page, "Shelve selected…").click()
+    shelve = page.get_by_role("form", name="Shelve")
+    expect(button(shelve, "Shelve")).to_be_disabled()
+    button(shelve, "8 h").click()
+    shelve.get_by_label("Reason").fill("the cell is being cleaned")
+    button(shelve, "Shelve").click()
+    expect(line(page, "no status comes")).to_have_count(0)
+    page.get_by_role("button", name=re.compile("^Shelved 1")).click()
+    expect(line(page, "no status comes").locator(".alarm-more")).to_contain_text("the cell is being cleaned")
+    button(page, "Unshelve: no status comes from it").click()
+    expect(line(page, "no status comes")).to_have_count(0)
+    page.get_by_role("button", name=re.compile("^Active")).click()
+    expect(line(page, "no status comes")).to_have_count(1)
+    raised("status.back", "status comes again", Event.INFO)
+
+
+def test_the_journal_lists_every_robots_events_and_is_narrowed_by_what_one_looks_for(open_page, raised):
+    page = open_page(EVENTS, drawn=False)
+    raised("recorder.note", "a note of the arm's recorder", Event.INFO)
+    journal = page.locator(".journal")
+    note = journal.locator(".journal-line").filter(has_text="a note of the arm's recorder")
+    expect(note).to_have_count(1)
+    journal.get_by_label("Severity").select_option(label="Warnings and up")
+    expect(note).to_have_count(0)
+    journal.get_by_label("Severity").select_option(label="All severities")
+    journal.get_by_label("Search text, code, robot").fill("recorder.note")
+    expect(journal.locator(".journal-line")).to_have_count(1)
+    button(journal, "Pause").click()
+    raised("recorder.note", "another note", Event.INFO)
+    expect(journal.get_by_role("button", name=re.compile(r"^Go on \([1-9]"))).to_be_visible()
+    expect(journal.locator(".journal-line")).to_have_count(1)
+    note.click()
+    expect(journal.locator(".entry-details")).to_contain_text("recorder.note")
+
+
+def test_the_audit_of_every_robot_is_there_and_its_logs_are_searched_when_asked(open_page, plant, raised):
+    async def acquire_and_release():
+        key = "robomesh/hall/arm/lease/request/wang"
+        given = await plant.session.ask(key, schema.LeaseRequest(action=schema.LeaseRequest.ACQUIRE, ttl_s=2))
+        await plant.session.ask(
+            key, schema.LeaseRequest(action=schema.LeaseRequest.RELEASE, lease=given.lease)
+        )
+
+    plant.call(acquire_and_release())
+    page = open_page(EVENTS, drawn=False)
+    journal = page.locator(".journal")
+    button(journal, "Requests").click()
+    asked = journal.locator(".journal-line").filter(has_text="wang").filter(has_text="ACQUIRE")
+    expect(asked).not_to_have_count(0)
+    journal.get_by_label("Robot", exact=True).select_option(label="arm")
+    button(journal, "Search the audit logs").click()
+    expect(journal.locator(".notice")).to_have_text(re.compile("^Found in the logs: [1-9]"))
+
+
+def test_settings_shows_a_service_that_is_gone(open_page, plant, raised):
+    async def appear():
+        token = plant.session.declare_presence_of("hall", WHOLE_SITE, "renderer", "r1")
+        health = plant.session.declare_publisher("hall", WHOLE_SITE, "health/renderer.r1")
+        message = schema.ServiceHealth(service="renderer", id="r1", host="cell-9", version="0.0.9")
+        message.timestamp.GetCurrentTime()
+        message.values["certificate_seconds"] = 3.5 * 86_400
+        health.put(message)
+        return token, health
+
+    async def go(token, health):
+        health.close()
+        token.undeclare()
+
+    there = plant.call(appear())
+    page = open_page("#/settings", drawn=False)
+    row = page.locator('tr[data-service="renderer"]')
+    expect(row).to_contain_text("cell-9")
+    expect(row).to_contain_text("0.0.9")
+    expect(page.locator(".certificates li")).to_contain_text(re.compile(r"ends in 3\sd"))
+    plant.call(go(*there))
+    expect(row.locator("td").first).to_have_text(re.compile("^(gone since|silent) "))

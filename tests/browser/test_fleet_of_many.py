@@ -1,0 +1,72 @@
+"""Two hundred robots on one page: only what is in sight is watched and drawn."""
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.crowd import crowd
+
+pytestmark = pytest.mark.browser
+
+COUNT = 200
+FIRST, LAST = "yard/r000", f"yard/r{COUNT - 1:03d}"
+
+
+@pytest.fixture(scope="module")
+def many(plant):
+    """Robots of another site than the console's."""
+    with crowd(plant.endpoint, ("yard",), COUNT) as held:
+        yield held
+
+
+def tile(page, name):
+    return page.locator(f'.tile[data-robot="robomesh/{name}"]')
+
+
+def until(page, holds, *, seconds=30):
+    """Waits for what no locator sees."""
+    for _ in range(10 * seconds):
+        if holds():
+            return
+        page.wait_for_timeout(100)
+    raise AssertionError("it did not come to hold")
+
+
+def test_of_two_hundred_robots_only_the_tiles_in_sight_are_watched_and_drawn(open_page, many):
+    page = open_page()
+    expect(page.locator(".tile")).to_have_count(COUNT + 2, timeout=60_000)
+    expect(tile(page, FIRST).locator("canvas[data-drawn]")).to_have_count(1, timeout=60_000)
+    assert page.locator(".tile canvas").count() < COUNT / 4
+    until(page, lambda: FIRST in many.watched and len(many.watched) < COUNT / 4)
+    tile(page, LAST).scroll_into_view_if_needed()
+    expect(tile(page, LAST).locator("canvas[data-drawn]")).to_have_count(1, timeout=60_000)
+    expect(tile(page, FIRST).locator("canvas")).to_have_count(0)
+    until(page, lambda: LAST in many.watched and FIRST not in many.watched)
+    expect(tile(page, LAST)).to_contain_text("slow link")
+
+
+def test_what_needs_a_look_is_found_among_many_and_stands_first_when_asked(open_page, many):
+    many.mark("faulty", [LAST])
+    page = open_page(drawn=False)
+    expect(page.locator(".summary")).to_contain_text("1 Fault", timeout=60_000)
+    page.get_by_label("Order").select_option(label="Most urgent first")
+    yard = page.get_by_role("region", name="Site yard")
+    expect(yard.locator(".tile").first).to_have_attribute("data-robot", f"robomesh/{LAST}")
+    expect(tile(page, LAST)).to_contain_text("axis 2: following error")
+    page.get_by_label("State").select_option(label="Faults and stops")
+    expect(page.locator(".tile")).to_have_count(1)
+    page.get_by_label("Filter robots").fill("nowhere")
+    expect(page.locator(".empty")).to_have_text(re.compile(r"^No robot matches the filter\. \d+ are on"))
+    page.get_by_role("button", name="Clear the filter").click()
+    expect(page.locator(".tile")).to_have_count(COUNT + 2)
+    many.mark("faulty", [])
+
+
+def test_a_robot_of_another_site_is_shown_from_its_slow_states_until_all_is_asked_for(open_page, many):
+    page = open_page("#/yard/r007", drawn=False)
+    expect(page.locator('[data-joint="waist"]')).to_have_text(re.compile(r"^−?\d"))
+    expect(page.locator(".camera select").first).to_have_value("far")
+    until(page, lambda: "yard/r007" in many.watched)
+    page.get_by_role("button", name="All", exact=True).click()
+    until(page, lambda: "yard/r007" not in many.watched)

@@ -1,0 +1,68 @@
+"""How a robot's link does, its old clients, and floods of refusals, as its page tells them."""
+
+import asyncio
+import re
+import socket
+
+import pytest
+from playwright.sync_api import expect
+
+from bus.errors import RefusedError
+from bus.schemas.robomesh_pb2 import LeaseRequest
+from tests.browser.robot_page import ARM, button, serious
+
+pytestmark = pytest.mark.browser
+
+PT600 = "#/hall/pt600"
+
+
+def test_how_the_link_does_is_told_in_figures(open_page):
+    page = open_page(ARM, drawn=False)
+    button(page, "Link").click()
+    facts = page.locator(".facts-list")
+    expect(facts).to_contain_text(re.compile(r"Units\s*\d+\.\d\s*/s"))
+    for name in ("Units received", "Malformed", "Lost"):
+        expect(facts).to_contain_text(name)
+    expect(facts).not_to_contain_text("Old clients")  # none may attach here
+    assert serious(page) == []
+
+
+def test_old_clients_are_counted_where_they_may_attach(open_page, plant):
+    page = open_page(PT600, drawn=False)
+    button(page, "Link").click()
+    expect(page.locator(".facts-list")).to_contain_text(re.compile(r"Old clients attached\s*0"))
+    with socket.create_connection(("127.0.0.1", plant.legacy_port)):
+        expect(page.locator(".facts-list")).to_contain_text(re.compile(r"Old clients attached\s*1"))
+        expect(page.locator(".facts")).to_contain_text("old clients: 1")
+
+
+def test_a_flooding_controller_is_told_in_words(open_page, plant):
+    page = open_page(PT600, drawn=False)
+    expect(page.locator(".headline .state")).to_have_text(re.compile("Idle|Moving"))
+    port = plant.call(plant.stop_controller("pt600"))
+    try:
+        plant.call(plant.start_controller("pt600", port, demo=True, faults=("flood",)))
+        expect(page.locator(".headline .trouble.warning")).to_contain_text("flooded", timeout=20_000)
+        plant.call(plant.stop_controller("pt600"))
+    finally:
+        plant.call(plant.start_controller("pt600", port, demo=True))
+    expect(page.locator(".headline .trouble.warning")).to_have_count(0, timeout=20_000)
+
+
+def test_a_flood_of_refusals_is_shown_with_its_count(open_page, plant):
+    page = open_page(ARM, drawn=False)
+    button(page, "Requests").click()
+
+    async def flood():
+        for _ in range(200):
+            with pytest.raises(RefusedError):
+                await plant.session.ask(
+                    "robomesh/hall/arm/lease/request/mallory",
+                    LeaseRequest(action=LeaseRequest.OFFER, to="eve"),
+                )
+
+    plant.call(asyncio.wait_for(flood(), 15.0))
+    counted = page.locator(".event-list li").filter(has=page.locator(".repeated")).first
+    expect(counted).to_contain_text("refused")
+    expect(counted).to_contain_text("mallory OFFER")
+    expect(counted.locator(".repeated")).to_have_text(re.compile(r"× \d+"))

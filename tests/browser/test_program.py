@@ -1,0 +1,226 @@
+"""The program's page before a real site: written, taught, checked, run; and refused where it collides."""
+
+import json
+import re
+from types import SimpleNamespace
+
+import pytest
+from playwright.sync_api import expect
+
+from services.console import build_page
+from tests.browser.conftest import CHROMIUM
+from tests.browser.robot_page import button, serious, take
+from tests.site import running_site
+
+pytestmark = pytest.mark.browser
+
+PAGE = "#/program/test/arm"
+# A post beside the arm: the forearm sweeps through it between 0 and 60 degrees of the waist.
+SITE = """
+[[robot]]
+name = "arm"
+model = "pt600"
+cell = "a"
+check = "require"
+
+[[fixture]]
+cell = "a"
+name = "post"
+cylinder = [40.0, 900.0]
+pose = { xyz = [300.0, 200.0, 450.0], rpy = [0.0, 0.0, 0.0] }
+"""
+FREE = """home
+move_joints -20 90 -90 0 0
+wait 0.2
+move_joints 0 90 -90 0 0
+"""
+COLLIDES = """home
+speed 50
+# through the post
+move_joints 60 90 -90 0 0
+"""
+# 28 mm beside the post, where a warning is due: on three lines, of one cause.
+NEAR = """home
+move_joints 14 90 -90 0 0
+wait 0.2
+move_joints 0 90 -90 0 0
+"""
+# Runs until it is stopped, however slow the pages are.
+WAITS = """home
+wait 60
+home
+"""
+CHECKED_MS = 40_000  # a busy machine's worker starts slowly
+
+
+@pytest.fixture(scope="module")
+def plant(tmp_path_factory):
+    if not CHROMIUM.exists():
+        pytest.skip(f"no {CHROMIUM}: the page is not driven here")
+    build_page.build()
+    with running_site(tmp_path_factory.mktemp("site"), robots=SITE) as site:
+        yield SimpleNamespace(address=site.console.rstrip("/"), site=site)
+
+
+def write(page, text):
+    field = page.get_by_role("textbox", name="Program text")
+    expect(field).to_have_value(re.compile("move_joints"), timeout=CHECKED_MS)  # the example is there
+    field.fill(text)
+
+
+def verdict(page, ok):
+    expect(page.locator(f'.verdict[data-ok="{str(ok).lower()}"][data-busy="false"]')).to_be_visible(
+        timeout=CHECKED_MS
+    )
+
+
+def positions(plant):
+    """Where the arm's joints are now, as anybody on the mesh hears it."""
+    state = json.loads(plant.site.command("monitor", "arm", "--json", "--count", "1").stdout)
+    return state["joints"]
+
+
+def test_a_program_that_is_typed_is_checked_and_its_motion_is_shown_as_a_ghost(open_page):
+    page = open_page(PAGE)
+    write(page, FREE)
+    verdict(page, ok=True)
+    assumed = page.locator(".assumed p")
+    expect(assumed).to_be_hidden()
+    page.get_by_text("What is assumed").click()
+    expect(assumed).to_be_visible()
+    expect(assumed).to_contain_text("jerk-limited")
+    page.wait_for_selector('canvas[data-loaded="true"]')
+    page.get_by_role("slider", name="Moment of the checked motion").fill("1")
+    expect(page.locator(".scrub-words")).to_contain_text("line")
+    page.wait_for_selector('.canvas-place canvas:not([data-ghost="0"])[data-ghost]')
+    write_wrong = FREE.replace("wait 0.2", "wiat 0.2")
+    page.get_by_role("textbox", name="Program text").fill(write_wrong)
+    row = page.locator(".violation")
+    expect(row).to_contain_text("line 3", timeout=CHECKED_MS)
+    expect(row).to_contain_text("wiat")
+    expect(page.locator(".run-panel .notice")).to_contain_text("Cannot run: line 3")
+    expect(page.locator("button.run")).to_be_disabled()
+
+
+def test_a_program_that_collides_leads_to_its_line_and_the_gateway_refuses_it_and_nothing_moves(
+    open_page, plant
+):
+    page = open_page(PAGE)
+    write(page, COLLIDES)
+    verdict(page, ok=False)
+    row = page.locator('.violation[data-kind="collision"]').first
+    expect(row).to_contain_text("post")
+    expect(row).to_contain_text("line 4")
+    row.click()
+    field = page.get_by_role("textbox", name="Program text")
+    assert field.evaluate("field => field.value.slice(field.selectionStart, field.selectionEnd)") == (
+        "move_joints 60 90 -90 0 0"
+    )
+    expect(page.locator(".scrub-words")).to_contain_text("line 4")
+    before = positions(plant)
+    take(page)
+    page.locator("button.run").click()
+    expect(page.locator(".run-panel .notice.refused")).to_contain_text("post", timeout=CHECKED_MS)
+    assert positions(plant) == pytest.approx(before, abs=1e-6)
+    field.fill(FREE)  # of which the refusal says nothing
+    expect(page.locator(".run-panel .notice.refused")).to_have_count(0)
+    button(page, "Release").click()
+
+
+def progress(seen, outcome, name):
+    expect(seen.locator(f'.progress[data-outcome="{outcome}"]')).to_contain_text(name, timeout=CHECKED_MS)
+
+
+def test_a_program_runs_or_is_stopped_and_everybody_sees_how_far_it_is_and_what_to_mind(open_page):
+    page, other = open_page(PAGE, drawn=False), open_page(PAGE, drawn=False)
+    write(page, NEAR)
+    verdict(page, ok=True)
+    rows = page.locator(".violation")
+    expect(rows.filter(has_text="arm/forearm comes within")).to_have_count(1)
+    expect(rows.first).to_contain_text("lines 2 to 4")
+    page.get_by_label("Program name").fill("to and fro")
+    take(page)
+    page.locator("button.run").click()
+    for seen in (page, other):
+        progress(seen, "DONE", "to and fro")
+    page.evaluate("location.hash = '#/test/arm'")
+    for key in ("PageUp", *["ArrowUp"] * 3, "Enter"):
+        page.get_by_role("slider", name="Target of waist").press(key)
+    expect(page.locator(".joints .mind")).to_contain_text("post", timeout=CHECKED_MS)
+    page.evaluate(f"location.hash = '{PAGE}'")
+    page.get_by_role("textbox", name="Program text").fill(WAITS)
+    page.get_by_label("Program name").fill("waits")
+    verdict(page, ok=True)
+    page.locator("button.run").click()
+    for seen in (page, other):
+        progress(seen, "RUNNING", "waits")
+        expect(seen.locator(".progress-line")).to_contain_text("left of 01:0", timeout=CHECKED_MS)
+    expect(page.locator(".editor-band.running")).to_have_count(1, timeout=CHECKED_MS)
+    page.locator("button.stop").click()
+    for seen in (page, other):
+        progress(seen, "ENDED", "the page")
+    page.get_by_role("button", name=re.compile("Reset stop")).click(timeout=CHECKED_MS)
+    expect(page.get_by_role("button", name=re.compile("Reset stop"))).to_have_count(0, timeout=CHECKED_MS)
+    button(page, "Release").click()
+
+
+def test_points_are_taught_named_shown_and_taken_back_and_the_draft_outlives_a_reload(open_page):
+    page = open_page(PAGE, drawn=False)
+    write(page, "# mine\nhome\n")
+    field = page.get_by_role("textbox", name="Program text")
+    field.press("Control+End")
+    button(page, "Add where the robot is").click()
+    expect(field).to_have_value(re.compile(r"^# mine\npoint p1 = joints [-\d. ]+\nhome\nmove_joints p1$"))
+    button(page, "Pose a ghost").click()
+    handle = page.get_by_role("slider", name="waist of the ghost")
+    handle.press("PageUp")
+    button(page, "Add this pose").click()
+    expect(page.locator(".points li")).to_have_count(2)
+    page.get_by_role("button", name="Rename p2").click()
+    page.get_by_role("textbox", name="Rename p2").fill("part")
+    page.get_by_role("textbox", name="Rename p2").press("Enter")
+    expect(field).to_have_value(re.compile("move_joints part"))
+    page.get_by_role("button", name="Delete part").click()
+    expect(page.locator(".teach")).to_contain_text("still used in line")
+    button(page, "Undo").click()
+    expect(page.locator('[data-point="part"]')).to_be_visible()
+    kept = field.input_value()
+    page.reload()
+    expect(field).to_have_value(kept)
+    page.evaluate("location.hash = '#/program/test/nobody'")
+    page.wait_for_selector(".missing")
+    page.evaluate(f"location.hash = '{PAGE}'")
+    expect(field).to_have_value(kept)
+    field.press("Control+End")
+    field.type("# more")
+    page.reload()
+    expect(field).to_have_value(f"{kept}# more")
+
+
+@pytest.mark.parametrize("path", ["#/program", PAGE])
+def test_a_phone_shows_programs_in_one_column_and_axe_finds_nothing_serious(open_page, path):
+    page = open_page(path, width=360, height=740, has_touch=True, drawn=False)
+    page.wait_for_selector(".program-choose a" if path == "#/program" else ".points li")
+    assert page.evaluate("document.documentElement.scrollWidth") == 360
+    small = page.evaluate(
+        """[...document.querySelectorAll("main button, main a, main input:not([type=file])")]
+           .map((each) => [each.outerHTML.slice(0, 80), each.getBoundingClientRect().height])
+           .filter(([, height]) => height > 0 && height < 44)"""
+    )
+    assert small == []
+    assert serious(page) == []
+
+
+def test_on_a_desk_only_lists_of_a_program_scroll_and_axe_finds_nothing_serious(open_page):
+    page = open_page(PAGE, drawn=False)
+    write(page, COLLIDES)
+    page.locator(".violation").first.click(timeout=CHECKED_MS)
+    button(page, "Pose a ghost").click()
+    button(page, "pose").click()
+    assert page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]") == [
+        1440,
+        900,
+    ]
+    assert serious(page) == []
+    button(page, "Light").click()
+    assert serious(page) == []

@@ -1,0 +1,232 @@
+"""Recordings on the page: begun at a robot, listed, played back; a replay is marked and takes no command."""
+
+import asyncio
+import re
+
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer
+from playwright.sync_api import expect
+
+from bus.errors import RefusedError
+from bus.keys import WHOLE_SITE
+from bus.schemas import robomesh_pb2 as schema
+from services import player, recorder
+from tests.browser.robot_page import button, serious
+
+pytestmark = pytest.mark.browser
+
+ROBOT = "robomesh/hall/pt600"
+NAME = "swing"
+QUARTER = "quarter.mcap"
+ENOUGH = 200  # joint states: some seconds of motion
+_Ask = schema.RecorderRequest
+
+
+@pytest.fixture(scope="module")
+def recorded(plant, tmp_path_factory):
+    """A recorder and a player of the plant, and the file of a recording of its moving arm."""
+    folder = tmp_path_factory.mktemp("recordings")
+
+    async def start():
+        own = plant.session
+        for name in ("recorder", "player"):
+            own.declare_presence("hall", WHOLE_SITE, name)
+        serving = (
+            recorder.serve(own, recorder.Settings(site="hall", robots=("pt600",), folder=folder, views=())),
+            player.serve(own, player.Settings(site="hall", folder=folder)),
+        )
+        tasks = [plant.loop.create_task(each) for each in serving]
+        await ask_recorder(plant, _Ask.TRACE_ON, name=NAME)
+        acquire = schema.LeaseRequest(action=schema.LeaseRequest.ACQUIRE, ttl_s=0.5)
+        await own.ask(f"{ROBOT}/lease/request/li", acquire, timeout_s=15.0)
+        async with asyncio.timeout(40):
+            async for sample in own.subscribe(f"{ROBOT}/recording"):
+                if joints_in(sample.message()) >= ENOUGH:
+                    break
+        closed = await ask_recorder(plant, _Ask.TRACE_OFF)
+        path = next(folder.rglob(closed.file))
+        of_quarter(path)
+        path.with_name("empty.mcap").touch()
+        return tasks, closed.file
+
+    async def end(tasks):
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    tasks, file = plant.call(start())
+    yield file
+    plant.call(end(tasks))
+
+
+def of_quarter(path):
+    """A copy beside it, whose frames and joints end after a quarter of it."""
+    with path.open("rb") as file, path.with_name(QUARTER).open("wb") as to:
+        reader, writer = make_reader(file), Writer(to)
+        whole = reader.get_summary().statistics
+        quarter = (3 * whole.message_start_time + whole.message_end_time) // 4
+        writer.start()
+        channels = {}
+        for schema_, channel, message in reader.iter_messages():
+            if message.log_time > quarter and channel.topic.endswith(("/frames", "/joints")):
+                continue
+            if channel.id not in channels:
+                known = writer.register_schema(schema_.name, schema_.encoding, schema_.data)
+                channels[channel.id] = writer.register_channel(channel.topic, "protobuf", known)
+            writer.add_message(
+                channels[channel.id], message.log_time, message.data, message.publish_time, message.sequence
+            )
+        writer.finish()
+
+
+async def ask_recorder(plant, action, **values):
+    return await plant.session.ask(f"{ROBOT}/recorder/request", _Ask(action=action, **values), timeout_s=15.0)
+
+
+def joints_in(recording):
+    return sum(each.messages for each in recording.topics if each.topic.endswith("/joints"))
+
+
+def play(page):
+    """Opens the recording from the list, and stops it where it is."""
+    page.get_by_role("link", name=f"Play {NAME}").click()
+    expect(page.locator(".scene canvas[data-loaded=true]")).to_be_visible()
+    expect(page.locator(".player")).to_have_attribute("data-replay", re.compile("^replay-"))
+
+
+def position(page):
+    minutes, seconds = page.locator(".transport-time .figure").inner_text().split(" /")[0].split(":")
+    return 60 * int(minutes) + float(seconds)
+
+
+def arm(page):
+    return page.locator(".scene canvas").screenshot()
+
+
+def moment_line(page):
+    return page.locator(".moment-line").first.evaluate("line => line.getBoundingClientRect().left")
+
+
+def until(page, condition):
+    """A condition, looked at until it holds."""
+    for _ in range(200):
+        if condition():
+            return
+        page.wait_for_timeout(100)
+    raise AssertionError("it does not come true")
+
+
+def test_a_recording_is_listed_and_played_and_a_seek_moves_arm_curves_and_clock(open_page, recorded):
+    page = open_page("#/recordings", width=1280, height=800)
+    card = page.locator(f"[data-file='{recorded}']")
+    expect(card).to_contain_text("pt600")
+    expect(card).to_contain_text("messages")
+    empty = page.locator("[data-file='empty.mcap']")
+    expect(empty.locator(".state.warning")).to_be_visible()
+    expect(empty.get_by_role("link", name="Play")).to_have_count(0)
+    button(card, "Compare").click()
+    expect(page.get_by_role("link", name=f"Compare with {NAME}").first).to_be_visible()
+    button(page, "Cancel").click()
+    play(page)
+    expect(page.locator(".tag.replay").first).to_contain_text("replay of pt600")
+    expect(page.locator(".recorded-events")).to_contain_text("li asked acquire")
+    expect(page.locator(".event-mark").first).to_be_visible()
+
+    # It plays by itself, to its end.
+    expect(page.locator(".player")).to_have_attribute("data-playing", "false")
+    page.keyboard.press("Home")
+    until(page, lambda: position(page) < 0.5)
+    expect(page.locator(".chart")).to_be_visible(timeout=40_000)
+    left, at_start = moment_line(page), arm(page)
+    page.get_by_label("Moment").fill("1.5")
+    until(page, lambda: abs(position(page) - 1.5) < 0.02)
+    until(page, lambda: moment_line(page) > left + 10 and arm(page) != at_start)
+
+    # A click into the curves goes there.
+    box = page.locator(".chart .u-over").first.bounding_box()
+    page.mouse.click(box["x"] + 0.2 * box["width"], box["y"] + box["height"] / 2)
+    until(page, lambda: position(page) < 1.4)
+
+    # As the joints move, so does the picture; slowly enough to be seen on a busy machine.
+    page.locator(".transport select").select_option("0.1")
+    begun, before = position(page), arm(page)
+    page.keyboard.press("Space")
+    until(page, lambda: position(page) > begun + 0.1 and arm(page) != before)
+    button(page, "Pause").click()
+    expect(page.locator(".player")).to_have_attribute("data-playing", "false")
+
+
+def test_a_moment_without_joints_is_told_and_no_other_is_shown_as_this_one(open_page, recorded):
+    page = open_page(f"#/recordings/hall/{QUARTER}", drawn=False)
+    expect(page.locator(".transport .play")).to_be_visible()
+    page.keyboard.press("End")
+    expect(page.locator(".scene-stale")).to_have_text("No joints were recorded of this moment.")
+    page.keyboard.press("Home")
+    expect(page.locator(".scene")).to_have_attribute("data-moment", "here")
+    expect(page.locator(".scene-stale")).to_have_count(0)
+
+
+def test_a_replay_cannot_be_commanded_and_stop_stays_that_of_the_robots(open_page, plant, recorded):
+    page = open_page("#/recordings", drawn=False)
+    page.get_by_role("link", name=f"Play {NAME}").click()
+    expect(page.locator(".player")).to_have_attribute("data-replay", re.compile("^replay-"))
+    robot = page.locator(".player").get_attribute("data-replay")
+
+    with pytest.raises(RefusedError, match="replay"):
+        plant.call(
+            plant.session.ask(
+                f"robomesh/hall/{robot}/lease/request/li",
+                schema.LeaseRequest(action=schema.LeaseRequest.ACQUIRE, ttl_s=2.0),
+            )
+        )
+
+    other = open_page(f"#/hall/{robot}", drawn=False)
+    expect(other.locator(".tag.replay").first).to_contain_text("replay of pt600")
+    expect(other.locator(".transport")).to_be_visible()
+    expect(button(other, "Take control")).to_have_count(0)
+    expect(other.locator(".stop")).to_contain_text("Stop request: all")
+    other.goto(f"{plant.address}/#/")
+    expect(other.locator(".replays")).to_contain_text("replay of pt600")
+    expect(other.locator(".tile").filter(has_text=robot)).to_have_count(0)
+
+    # It ends with the page that opened it.
+    page.goto(f"{plant.address}/#/recordings")
+    expect(other.locator(".replays")).to_have_count(0)
+
+
+def test_a_recording_is_begun_and_ended_on_the_robots_page(open_page, recorded):
+    page = open_page("#/hall/pt600", drawn=False)
+    page.locator(".record-button").click()
+    page.get_by_label("Name of the recording").fill("from/here")
+    button(page, "Record").click()
+    expect(page.locator(".record-panel [role=alert]")).to_contain_text("from/here")
+    page.get_by_label("Name of the recording").fill("from the page")
+    button(page, "Record").click()
+    expect(page.locator(".record-panel")).to_contain_text("nothing lost")
+    expect(page.locator(".record-button")).to_contain_text("recording now")
+    button(page, "Stop recording").click()
+    page.locator(".record-last a").click()
+    expect(page.locator(".player h1")).to_have_text("from-the-page")
+
+
+def test_what_cannot_be_played_is_said(open_page, recorded):
+    page = open_page("#/recordings/hall/gone.mcap", drawn=False)
+    expect(page.locator(".player-trouble")).to_contain_text("gone.mcap")
+    page.goto(page.url.replace("hall/gone.mcap", "nowhere/x.mcap"))
+    expect(page.locator(".player-trouble")).to_contain_text("No player answers at nowhere")
+
+
+def test_the_list_and_the_player_fit_a_phone_and_axe_finds_nothing_serious(open_page, recorded):
+    page = open_page("#/recordings", width=360, height=740, drawn=False)
+    expect(page.locator(".recording").first).to_be_visible()
+    fits = "document.documentElement.scrollWidth <= innerWidth"
+    assert page.evaluate(fits)
+    assert serious(page) == []
+    page.get_by_role("link", name=f"Play {NAME}").click()
+    expect(page.locator(".transport .play")).to_be_in_viewport()
+    expect(page.locator(".stop")).to_be_in_viewport()
+    assert page.evaluate(fits)
+    assert page.locator(".transport .play").bounding_box()["height"] >= 44
+    expect(page.locator(".chart")).to_be_visible(timeout=40_000)
+    assert serious(page) == []

@@ -1,0 +1,159 @@
+"""The page of a console with accounts: signing in, what each role finds there, and how a session ends."""
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from bus.schemas.robomesh_pb2 import AuditQuery
+from services.console.accounts import sessions
+from services.console.accounts.desk import change_account
+from tests.browser.conftest import NO_WEBGL, Plant, run_plant
+from tests.browser.robot_page import ARM, button, serious
+from tests.services.certificates import self_signed
+from tests.services.signing_in import PASSWORD, accounts_file
+from tests.site import wait_until
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture(scope="module")
+def accounts(tmp_path_factory):
+    return accounts_file(tmp_path_factory.mktemp("accounts"))
+
+
+@pytest.fixture(scope="module")
+def plant(accounts, tmp_path_factory):
+    """A site whose console has accounts and TLS."""
+    certificate, key = self_signed(tmp_path_factory.mktemp("tls"))
+    settings = {"accounts": accounts, "certificate": certificate, "key": key}
+    yield from run_plant(Plant(audit=tmp_path_factory.mktemp("audit"), console=settings))
+
+
+@pytest.fixture
+def open_tab(chromium, plant):
+    """Opens tabs of one browser, which shares its cookies; nothing may go wrong in them."""
+    context = chromium.new_context(
+        viewport={"width": 1440, "height": 900}, locale="en-GB", color_scheme="dark", ignore_https_errors=True
+    )
+    context.set_default_timeout(60_000)
+    wrong = []
+
+    def open_one(path=ARM):
+        page = context.new_page()
+        page.add_init_script(NO_WEBGL)  # drawn by the processor here, it would take all of it
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.goto(f"{plant.address}/{path}")
+        return page
+
+    yield open_one
+    context.close()
+    assert wrong == []
+
+
+def sign_in(page, name, password=PASSWORD):
+    page.get_by_label("Account", exact=True).fill(name)
+    page.get_by_label("Password", exact=True).fill(password)
+    page.keyboard.press("Enter")
+
+
+def asked_by(plant, request):
+    """Who asked the arm's gateway for that, by its audit log."""
+    asked = plant.session.ask("robomesh/hall/arm/audit/find", AuditQuery(request=request), timeout_s=10)
+    return [entry.operator for entry in plant.call(asked).entries]
+
+
+def signed_in(page):
+    return page.locator(".account-menu summary")
+
+
+def test_an_operator_signs_in_has_control_in_its_own_name_and_signs_out_in_all_tabs(open_tab, plant):
+    page = open_tab()
+    expect(page.get_by_role("heading", name="Console of hall")).to_be_visible()
+    expect(page.locator(".sign-in")).to_contain_text("Encrypted connection")
+    expect(button(page, "Stop request")).to_be_disabled()
+    assert serious(page) == []
+    sign_in(page, "li", "not the password")
+    expect(page.get_by_role("alert")).to_have_text("The account or the password is wrong.")
+    expect(page.get_by_label("Password", exact=True)).to_have_value("")
+    sign_in(page, "li")
+    expect(signed_in(page)).to_contain_text("operator")
+    expect(page.get_by_label("Your name")).to_have_value("li.hall")
+    expect(page.get_by_label("Your name")).to_be_disabled()
+    button(page, "Take control").click()
+    expect(page.locator(".holder")).to_have_text("You are in control")
+    assert "li.hall" in asked_by(plant, "ACQUIRE")
+    second = open_tab()
+    expect(signed_in(second)).to_contain_text("li")
+    signed_in(second).click()
+    button(second, "Sign out everywhere").click()
+    for tab in (second, page):
+        expect(tab.get_by_role("heading", name="Console of hall")).to_be_visible()
+        expect(tab.locator(".sign-in")).to_contain_text("You have signed out.")
+        expect(tab.locator("[data-joint]")).to_have_count(0)
+    # Control went with the session: the next one finds nobody there.
+    sign_in(page, "li")
+    expect(page.locator(".holder")).to_have_text("Nobody is in control")
+
+
+def test_a_monitor_finds_why_it_has_no_control_and_its_stop_request_works(open_tab, plant):
+    page = open_tab()
+    sign_in(page, "zhao")
+    expect(page.locator(".no-control")).to_contain_text("zhao is a monitor’s account")
+    expect(button(page, "Take control")).to_have_count(0)
+    button(page, "Stop request").click()
+    expect(page.locator(".stop-notice")).to_contain_text(re.compile("Stop sent to hall/arm"))
+    # The stop went first; it is written down after it.
+    wait_until(lambda: "zhao.hall" in asked_by(plant, "STOP"), what="the audit log does not name zhao.hall")
+
+
+def test_who_is_disabled_is_told_so_and_sees_nothing_more(open_tab, accounts):
+    page = open_tab()
+    sign_in(page, "zhao")
+    expect(page.locator("[data-joint]").first).to_be_visible()
+    change_account(accounts, "disable", "zhao")
+    expect(page.locator(".sign-in")).to_contain_text("this account was disabled")
+    expect(page.locator(".sign-in")).to_contain_text("nothing of it would be live")
+    expect(page.locator("[data-joint]")).to_have_count(0)
+    change_account(accounts, "enable", "zhao")
+
+
+def test_the_right_to_command_that_rests_is_given_back_for_the_password(open_tab, monkeypatch):
+    page = open_tab()
+    sign_in(page, "chen")
+    expect(button(page, "Take control")).to_be_visible()
+    with monkeypatch.context() as patched:
+        patched.setattr(sessions, "COMMANDS_UNTOUCHED_S", 0.0)
+        expect(page.locator(".no-control")).to_contain_text("The right to command rests")
+    expect(button(page, "Take control")).to_have_count(0)
+    signed_in(page).click()
+    expect(page.locator(".account-sheet")).to_contain_text("Watches until the password is given again")
+    assert serious(page) == []
+    page.keyboard.press("Escape")
+    page.locator(".no-control").get_by_label("Password", exact=True).fill(PASSWORD)
+    button(page, "Give the right back").click()
+    button(page, "Take control").click()
+    expect(page.locator(".holder")).to_have_text("You are in control")
+
+
+def test_on_a_phone_in_chinese_signing_in_fits_and_has_no_serious_finding(chromium, plant):
+    context = chromium.new_context(
+        viewport={"width": 360, "height": 740},
+        locale="zh-CN",
+        color_scheme="light",
+        ignore_https_errors=True,
+    )
+    context.set_default_timeout(60_000)
+    page = context.new_page()
+    page.goto(plant.address)
+    expect(page.get_by_role("heading", name="hall 的控制台")).to_be_visible()
+    assert serious(page) == []
+    assert page.locator("html").evaluate("html => html.scrollWidth") == 360
+    page.get_by_label("账户", exact=True).fill("li")
+    page.get_by_label("密码", exact=True).fill(PASSWORD)
+    button(page, "登录").click()
+    expect(signed_in(page)).to_be_visible()
+    signed_in(page).click()
+    expect(page.locator(".account-sheet")).to_contain_text("操作员")
+    assert page.locator("html").evaluate("html => html.scrollWidth") == 360
+    context.close()

@@ -1,0 +1,138 @@
+"""What the page tells ends with what it is about: speed, motions, losses of control."""
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.robot_page import ARM, button, move_slowly, ready, set_speed, take
+
+pytestmark = pytest.mark.browser
+
+
+def test_everybody_sees_the_speed_that_was_set_and_a_low_one_stands_out(open_page):
+    alice, bob = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
+    ready(alice, "alice")
+    set_speed(alice, 2)
+    button(alice, "Release").click()
+    expect(bob.locator(".speed .value")).to_have_text(re.compile(r"2\s%"))
+    expect(bob.locator(".speed.low .speed-hint")).to_have_text("Low: the arm moves slowly.")
+    take(bob, "bob")
+    slider = bob.get_by_label("Speed")
+    slider.press("ArrowRight")
+    expect(bob.locator(".speed.unsent .value")).to_have_text(re.compile(r"3\s%"))
+    expect(bob.locator(".speed-hint")).to_have_text(re.compile(r"Not sent yet: Enter sends 3\s%"))
+    slider.press("Escape")
+    expect(bob.locator(".speed .value")).to_have_text(re.compile(r"2\s%"))
+    set_speed(bob, 100)
+    expect(alice.locator(".speed .value")).to_have_text(re.compile(r"100\s%"))
+    expect(alice.locator(".speed.low")).to_have_count(0)
+    button(bob, "Release").click()
+
+
+def test_what_was_sent_is_done_when_the_arm_is_there_and_gone_when_it_was_stopped(open_page):
+    page = open_page(ARM, drawn=False)
+    ready(page)
+    notice = page.locator(".joints .notice")
+    handle = page.get_by_role("slider", name="Target of waist")
+    handle.press("PageUp")
+    handle.press("Enter")
+    expect(notice).to_contain_text("Sent: waist")
+    expect(notice).to_contain_text("Done: waist")
+    button(page, "Home").click()
+    expect(page.locator(".control .notice")).to_have_text("Sent: Home")
+    expect(page.locator(".control .notice")).to_have_text("Done: Home", timeout=30_000)
+    handle.press("PageUp")
+    handle.press("Enter")
+    expect(page.locator(".headline .state")).to_have_text("Moving")
+    page.locator("button.stop").click()
+    expect(page.locator(".headline .state")).to_have_text("Stopped")
+    expect(page.locator("main")).not_to_contain_text("Sent: ")
+    expect(page.locator(".event-list")).to_contain_text("li asked for a stop; it was sent to the controller.")
+    page.get_by_role("button", name="Reset stop").click()
+    button(page, "Release").click()
+
+
+def test_a_motion_that_another_goes_on_from_has_not_failed(open_page):
+    page = open_page(ARM, drawn=False)
+    ready(page)
+    button(page, "5").click()
+    button(page, "waist +5°").click()
+    expect(page.locator('[data-joint="waist"]')).to_have_text("5.00°")
+    expect(page.locator(".joints .notice")).to_contain_text("Done: waist")
+    # As soon as it is there, while the gateway still waits whether it stays there.
+    button(page, "Home").click()
+    expect(page.locator('[data-joint="waist"]')).to_have_text("0.00°", timeout=30_000)
+    button(page, "waist +5°").click()
+    expect(page.locator(".joints .notice")).to_contain_text("Done: waist")
+    expect(page.locator(".headline .state")).to_have_text("Idle")
+    expect(page.locator("main")).not_to_contain_text("Ended before its target")
+    page.wait_for_timeout(2000)  # longer than a message waits for news of its motion
+    expect(page.locator("main")).not_to_contain_text("Ended before its target")
+    button(page, "Release").click()
+
+
+def test_a_loss_is_told_of_until_who_took_control_has_gone(open_page):
+    alice, bob = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
+    take(alice, "alice")
+    bob.get_by_label("Your name").fill("bob")
+    button(bob, "Take over…").click()
+    bob.get_by_label("Reason").fill("smoke")
+    button(bob, "Take over from alice").click()
+    expect(alice.locator(".control .notice")).to_have_text("Control lost: taken by bob: smoke")
+    button(bob, "Release").click()
+    expect(alice.locator(".holder")).to_have_text("Nobody is in control")
+    expect(alice.locator(".control .notice")).not_to_contain_text("Control lost")
+
+
+def test_a_window_that_is_closed_has_not_given_control_back(open_page):
+    alice, bob = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
+    ready(alice, "alice")
+    move_slowly(alice)
+    alice.close()
+    expect(bob.locator(".stopped")).to_contain_text(
+        re.compile("alice's page or program has gone|window hidden or closed")
+    )
+    take(bob, "bob")
+    bob.get_by_role("button", name="Reset stop").click()
+    set_speed(bob, 100)
+    button(bob, "Release").click()
+
+
+def test_a_browser_that_is_seen_to_be_slow_keeps_control_and_is_told_when_it_is_too_slow(open_page):
+    page, other = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
+    expect(page.locator(".holder")).to_have_text("Nobody is in control")
+    busy = "ms => { const end = performance.now() + ms; while (performance.now() < end); }"
+    page.evaluate(busy, 700)  # as a slow browser is while it loads: from now on its leases are longer
+    take(page, "alice")
+    expect(other.locator(".holder")).to_have_text("alice is in control")
+    page.evaluate(busy, 2500)  # with what has passed since the last renewal longer than 2 s, shorter than 5
+    expect(other.locator(".holder")).to_have_text("alice is in control")
+    expect(page.locator(".holder")).to_have_text("You are in control")
+    page.evaluate(busy, 6500)
+    expect(page.locator(".control .notice")).to_contain_text(
+        "Control lost: this browser was too slow to renew it in time."
+    )
+    expect(other.locator(".holder")).to_have_text("Nobody is in control")
+
+
+def test_an_exact_target_can_be_typed_and_what_is_none_is_refused_in_words(open_page):
+    page = open_page(ARM, drawn=False)
+    ready(page)
+    notice = page.locator(".joints .notice")
+    value = page.get_by_label("Type a target of waist")
+    value.click()
+    value.fill("12,5")
+    expect(notice).to_have_text("Target waist: 12.50°, not sent yet")
+    value.press("Enter")
+    expect(page.locator('[data-joint="waist"]')).to_have_text("12.50°", timeout=30_000)
+    expect(notice).to_have_text("Done: waist 12.50°")
+    for text, said in (
+        ("200", "joint waist at 200.00° is beyond its limit 150.00°"),
+        ("x", "“x” is no number"),
+    ):
+        value.click()
+        value.fill(text)
+        value.press("Enter")
+        expect(notice).to_contain_text(f"Not sent: {said}")
+    button(page, "Release").click()

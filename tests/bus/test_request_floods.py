@@ -1,0 +1,101 @@
+"""More requests than their owner can begin."""
+
+import asyncio
+import contextlib
+
+import pytest
+
+from bus.errors import BusyError
+from bus.requests import Request, ask_all
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import open_session
+from tests.conftest import run
+from tests.protocol_gateway.hall import until
+
+HOME = schema.CommandRequest(command=schema.CommandRequest.HOME)
+
+
+class Owner:
+    """Begins whatever comes, and answers once it is let."""
+
+    def __init__(self, session):
+        self.begun, self.go_on = [], asyncio.Event()
+        session.answer("site", "arm", "command/*", self._wait)
+        session.answer("site", "arm", "stop", self._stop)
+
+    async def _wait(self, request: Request):
+        if request.chunk != "ready":
+            self.begun.append(request.chunk)
+            await self.go_on.wait()
+        return schema.CommandAnswer(accepted=True)
+
+    async def _stop(self, request: Request):
+        return schema.StopAnswer(stop_id=1, sent=True)
+
+
+@contextlib.asynccontextmanager
+async def site(mesh):
+    async with open_session(mesh) as gateway, open_session(mesh) as eve, open_session(mesh) as li:
+        owner = Owner(gateway)
+        # The router knows of it from here on: what is asked before has no answer.
+        await li.ask("robomesh/site/arm/command/ready", HOME, timeout_s=20.0)
+        yield owner, eve, li
+
+
+def once(session, name):
+    """Asked as a flooder asks, who is answered and does not wait."""
+    key, payload = f"robomesh/site/arm/command/{name}", HOME.SerializeToString()
+    return asyncio.create_task(ask_all(session.zenoh_session, key, payload, timeout_s=20.0))
+
+
+def is_busy(task):
+    return task.done() and isinstance(task.result()[0][2], BusyError)
+
+
+def test_who_floods_an_owner_fills_his_own_share_and_others_are_answered_meanwhile(mesh):
+    async def main():
+        async with site(mesh) as (owner, eve, li):
+            asked = [once(eve, "eve") for _ in range(500)]
+            await until(lambda: sum(map(is_busy, asked)) >= 480)
+            other = asyncio.create_task(li.ask("robomesh/site/arm/command/li", HOME, timeout_s=20.0))
+            await until(lambda: "li" in owner.begun)
+            assert (await li.ask("robomesh/site/arm/stop", schema.StopRequest())).sent
+            owner.go_on.set()
+            assert (await other).accepted
+            await asyncio.gather(*asked)
+            assert sum(map(is_busy, asked)) + owner.begun.count("eve") == 500
+            assert owner.begun.count("eve") == 16
+
+    run(main())
+
+
+def test_a_flooder_of_many_names_is_bounded_too(mesh):
+    async def main():
+        async with site(mesh) as (owner, eve, li):
+            asked = [once(eve, f"eve-{number}") for number in range(600)]
+            await until(lambda: sum(map(is_busy, asked)) == 600 - 256)
+            assert (await li.ask("robomesh/site/arm/stop", schema.StopRequest())).sent
+            owner.go_on.set()
+            await asyncio.gather(*asked)
+            assert len(owner.begun) == 256
+
+    run(main())
+
+
+def test_a_busy_owner_is_asked_again_until_the_time_is_over_and_begins_it_once(mesh):
+    async def main():
+        async with site(mesh) as (owner, eve, li):
+            asked = [once(eve, "li") for _ in range(16)]
+            await until(lambda: len(owner.begun) >= 16)
+            key = "robomesh/site/arm/command/li"
+            with pytest.raises(BusyError, match="too many requests wait"):
+                await li.ask(key, HOME, timeout_s=0.3)
+            patient = asyncio.create_task(li.ask(key, HOME, timeout_s=20.0))
+            await asyncio.sleep(0.2)
+            assert len(owner.begun) == 16
+            owner.go_on.set()
+            assert (await patient).accepted
+            await asyncio.gather(*asked)
+            assert len(owner.begun) == 17
+
+    run(main())

@@ -1,0 +1,20 @@
+"""Cells for tests."""
+
+import numpy as np
+
+from robots.cells import STOP_M, WARNING_M, CellDescription, CellRobot, Fixture
+from services import kinematics
+
+
+def arm_alone(
+    name: str = "arm",
+    model: str = "pt600",
+    *,
+    simulated: bool = False,
+    fixtures: tuple[Fixture, ...] = (),
+    warning_m: float = WARNING_M,
+    stop_m: float = STOP_M,
+) -> kinematics.RobotSettings:
+    """A robot of a kinematics service, in a cell of its own."""
+    robot = CellRobot(name=name, model=model, base_to_site=np.eye(4), warning_m=warning_m, stop_m=stop_m)
+    return kinematics.RobotSettings(name=name, place=CellDescription((robot,), fixtures), simulated=simulated)

@@ -1,0 +1,62 @@
+"""Controllers that say what a test tells them to."""
+
+import asyncio
+import contextlib
+import time
+
+
+@contextlib.asynccontextmanager
+async def bare_controller():
+    """A controller that says what a test tells it to: (port, say, heard)."""
+    writers, heard = [], bytearray()
+
+    async def serve(reader, writer):
+        writers.append(writer)
+        while data := await reader.read(100):
+            heard.extend(data)
+
+    def say(text):
+        for writer in writers:
+            writer.write(text.encode())
+
+    server = await asyncio.start_server(serve, "127.0.0.1", 0)
+    try:
+        yield server.sockets[0].getsockname()[1], say, heard
+    finally:
+        server.close()
+        for writer in writers:
+            writer.transport.abort()
+
+
+@contextlib.asynccontextmanager
+async def repeated(say, text):
+    """Something said 100 times a second; `text` is asked for each time."""
+
+    async def keep_saying():
+        while True:
+            say(text())
+            await asyncio.sleep(0.01)
+
+    task = asyncio.create_task(keep_saying())
+    try:
+        yield
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+@contextlib.asynccontextmanager
+async def slow_starter(after_s):
+    """A controller that begins to move so long after it was sent a target: (port, heard)."""
+    waist, begins = 0.0, None
+
+    def state():
+        nonlocal waist, begins
+        if begins is None and b"ABSOLUTE" in heard:
+            begins = time.monotonic() + after_s
+        moves = begins is not None and time.monotonic() >= begins
+        waist += 0.1 if moves else 0.0
+        return f"2#ABSOLUTE.DEG*{waist:.2f};0;0;0;0&STATUS*{'moving' if moves else 'idle'};remote;homed@"
+
+    async with bare_controller() as (port, say, heard), repeated(say, state):
+        yield port, heard

@@ -1,0 +1,27 @@
+"""What the gateway's tests share."""
+
+import time
+
+import pytest
+
+from protocol_gateway.authority.rules import Now
+from protocol_gateway.control import control, stops
+
+
+class Clock:
+    """A clock of control's, set by hand."""
+
+    def __init__(self):
+        self.now = Now(time.monotonic(), time.time_ns())
+
+    def goes_on(self, seconds):
+        self.now = Now(self.now.monotonic_s + seconds, self.now.wall_ns + round(seconds * 1e9))
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """In place of both of control's clocks; the lease's alarm and the disk go by their own."""
+    it = Clock()
+    for module in (control, stops):
+        monkeypatch.setattr(module, "both_clocks", lambda: it.now)
+    return it

@@ -1,0 +1,21 @@
+"""A robot whose simulated controller misbehaves on request."""
+
+import contextlib
+
+from bus.schemas import robomesh_pb2 as schema
+from services.simulator.fault_requests import Mesh
+from tests.protocol_gateway.hall import gateway, simulator
+
+
+@contextlib.asynccontextmanager
+async def faulty(mesh, folder, *more_ports, demo=True, **robot):
+    """A plant, and `await fault(name)`, `await fault(name, off=True)`."""
+    own = Mesh(site="hall", robot="arm", session=mesh)
+    simulated = simulator(demo=demo, mesh=own)
+    async with simulated as port, gateway(mesh, folder, port, *more_ports, **robot) as plant:
+
+        async def fault(name, *, off=False):
+            request = schema.FaultRequest(fault=name, off=off)
+            return await plant.session.ask(plant.key("simulator/fault"), request)
+
+        yield plant, fault

@@ -1,0 +1,89 @@
+"""Control of one robot: its driver, audit log and rules are real, the socket is a list."""
+
+from contextlib import asynccontextmanager
+
+from bus.schemas import robomesh_pb2 as schema
+from protocol_gateway.audit.log import AuditLog, read_entries
+from protocol_gateway.authority.obstacles import Controller
+from protocol_gateway.authority.rules import Authority
+from protocol_gateway.control.control import Control
+from protocol_gateway.control.ledger import Ledger
+from protocol_gateway.control.stops import Guarded
+from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
+from protocol_gateway.drivers.unit import UnitDriver
+from protocol_gateway.errors import LinkDownError
+from protocol_gateway.journal import Journal
+from protocol_gateway.link.link import LinkState, LinkStatus
+from robots.description import load
+from robots.joints import joints_of
+
+
+class Place:
+    """A control and all around it."""
+
+    def __init__(self, folder):
+        self.socket = []
+        self.events = []
+        self.changes = 0
+        self.status = StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=False)
+        self.positions = (0.0,) * 5
+        self.known = None  # the controller, if not as the above say
+        self.broken = False
+        self.secret = ""
+        joints = joints_of(load("pt600"))
+        self.log = AuditLog(folder / "arm.jsonl", on_written=lambda entry: None)
+        journal = Journal(self, "arm")
+        self.control = Control(
+            joints,
+            Guarded(
+                authority=Authority(),
+                driver=UnitDriver(joints.types),
+                ledger=Ledger(self.log, journal),
+                journal=journal,
+                send=self.send,
+                controller=self.controller,
+                on_change=self.changed,
+            ),
+        )
+
+    def changed(self):
+        self.changes += 1
+
+    def put(self, event):
+        self.events.append(event)
+
+    def send(self, unit):
+        if self.broken:
+            raise LinkDownError("not sent: the cable is cut")
+        self.socket.append(unit)
+
+    def controller(self):
+        return self.known or Controller(
+            link=LinkStatus(LinkState.UP, "connected"), status=self.status, positions=self.positions
+        )
+
+    async def lease(self, action, operator="li", **fields):
+        request = schema.LeaseRequest(action=action, **fields)
+        answer = await self.control.leases.ask(request, operator=operator, source="test")
+        self.secret = answer.lease or self.secret
+        return answer
+
+    async def commands(self, *commands, first_id=1):
+        requests = [
+            schema.CommandRequest(lease=self.secret, id=first_id + number, command=command, **fields)
+            for number, (command, fields) in enumerate(commands)
+        ]
+        return await self.control.commands(requests, operator="li", source="test")
+
+    def entries(self):
+        return [(entry.request, entry.outcome) for entry in read_entries(self.log.path)]
+
+
+@asynccontextmanager
+async def place(folder):
+    it = Place(folder)
+    try:
+        yield it
+    finally:
+        await it.control.close()
+        await it.log.close()

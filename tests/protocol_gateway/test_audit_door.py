@@ -1,0 +1,78 @@
+"""What is refused before anybody judges it is in the audit log all the same, and nothing is sent."""
+
+import asyncio
+import json
+import math
+
+from bus.messages import JSON, PROTOBUF
+from bus.schemas import robomesh_pb2 as schema
+from protocol_gateway.audit.log import read_entries, verify
+from tests.conftest import run
+from tests.protocol_gateway.hall import C, gateway, simulator, until
+
+MOVE = {"command": "MOVE_ABSOLUTE", "lease": "x", "id": "1"}
+
+
+def asked(plant, topic, payload, encoding=JSON):
+    """The refusal of a request in bytes of anybody's own."""
+    replies = plant.session.zenoh_session.get(plant.key(topic), payload=payload, encoding=encoding)
+    return [reply.err.payload.to_string() for reply in replies if reply.err is not None]
+
+
+CASES = [
+    ("command/li", json.dumps({**MOVE, "joint_positions": [0, "NaN"]}), "joint_positions: [0.0, nan] is not"),
+    ("command/li", '{"lease": "x"}', "command: one of HOME,"),
+    ("command/li", '{"command": "DANCE"}', "DANCE"),
+    ("command/li", '{"command"', "not JSON"),
+    ("lease/request/li", '{"action": "ACQUIRE", "ttl_s": "NaN"}', "ttl_s: nan is not finite"),
+    ("lease/request/li", "{}", "action: one of ACQUIRE,"),
+    ("command/*", json.dumps(MOVE), "has a wildcard"),
+    ("lease/request/*", '{"action": "ACQUIRE"}', "has a wildcard"),
+    ("command/stop", json.dumps(MOVE), "operator 'stop' cannot be used: a request is called so"),
+    ("command/李\x1b[1m", json.dumps(MOVE), "cannot be used: letters, digits"),
+    ("lease/request/" + "o" * 300, '{"action": "ACQUIRE"}', "a name has at most 200 characters"),
+]
+
+
+def test_what_nobody_judged_is_refused_by_name_and_written_down(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            for topic, payload, words in CASES:
+                count = len(plant.seen["audit"])
+                (text,) = await asyncio.to_thread(asked, plant, topic, payload.encode())
+                assert words in text
+                (entry,) = await until(lambda count=count: plant.seen["audit"][count:])
+                assert entry.request == ("LEASE" if topic.startswith("lease") else "COMMAND")
+                assert entry.outcome == schema.AuditEntry.REFUSED
+                assert entry.text == text
+                assert entry.source == "mesh"
+                assert len(entry.operator) <= 40
+                assert entry.operator.isprintable()
+                assert entry.operator.startswith(topic.rsplit("/", 1)[-1][:1])
+            for message in (
+                schema.CommandRequest(command=C.SPEED, speed_percent=math.inf),
+                schema.CommandRequest(command=77),
+            ):
+                bytes_ = message.SerializeToString()
+                assert await asyncio.to_thread(asked, plant, "command/li", bytes_, PROTOBUF)
+            assert await asyncio.to_thread(asked, plant, "command/li", b"\xff\xff", PROTOBUF)
+            every = len(CASES) + 3
+            await until(lambda: sum(1 + entry.repeated_count for entry in plant.seen["audit"]) == every)
+            assert plant.controller.counters.units_sent == 0
+        assert verify(plant.audit).ok
+
+    run(main())
+
+
+def test_a_flood_of_what_cannot_be_read_is_counted(mesh, tmp_path):
+    flood = 200
+
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            for _ in range(flood):
+                await asyncio.to_thread(asked, plant, "command/li", b"{")
+        told = [entry for entry in read_entries(plant.audit) if entry.request == "COMMAND"]
+        assert sum(1 + entry.repeated for entry in told) == flood
+        assert len(told) < 40
+
+    run(main())

@@ -1,0 +1,169 @@
+"""The gateway's worker processes: who waits for whom, what no check covers, and what goes wrong in one."""
+
+import asyncio
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from protocol_gateway.checking.checker import MOST_PROCESSES, Checker, checkers_of
+from protocol_gateway.checking.questions import Checked, CheckMotion
+from protocol_gateway.checking.worker import begin
+from protocol_gateway.errors import CheckError
+from robots.cells import CellDescription, CellRobot, Fixture
+from robots.meshes.mesh import Material, Mesh, Part
+from robots.tree import Shape
+from tests.conftest import run
+from tests.robots.boxes import bar_arm, block, placed
+
+STANDING = (0.0, 0.0)
+BARE = """<robot name="bare"><link name="base"/><link name="tip"/>
+<joint name="turn" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+HALF = BARE.replace(
+    '<link name="base"/><link name="tip"/>',
+    '<link name="base"><visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual></link>'
+    '<link name="tip"><visual><geometry><mesh filename="nowhere.stl"/></geometry></visual></link>',
+)
+
+
+def motion(robot, *targets, others=None, start=STANDING):
+    return CheckMotion(robot=robot, start=start, targets=targets or ((0.1, 0.0),), others=others or {})
+
+
+@contextlib.asynccontextmanager
+async def running(checker):
+    task = asyncio.create_task(checker.run())
+    try:
+        yield task
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+async def ready(checker, robot):
+    async with asyncio.timeout(60):
+        while checker.problem(robot):
+            await asyncio.sleep(0.02)
+
+
+def alone(name, model, *fixtures):
+    return CellDescription((CellRobot(name, model, placed(0.0)),), fixtures)
+
+
+def test_robots_of_a_cell_share_a_process_and_who_is_alone_needs_none_of_his_own():
+    pairs = [
+        CellDescription((CellRobot(f"l{n}", "pt600", placed(0.0)), CellRobot(f"r{n}", "pt600", placed(1.0))))
+        for n in range(MOST_PROCESSES + 3)
+    ]
+    surroundings = {robot.name: pair for pair in pairs for robot in pair.robots}
+    surroundings |= {f"a{n}": alone(f"a{n}", "pt600") for n in range(100)}
+    checkers = checkers_of(surroundings, at_once=["a7"])
+    assert checkers.keys() == surroundings.keys()
+    assert len(set(checkers.values())) == MOST_PROCESSES + 1
+    assert all(checkers[f"l{n}"] is checkers[f"r{n}"] for n in range(len(pairs)))
+    assert checkers["l0"] is not checkers["l1"]
+    assert len({checkers[f"a{n}"] for n in range(100)}) == 1
+    assert checkers["a0"] not in {checkers[f"l{n}"] for n in range(len(pairs))}
+
+
+def test_what_nobody_waits_for_any_more_is_not_begun(tmp_path, monkeypatch):
+    async def main():
+        checker = Checker({"arm": alone("arm", bar_arm(tmp_path))}, at_once=True)
+        begun = []
+        ask = checker._worker.ask
+
+        async def counted(question, *, timeout_s):
+            begun.append(question)
+            return await ask(question, timeout_s=timeout_s)
+
+        monkeypatch.setattr(checker._worker, "ask", counted)
+        async with running(checker):
+            await ready(checker, "arm")
+            begun.clear()
+            os.kill(checker.pid, signal.SIGSTOP)
+            monkeypatch.setattr("protocol_gateway.checking.checker.MOTION_WITHIN_S", 0.2)
+            late = await asyncio.gather(
+                *(checker.motion(motion("arm")) for _ in range(20)), return_exceptions=True
+            )
+            assert all(isinstance(each, CheckError) and "took longer" in str(each) for each in late)
+            os.kill(checker.pid, signal.SIGCONT)
+            monkeypatch.setattr("protocol_gateway.checking.checker.MOTION_WITHIN_S", 30.0)
+            assert isinstance(await checker.motion(motion("arm")), Checked)
+            # The one that hung, and the one that was waited for.
+            assert len(begun) == 2
+
+    run(main(), timeout_s=90)
+
+
+def test_an_error_that_nobody_foresaw_is_said_in_words_and_ends_nothing(tmp_path):
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, np.nan]])
+    faces = np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3]])
+    shape = Shape(Mesh(parts=(Part("", Material(), corners, np.zeros_like(corners), faces),)), np.eye(4))
+    model = bar_arm(tmp_path)
+
+    async def main():
+        cells = {
+            "bad": alone("bad", model, Fixture("odd", (shape,), np.eye(4))),
+            "good": alone("good", model),
+        }
+        checker = Checker(cells, at_once=True)
+        async with running(checker) as task:
+            await ready(checker, "good")
+            assert "LinAlgError" in checker.problem("bad")
+            with pytest.raises(CheckError, match="LinAlgError"):
+                await checker.motion(motion("bad"))
+            # Of a mate that its cell has not: a bug, wherever it came from.
+            with pytest.raises(CheckError, match="the check failed: KeyError: 'nobody'"):
+                await checker.motion(motion("good", others={"nobody": (STANDING,)}))
+            assert not task.done()
+
+    run(main(), timeout_s=90)
+
+
+def test_a_mate_without_shapes_or_with_missing_meshes_is_refused(tmp_path):
+    for name, text, words in (
+        ("bare", BARE, "bare's description gives no link a shape"),
+        ("half", HALF, "half cannot be checked whole: no such mesh file: nowhere.stl"),
+    ):
+        (tmp_path / f"{name}.urdf").write_text(text)
+        robots = (
+            CellRobot("arm", bar_arm(tmp_path / "arm"), placed(0.0)),
+            CellRobot(name, tmp_path / f"{name}.urdf", placed(5.0)),
+        )
+        answer = begin({"arm": CellDescription(robots)})
+        (refusal,) = answer(motion("arm", others={name: ((0.0,),)})).refusals
+        assert refusal.startswith(words)
+
+
+def test_links_that_no_check_covers_are_said_of_each_motion(tmp_path):
+    arm = CellRobot("arm", bar_arm(tmp_path, bare=("elbow",)), placed(0.0))
+    checked = begin({"arm": CellDescription((arm,))})(motion("arm"))
+    assert checked.refusals == ()
+    assert checked.warnings == ("not checked, for they have no shape: elbow of arm",)
+
+
+def test_a_mates_long_program_is_gone_through_only_where_it_is_near(tmp_path):
+    bars = bar_arm(tmp_path / "bars")
+    fixture = block("post", (0.1, 0.1, 0.1), placed(0.0, 1.0))
+
+    def cell(apart):
+        mates = CellRobot("arm", bars, placed(0.0)), CellRobot("mate", bars, placed(apart))
+        return begin({"arm": CellDescription(mates, (fixture,))})
+
+    rng = np.random.default_rng(0)
+    way = tuple(map(tuple, rng.uniform(-3.0, 3.0, (101, 2)).tolist()))
+    swinging = motion("arm", (1.0, 0.0), others={"mate": way})
+    # Both reach 0.78 m: they meet, or pass each other 0.1 m apart.
+    assert any("mate/" in each for each in cell(1.2)(swinging).refusals)
+    assert cell(1.66)(swinging).refusals == ()
+
+
+def test_the_gateways_own_process_holds_neither_coal_nor_pinocchio():
+    code = "import sys, protocol_gateway.gateway; print({'coal', 'pinocchio'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"

@@ -1,0 +1,227 @@
+"""Motions that are checked before they are made: real gateway, real worker process, simulated controllers."""
+
+import asyncio
+import contextlib
+import os
+import signal
+from math import radians
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bus.errors import RefusedError
+from bus.schemas import robomesh_pb2 as schema
+from robots.cells import CellDescription, CellRobot, Fixture
+from robots.poses import pose_matrix
+from robots.schema import Pose, Units
+from services import site_fixtures
+from tests.conftest import run
+from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
+
+# Beside the arm, which at home reaches out along x: waist at +90 degrees is in it.
+POST = site_fixtures.Fixture(
+    cell="a", name="post", box=(200.0, 200.0, 800.0), pose={"xyz": (0.0, 500.0, 400.0)}
+)
+AWAY, INTO_POST = [radians(-60), 0, 0, 0, 0], [radians(90), 0, 0, 0, 0]
+
+
+def fixture(each):
+    shape = site_fixtures.fixture_shape(each)
+    return Fixture(each.name, (shape,), site_fixtures.fixture_to_site(each))
+
+
+def place_of(x_mm=0.0, turn_deg=0.0):
+    return pose_matrix(Pose(xyz=(x_mm, 0.0, 0.0), rpy=(0.0, 0.0, turn_deg)), Units())
+
+
+def alone(*fixtures):
+    return CellDescription((CellRobot("arm", "pt600", np.eye(4)),), tuple(map(fixture, fixtures)))
+
+
+OUT = [0, 0, 0, 0, 0]
+# The second stands a metre ahead of the first, and at home reaches out across its way.
+TWO = CellDescription(
+    (CellRobot("arm", "pt600", np.eye(4)), CellRobot("arm-2", "pt600", place_of(1000.0, 90.0)))
+)
+
+
+async def checked(plant):
+    """Wait until motions can be checked, and be homed."""
+    await until(lambda: not plant.controller.check_text, timeout_s=60)
+    await plant.home()
+
+
+async def move(plant, target):
+    """Asked again while this machine is too busy to check it in time, as anybody would."""
+    async with asyncio.timeout(60):
+        while True:
+            try:
+                return await plant.command(C.MOVE_ABSOLUTE, joint_positions=target)
+            except RefusedError as error:
+                if "took longer" not in str(error) and "waited" not in str(error):
+                    raise
+            await plant.lease(A.RENEW, ttl_s=5)
+
+
+async def standing(plant, target):
+    await until(lambda: np.allclose(plant.joints, target, atol=1e-3), timeout_s=20)
+    await until(lambda: plant.controller.activity == STATE.IDLE)
+
+
+def test_required_what_collides_is_refused_and_the_arm_has_not_moved(mesh, tmp_path):
+    async def main():
+        async with (
+            simulator() as port,
+            gateway(mesh, tmp_path, port, check="require", cell=alone(POST)) as plant,
+        ):
+            assert plant.controller.check == STATE.REQUIRE
+            await checked(plant)
+            before, units = list(plant.joints), plant.controller.counters.units_sent
+            text = await refusal(move(plant, INTO_POST))
+            assert "post" in text
+            assert "arm/" in text
+            entry = await until(
+                lambda: next((each for each in plant.seen["audit"] if each.request == "MOVE_ABSOLUTE"), None)
+            )
+            assert entry.outcome == schema.AuditEntry.REFUSED
+            assert "post" in entry.text
+            await move(plant, AWAY)
+            await until(lambda: plant.joints[0] < before[0] - 0.1)
+            assert plant.controller.counters.units_sent <= units + 1
+            text = await refusal(move(plant, [0, 0, 0, 0, 0]))
+            assert "wait until it stands" in text
+
+    run(main(), timeout_s=90)
+
+
+def test_warned_what_collides_is_made_and_said(mesh, tmp_path):
+    async def main():
+        async with (
+            simulator() as port,
+            gateway(mesh, tmp_path, port, check="warn", cell=alone(POST)) as plant,
+        ):
+            assert plant.controller.check == STATE.WARN
+            await checked(plant)
+            answer = await move(plant, INTO_POST)
+            assert answer.accepted
+            assert "post" in answer.text
+            event = (await until(lambda: plant.events("check.warning")))[0]
+            assert event.severity == schema.Event.WARNING
+            assert "post" in event.text
+            await until(lambda: plant.joints[0] > 0.1)
+
+    run(main(), timeout_s=90)
+
+
+def test_required_while_nothing_can_check_nothing_moves_and_a_killed_worker_comes_back(mesh, tmp_path):
+    async def main():
+        async with (
+            simulator() as port,
+            gateway(mesh, tmp_path, port, check="require", cell=alone(POST)) as plant,
+        ):
+            await checked(plant)
+            os.kill(worker_of(os.getpid()), signal.SIGKILL)
+            text = await refusal(move(plant, AWAY))
+            assert 'check = "require"' in text
+            assert plant.controller.counters.units_sent == 1
+            async with asyncio.timeout(60):
+                while plant.joints[0] > -0.1:
+                    await plant.lease(A.RENEW, ttl_s=5)
+                    with contextlib.suppress(RefusedError):
+                        await move(plant, AWAY)
+                    await asyncio.sleep(0.1)
+
+    run(main(), timeout_s=120)
+
+
+def worker_of(parent):
+    """The process that checks, of those that a process has started."""
+    for process in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            ours = f") S {parent} " in (process / "stat").read_text()
+            if ours and "checking.worker" in (process / "cmdline").read_text():
+                return int(process.name)
+    raise AssertionError("no worker process")
+
+
+def test_required_a_robot_without_shapes_is_not_moved(mesh, tmp_path):
+    urdf = tmp_path / "bare.urdf"
+    urdf.write_text(BARE)
+
+    async def main():
+        bare = CellDescription((CellRobot("arm", urdf, np.eye(4)),))
+        async with (
+            simulator(robot=str(urdf)) as port,
+            gateway(mesh, tmp_path, port, check="require", cell=bare, description=str(urdf)) as plant,
+        ):
+            await until(lambda: "no link a shape" in plant.controller.check_text, timeout_s=60)
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            assert "no link a shape" in await refusal(plant.command(C.HOME))
+
+    run(main(), timeout_s=90)
+
+
+BARE = """<robot name="bare"><link name="base"/><link name="tip"/>
+<joint name="turn" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+
+
+def test_robots_of_a_cell_are_checked_where_they_are_and_where_they_have_been_told_to_go(mesh, tmp_path):
+    async def main():
+        async with (
+            simulator() as port,
+            simulator() as other_port,
+            gateway(mesh, tmp_path, port, other_port, check="require", each=[{"cell": TWO}] * 2) as arm,
+        ):
+            (other,) = arm.others
+            await checked(arm)
+            await checked(other)
+            await arm.lease(A.RENEW, ttl_s=5)
+            await move(arm, OUT)
+            # While it goes there, and when it is there, the other may not swing through it.
+            text = await refusal(move(other, [radians(90), 0, 0, 0, 0]))
+            assert "arm/" in text
+            await standing(arm, OUT)
+            text = await refusal(move(other, [radians(90), 0, 0, 0, 0]))
+            assert "arm/" in text
+            assert "arm-2/" in text
+            await arm.lease(A.RENEW, ttl_s=5)
+            await move(arm, [radians(-90), 0, 0, 0, 0])
+            await standing(arm, [radians(-90), 0, 0, 0, 0])
+            await arm.lease(A.RENEW, ttl_s=5)
+            await other.lease(A.RENEW, ttl_s=5)
+            # Asked for at once, each good alone: whichever comes second is told of the first's way.
+            answers = await asyncio.gather(
+                move(arm, OUT),
+                move(other, [radians(90), 0, 0, 0, 0]),
+                return_exceptions=True,
+            )
+            refused = [answer for answer in answers if isinstance(answer, RefusedError)]
+            assert len(refused) == 1, answers
+            assert "arm-2/" in str(refused[0])
+
+    run(main(), timeout_s=120)
+
+
+def test_required_a_cell_mate_that_nobody_hears_of_keeps_an_arm_where_it_is(mesh, tmp_path):
+    async def main():
+        async with (
+            simulator() as port,
+            gateway(mesh, tmp_path, port, check="require", cell=TWO) as plant,
+        ):
+            await until(lambda: not plant.controller.check_text, timeout_s=60)
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            text = await refusal(plant.command(C.HOME))
+            assert "where arm-2 is or goes (this gateway does not serve it)" in text
+
+    run(main(), timeout_s=90)
+
+
+def test_a_policy_that_there_is_not_is_named(mesh, tmp_path):
+    async def main():
+        async with gateway(mesh, tmp_path, 9, up=False, check="sometimes"):
+            pass
+
+    with pytest.raises(Exception, match="'sometimes': should be 'require', 'warn', 'off'"):
+        run(main())

@@ -1,0 +1,132 @@
+"""What the robots of a cell are checked against: everywhere that each has been told to go."""
+
+import asyncio
+from dataclasses import replace
+from math import radians
+
+import pytest
+
+from bus.errors import RefusedError
+from bus.schemas import robomesh_pb2 as schema
+from protocol_gateway.checking.cell_mates import CellMates
+from protocol_gateway.checking.policy import Policy
+from protocol_gateway.control.checks import Checks
+from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
+from robots.description import load
+from robots.joints import joints_of
+from tests.conftest import run
+from tests.protocol_gateway.hall import A, C, gateway, simulator, until
+from tests.protocol_gateway.place import place
+from tests.protocol_gateway.test_checked_motion import OUT, TWO, checked, move, standing
+from tests.protocol_gateway.test_program_runs import RUN, ended, start, states
+
+JOINTS = joints_of(load("pt600"))
+READY = StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=True)
+HERE, FAR, NEAR = (0.0,) * 5, (1.0, 0.0, 0.0, 0.0, 0.0), (0.1, 0.0, 0.0, 0.0, 0.0)
+
+
+def whereabouts(it):
+    """As the cell's other robots get it."""
+    guarded = it.control._guarded
+    mates = CellMates()
+    Checks(
+        "arm",
+        Policy.OFF,
+        cell=("arm", "arm-2"),
+        checker=None,
+        planner=None,
+        mates=mates,
+        joints=JOINTS,
+        guarded=guarded,
+    )
+    return mates.others("arm-2", ("arm", "arm-2"))["arm"].path
+
+
+@pytest.mark.parametrize(
+    ("second", "way"),
+    [
+        ((C.MOVE_ABSOLUTE, {"joint_positions": NEAR}), (HERE, FAR, NEAR)),
+        ((C.MOVE_RELATIVE, {"joint_positions": NEAR}), (HERE, FAR, (1.1, 0.0, 0.0, 0.0, 0.0))),
+    ],
+)
+def test_of_a_unit_of_two_motions_the_others_are_kept_out_of_both(tmp_path, second, way):
+    async def main():
+        async with place(tmp_path) as it:
+            await it.lease(A.ACQUIRE)
+            it.status = READY
+            await it.commands((C.MOVE_ABSOLUTE, {"joint_positions": FAR}), second)
+            told = whereabouts(it)
+            assert [tuple(round(value, 9) for value in each) for each in told] == list(way)
+
+    run(main())
+
+
+def test_resume_and_another_motion_are_two_units(tmp_path):
+    async def main():
+        async with place(tmp_path) as it:
+            await it.lease(A.ACQUIRE)
+            it.status = READY
+            await it.commands((C.MOVE_ABSOLUTE, {"joint_positions": FAR}))
+            it.status = replace(READY, activity=Activity.HOLDING)
+            with pytest.raises(RefusedError, match="two units"):
+                await it.commands((C.RESUME, {}), (C.MOVE_ABSOLUTE, {"joint_positions": NEAR}), first_id=2)
+            assert len(it.socket) == 1
+
+    run(main())
+
+
+def test_who_is_not_checked_himself_still_meets_nobody_who_is(mesh, tmp_path):
+    async def main():
+        policies = [{"cell": TWO, "check": "require"}, {"cell": TWO, "check": "off"}]
+        async with (
+            simulator() as port,
+            simulator() as other_port,
+            gateway(mesh, tmp_path, port, other_port, each=policies) as arm,
+        ):
+            (other,) = arm.others
+            await checked(arm)
+            await checked(other)
+            await arm.lease(A.RENEW, ttl_s=5)
+            await move(arm, [radians(-90), 0, 0, 0, 0])
+            await standing(arm, [radians(-90), 0, 0, 0, 0])
+            await arm.lease(A.RENEW, ttl_s=5)
+            await other.lease(A.RENEW, ttl_s=5)
+            answers = await asyncio.gather(
+                move(other, [radians(90), 0, 0, 0, 0]), move(arm, OUT), return_exceptions=True
+            )
+            assert any(isinstance(answer, RefusedError) for answer in answers), answers
+
+    run(main(), timeout_s=120)
+
+
+def test_a_stop_that_is_reset_at_once_ends_a_program_that_waits(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.home()
+            await start(plant, "wait 2\nmove_joints -60 90 -90 0 0\n")
+            await until(lambda: states(plant)[-1].outcome == RUN.RUNNING)
+            for _ in range(3):
+                stop = await plant.stop(by="wang")
+                plant.id += 1
+                request = schema.CommandRequest(
+                    command=C.RESET, lease=plant.secret, id=plant.id, stop_id=stop.stop_id
+                )
+                # No sooner than the answer to the stop: within one look of the program's.
+                await plant.session.ask(plant.key("command/li"), request)
+            state = await ended(plant, RUN.ENDED)
+            assert state.text.startswith("stopped")
+
+    run(main(), timeout_s=60)
+
+
+def test_a_program_is_planned_from_where_the_robot_stands_whatever_the_policy(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.home()
+            await plant.command(C.SPEED, speed_percent=5)
+            await plant.command(C.MOVE_ABSOLUTE, joint_positions=[radians(-60), 1.57, -1.57, 0, 0])
+            await until(lambda: plant.joints[0] < -0.02)
+            with pytest.raises(RefusedError, match="wait until it stands"):
+                await start(plant, "move_joints -20 90 -90 0 0\n")
+
+    run(main(), timeout_s=60)

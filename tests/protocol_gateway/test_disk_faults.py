@@ -1,0 +1,91 @@
+"""The audit log's disk, full or slow."""
+
+import asyncio
+import contextlib
+import os
+import time
+from pathlib import Path
+
+from protocol_gateway.audit.log import read_entries, verify
+from tests.conftest import run
+from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
+
+
+@contextlib.contextmanager
+def full_disk(path):
+    """The open audit log's file is a full device for a while: its writes really fail."""
+    (number,) = [int(fd.name) for fd in Path("/proc/self/fd").iterdir() if _target(fd) == path]
+    kept, full = os.dup(number), os.open("/dev/full", os.O_RDWR)
+    os.dup2(full, number)
+    os.close(full)
+    try:
+        yield
+    finally:
+        os.dup2(kept, number)
+        os.close(kept)
+
+
+def _target(fd):
+    with contextlib.suppress(OSError):
+        return fd.readlink()
+    return None
+
+
+def test_on_a_full_disk_a_stop_works_and_a_motion_is_refused_and_the_stop_is_written_later(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.home()
+            with full_disk(plant.audit):
+                text = await refusal(plant.command(C.HOME))
+                assert "No space left on device" in text
+                stop = await plant.stop(by="wang")
+                assert stop.sent
+                await until(lambda: plant.controller.activity == STATE.STOPPED)
+                await plant.lease(A.RENEW)
+                await until(lambda: plant.events("audit.failed"))
+            await until(lambda: [entry.request for entry in read_entries(plant.audit)][-1] == "STOP")
+            await plant.lease(A.RENEW)
+            await plant.command(C.RESET, stop_id=stop.stop_id)
+        assert verify(plant.audit).ok
+        assert [e.request for e in read_entries(plant.audit)] == [
+            "ACQUIRE",
+            "HOME",
+            "HOME",
+            "STOP",
+            "RESET",
+            "REVOKE",
+        ]
+
+    run(main())
+
+
+def test_a_command_that_waited_for_a_slow_disk_is_not_sent_after_its_sender_has_given_up(
+    mesh, tmp_path, monkeypatch
+):
+    async def main():
+        async with simulator(demo=True) as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            fsync = os.fsync
+
+            def slow(file):
+                time.sleep(3.0)
+                fsync(file)
+
+            monkeypatch.setattr(os, "fsync", slow)
+            asked = [plant.command(C.TRACE_ON), plant.command(C.SPEED, speed_percent=10)]
+            first, second = await asyncio.gather(*(refusal(each) for each in asked))
+            assert first.startswith("Not sent: the audit log's disk takes longer than 1 s, and what is not")
+            # Which of the two depends on how soon it came behind the first.
+            assert second.startswith(("Not sent: it waited ", first[:45]))
+            await until(lambda: plant.events("audit.failed"))
+            monkeypatch.setattr(os, "fsync", fsync)
+            await until(lambda: plant.seen["audit"][-1].request == "SPEED")
+            await plant.lease(A.RENEW, ttl_s=5)
+            await plant.command(C.TRACE_OFF)
+            await until(lambda: plant.controller.counters.units_sent == 1)
+        outcomes = [(each.request, each.outcome) for each in read_entries(plant.audit)]
+        assert ("TRACE_ON", "FAILED") in outcomes
+        assert dict(outcomes)["SPEED"] in ("REFUSED", "FAILED")
+        assert dict(outcomes)["TRACE_OFF"] == "ACCEPTED"
+
+    run(main())

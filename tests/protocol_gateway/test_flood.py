@@ -1,0 +1,302 @@
+"""More than is taken: floods thinned, deluges thrown away, the newest of a burst; over real sockets too."""
+
+import asyncio
+import contextlib
+import math
+import time
+
+import pytest
+
+from bus.keys import robot_key
+from protocol_gateway.drivers.driver import Activity, JointsReceived, Mode, Refused, StatusReceived
+from protocol_gateway.link.dating import Received
+from protocol_gateway.link.flood import Flood, HandOver
+from tests.conftest import run
+from tests.protocol_gateway.bare import bare_controller, repeated
+from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
+from tests.protocol_gateway.old_program import legacy, program
+
+
+def flooded(rate_hz, seconds, flood=None, begin_s=10.0):
+    it = flood or Flood()
+    for number in range(int(rate_hz * seconds)):
+        it.came(100, begin_s + number / rate_hz, more_waits=False)
+        assert not it.deluge
+        it.count(1)
+    return it
+
+
+def test_a_thousand_units_a_second_are_no_flood_and_three_thousand_are():
+    assert not flooded(1000, 5).on
+    assert flooded(3000, 1).on
+
+
+def test_a_flood_is_over_after_half_a_second_of_calm_and_not_before():
+    it = flooded(3000, 1)
+    assert flooded(100, 0.4, it, 11.0).on
+    assert not flooded(100, 1.2, it, 11.4).on
+
+
+def test_more_than_a_mebibyte_in_half_a_second_is_a_deluge_until_half_a_second_is_calm():
+    it = Flood()
+
+    def deluge(length, now_s, *, more_waits=False):
+        it.came(length, now_s, more_waits=more_waits)
+        return it.deluge
+
+    assert not deluge(1 << 20, 10.0)
+    assert deluge(1, 10.4)
+    assert deluge(1 << 18, 10.6)  # the half second before was none of calm
+    assert deluge(1, 11.0)
+    assert deluge(1, 11.2, more_waits=True)  # few bytes, but more of them wait
+    assert deluge(1, 11.7)
+    assert it.on
+    assert not deluge(1, 12.3)
+    assert not it.on
+
+
+def test_units_so_many_that_others_would_wait_for_their_reading_are_a_deluge_too():
+    it = Flood()
+    it.came(10_000, 10.0, more_waits=False)
+    it.count(10_000)
+    assert not it.deluge
+    it.count(1)
+    assert it.deluge
+
+
+class Timers:
+    """What is to be called later, called by hand."""
+
+    def __init__(self):
+        self.calls = []
+
+    def later(self, seconds, call):
+        self.calls.append(call)
+        return self
+
+    def cancel(self):
+        self.calls.clear()
+
+
+def handed_over(*reads, burst):
+    """What is handed over of the events of reads, before and after a time without more."""
+    seen, timers, now = [], Timers(), Received(1.0, 10**9)
+    it = HandOver(lambda event, date: seen.append(event), timers.later)
+    for events in reads:
+        it.give(events, [now] * len(events), burst=burst)
+    before = list(seen)
+    (call,) = timers.calls or [lambda: None]
+    call()
+    return before, seen[len(before) :], it.left_out
+
+
+def joints(number):
+    return JointsReceived((number,))
+
+
+def test_of_a_burst_in_pieces_the_newest_alone_is_handed_over_and_only_when_no_more_comes():
+    reads = [joints(1), joints(2)], [], [joints(3)]
+    assert handed_over(*reads, burst=True) == ([], [joints(3)], 2)
+    assert handed_over(*reads, burst=False) == ([joints(1), joints(2), joints(3)], [], 0)
+
+
+def test_of_a_burst_what_its_controller_dates_and_what_it_refuses_is_handed_over_at_once():
+    dated = [JointsReceived((1.0,), None, 5.0), JointsReceived((2.0,), None, 5.1), Refused(5, "limit")]
+    assert handed_over(dated, burst=True) == (dated, [], 0)
+
+
+def test_of_statuses_held_back_none_that_says_something_else_is_left_out_and_the_newest_is_the_last():
+    idle, local = StatusReceived(activity=Activity.IDLE), StatusReceived(mode=Mode.LOCAL)
+    assert handed_over([idle, local, idle], [local], burst=True) == ([], [idle, local], 0)
+
+
+# ------------------------------------------------------------------- on real sockets
+
+UNIT = "1#ABSOLUTE.DEG*%.2f;0;0;0;0@"
+
+
+@contextlib.asynccontextmanager
+async def flooding(say):
+    """Positions, 8,000 a second, however seldom the machine comes to it."""
+
+    async def keep_saying():
+        said_s = time.monotonic()
+        while True:
+            await asyncio.sleep(0.001)
+            now_s = time.monotonic()
+            say(UNIT % 1.0 * min(1000, round(8000 * (now_s - said_s))))
+            said_s = now_s
+
+    task = asyncio.create_task(keep_saying())
+    try:
+        yield
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+def test_a_status_told_once_in_the_midst_of_a_flood_is_heeded_and_reaches_old_client_programs(mesh, tmp_path):
+    async def main():
+        settings = legacy(commanders={})
+        async with (
+            bare_controller() as (port, say, heard),
+            gateway(mesh, tmp_path, port, up=False, legacy_clients=settings) as plant,
+        ):
+            await until(lambda: plant.controller.link == STATE.SILENT)
+            say("1#STATUS*idle;remote;homed@" + UNIT % 1.0)
+            await until(lambda: plant.controller.mode == STATE.REMOTE)
+            async with program(settings) as old, flooding(say):
+                await until(lambda: plant.controller.health.flooding)
+                await plant.lease(A.ACQUIRE, ttl_s=5)
+                for mode, known in (("local", STATE.LOCAL), ("remote", STATE.REMOTE)) * 3:
+                    say(UNIT % 1.0 * 3 + f"1#STATUS*idle;{mode};homed@" + UNIT % 1.0 * 3)
+                    await until(lambda known=known: plant.controller.mode == known)
+                    await until(lambda mode=mode: mode in old.words)
+                say("1#STATUS*idle;local;homed@1#STATUS*idle;remote;homed@" + UNIT % 1.0)
+                await until(lambda: len(plant.events("controller.local")) == 4)  # not even one of a moment
+                say("1#STATUS*idle;local;homed@" + UNIT % 1.0)
+                await until(lambda: plant.controller.mode == STATE.LOCAL)
+                move = plant.command(C.MOVE_ABSOLUTE, joint_positions=[0.1, 0, 0, 0, 0])
+                assert "local mode" in await refusal(move)
+            assert b"ABSOLUTE" not in heard
+
+    run(main())
+
+
+def test_of_a_flood_the_newest_is_published_some_two_hundred_times_a_second(mesh, tmp_path):
+    async def main():
+        settings = legacy(commanders={})
+        async with (
+            bare_controller() as (port, say, _),
+            gateway(mesh, tmp_path, port, up=False, legacy_clients=settings) as plant,
+        ):
+            await until(lambda: plant.controller.link == STATE.SILENT)
+            async with program(settings) as old, flooding(say):
+                await until(lambda: plant.controller.health.flooding)
+                before, told, begin_s = len(plant.seen["joints"]), len(old.units), time.monotonic()
+                await asyncio.sleep(1.5)
+                elapsed_s = time.monotonic() - begin_s
+                assert 0 < len(plant.seen["joints"]) - before < 250 * elapsed_s
+                assert 0 < len(old.units) - told < 250 * elapsed_s
+            assert plant.controller.counters.units_skipped > 1000
+            # Not even the last of a flood is left out.
+            say(UNIT % 2.0)
+            await until(lambda: plant.joints[0] == pytest.approx(math.radians(2.0)))
+
+    run(main())
+
+
+@contextlib.asynccontextmanager
+async def deluging():
+    """A controller that sends as fast as it is read, while `on` is set: (port, on, heard)."""
+    on, heard, tasks = asyncio.Event(), bytearray(), []
+    on.set()
+    state = b"2#STATUS*idle;remote;homed&ABSOLUTE.DEG*1;0;0;0;0@"
+
+    async def pour(writer):
+        while True:
+            writer.write(state * 2000 if on.is_set() else state)
+            await writer.drain()
+            await asyncio.sleep(0.001 if on.is_set() else 0.01)
+
+    async def serve(reader, writer):
+        tasks.append(asyncio.create_task(pour(writer)))
+        with contextlib.suppress(ConnectionError):
+            while data := await reader.read(100):
+                heard.extend(data)
+        tasks[-1].cancel()
+        writer.transport.abort()
+
+    server = await asyncio.start_server(serve, "127.0.0.1", 0)
+    try:
+        yield server.sockets[0].getsockname()[1], on, heard
+    finally:
+        server.close()
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+def test_in_a_deluge_a_stop_is_sent_at_once_another_robot_keeps_its_rate_and_all_is_well_after_it(
+    mesh, tmp_path
+):
+    async def main():
+        async with (
+            deluging() as (port, on, heard),
+            simulator(demo=True) as calm_port,
+            gateway(mesh, tmp_path, port, calm_port, up=False) as plant,
+        ):
+            await until(lambda: "sends far too much: nothing of it is taken" in plant.controller.link_text)
+            assert plant.controller.link == STATE.SILENT
+            for number in range(3):
+                begin_s = time.monotonic()
+                assert (await plant.stop(by="wang")).sent
+                await until(lambda number=number: heard.count(b"1#COMMAND*stop@") == number + 1)
+                assert time.monotonic() - begin_s < 2.0
+                await asyncio.sleep(0.15)
+            # By now the last state from before the deluge is here: it goes another way than the link's state.
+            joints = len(plant.seen["joints"])
+            calm = plant.session.subscribe(robot_key("hall", "arm-2", "joints"), newest=1000)
+            await anext(calm)
+            taken, begin_s = plant.controller.counters.bytes_received, time.monotonic()
+            for _ in range(300):
+                await anext(calm)
+            elapsed_s = time.monotonic() - begin_s
+            assert elapsed_s < 9.0  # 3 s where nothing else runs
+            # The state is told each second.
+            await until(lambda: plant.controller.counters.bytes_received > taken)
+            taken = plant.controller.counters.bytes_received - taken
+            assert taken < 5e6 * (elapsed_s + 2.0)
+            assert len(plant.seen["joints"]) == joints
+            # Longer than the link waits for a controller that sends nothing.
+            await asyncio.sleep(max(0.0, 4.5 - elapsed_s))
+            assert plant.controller.counters.connections == 1
+            await until(lambda: len(plant.events("link.deluge")) == 1)
+            on.clear()
+            await until(lambda: plant.controller.link == STATE.UP, timeout_s=40.0)
+            await until(lambda: len(plant.seen["joints"]) > joints + 20)
+            await until(lambda: plant.events("link.flooding_ended"))
+            assert plant.controller.counters.connections == 1
+
+    run(main(), timeout_s=60.0)
+
+
+def test_of_what_was_held_back_without_a_clock_the_newest_alone_is_published(mesh, tmp_path):
+    async def main():
+        async with bare_controller() as (port, say, _), gateway(mesh, tmp_path, port, up=False) as plant:
+            await until(lambda: plant.controller.link == STATE.SILENT)
+            for first in (1.0, 2.0):
+                say(UNIT % first)
+                await until(lambda: plant.seen["joints"])
+                await until(lambda first=first: plant.joints[0] == pytest.approx(math.radians(first)))
+                before = len(plant.seen["joints"])
+                await asyncio.sleep(0.5)
+                skipped = plant.controller.counters.units_skipped + 198
+                for begin in (10, 110):  # in two pieces, as networks do
+                    say("".join(UNIT % (begin + number) for number in range(100)))
+                await until(lambda: plant.joints[0] == pytest.approx(math.radians(209.0)))
+                assert len(plant.seen["joints"]) - before <= 2
+                await until(lambda skipped=skipped: plant.controller.counters.units_skipped >= skipped)
+
+    run(main())
+
+
+def test_live_positions_after_a_gap_are_all_published(mesh, tmp_path):
+    async def main():
+        waist = 0
+
+        def state():
+            nonlocal waist
+            waist += 1
+            return UNIT % (0.1 * waist)
+
+        async with bare_controller() as (port, say, _), gateway(mesh, tmp_path, port, up=False) as plant:
+            await until(lambda: plant.controller.link == STATE.SILENT)
+            say(state())
+            await asyncio.sleep(0.5)
+            async with repeated(say, state):
+                await until(lambda: len(plant.seen["joints"]) > 60)
+            # What two of which came at once is a burst, on a busy machine.
+            assert len(plant.seen["joints"]) > 0.7 * waist
+
+    run(main())

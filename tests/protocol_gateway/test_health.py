@@ -1,0 +1,88 @@
+"""Health of a link, with the clock as an argument."""
+
+import pytest
+
+from protocol_gateway.drivers.driver import Activity, JointsReceived, Refused, StatusReceived
+from protocol_gateway.link.health import Answers, Arrivals, Losses
+
+IDLE, MOVING = StatusReceived(activity=Activity.IDLE), StatusReceived(activity=Activity.MOVING)
+
+
+def arrivals(*spans_s):
+    it, now_s = Arrivals(), 100.0
+    for span_s in spans_s:
+        now_s += span_s
+        it.count(1, now_s)
+    return it, now_s
+
+
+def test_units_in_step_have_no_jitter_and_a_rate():
+    it, now_s = arrivals(*[0.01] * 300)
+    assert it.jitter_s(now_s) == pytest.approx(0.0, abs=1e-9)
+    assert it.rate_hz(now_s) == pytest.approx(100.0, rel=0.02)
+
+
+def test_jitter_is_the_99th_percentile_less_the_median():
+    it, now_s = arrivals(*([0.01] * 49 + [0.03]) * 8)
+    assert it.jitter_s(now_s) == pytest.approx(0.02)
+
+
+def test_what_few_units_or_old_ones_tell_of_jitter_and_rate_is_nothing():
+    it, now_s = arrivals(*[0.01] * 15)
+    assert it.jitter_s(now_s) is None
+    it, now_s = arrivals(*[0.01] * 200)
+    assert it.jitter_s(now_s + 6.0) is None
+    assert it.rate_hz(now_s + 2.5) == 0.0
+
+
+def losses(*times_s):
+    it = Losses()
+    for time_s in times_s:
+        it.see(time_s)
+    return it.lost
+
+
+REGULAR = [number * 0.01 for number in range(100)]
+
+
+@pytest.mark.parametrize(
+    ("times_s", "lost"),
+    [
+        (REGULAR, 0),
+        ([time_s for number, time_s in enumerate(REGULAR) if number not in (30, 31, 55)], 3),
+        ([each for time_s in REGULAR for each in (time_s, time_s)], 0),  # joints and status of one unit
+        ([time_s + 0.004 * (number % 7 == 0) for number, time_s in enumerate(REGULAR)], 0),  # told late
+        ([*REGULAR, *[5000.0 + time_s for time_s in REGULAR]], 0),  # the clock was set
+        ([*REGULAR, *REGULAR], 0),  # it was restarted
+        ([0.014 * number - 0.014 * number % 0.01 for number in range(100)], 0),  # a coarse clock
+        ([number**1.5 for number in range(60)], 0),  # no rate at all
+    ],
+)
+def test_units_that_never_came_are_gaps_in_a_clock_that_beats_regularly(times_s, lost):
+    assert losses(*times_s) == lost
+
+
+def test_an_answer_is_a_refusal_or_a_status_that_changes_after_a_command():
+    it = Answers()
+    it.see(IDLE, 1.0)
+    it.see(MOVING, 1.1)
+    assert it.answer_s is None  # nothing was asked
+    it.sent(2.0)
+    it.see(JointsReceived((0.0,)), 2.01)
+    it.see(MOVING, 2.02)
+    assert it.answer_s is None
+    it.see(IDLE, 2.03)
+    assert it.answer_s == pytest.approx(0.03)
+    it.see(MOVING, 2.5)
+    assert it.answer_s == pytest.approx(0.03)
+    it.sent(3.0)
+    it.see(Refused(5, "limit"), 3.2)
+    assert it.answer_s == pytest.approx(0.2)
+
+
+def test_what_comes_more_than_two_seconds_after_a_command_is_no_answer_to_it():
+    it = Answers()
+    it.see(IDLE, 0.0)
+    it.sent(1.0)
+    it.see(MOVING, 3.5)
+    assert it.answer_s is None

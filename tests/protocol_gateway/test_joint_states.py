@@ -1,0 +1,25 @@
+from foxglove_schemas_protobuf.JointState_pb2 import JointState
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from hypothesis import given
+from hypothesis import strategies as st
+
+from protocol_gateway.drivers.driver import JointsReceived
+from protocol_gateway.states import JointStatesMessage, timestamp
+
+NAMES = ("waist", "elbow")
+_NUMBERS = st.tuples(*[st.floats(allow_nan=False, allow_infinity=False)] * len(NAMES))
+
+
+@given(st.lists(st.tuples(_NUMBERS, st.none() | _NUMBERS, st.integers(0, 2**62)), min_size=1, max_size=4))
+def test_message_that_is_filled_in_again_is_the_one_that_would_be_made_anew(units):
+    message = JointStatesMessage(NAMES)
+    for positions, velocities, wall_ns in units:
+        anew = JointStates(
+            timestamp=timestamp(wall_ns),
+            joints=[
+                JointState(name=name, position=position, velocity=velocity)
+                for name, position, velocity in zip(NAMES, positions, velocities or (None, None), strict=True)
+            ],
+        )
+        filled = message.of(JointsReceived(positions, velocities), wall_ns)
+        assert filled.SerializeToString() == anew.SerializeToString()

@@ -1,0 +1,46 @@
+"""Events of a kind that comes again and again."""
+
+from bus.schemas.robomesh_pb2 import Event
+from protocol_gateway.journal import Journal
+
+
+class Heard:
+    def __init__(self):
+        self.events = []
+
+    def put(self, event):
+        self.events.append(event)
+
+
+def test_of_many_of_a_kind_five_are_said_then_one_each_five_seconds_and_all_are_counted():
+    heard, now_s = Heard(), 100.0
+    journal = Journal(heard, "arm", monotonic_s=lambda: now_s)
+    for _ in range(1000):  # 100 s of ten a second
+        journal.say(Event.WARNING, "unit.malformed", "a unit is malformed")
+        now_s += 0.1
+    assert 23 <= len(heard.events) <= 26
+    said = len(heard.events) + sum(int(event.values.get("left_out", 0)) for event in heard.events)
+    assert 950 <= said <= 1000
+    more = heard.events[6].values["left_out"]
+    assert heard.events[6].text == f"a unit is malformed (and {more} more like it before)"
+
+
+def test_a_flood_of_one_kind_leaves_out_no_other():
+    heard, now_s = Heard(), 100.0
+    journal = Journal(heard, "arm", monotonic_s=lambda: now_s)
+    for _ in range(100):
+        journal.say(Event.WARNING, "unit.malformed", "a unit is malformed")
+    journal.say(Event.WARNING, "stop.latched", "stop request 1")
+    assert [event.code for event in heard.events] == ["unit.malformed"] * 5 + ["stop.latched"]
+
+
+def test_after_a_rest_as_many_are_said_at_once_as_at_first():
+    heard, now_s = Heard(), 100.0
+    journal = Journal(heard, "arm", monotonic_s=lambda: now_s)
+    for _ in range(10):
+        journal.say(Event.INFO, "link.up", "up")
+    now_s += 60.0
+    for _ in range(10):
+        journal.say(Event.INFO, "link.up", "up")
+    assert len(heard.events) == 10
+    assert heard.events[5].values["left_out"] == "5"

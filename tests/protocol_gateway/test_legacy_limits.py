@@ -1,0 +1,228 @@
+"""Old client programs that are slow, deaf, half-open, too many or too loud: they harm nobody."""
+
+import asyncio
+import ctypes
+import os
+import shutil
+import socket
+import subprocess
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from bus.schemas import robomesh_pb2 as schema
+from protocol_gateway.core.stream import UnitStream
+from protocol_gateway.serving.budget import Budget, Limits
+from tests.protocol_gateway.hall import STATE, until
+from tests.protocol_gateway.old_program import ME, Program, hall, in_loop, legacy, program
+
+
+@in_loop
+async def test_one_too_many_is_told_so_and_a_hundred_harm_nobody(mesh, tmp_path):
+    settings = legacy(most=2)
+    simulated = {"demo": True}
+    async with hall(mesh, tmp_path, settings, simulated=simulated) as plant, program(settings) as one:
+        async with program(settings):
+            await until(lambda: plant.controller.legacy_clients.attached == 2)
+            async with program(settings) as third:
+                third.say(b"1#COMMAND*home@")
+                await until(lambda: third.ended)
+                assert third.bytes == b"1#ERROR*1;too many clients@"
+            crowd = [await asyncio.open_connection(ME, settings.port) for _ in range(100)]
+            before = len(one.positions)
+            await until(lambda: plant.controller.legacy_clients.turned_away == 101)
+            await until(lambda: len(one.positions) > before + 50)
+            for _, writer in crowd:
+                writer.close()
+        await until(lambda: plant.controller.legacy_clients.attached == 1)
+        async with program(settings) as again:
+            await until(lambda: again.positions)
+
+
+@in_loop
+async def test_who_does_not_read_delays_nobody_and_is_closed(mesh, tmp_path):
+    settings = legacy()
+    simulated = {"demo": True, "rate_hz": 1000.0}
+    async with hall(mesh, tmp_path, settings, simulated=simulated) as plant, program(settings) as one:
+        with socket.socket() as deaf:
+            deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            deaf.connect((ME, settings.port))
+            await until(lambda: plant.controller.legacy_clients.states_skipped > 100)
+            before, skipped = len(one.units), plant.controller.legacy_clients.states_skipped
+            await until(lambda: plant.controller.legacy_clients.closed == 1, timeout_s=20)
+            gained = len(one.units) - before
+            kept_from_it = plant.controller.legacy_clients.states_skipped - skipped
+            assert gained > 100
+            assert kept_from_it > 0.5 * gained
+        assert plant.controller.legacy_clients.attached == 1
+        assert "does not read" in (await plant.event("legacy.closed", 0)).text
+
+
+@in_loop
+async def test_who_reads_slowly_gets_the_newest_state_when_he_has_read(mesh, tmp_path):
+    settings = legacy()
+    simulated = {"demo": True, "rate_hz": 1000.0}
+    async with hall(mesh, tmp_path, settings, simulated=simulated) as plant:
+        with socket.socket() as slow:
+            slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            slow.connect((ME, settings.port))
+            slow.setblocking(False)
+            await until(lambda: plant.controller.legacy_clients.states_skipped > 500)
+            loop, stream, times = asyncio.get_running_loop(), UnitStream(), []
+            while not times or plant.controller.controller_time_s - times[-1] > 0.3:
+                for unit in stream.receive(await asyncio.wait_for(loop.sock_recv(slow, 4096), 5)):
+                    times += [r.seconds for r in unit.records if hasattr(r, "seconds")]
+            jumps = [later - earlier for earlier, later in pairwise(times)]
+            assert min(jumps) > 0
+            assert max(jumps) > 0.3
+
+
+@in_loop
+async def test_a_flood_is_not_read_on_and_ends_and_its_stop_is_done(mesh, tmp_path):
+    settings = legacy(commanders={})
+    simulated = {"demo": True}
+    async with hall(mesh, tmp_path, settings, simulated=simulated) as plant, program(settings) as one:
+        async with program(settings) as flood:
+            flood.say(b"1#COMMAND*stop@", b"1#ABSOLUTE.DEG*1;2;3;4;5@" * 200_000)
+            await until(lambda: plant.events("stop.latched"))
+            assert plant.controller.legacy_clients.closed == 0
+            before = len(one.positions)
+            await until(lambda: plant.controller.legacy_clients.closed == 1, timeout_s=20)
+            assert plant.controller.legacy_clients.units_refused < 5000
+            assert len(one.positions) - before > 200
+        assert "more than it may" in (await plant.event("legacy.closed", 0)).text
+        await until(lambda: plant.controller.legacy_clients.attached == 1)
+
+
+@in_loop
+async def test_rubbish_is_counted_and_answered_and_the_next_unit_is_heard(mesh, tmp_path):
+    async with hall(mesh, tmp_path, settings := legacy()) as plant, program(settings) as one:
+        one.say(b"\xff\x00#@", b"hello\r\n@", b"1#COMMAND*trace@")
+        await until(lambda: plant.controller.trace == STATE.YES)
+        assert [error.number for error in one.errors] == [2, 2]
+        assert plant.controller.legacy_clients.units_refused == 2
+        event = await plant.event("legacy.malformed", 0)
+        assert (event.values["offset"], event.values["bytes"]) == ("0", "\\xff\\x00#")
+        one.say(b"1#COMMAND*dance@", b"1#MOOD*fine@")
+        await until(lambda: len(one.errors) >= 4)
+        await until(lambda: len([e for e in plant.seen["audit"] if e.request == "UNIT"]) >= 4)
+        told = [e for e in plant.seen["audit"] if e.request == "UNIT"]
+        assert [(e.operator, e.outcome, e.values["unit"]) for e in told] == [
+            ("li", schema.AuditEntry.REFUSED, unit)
+            for unit in ("\\xff\\x00#", "hello\\x0d\\x0a", "1#COMMAND*dance", "1#MOOD*fine")
+        ]
+        assert told[0].text == f"Not sent: {one.errors[0].text}."
+
+
+@in_loop
+async def test_who_asks_and_goes_before_the_answers_leaves_no_line_for_each(mesh, tmp_path, caplog):
+    settings = legacy(commanders={})
+    async with hall(mesh, tmp_path, settings) as plant:
+        clients = lambda: plant.controller.legacy_clients  # noqa: E731
+        for _ in range(5):
+            before = clients().units_refused
+            with socket.create_connection((ME, settings.port)) as hasty:
+                hasty.sendall(b"1#COMMAND*home@" * 60)
+            # What was not read yet when its answers found nobody is not read any more.
+            await until(lambda before=before: clients().units_refused > before and not clients().attached)
+    assert "socket.send()" not in caplog.text
+
+
+# ----------------------------------------------------------------------- half-open
+
+
+def networks(*lines):
+    for line in lines:
+        subprocess.run(["ip", *line.split()], check=True, capture_output=True, timeout=10)
+
+
+@pytest.fixture
+def cable():
+    """A cable to another network: (this end's address, connect there, pull it out)."""
+    name, address = f"rm{os.getpid()}", f"169.254.{os.getpid() % 250 + 1}"
+    if os.geteuid() != 0 or shutil.which("ip") is None:
+        pytest.skip("a cable of one's own to pull out takes root and `ip`")
+    try:
+        networks(f"netns add {name}")
+    except subprocess.CalledProcessError as error:
+        pytest.skip(f"no network of one's own to be had here: {error.stderr.decode().strip()}")
+
+    def connect(port):
+        """A socket that belongs to the other network; it is only made there."""
+        libc = ctypes.CDLL(None, use_errno=True)
+        own, other = Path("/proc/thread-self/ns/net"), Path("/run/netns", name)
+        with own.open() as here, other.open() as there:
+            assert libc.setns(there.fileno(), 0x40000000) == 0
+            try:
+                return socket.create_connection((f"{address}.1", port), timeout=5)
+            finally:
+                assert libc.setns(here.fileno(), 0x40000000) == 0
+
+    try:
+        networks(
+            f"link add {name} type veth peer name far netns {name}",
+            f"addr add {address}.1/24 dev {name}",
+            f"link set {name} up",
+            f"-n {name} addr add {address}.2/24 dev far",
+            f"-n {name} link set far up",
+        )
+        yield f"{address}.1", f"{address}.2", connect, lambda: networks(f"-n {name} link set far down")
+    finally:
+        # The cable by itself: the network lives on as long as a socket of it does.
+        subprocess.run(["ip", "link", "del", name], check=False, capture_output=True, timeout=10)
+        networks(f"netns del {name}")
+
+
+@in_loop
+async def test_a_pulled_cable_ends_control_and_is_noticed_in_seconds(mesh, tmp_path, cable):
+    here, far, connect, pull_out = cable
+    settings = legacy(host=here, commanders={far: "li"})
+    async with hall(mesh, tmp_path, settings) as plant:
+        far_socket = await asyncio.to_thread(connect, settings.port)
+        far_program = Program(*await asyncio.open_connection(sock=far_socket))
+
+        def homed():
+            far_program.say(b"1#TIME*1@")
+            return "homed" in far_program.words and "idle" in far_program.words
+
+        far_program.say(b"1#COMMAND*home@")
+        await until(homed, timeout_s=30)
+        far_program.say(b"2#COMMAND*speed=5&ABSOLUTE.DEG*140;0;0;0;0@")
+        await until(lambda: plant.controller.activity == STATE.MOVING)
+        await asyncio.to_thread(pull_out)
+        await until(lambda: plant.events("stop.latched"))
+        assert "was not renewed" in (await plant.event("stop.latched", 0)).text
+        await until(lambda: plant.controller.legacy_clients.attached == 0, timeout_s=30)
+        far_program.writer.transport.abort()
+        await far_program.close()
+
+
+# -------------------------------------------------------------------------- budget
+
+
+def test_a_budget_gives_a_burst_then_its_rate_and_knows_a_flood():
+    limits = Limits(units_per_s=10.0, bytes_per_s=1000.0, burst_s=2.0, patience_s=5.0)
+    budget = Budget(limits, 0.0)
+    assert budget.spend(units=20, length=100, now_s=0.0) == 0.0
+    assert budget.spend(units=10, length=50, now_s=0.0) == pytest.approx(2.0)
+    assert not budget.is_flood(0.0)
+    now_s = 2.0
+    while not budget.is_flood(now_s):
+        now_s += budget.spend(units=20, length=100, now_s=now_s)
+        assert now_s < 20.0
+    assert now_s >= 5.0
+
+
+def test_bytes_count_as_units_do_and_who_keeps_to_the_rate_is_never_paused():
+    budget = Budget(Limits(units_per_s=10.0, bytes_per_s=1000.0), 0.0)
+    assert budget.spend(units=1, length=5000, now_s=0.0) == pytest.approx(4.0)
+    budget = Budget(Limits(units_per_s=10.0, bytes_per_s=1000.0), 0.0)
+    assert not any(budget.spend(units=1, length=99, now_s=0.1 * number) for number in range(10_000))
+
+
+def test_who_was_over_the_limits_once_and_long_ago_begins_anew():
+    budget = Budget(Limits(units_per_s=10.0), 0.0)
+    assert budget.spend(units=50, length=1, now_s=0.0)
+    assert budget.spend(units=50, length=1, now_s=100.0)
+    assert not budget.is_flood(100.0)

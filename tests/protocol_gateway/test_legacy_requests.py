@@ -1,0 +1,207 @@
+"""What an old program's unit asks for, and the ERROR number of a refusal."""
+
+import asyncio
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
+from protocol_gateway.authority.obstacles import Controller
+from protocol_gateway.authority.rules import Authority, Stop
+from protocol_gateway.core.records import Error, read_records, write_unit
+from protocol_gateway.core.stream import Unit, UnitStream
+from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
+from protocol_gateway.legacy.requests import (
+    NUMBERS,
+    asks_for_more,
+    asks_to_stop,
+    requests_of,
+    stop_to_reset,
+)
+from protocol_gateway.legacy.settings import plain_address
+from protocol_gateway.link.link import LinkState, LinkStatus
+from robots.description import load
+from robots.joints import joints_of
+from tests.conftest import run
+from tests.protocol_gateway.place import place
+
+JOINTS = joints_of(load("pt600"))
+A = LeaseRequest.Action
+C = CommandRequest.Command
+READY = Controller(
+    link=LinkStatus(LinkState.UP, "connected"),
+    status=StatusReceived(Activity.IDLE, Mode.REMOTE, True, False),
+    positions=(0.0,) * 5,
+)
+
+
+def requests(text):
+    return requests_of(read_records(text.encode()), JOINTS)
+
+
+async def refused(it, unit, *, first_id=1, **fields):
+    """The number of the refusal that control gives a unit's requests."""
+    asked = requests(unit)
+    for number, request in enumerate(asked):
+        request.MergeFrom(CommandRequest(lease=it.secret, id=first_id + number, **fields))
+    answer = await it.control.attempt(asked, operator="li", source="test")
+    assert not answer.accepted
+    return NUMBERS[answer.why]
+
+
+def told(**changes):
+    return replace(READY, status=replace(READY.status, **changes))
+
+
+def test_the_papers_unit_is_three_requests_in_its_order():
+    unit = "2# COMMAND* trace; home&ABSOLUTE.DEG* 100.00; 30.45; 92.66; - 67.10; - 25.85"
+    trace, home, move = requests(unit)
+    assert [each.command for each in (trace, home, move)] == [C.TRACE_ON, C.HOME, C.MOVE_ABSOLUTE]
+    expected = [math.radians(value) for value in (100.00, 30.45, 92.66, -67.10, -25.85)]
+    assert list(move.joint_positions) == pytest.approx(expected, abs=1e-12)
+
+
+def test_every_word_has_its_request_and_stop_is_done_elsewhere():
+    words = "1#COMMAND*trace;untrace;home;hold;resume;stop;reset;speed=25"
+    assert [C.Name(each.command) for each in requests(words)] == [
+        "TRACE_ON", "TRACE_OFF", "HOME", "HOLD", "RESUME", "RESET", "SPEED",
+    ]  # fmt: skip
+    assert requests(words)[-1].speed_percent == 25.0
+    assert requests("1#RELATIVE.DEG*1;0;0;0;0")[0].command == C.MOVE_RELATIVE
+
+
+@pytest.mark.parametrize(
+    ("unit", "stops", "more"),
+    [
+        ("1#COMMAND*stop", True, False),
+        ("2#COMMAND*stop&STATUS*idle", True, False),
+        ("1#COMMAND*home;stop", True, True),
+        ("2#TIME*1&VELOCITY.DEG*1;2", False, False),
+        ("1#ERROR*9;broken", False, False),
+        ("2#STATUS*idle&ABSOLUTE.DEG*1;2;3;4;5", False, True),
+        ("1#THERMAL*1", False, True),
+        ("1#STATUS*stop", False, False),
+    ],
+)
+def test_what_a_unit_asks_for_is_told_apart_from_what_it_tells(unit, stops, more):
+    records = read_records(unit.encode())
+    assert (asks_to_stop(records), asks_for_more(records)) == (stops, more)
+
+
+@pytest.mark.parametrize(
+    ("unit", "number"),
+    [
+        ("1#COMMAND*home;sing", 3),
+        ("1#COMMAND*speed=1e999", 2),
+        ("2#COMMAND*home&THERMAL*1", 3),
+        ("1#COMMAND*" + ";".join(["hold"] * 17), 2),
+        ("1#ABSOLUTE.DEG*1;2;3;4", 4),
+        ("1#RELATIVE.DEG*1;2;3;4;5;6", 4),
+        ("3#ABSOLUTE.DEG*1;2;3;4;5&VELOCITY.DEG*0;0;0;0;0&STATUS*idle", 7),
+        ("2#ABSOLUTE.DEG*1;2;3;4;5&TIME*7", 7),
+    ],
+)
+def test_a_unit_is_refused_whole_with_its_number(unit, number):
+    refusal = requests(unit)
+    assert isinstance(refusal, Error)
+    assert refusal.number == number
+
+
+@pytest.mark.parametrize(
+    ("unit", "controller", "number"),
+    [
+        ("1#COMMAND*home", replace(READY, read_only="no proven stop"), 7),
+        ("1#COMMAND*home", replace(READY, link=LinkStatus(LinkState.DOWN, "cut")), 9),
+        ("1#COMMAND*home", replace(READY, link=LinkStatus(LinkState.SILENT, "quiet")), 9),
+        ("1#COMMAND*home", told(mode=Mode.LOCAL), 6),
+        ("1#COMMAND*home", told(mode=None), 6),
+        ("1#COMMAND*home", told(activity=Activity.STOPPED), 8),
+        ("1#ABSOLUTE.DEG*0;0;0;0;0", told(activity=Activity.HOLDING), 8),
+        ("1#COMMAND*home", told(activity=Activity.FAULT), 9),
+        ("1#ABSOLUTE.DEG*0;0;0;0;0", told(homed=False), 9),
+        ("1#ABSOLUTE.DEG*999;0;0;0;0", told(homed=False), 9),
+        ("1#ABSOLUTE.DEG*999;0;0;0;0", READY, 5),
+        ("1#COMMAND*speed=0", READY, 5),
+        # Judged as those before it leave things.
+        ("2#COMMAND*home&ABSOLUTE.DEG*999;0;0;0;0", told(homed=False), 5),
+        ("2#COMMAND*reset&ABSOLUTE.DEG*999;0;0;0;0", told(activity=Activity.STOPPED), 5),
+        ("1#COMMAND*hold;home", READY, 8),
+    ],
+)
+def test_a_refusal_has_the_number_of_its_reason(tmp_path, unit, controller, number):
+    async def main():
+        async with place(tmp_path) as it:
+            await it.lease(A.ACQUIRE)
+            it.known = controller
+            assert await refused(it, unit) == number
+            assert it.socket == []
+
+    run(main())
+
+
+def test_who_is_not_in_control_is_told_to_read_only(tmp_path):
+    async def main():
+        async with place(tmp_path) as it:
+            assert await refused(it, "1#COMMAND*home") == 7
+            await it.lease(A.ACQUIRE)
+            asked = asyncio.create_task(refused(it, "1#COMMAND*home"))
+            await asyncio.sleep(0)  # it is being written down now
+            it.control.leases.end("it is over")
+            assert await asked == 7
+
+    run(main())
+
+
+def test_motion_under_a_latched_stop_and_a_reset_while_the_robot_moves_are_refused_as_stopped(tmp_path):
+    async def main():
+        async with place(tmp_path) as it:
+            await it.lease(A.ACQUIRE)
+            it.control.stop(by="wang", reason="smoke", source="test")
+            assert await refused(it, "1#COMMAND*home", first_id=1) == 8
+            it.control.observe(moving=True)
+            assert await refused(it, "1#COMMAND*reset", first_id=2, stop_id=1) == 8
+
+    run(main())
+
+
+def test_reset_means_the_stop_that_can_have_been_seen():
+    assert stop_to_reset(Authority(), 100.0) == 0
+    stop = Stop(id=3, by="wang", reason="smoke", since_ns=0, sent_s=10.0)
+    assert stop_to_reset(Authority(stop=stop), 11.5) == 3
+    fresh = stop_to_reset(Authority(stop=stop), 10.5)
+    assert isinstance(fresh, Error)
+    assert (fresh.number, "stop request 3 (wang, smoke) has just been sent" in fresh.text) == (8, True)
+    unsent = stop_to_reset(Authority(stop=replace(stop, sent_s=None)), 100.0)
+    assert isinstance(unsent, Error)
+
+
+def test_an_address_has_one_way_of_writing():
+    assert plain_address("::ffff:10.0.0.9") == plain_address("10.0.0.9") == "10.0.0.9"
+    assert plain_address("FE80:0:0::1") == "fe80::1"
+    with pytest.raises(ValueError, match=r"ten\.0\.0\.9"):
+        plain_address("ten.0.0.9")
+
+
+WORDS = ("home", "stop", "hold", "reset", "speed=50", "speed=", "sing", "", "1e999", "- 7")
+TYPES = ("COMMAND", "ABSOLUTE.DEG", "RELATIVE.DEG", "STATUS", "TIME", "ERROR", "2", "99", "X")
+RECORDS = st.lists(
+    st.tuples(st.sampled_from(TYPES), st.lists(st.sampled_from(WORDS) | st.floats().map(str), max_size=6)),
+    min_size=1,
+    max_size=4,
+)
+
+
+@given(RECORDS)
+def test_whatever_a_unit_holds_it_is_requests_or_a_refusal_that_can_be_written(records):
+    text = "&".join(f"{kind}*{';'.join(items)}" for kind, items in records)
+    for event in UnitStream().receive(f"{len(records)}#{text}@".encode()):
+        if not isinstance(event, Unit):
+            continue
+        asked = requests_of(event.records, JOINTS)
+        if isinstance(asked, Error):
+            assert write_unit((asked,))
+        else:
+            assert not asked or asks_for_more(event.records)

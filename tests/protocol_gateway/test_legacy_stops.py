@@ -1,0 +1,83 @@
+"""A stop of an old client program is done, whatever else is wrong with the program."""
+
+import asyncio
+import contextlib
+
+from protocol_gateway.serving.budget import Limits
+from tests.protocol_gateway.hall import STATE, until
+from tests.protocol_gateway.old_program import ME, Program, hall, in_loop, legacy, program
+
+TIME, STOP = b"1#TIME*1@", b"1#COMMAND*stop@"
+
+
+@in_loop
+async def test_a_program_over_its_limits_is_heard_for_a_stop_at_once_and_for_nothing_else(mesh, tmp_path):
+    settings = legacy(limits=Limits(units_per_s=10.0, burst_s=20.0))
+    async with hall(mesh, tmp_path, settings) as plant, program(settings) as one:
+        number, text = await one.asks(TIME * 250)
+        assert number == 9
+        assert "10 units/s" in text
+        # For 10 s or more it is over them.
+        one.say(b"1#COMMAND*trace@", TIME * 250, STOP)
+        await until(lambda: plant.events("stop.latched"), timeout_s=30)
+        assert plant.controller.stop.by == "li"
+        assert plant.controller.trace == STATE.NO
+        await until(lambda: plant.seen["lease"][-1].holder == "")
+
+
+@in_loop
+async def test_a_program_that_was_over_its_limits_is_heard_again(mesh, tmp_path):
+    settings = legacy(limits=Limits(units_per_s=200.0, burst_s=0.5))
+    async with hall(mesh, tmp_path, settings) as plant, program(settings) as one:
+        assert (await one.asks(TIME * 110))[0] == 9
+
+        def traced():
+            one.say(b"1#COMMAND*trace@")
+            return plant.controller.trace == STATE.YES
+
+        await until(traced)
+
+
+@in_loop
+async def test_a_stop_behind_the_flood_for_which_a_program_is_closed_is_done(mesh, tmp_path):
+    settings = legacy(commanders={}, limits=Limits(burst_s=0.1, patience_s=0.0))
+    async with hall(mesh, tmp_path, settings) as plant, program(settings) as one:
+        one.say(TIME * 1500, STOP)
+        await until(lambda: plant.events("stop.latched"))
+        assert plant.controller.stop.by == f"legacy {ME}"
+        await until(lambda: plant.controller.legacy_clients.closed == 1)
+        await until(lambda: one.ended)
+
+
+@in_loop
+async def test_a_stop_of_one_too_many_is_done(mesh, tmp_path):
+    settings = legacy(commanders={}, most=1)
+    async with hall(mesh, tmp_path, settings) as plant, program(settings):
+        await until(lambda: plant.controller.legacy_clients.attached == 1)
+        async with program(settings) as second:
+            second.say(b"2#ABSOLUTE.DEG*1;2;3;4;5&COMMAND*stop@")
+            await until(lambda: plant.events("stop.latched"))
+            await until(lambda: second.ended)
+            assert second.bytes == b"1#ERROR*1;too many clients@"
+
+
+@contextlib.asynccontextmanager
+async def program_from(address, settings):
+    one = Program(*await asyncio.open_connection(ME, settings.port, local_addr=(address, 0)))
+    try:
+        yield one
+    finally:
+        await one.close()
+
+
+@in_loop
+async def test_readers_leave_a_place_to_the_first_that_may_command(mesh, tmp_path):
+    settings = legacy(commanders={"127.0.0.2": "li"}, most=2)
+    async with hall(mesh, tmp_path, settings) as plant, program(settings) as reader:
+        await until(lambda: reader.positions)
+        async with program(settings) as second:
+            await until(lambda: second.ended)
+            assert [error.number for error in second.errors] == [1]
+        async with program_from("127.0.0.2", settings) as commander:
+            commander.say(b"1#COMMAND*trace@")
+            await until(lambda: plant.controller.trace == STATE.YES)

@@ -1,0 +1,108 @@
+"""Operators that vanish, links that break: the arm does not move on unseen or unowned."""
+
+import asyncio
+import contextlib
+import signal
+import sys
+
+import pytest
+
+from protocol_gateway.audit.log import read_entries
+from tests.conftest import run
+from tests.protocol_gateway.hall import STATE, A, C, gateway, simulator, until
+
+FAR = [2.4, 1.0, 0.5, -1.0, 2.0]
+
+
+@contextlib.asynccontextmanager
+async def homing(plant, mesh):
+    """`robomesh send arm home` as a process of its own, and the arm homes."""
+    plant.session.declare_presence("hall", "arm", "gateway")  # as the service itself does when it is run
+    process = await asyncio.create_subprocess_exec(
+        *[sys.executable, "-m", "services.command_line.main", "send", "arm", "home"],
+        *["--connect", mesh.connect[0], "--operator", "wang"],
+        stdout=asyncio.subprocess.DEVNULL,
+        stderr=asyncio.subprocess.DEVNULL,
+    )
+    try:
+        await until(lambda: plant.controller.activity == STATE.HOMING)
+        yield process
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            process.kill()
+        await process.wait()
+
+
+def test_an_operators_program_that_is_killed_loses_control_with_its_session_and_the_arm_stops(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            async with homing(plant, mesh) as process:
+                process.send_signal(signal.SIGKILL)
+                await until(lambda: plant.controller.HasField("stop"))
+            assert plant.controller.stop.reason == "dead-man: wang's page or program has gone"
+            await until(lambda: plant.controller.activity == STATE.STOPPED)
+            assert plant.controller.homed == STATE.NO
+            await until(lambda: plant.seen["lease"][-1].ended == "wang's page or program has gone")
+            entries = {entry.request: entry for entry in read_entries(plant.audit)}
+            # Its time was not over: the lease was ended, it did not expire.
+            assert entries["REVOKE"].text == "wang's page or program has gone"
+            assert "EXPIRE" not in entries
+
+    run(main())
+
+
+def test_an_operators_program_that_hangs_loses_control_with_its_leases_time(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.home()
+            await plant.command(C.MOVE_ABSOLUTE, joint_positions=[0.3, 0, 0, 0, 0])
+            await until(lambda: plant.joints[0] == pytest.approx(0.3, abs=1e-3))
+            await until(lambda: not plant.seen["lease"][-1].motion)
+            await plant.command(C.SPEED, speed_percent=1)  # the way home takes longer than the lease lives
+            await plant.lease(A.RELEASE)
+            async with homing(plant, mesh) as process:
+                process.send_signal(signal.SIGSTOP)
+                await until(lambda: plant.controller.HasField("stop"))
+            assert plant.controller.stop.reason == "dead-man: wang's lease was not renewed within 2 s"
+
+    run(main())
+
+
+def test_a_link_that_breaks_while_the_arm_moves_is_a_stop_that_the_controller_gets_when_it_is_back(
+    mesh, tmp_path
+):
+    async def main():
+        async with contextlib.AsyncExitStack() as stack:
+            first = await stack.enter_async_context(contextlib.AsyncExitStack())
+            port = await first.enter_async_context(simulator())
+            plant = await stack.enter_async_context(gateway(mesh, tmp_path, port))
+            await plant.home()
+            await plant.command(C.MOVE_ABSOLUTE, joint_positions=FAR)
+            await until(lambda: plant.controller.activity == STATE.MOVING)
+            await first.aclose()  # the controller dies
+            await until(lambda: plant.controller.HasField("stop"))
+            stop = plant.controller.stop
+            assert not stop.sent
+            assert stop.reason.startswith("li's motion ran, and ")
+            await stack.enter_async_context(simulator(listen=f"127.0.0.1:{port}"))
+            await until(lambda: plant.controller.activity == STATE.STOPPED)
+            assert plant.controller.stop.sent
+
+    run(main())
+
+
+def test_a_link_that_breaks_while_the_arm_rests_takes_nobodys_control(mesh, tmp_path):
+    async def main():
+        async with contextlib.AsyncExitStack() as stack:
+            first = await stack.enter_async_context(contextlib.AsyncExitStack())
+            port = await first.enter_async_context(simulator())
+            plant = await stack.enter_async_context(gateway(mesh, tmp_path, port))
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            await first.aclose()
+            await until(lambda: plant.controller.link == STATE.DOWN)
+            await stack.enter_async_context(simulator(listen=f"127.0.0.1:{port}"))
+            await until(lambda: plant.controller.link == STATE.UP)
+            assert not plant.controller.HasField("stop")
+            await plant.lease(A.RENEW)
+
+    run(main())

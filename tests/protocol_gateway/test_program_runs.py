@@ -1,0 +1,239 @@
+"""Programs that the gateway runs step by step: real gateway, real worker process, simulated controller."""
+
+import asyncio
+from math import radians
+
+import pytest
+from google.protobuf.timestamp_pb2 import Timestamp
+
+from bus.schemas import robomesh_pb2 as schema
+from tests.conftest import run
+from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
+from tests.protocol_gateway.test_checked_motion import POST, alone, checked, standing
+
+RUN = schema.ProgramState
+GOOD = """home
+speed 100
+move_joints -40 90 -90 0 0   # away from the post
+wait 0.1
+trace on
+repeat 2
+  move_joints -30 90 -90 0 0
+  move_joints -40 90 -90 0 0
+end
+"""
+LAST = [radians(-40), radians(90), radians(-90), 0, 0]
+LONG = "move_joints -140 90 -90 0 0\nmove_joints 0 90 -90 0 0\n"
+
+
+async def start(plant, text, **fields):
+    """Run a program; the holder's hand stays on it."""
+    await plant.lease(A.RENEW, ttl_s=5)
+    plant.id += 1
+    request = schema.CommandRequest(
+        command=C.RUN_PROGRAM, lease=plant.secret, id=plant.id, program=text, program_name="weld", **fields
+    )
+    asked = asyncio.ensure_future(plant.session.ask(plant.key("command/li"), request, timeout_s=60))
+    while not asked.done():
+        # What checks may still have to begin.
+        await plant.lease(A.RENEW, ttl_s=5)
+        await asyncio.wait([asked], timeout=0.5)
+    return asked.result()
+
+
+def states(plant):
+    return plant.seen["program"]
+
+
+async def ended(plant, outcome, timeout_s=60):
+    async with asyncio.timeout(timeout_s):
+        while not states(plant) or states(plant)[-1].outcome != outcome:
+            await plant.lease(A.RENEW, ttl_s=5)
+            await asyncio.sleep(0.1)
+    return states(plant)[-1]
+
+
+@pytest.mark.parametrize("check", ["off", "require"])
+def test_a_program_runs_step_by_step_to_its_end_and_everybody_sees_where_it_is(mesh, tmp_path, check):
+    async def main():
+        async with (
+            simulator() as port,
+            gateway(mesh, tmp_path, port, check=check, cell=alone(POST)) as plant,
+        ):
+            await until(lambda: not plant.controller.check_text, timeout_s=60)
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            answer = await start(plant, GOOD)
+            assert answer.text == "RUN_PROGRAM: it runs"
+            done = await ended(plant, RUN.DONE)
+            assert (done.name, done.operator, done.text) == ("weld", "li", "")
+            assert done.steps == done.step == 10
+            assert done.duration_s > 1.0
+            await standing(plant, LAST)
+            seen = {(state.line, state.statement) for state in states(plant)}
+            assert {(1, "home"), (3, "move_joints -40 90 -90 0 0")} <= seen
+            assert plant.controller.trace == STATE.YES
+            entries = [(each.request, each.source) for each in plant.seen["audit"]]
+            run_at = entries.index(("RUN_PROGRAM", "mesh"))
+            # The lease's renewals stand in no entry: what follows is the program's own.
+            assert [request for request, _ in entries[run_at + 1 : run_at + 5]] == [
+                *("SPEED", "HOME", "SPEED", "MOVE_ABSOLUTE"),
+            ]
+            await until(lambda: any(each.request == "PROGRAM_END" for each in plant.seen["audit"]))
+            assert await plant.event("program.done", 0)
+
+    run(main(), timeout_s=120)
+
+
+def test_required_a_program_that_collides_is_refused_with_its_line_and_the_arm_has_not_moved(mesh, tmp_path):
+    async def main():
+        async with (
+            simulator() as port,
+            gateway(mesh, tmp_path, port, check="require", cell=alone(POST)) as plant,
+        ):
+            await checked(plant)
+            units, before = plant.controller.counters.units_sent, list(plant.joints)
+            text = await refusal(start(plant, "move_joints -40 90 -90 0 0\nmove_joints 90 0 0 0 0\n"))
+            assert "post" in text
+            assert "line 2" in text
+            text = await refusal(start(plant, "move_joints 0 0 0 0 0\nmove_joint 0 0 0 0 0\n"))
+            assert "line 2" in text
+            assert "move_joint" in text
+            text = await refusal(start(plant, "# nothing\n"))
+            assert "no statement that does anything" in text
+            await asyncio.sleep(1.1)
+            assert plant.controller.counters.units_sent == units
+            assert list(plant.joints) == pytest.approx(before)
+            assert states(plant)[-1].outcome == RUN.OUTCOME_UNSPECIFIED
+
+    run(main(), timeout_s=120)
+
+
+def test_a_stop_ends_a_program_and_no_step_of_it_comes_after_the_reset(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.home()
+            await start(plant, LONG)
+            await until(lambda: plant.joints[0] < -0.2)
+            await plant.stop(by="wang", reason="somebody is in there")
+            state = await ended(plant, RUN.ENDED)
+            assert state.text == "stopped by wang: somebody is in there"
+            assert state.line == 1
+            await until(lambda: plant.controller.activity == STATE.STOPPED)
+            await asyncio.sleep(0.5)
+            await plant.command(C.RESET, stop_id=plant.controller.stop.id)
+            await plant.lease(A.RENEW, ttl_s=5)
+            where = list(plant.joints)
+            await asyncio.sleep(1.0)
+            assert list(plant.joints) == pytest.approx(where, abs=1e-3)
+
+    run(main(), timeout_s=60)
+
+
+def test_what_would_hold_up_a_program_is_told_before_it_begins(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            text = await refusal(start(plant, "speed 50\nmove_joints -40 90 -90 0 0\n"))
+            assert "not homed" in text
+            assert plant.controller.counters.units_sent == 0
+
+    run(main(), timeout_s=60)
+
+
+def test_a_program_ends_with_its_holders_control_even_while_it_waits(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.home()
+            await start(plant, "wait 600\nmove_joints -140 90 -90 0 0\n")
+            await until(lambda: states(plant)[-1].outcome == RUN.RUNNING)
+            text = await refusal(plant.command(C.MOVE_ABSOLUTE, joint_positions=LAST))
+            assert "the program weld runs: stop it, or wait until it has ended" in text
+            # It was checked for its own speed.
+            assert "the program weld runs" in await refusal(plant.command(C.SPEED, speed_percent=100))
+            await plant.lease(A.RELEASE)
+            await until(lambda: states(plant)[-1].outcome == RUN.ENDED)
+            assert states(plant)[-1].text.startswith("control ended: ")
+
+    run(main(), timeout_s=60)
+
+
+def test_a_program_on_hold_waits_and_goes_on_with_resume(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.home()
+            await start(plant, "move_joints -60 90 -90 0 0\nmove_joints -40 90 -90 0 0\n")
+            await until(lambda: plant.joints[0] < -0.1)
+            await plant.command(C.HOLD)
+            await until(lambda: plant.controller.activity == STATE.HOLDING)
+            await asyncio.sleep(1.0)
+            assert states(plant)[-1].outcome == RUN.RUNNING
+            await plant.lease(A.RENEW, ttl_s=5)
+            await plant.command(C.RESUME)
+            await ended(plant, RUN.DONE)
+            await standing(plant, LAST)
+
+    run(main(), timeout_s=60)
+
+
+def test_a_program_on_hold_between_two_motions_waits_there(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.home()
+            await start(plant, "wait 1\nmove_joints -40 90 -90 0 0\n")
+            await until(lambda: states(plant)[-1].outcome == RUN.RUNNING)
+            await plant.command(C.HOLD)
+            await until(lambda: plant.controller.activity == STATE.HOLDING)
+            await asyncio.sleep(1.5)
+            await plant.lease(A.RENEW, ttl_s=5)
+            assert states(plant)[-1].outcome == RUN.RUNNING
+            await plant.command(C.RESUME)
+            await ended(plant, RUN.DONE)
+            await standing(plant, LAST)
+
+    run(main(), timeout_s=60)
+
+
+def test_what_planning_takes_is_no_delay_on_the_way(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            lease = await plant.lease(A.ACQUIRE, ttl_s=5)
+            soon = Timestamp()
+            soon.FromNanoseconds(lease.now.ToNanoseconds() + 1_000_000_000)
+            # The process that plans has still to begin: over a second.
+            await start(plant, "home\n", not_after=soon)
+            await ended(plant, RUN.DONE)
+            late = Timestamp()
+            late.FromNanoseconds(lease.now.ToNanoseconds())
+            assert "after its not_after" in await refusal(start(plant, "home\n", not_after=late))
+
+    run(main(), timeout_s=60)
+
+
+def test_a_program_is_not_run_twice_when_it_is_asked_for_twice(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.home()
+            await start(plant, "move_joints -20 90 -90 0 0\n")
+            plant.id -= 1
+            again = await start(plant, "move_joints -20 90 -90 0 0\n")
+            assert again.accepted
+            await ended(plant, RUN.DONE)
+            asked = [each for each in plant.seen["audit"] if each.request == "RUN_PROGRAM"]
+            assert len(asked) == 1
+
+    run(main(), timeout_s=60)
+
+
+def test_what_is_warned_of_is_in_the_answer_to_who_runs_the_program(mesh, tmp_path):
+    async def main():
+        async with (
+            simulator() as port,
+            gateway(mesh, tmp_path, port, check="warn", cell=alone(POST)) as plant,
+        ):
+            await checked(plant)
+            answer = await start(plant, "move_joints 90 45 -45 0 0\n")
+            assert answer.accepted
+            assert answer.text.startswith("RUN_PROGRAM: it runs; mind: line 1: ")
+            assert "post" in answer.text
+
+    run(main(), timeout_s=90)

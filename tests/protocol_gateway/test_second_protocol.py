@@ -1,0 +1,155 @@
+"""A controller of another protocol: one driver, one line in the table, and nothing else is touched.
+
+The protocol is a line of JSON each way: {"q": [..], "state": "idle", "remote": true, "homed": true} in
+radians from the controller, {"do": ["stop"]} or {"do": [{"to": [..]}]} to it.
+"""
+
+import asyncio
+import contextlib
+import json
+import math
+
+import pytest
+
+from protocol_gateway.drivers.driver import (
+    Activity,
+    Home,
+    JointsReceived,
+    MalformedReceived,
+    Mode,
+    MoveAbsolute,
+    Refused,
+    Reset,
+    StatusReceived,
+    Stop,
+)
+from protocol_gateway.drivers.registry import DRIVERS
+from protocol_gateway.errors import CommandError
+from services.errors import SiteFileError
+from services.site import load
+from tests.conftest import run
+from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, until
+
+_WORDS = {Home: "home", Stop: "stop", Reset: "reset"}
+
+
+class JsonLines:
+    """A `protocol_gateway.drivers.driver.Driver`."""
+
+    can_stop = True
+
+    def __init__(self, joint_types, codes, *, relay):
+        self._joints = len(joint_types)
+        self.units_received = self.refusals_received = 0
+        self.connected()
+
+    def connected(self):
+        self._rest, self._offset = b"", 0
+
+    def receive(self, data):
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        return [event for line in lines for event in self._events(line)]
+
+    def _events(self, line):
+        offset, self._offset = self._offset, self._offset + len(line) + 1
+        try:
+            told = json.loads(line)
+            if "no" in told:
+                self.refusals_received += 1
+                events = [Refused(0, told["no"])]
+            else:
+                if len(told["q"]) != self._joints:
+                    raise ValueError
+                events = [
+                    JointsReceived(tuple(told["q"])),
+                    StatusReceived(
+                        activity=Activity(told["state"]),
+                        mode=Mode.REMOTE if told["remote"] else Mode.LOCAL,
+                        homed=told["homed"],
+                    ),
+                ]
+        except (ValueError, KeyError, TypeError):
+            return [MalformedReceived(offset, line[:80].decode("ascii", "backslashreplace"), "no state")]
+        self.units_received += 1
+        return events
+
+    def encode(self, *commands):
+        return json.dumps({"do": [self._said(command) for command in commands]}).encode() + b"\n"
+
+    def _said(self, command):
+        if isinstance(command, MoveAbsolute):
+            return {"to": command.positions}
+        if type(command) not in _WORDS:
+            raise CommandError(f"this controller knows no {type(command).__name__}")
+        return _WORDS[type(command)]
+
+
+@contextlib.asynccontextmanager
+async def json_controller():
+    """A controller that speaks JSON, and does at once what it is told: (port, what it was told)."""
+    heard, state = [], {"q": [0.1] * 5, "state": "idle", "remote": True, "homed": True}
+
+    async def listen(reader):
+        async for line in reader:
+            for what in json.loads(line)["do"]:
+                heard.append(what)
+                if what == "stop":
+                    state["state"] = "stopped"
+                elif what == "reset":
+                    state["state"] = "idle"
+                elif "to" in what:
+                    state["q"] = what["to"]
+
+    async def serve(reader, writer):
+        listening = asyncio.create_task(listen(reader))
+        try:
+            while not listening.done():
+                writer.write(json.dumps(state).encode() + b"\n")
+                await asyncio.sleep(0.01)
+        finally:
+            listening.cancel()
+            writer.transport.abort()
+
+    server = await asyncio.start_server(serve, "127.0.0.1", 0)
+    async with server:
+        yield server.sockets[0].getsockname()[1], heard, state
+
+
+def test_a_robot_of_another_protocol_is_shown_commanded_and_stopped_like_any_other(
+    mesh, tmp_path, monkeypatch
+):
+    async def main():
+        monkeypatch.setitem(DRIVERS, "json", JsonLines)
+        async with (
+            json_controller() as (port, heard, state),
+            gateway(mesh, tmp_path, port, protocol="json") as plant,
+        ):
+            await until(lambda: plant.joints == [0.1] * 5)
+            assert (plant.controller.mode, plant.controller.homed) == (STATE.REMOTE, STATE.YES)
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            target = [0.2, 1.0, -0.5, 0.1, 0.3]
+            await plant.command(C.MOVE_ABSOLUTE, joint_positions=target)
+            await until(lambda: plant.joints == target)
+            assert "knows no Trace" in await refusal(plant.command(C.TRACE_ON))
+            far = [math.radians(170.0), *target[1:]]
+            assert "waist" in await refusal(plant.command(C.MOVE_ABSOLUTE, joint_positions=far))
+            stop = await plant.stop(by="wang")
+            await until(lambda: plant.controller.activity == STATE.STOPPED)
+            await plant.lease(A.RENEW, ttl_s=5)
+            await plant.command(C.RESET, stop_id=stop.stop_id)
+            await until(lambda: heard[-1] == "reset")
+            state["q"] = [0.0] * 3
+            await until(lambda: plant.events("unit.malformed"))
+            await until(lambda: plant.controller.link == STATE.SILENT)
+
+    run(main())
+
+
+def test_a_site_file_names_a_protocol_that_there_is_or_is_told_which_there_are(tmp_path, monkeypatch):
+    path = tmp_path / "site.toml"
+    path.write_text('site = "hall"\n[[robot]]\nname = "arm"\nmodel = "pt600"\nprotocol = "json"\n')
+    with pytest.raises(SiteFileError, match="'unit'") as caught:
+        load(path)
+    assert "protocol" in str(caught.value)
+    monkeypatch.setitem(DRIVERS, "json", JsonLines)
+    assert load(path).robot[0].protocol == "json"

@@ -1,0 +1,170 @@
+"""Controllers that send too much, too little, in pieces or something else: state, event, recovery."""
+
+import asyncio
+import time
+
+from bus.keys import robot_key
+from tests.conftest import run
+from tests.protocol_gateway.faulty import faulty
+from tests.protocol_gateway.hall import STATE, A, C, refusal, simulator, until
+from tests.protocol_gateway.old_program import legacy, program
+
+
+def test_a_controller_with_another_joint_count_is_silent_says_why_once_and_comes_back(mesh, tmp_path):
+    async def main():
+        async with faulty(mesh, tmp_path) as (plant, fault):
+            await fault("joints")
+            await until(lambda: plant.controller.link == STATE.SILENT)
+            assert "sends 6 joint values, the description has 5" in plant.controller.link_text
+            joints = len(plant.seen["joints"])
+            malformed = len(plant.events("unit.malformed"))
+            await plant.lease(A.ACQUIRE)
+            assert "the description has 5" in await refusal(plant.command(C.HOME))
+            # Longer than the link waits for a controller that sends nothing.
+            await asyncio.sleep(4.5)
+            await until(lambda: len(plant.events("controller.joint_count")) == 1)
+            assert len(plant.events("unit.malformed")) == malformed
+            assert len(plant.seen["joints"]) == joints
+            assert plant.controller.counters.connections == 1
+            await fault("joints", off=True)
+            await until(lambda: plant.controller.link == STATE.UP)
+
+    run(main())
+
+
+def test_a_controller_that_restarts_with_another_joint_count_is_never_taken_for_the_old_one(mesh, tmp_path):
+    async def main():
+        async with faulty(mesh, tmp_path) as (plant, fault):
+            await fault("restart")
+            await fault("joints")
+            await until(lambda: plant.controller.link == STATE.DOWN)
+            joints = len(plant.seen["joints"])
+            await until(lambda: "sends 6 joint values" in plant.controller.link_text)
+            assert plant.controller.link == STATE.SILENT
+            await until(lambda: plant.events("controller.joint_count"))
+            await until(lambda: len(plant.events("controller.joint_count")) == 1)
+            assert not plant.events("unit.malformed")
+            assert len(plant.seen["joints"]) == joints
+            await fault("joints", off=True)
+            await until(lambda: plant.controller.link == STATE.UP)
+
+    run(main())
+
+
+def test_of_a_flood_the_newest_is_published_the_rest_counted_and_another_robot_keeps_its_rate(mesh, tmp_path):
+    async def main():
+        async with simulator(demo=True) as other, faulty(mesh, tmp_path, other) as (plant, fault):
+            await fault("flood")
+            await until(lambda: plant.events("link.flooding"))
+            await until(lambda: plant.controller.health.flooding)
+            calm = plant.session.subscribe(robot_key("hall", "arm-2", "joints"), newest=1000)
+            await anext(calm)
+            begin_s, flooded = time.monotonic(), len(plant.seen["joints"])
+            for _ in range(200):
+                await anext(calm)
+            elapsed_s = time.monotonic() - begin_s
+            assert elapsed_s < 4.0  # 2 s where nothing else runs
+            assert len(plant.seen["joints"]) - flooded < 250 * elapsed_s
+            assert plant.controller.counters.units_skipped > 1000
+            assert plant.controller.link == STATE.UP
+            await fault("flood", off=True)
+            await until(lambda: plant.events("link.flooding_ended"))
+            await until(lambda: not plant.controller.health.flooding)
+            await until(lambda: len(plant.events("link.flooding")) == 1)
+
+    run(main())
+
+
+def test_a_flood_does_not_reach_old_client_programs(mesh, tmp_path):
+    async def main():
+        settings = legacy(commanders={})
+        plants = faulty(mesh, tmp_path, legacy_clients=settings)
+        async with plants as (plant, fault), program(settings) as one:
+            await fault("flood")
+            await until(lambda: plant.events("link.flooding"))
+            begin_s, before = time.monotonic(), len(one.units)
+            await asyncio.sleep(1.0)
+            told = len(one.units) - before
+            assert 0 < told < 400 * (time.monotonic() - begin_s)
+
+    run(main())
+
+
+def test_of_a_controller_that_sends_more_than_can_be_read_nothing_is_taken_until_it_sends_less(
+    mesh, tmp_path
+):
+    async def main():
+        async with faulty(mesh, tmp_path) as (plant, fault):
+            await fault("deluge")
+            await until(lambda: plant.events("link.deluge"))
+            await until(lambda: plant.controller.link == STATE.SILENT)
+            assert (await plant.stop(by="wang")).sent
+            await fault("deluge", off=True)
+            await until(lambda: plant.controller.link == STATE.UP, timeout_s=20.0)
+            await until(lambda: plant.controller.activity == STATE.STOPPED)
+            before = len(plant.seen["joints"])
+            await until(lambda: len(plant.seen["joints"]) > before + 20)
+            assert plant.controller.counters.connections == 1
+
+    run(main(), timeout_s=60.0)
+
+
+def test_units_in_pieces_are_units(mesh, tmp_path):
+    async def main():
+        async with faulty(mesh, tmp_path) as (plant, fault):
+            await fault("split")
+            before = len(plant.seen["joints"])
+            await until(lambda: len(plant.seen["joints"]) > before + 30)
+            assert plant.controller.counters.units_malformed == 0
+            assert plant.controller.link == STATE.UP
+
+    run(main())
+
+
+def test_garbage_between_units_is_said_a_few_times_and_counted_always(mesh, tmp_path):
+    async def main():
+        async with faulty(mesh, tmp_path) as (plant, fault):
+            await fault("garbage")
+            await until(lambda: plant.controller.counters.units_malformed > 25)
+            told = plant.events("unit.malformed")
+            assert 5 <= len(told) < plant.controller.counters.units_malformed
+            assert told[0].values["offset"]
+            assert all(len(event.values["bytes"]) <= 260 for event in told)
+            assert len(plant.seen["joints"]) > 20
+            await fault("garbage", off=True)
+            await until(lambda: plant.controller.link == STATE.UP)
+
+    run(main())
+
+
+def test_a_status_that_comes_no_more_is_not_known_any_more_and_is_again_when_it_comes(mesh, tmp_path):
+    async def main():
+        async with faulty(mesh, tmp_path, demo=False) as (plant, fault):
+            await until(lambda: plant.controller.mode == STATE.REMOTE)
+            await asyncio.sleep(0.1)  # its status is seen to come again and again
+            await fault("mute")
+            await until(lambda: plant.events("status.gone"))
+            await until(lambda: plant.controller.mode == STATE.MODE_UNKNOWN)
+            assert plant.controller.homed == STATE.UNKNOWN
+            assert plant.controller.link == STATE.UP
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            assert "does not tell whether" in await refusal(plant.command(C.HOME))
+            await fault("mute", off=True)
+            await until(lambda: plant.controller.mode == STATE.REMOTE)
+
+    run(main())
+
+
+def test_a_controller_that_tells_only_positions_is_shown_and_the_rest_is_unknown(mesh, tmp_path):
+    async def main():
+        async with faulty(mesh, tmp_path) as (plant, fault):
+            await asyncio.sleep(0.1)  # its status is seen to come again and again
+            await fault("bare")
+            await until(lambda: plant.controller.mode == STATE.MODE_UNKNOWN)
+            assert plant.controller.activity == STATE.ACTIVITY_UNKNOWN
+            assert not any(joint.HasField("velocity") for joint in plant.seen["joints"][-1].joints)
+            before = len(plant.seen["joints"])
+            await until(lambda: len(plant.seen["joints"]) > before + 20)
+            assert plant.controller.link == STATE.UP
+
+    run(main())

@@ -1,0 +1,90 @@
+"""Recordings for tests, written by the plain `mcap` writer: what is in them is known."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from google.protobuf.message import Message
+from mcap.writer import Writer
+from mcap_protobuf.schema import register_schema
+
+from bus.schemas import robomesh_pb2 as schema
+
+START_NS = 1_700_000_000_000_000_000
+KEY_PICTURE = b"\x00\x00\x00\x01\x67sps\x00\x00\x00\x01\x68pps\x00\x00\x01\x65"
+PICTURE = b"\x00\x00\x00\x01\x41"
+
+
+@dataclass
+class Written:
+    """An MCAP file being written."""
+
+    path: Path
+    site: str = "site"
+    robot: str = "arm"
+    chunked: bool = True
+
+    def __enter__(self) -> "Written":
+        self._stream = self.path.open("wb")
+        self._writer = Writer(self._stream, use_chunking=self.chunked, chunk_size=4096)
+        self._writer.start(library="test")
+        about = {"site": self.site, "robot": self.robot, "name": self.path.stem, "started_by": "request"}
+        self._writer.add_metadata("robomesh", about)
+        self._channels: dict[str, int] = {}
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._writer.finish()
+        self._stream.close()
+
+    def put(self, topic: str, message: Message, at_s: float) -> None:
+        """A message of the robot, received so long after the start."""
+        key = f"robomesh/{self.site}/{self.robot}/{topic}"
+        if key not in self._channels:
+            number = register_schema(self._writer, type(message))
+            self._channels[key] = self._writer.register_channel(key, "protobuf", number)
+        time_ns = START_NS + round(at_s * 1e9)
+        self._writer.add_message(
+            self._channels[key], time_ns, message.SerializeToString(), time_ns - 1000, int(at_s * 1e3)
+        )
+
+    def attach(self, name: str, data: bytes, media_type: str = "application/octet-stream") -> None:
+        """An attachment."""
+        self._writer.add_attachment(0, 0, name, media_type, data)
+
+
+def joints(**positions: float) -> JointStates:
+    """Joint states."""
+    message = JointStates()
+    for name, position in positions.items():
+        message.joints.add(name=name, position=position)
+    return message
+
+
+def write_recording(
+    path: Path, *, seconds: float = 4.0, hz: float = 100.0, chunked: bool = True, video: bool = True
+) -> Path:
+    """An arm whose waist turns by 1 rad a second, and what belongs to it."""
+    with Written(path, chunked=chunked) as file:
+        file.put("description", schema.Description(name="pt600", title="Pt600", cell="a"), 0.0)
+        file.attach("mesh/base", b"glTF of the base", "model/gltf-binary")
+        for number in range(int(seconds * hz)):
+            at_s = number / hz
+            file.put("joints", joints(waist=at_s, elbow=-at_s), at_s)
+            if number % 10 == 0:
+                frames = FrameTransforms()
+                frames.transforms.add(parent_frame_id="site", child_frame_id="site/arm/base")
+                file.put("frames", frames, at_s)
+            if number % int(hz) == 0:
+                state = schema.ControllerState(link=schema.ControllerState.UP, rate_hz=hz)
+                file.put("controller", state, at_s)
+                file.put("events", schema.Event(code=f"second.{number // int(hz)}"), at_s)
+            if video and number % 5 == 0:
+                data = KEY_PICTURE if number % 50 == 0 else PICTURE
+                picture = CompressedVideo(
+                    format="h264", frame_id="site/arm/camera/front", data=data + b"%d" % number
+                )
+                file.put("video/front", picture, at_s)
+    return path

@@ -1,0 +1,136 @@
+"""What is kept of a robot for its pictures: its trail, what touches, when it is stale, its neighbours."""
+
+import numpy as np
+import pytest
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+
+from bus.schemas.robomesh_pb2 import KinematicState, ViewRequest
+from renderer.composing import Known, composed
+from renderer.look import look_of
+from renderer.requested import Shot, standing
+from renderer.scene import Finish
+from renderer.state import Ages, RobotState, is_stale, touching_now
+from tests.renderer.test_look import described
+
+SECOND = 10**9
+FRESH = Ages(frames=0.1, joints=0.1, controller=0.1, kinematics=0.1)
+
+
+def robot(name="arm", *, cell="", replay=False):
+    message, _ = described("pt600")
+    message.cell = cell
+    if replay:
+        message.replay.id = "x"
+    return RobotState("hall", name, look=look_of(message))
+
+
+def frames(x, site_robot="hall/arm"):
+    message = FrameTransforms()
+    transform = message.transforms.add(parent_frame_id="hall", child_frame_id=f"{site_robot}/tool")
+    transform.translation.x, transform.rotation.w = x, 1.0
+    return message
+
+
+def touches(first, second, distance):
+    message = KinematicState()
+    message.own_clearance.first, message.own_clearance.second = first, second
+    message.own_clearance.distance = distance
+    return message
+
+
+def test_the_trail_is_where_the_tool_was_in_the_last_seconds():
+    state = robot()
+    for tick in range(60 * 20):
+        state.take_frames(frames(tick / 60), tick * SECOND // 60, 1)
+    at = [point[0] for _, point in state.trail]
+    assert at == sorted(at)
+    assert at[-1] == pytest.approx(20.0, abs=0.05)
+    assert at[0] == pytest.approx(14.0, abs=0.05)
+    assert 100 <= len(at) <= 240
+
+
+def test_a_replay_that_is_turned_back_begins_a_new_trail():
+    state = robot(replay=True)
+    for second in (10, 11, 12, 3, 4):
+        state.take_frames(frames(second), second * SECOND, 1)
+    assert [point[0] for _, point in state.trail] == [3.0, 4.0]
+
+
+def test_links_that_touch_are_red_while_it_is_known():
+    state = robot()
+    before = state.version
+    state.take_kinematics(touches("hall/arm/upper_arm", "hall/arm/base", 0.0), {})
+    assert state.version > before
+    assert touching_now(state, FRESH) == {"upper_arm", "base"}
+    old = Ages(frames=0.1, joints=0.1, controller=0.1, kinematics=5.0)
+    assert touching_now(state, old) == frozenset()
+    state.take_kinematics(touches("hall/arm/upper_arm", "hall/arm/base", 0.001), {})
+    assert touching_now(state, FRESH) == frozenset()
+
+
+def test_a_robot_is_stale_when_its_description_says_so():
+    state = robot()
+    assert state.look is not None
+    ages = Ages(frames=0.4, joints=0.4, controller=0.4)
+    assert not is_stale(state, ages)
+    state.look.description.stale_after_s = 0.3
+    assert is_stale(state, ages)
+
+
+def test_what_is_played_back_stands_in_nobody_s_cell():
+    assert (robot(cell="a").cell, robot(cell="a", replay=True).cell, robot().cell) == ("a", "", "")
+
+
+def test_a_picture_shows_the_cell_s_robots_each_as_old_as_it_is():
+    one, other = robot("one", cell="a"), robot("other", cell="a")
+    message, _ = described("pt600")
+    for link in message.links:
+        link.mesh = link.name  # the table has no meshes here
+    one.look = other.look = look_of(message)
+    old = Ages(frames=9.0, joints=9.0, controller=9.0)
+    shot = standing("front", size=(640, 360), fps=30.0)
+    picture = composed(shot, one.look, Known(one, FRESH), [Known(other, old)])
+    assert {part.finish for part in picture.scene.parts} == {Finish.PLAIN}
+    assert {part.finish for part in picture.scene.others} == {Finish.STALE}
+    assert len(picture.scene.others) == len(picture.scene.parts) > 0
+
+
+def test_what_is_asked_for_is_shown():
+    state = robot()
+    state.trail.extend((at, np.full(3, float(at))) for at in range(5))
+    show = ViewRequest.Show(trail=True, frames=True, ghost=[0.0] * 5, no_text=True)
+    show.path.add(x=0.1)
+    show.path.add(x=0.2)
+    assert state.look is not None
+    shot = Shot(name="free-x", of="front", size=(640, 360), fps=30.0)
+    plain = composed(shot, state.look, Known(state, FRESH), [])
+    shown = composed(
+        Shot(name="free-x", of="front", size=(640, 360), fps=30.0, show=show),
+        state.look,
+        Known(state, FRESH),
+        [],
+    )
+    assert (len(plain.scene.lines), plain.overlay.title) == (0, "arm")
+    assert len(shown.scene.lines) > 2
+    assert shown.overlay.title == ""
+
+
+def test_a_replay_is_marked_in_every_picture():
+    state = robot("replay-x", replay=True)
+    assert state.look is not None
+    for view in ("front", "close"):
+        shot = standing(view, size=(640, 360), fps=30.0)
+        assert "replay" in composed(shot, state.look, Known(state, FRESH), []).overlay.marks
+
+
+def test_a_low_picture_leaves_the_joints_values_away():
+    state = robot()
+    state.positions = {"waist": 0.1}
+    assert state.look is not None
+    rows = [
+        len(
+            composed(standing("front", size=size, fps=30.0), state.look, Known(state, FRESH), []).overlay.rows
+        )
+        for size in ((640, 360), (320, 180))
+    ]
+    assert rows == [1, 0]

@@ -1,0 +1,62 @@
+"""Pictures beside stored ones: another driver's are as good, a missing link or a lamp that is off are not.
+
+`make_pictures.py` makes the stored ones anew.
+"""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from renderer import drawing
+from renderer.scene import Finish
+from renderer.shadow import FloorShadow
+from tests.renderer.bodies import context_or_skip
+from tests.renderer.make_pictures import PICTURES, STORED, free
+
+# Levels of 255, after a blur over which edges that another rasteriser puts a little aside are gone.
+_BLUR_PX = 5
+_MOST, _MOST_ON_AVERAGE = 20.0, 0.8
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    context_or_skip().release()
+    return tmp_path_factory.mktemp("meshes")
+
+
+def like_stored(picture, name):
+    stored = cv2.imread(str(PICTURES / f"{name}.png"))[..., ::-1]
+    blurred = (cv2.blur(each.astype(np.float32), (_BLUR_PX, _BLUR_PX)) for each in (picture, stored))
+    difference = np.abs(np.subtract(*blurred))
+    return bool(difference.max() < _MOST and difference.mean() < _MOST_ON_AVERAGE)
+
+
+@pytest.mark.parametrize("name", STORED)
+def test_a_picture_is_as_the_stored_one(name, folder):
+    assert like_stored(STORED[name](folder), name)
+
+
+def without_its_flange(scene):
+    return replace(scene, parts=scene.parts[:-1])
+
+
+def with_a_red_forearm(scene):
+    red = (replace(part, finish=Finish.RED) if part.name == "forearm" else part for part in scene.parts)
+    return replace(scene, parts=tuple(red))
+
+
+@pytest.mark.parametrize("change", [without_its_flange, with_a_red_forearm])
+def test_a_picture_without_a_link_or_with_another_colour_is_told_from_it(change, folder):
+    assert not like_stored(free(folder, change=change), "free")
+
+
+def test_a_lamp_that_is_off_is_told_from_it(folder, monkeypatch):
+    monkeypatch.setattr(drawing, "KEY", (0.0, 0.0, -1.0))
+    assert not like_stored(free(folder), "free")
+
+
+def test_a_shadow_that_is_missing_is_told_from_it(folder, monkeypatch):
+    monkeypatch.setattr(FloorShadow, "lay", lambda *_, **__: None)
+    assert not like_stored(free(folder), "free")

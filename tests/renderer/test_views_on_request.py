@@ -1,0 +1,151 @@
+"""Views that are asked for: drawn by the real renderer, shared, limited, and ended when nobody watches."""
+
+import asyncio
+import io
+
+import av
+import numpy as np
+import pytest
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+
+from bus.errors import RefusedError
+from bus.schemas.robomesh_pb2 import Description, Vector3, View, ViewAnswer, ViewRequest
+from bus.session import open_session
+from renderer import service
+from renderer.mp4 import FragmentedMp4
+from tests.conftest import run
+from tests.renderer.hall import frames, hall, moving, picture
+
+ARM = "robomesh/hall/arm"
+BESIDE = View(
+    eye=Vector3(x=2.0, y=0.6, z=0.8), target=Vector3(z=0.45), projection=View.PERSPECTIVE, up=Vector3(z=1.0)
+)
+
+
+async def ask(monitor, **fields):
+    answer = await monitor.ask(f"{ARM}/views", ViewRequest(**fields), timeout_s=5.0)
+    assert isinstance(answer, ViewAnswer)
+    return answer
+
+
+async def packets(subscription, count):
+    found = []
+    async for sample in subscription:
+        message = sample.message()
+        assert isinstance(message, CompressedVideo)
+        found.append((sample, message.data))
+        if len(found) == count:
+            return found
+    raise AssertionError("the subscription ended")
+
+
+def test_a_view_of_one_s_own_is_drawn_shared_and_ends_when_nobody_watches(mesh, tmp_path, monkeypatch):
+    monkeypatch.setattr(service, "_COMES_BACK_WITHIN_S", 0.3)
+    monkeypatch.setattr(service, "_COMES_WITHIN_S", 8.0)
+
+    async def main():
+        async with hall(mesh, tmp_path, most_views=1) as (robot, monitor), moving(robot):
+            await picture(monitor)
+            answer = await ask(monitor, view=BESIDE, width=240, height=200, fps=25.0)
+            assert (answer.width, answer.height, answer.fps) == (240, 200, 25.0)
+            assert answer.topic.startswith("video/free-")
+            # The name of a camera is nobody's business.
+            named = View()
+            named.CopyFrom(BESIDE)
+            named.name = "mine"
+            assert await ask(monitor, view=named, width=240, height=200, fps=25.0) == answer
+            with pytest.raises(RefusedError, match="no room: 1 views were asked for already"):
+                await ask(monitor, of="top", width=240, height=200)
+            # As they are anyhow, they take nobody's room.
+            for name in ("front", "top", "left", "free", "close", "far"):
+                answer_of_own = await ask(monitor, of=name)
+                assert (answer_of_own.topic, answer_of_own.image) == (f"video/{name}", f"image/{name}")
+
+            video = monitor.subscribe(f"{ARM}/{answer.topic}", newest=100, history=False)
+            mp4 = FragmentedMp4()
+            data = b"".join(
+                mp4.add(packet, round(sample.received * 1e9)) for sample, packet in await packets(video, 20)
+            )
+            with av.open(io.BytesIO(data)) as file:
+                seen = [frame.to_ndarray(format="rgb24").astype(int) for frame in file.decode(video=0)]
+            assert len(seen) == 20
+            assert seen[0].shape == (200, 240, 3)
+            assert (np.abs(seen[2] - seen[-1]) > 40).any()
+            assert (await picture(monitor, answer.image.removeprefix("image/"))).shape == (200, 240, 3)
+
+            video.close()
+            # Now there is room for another: this one has ended.
+            async with asyncio.timeout(40):
+                while True:
+                    try:
+                        await ask(monitor, of="top", width=240, height=200)
+                        break
+                    except RefusedError:
+                        await asyncio.sleep(0.1)
+            assert await monitor.last(f"{ARM}/{answer.image}", timeout_s=0.3) is None
+
+    run(main())
+
+
+def test_a_request_that_is_not_possible_is_refused_and_harms_nobody(mesh, tmp_path):
+    async def main():
+        async with hall(mesh, tmp_path, most_views=4) as (robot, monitor), moving(robot):
+            await picture(monitor)
+            video = monitor.subscribe(f"{ARM}/video/front", newest=100, history=False)
+            await frames(video, 3)
+            for fields, says in (
+                ({"of": "behind"}, "no view 'behind'"),
+                ({"of": "front", "width": 5000, "height": 5000}, "5000 x 5000"),
+                ({"of": "front", "width": 1920, "height": 1080, "fps": 60.0}, "million pixels a second"),
+                ({"view": View(projection=View.PERSPECTIVE)}, "eye and target are both at"),
+                ({"view": View()}, "PERSPECTIVE, ORTHOGRAPHIC"),
+                ({"of": "front", "fps": float("nan")}, "finite"),
+            ):
+                with pytest.raises(RefusedError) as caught:
+                    await ask(monitor, **fields)
+                assert says in str(caught.value)
+            await frames(video, 3)
+
+    run(main())
+
+
+def test_a_robot_that_cannot_be_drawn_takes_no_other_robot_s_pictures(mesh, tmp_path):
+    async def main():
+        async with hall(mesh, tmp_path) as (robot, monitor), moving(robot):
+            await picture(monitor)
+            known = await monitor.last(f"{ARM}/description")
+            assert isinstance(known, Description)
+            broken = Description()
+            broken.CopyFrom(known)
+            del broken.fixtures[:]
+            broken.fixtures.add(name="box", mesh="box", mesh_sha256="0", fixture_to_site=[1.0, 2.0])
+            robot.declare_publisher("hall", "broken", "description").put(broken)
+            video = monitor.subscribe(f"{ARM}/video/front", newest=100, history=False)
+            await frames(video, 10)
+
+    run(main())
+
+
+def test_a_replay_is_drawn_as_one_and_forgotten_with_its_player(mesh, tmp_path, monkeypatch):
+    async def main():
+        async with hall(mesh, tmp_path) as (robot, monitor), moving(robot), open_session(mesh) as player:
+            await picture(monitor)
+            live = await monitor.last(f"{ARM}/description")
+            assert isinstance(live, Description)
+            live.replay.id = "x"
+            token = player.declare_presence_of("hall", "replay-x", "player", "1")
+            description = player.declare_publisher("hall", "replay-x", "description")
+            description.put(live)
+            replay = "robomesh/hall/replay-x"
+            async with asyncio.timeout(40):
+                while await monitor.last(f"{replay}/image/front", timeout_s=1.0) is None:
+                    pass
+            description.close()
+            token.undeclare()
+            async with asyncio.timeout(40):
+                while await monitor.last(f"{replay}/image/front", timeout_s=0.5) is not None:
+                    pass
+            # The live one, of the same meshes, stays.
+            await picture(monitor)
+
+    run(main())

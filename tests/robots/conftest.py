@@ -1,0 +1,21 @@
+"""What tests of robots share."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from robots.meshes.mesh import Mesh
+from robots.meshes.vrml.read import read_vrml
+
+
+@pytest.fixture
+def draw(tmp_path: Path) -> Callable[[str], Mesh]:
+    """What a VRML text, with the header before it, draws from a file `a.wrl`."""
+
+    def drawn(text: str) -> Mesh:
+        path = tmp_path / "a.wrl"
+        path.write_text(f"#VRML V2.0 utf8\n{text}")
+        return read_vrml(path)
+
+    return drawn

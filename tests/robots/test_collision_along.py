@@ -1,0 +1,159 @@
+"""How near an arm gets along a path: as measuring each sample says, sooner."""
+
+import re
+from itertools import pairwise
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robots.cells import CellDescription, CellRobot
+from robots.collision import (
+    Cell,
+    allowed_positions,
+    build_cell,
+    near_along,
+    outside_nearest,
+    own_contacts,
+)
+from robots.collision.nearest import arm_obstacles
+from robots.collision.path import SAMPLE_M, placements_along, sampled_path, travelled
+from robots.joints import FloatArray
+from tests.robots.arms import TELESCOPE
+from tests.robots.boxes import bar_arm, block, cell_of, globe, placed
+
+WITHIN = 0.05
+FIXTURES = (
+    block("table", (2.0, 2.0, 0.05), placed(0.0, 0.0, -0.1)),
+    block("post", (0.1, 0.1, 1.0), placed(0.4, 0.4, 0.5)),
+    globe("ball", 0.15, placed(-0.3, 0.4, 0.6)),
+)
+
+
+@pytest.fixture(scope="module")
+def cell() -> Cell:
+    robots = (CellRobot("one", "pt600", placed(0.0)), CellRobot("two", "pt500", placed(0.8, yaw=pi)))
+    return build_cell(CellDescription(robots, FIXTURES))
+
+
+def motions(cell: Cell, robot: str, count: int, seed: int) -> FloatArray:
+    """Straight joint motions between random positions, in samples of some 20 mm."""
+    ends = allowed_positions(cell.arms[robot].joints, count + 1, seed)
+    shares = np.linspace(0.0, 1.0, 60)[1:, None]
+    lines = [start + shares * (end - start) for start, end in pairwise(ends)]
+    return np.concatenate([ends[:1], *lines])
+
+
+def measured(
+    cell: Cell, positions: FloatArray, others: dict[str, FloatArray]
+) -> tuple[float, dict[tuple[str, str], float]]:
+    """The least distance around, and what is near, one position alone."""
+    moving = [pair for pair in outside_nearest(cell, "one", positions, others) if pair.pair[0] != "one/base"]
+    near = {each.pair: each.distance_m for each in moving if each.distance_m <= WITHIN}
+    near |= {each.pair: 0.0 for each in own_contacts(cell, "one", positions)}
+    return min(each.distance_m for each in moving), near
+
+
+@pytest.mark.parametrize("beside", [{}, {"two": np.radians([[20.0, 60.0, -60.0, 10.0, 0.0]])}])
+def test_a_path_says_what_each_of_its_samples_says(cell: Cell, beside: dict[str, FloatArray]) -> None:
+    path = motions(cell, "one", 12, seed=4)
+    along = near_along(cell, "one", path, beside, within_m=WITHIN)
+    seen: dict[int, dict[tuple[str, str], float]] = {}
+    for each in along.encounters:
+        assert list(each.samples) == sorted(set(each.samples))
+        gaps = np.linalg.norm(each.points[:, 0] - each.points[:, 1], axis=1)
+        apart = each.distances > 0
+        assert gaps[apart] == pytest.approx(each.distances[apart], abs=1e-6)
+        for sample, distance in zip(each.samples.tolist(), each.distances.tolist(), strict=True):
+            seen.setdefault(sample, {})[each.pair] = distance
+    near = touching = 0
+    for sample in range(0, len(path), 7):
+        least, expected = measured(cell, path[sample], {name: there[0] for name, there in beside.items()})
+        assert along.clearances[sample] == pytest.approx(least, abs=1e-5)
+        assert seen.get(sample, {}) == {pair: pytest.approx(d, abs=1e-5) for pair, d in expected.items()}
+        near += bool(expected)
+        touching += least == 0.0
+    # A path that meets nothing, or is never clear of anything, would have shown little.
+    assert 5 < near < len(path) / 7 - 5
+    assert touching > 0
+
+
+def test_another_arms_way_counts_as_all_of_its_places_at_once(cell: Cell) -> None:
+    # The neighbour turns by the arm: at both of its ends it is far away.
+    way = np.radians([[-100.0, 60.0, -60.0, 10.0, 0.0], [100.0, 60.0, -60.0, 10.0, 0.0]])
+    path = motions(cell, "one", 3, seed=11)
+    swept = near_along(cell, "one", path, {"two": way}, within_m=WITHIN).clearances
+    places, _ = sampled_path(cell.arms["two"], way)
+    count = len(places)
+    stands = [way[0] + share * (way[1] - way[0]) for share in np.linspace(0.0, 1.0, count)]
+    for sample in range(0, len(path), 25):
+        # Every tenth place: no nearer than all of them, nor farther than what is between.
+        found = [measured(cell, path[sample], {"two": there})[0] for there in stands[::10]]
+        assert swept[sample] <= min(found) + 1e-6
+        assert swept[sample] >= min(found) - 10 * SAMPLE_M
+    ends = [near_along(cell, "one", path, {"two": end[None]}, within_m=WITHIN).clearances for end in way]
+    assert (swept < np.minimum(*ends) - 0.05).any()
+
+
+def test_a_way_is_sampled_so_that_no_link_moves_more_than_five_millimetres(cell: Cell) -> None:
+    arm = cell.arms["one"]
+    # A turn right round, whose ends are one place.
+    way = np.array([[-pi, 1.0, -1.0, 0.0, -pi], [pi, 1.0, -1.0, 0.0, pi], [pi, 1.2, -1.0, 0.0, 0.0]])
+    places, come = sampled_path(arm, way)
+    assert np.diff(come, axis=0).max() <= SAMPLE_M
+    # The hand, half a metre out, goes once round and a little more.
+    assert come[-1].max() > 2.0
+    assert places[0] == pytest.approx(arm_obstacles(arm, way[0]).placements, abs=1e-12)
+    assert places[-1] == pytest.approx(arm_obstacles(arm, way[-1]).placements, abs=1e-12)
+
+
+def test_bodies_are_where_pinocchio_has_them(cell: Cell, tmp_path: Path) -> None:
+    # Prismatic joints, and one that follows another; a look for each of its bare links.
+    urdf = tmp_path / "telescope.urdf"
+    look = r'<link name="\1"><visual><geometry><box size="0.1 0.05 0.02"/></geometry></visual></link>'
+    urdf.write_text(re.sub(r'<link name="(\w+)"/>', look, TELESCOPE))
+    others = cell_of(
+        {"bars": (bar_arm(tmp_path / "bars"), placed(0.3, yaw=0.4)), "lift": (urdf, placed(1.0))}
+    )
+    for arm in (*cell.arms.values(), *build_cell(others).arms.values()):
+        assert arm.moving.any()
+        path = allowed_positions(arm.joints, 20, seed=2)
+        for there, positions in zip(placements_along(arm, path), path, strict=True):
+            assert there == pytest.approx(arm_obstacles(arm, positions).placements, abs=1e-12)
+
+
+def test_no_point_of_a_body_comes_farther_than_its_travel_says(cell: Cell) -> None:
+    arm = cell.arms["one"]
+    path = motions(cell, "one", 2, seed=3)
+    places = placements_along(arm, path)
+    come = travelled(arm.bodies, places)
+    for number, body in enumerate(arm.bodies):
+        points = body.center + np.random.default_rng(1).uniform(-1, 1, (50, 3)) * body.half
+        at = np.einsum("mij,kj->mki", places[:, number, :3, :3], points) + places[:, number, None, :3, 3]
+        for later in (1, 10, 100):
+            moved = np.linalg.norm(at[later:] - at[:-later], axis=2).max(axis=1)
+            assert (moved <= come[later:, number] - come[:-later, number] + 1e-12).all()
+
+
+def test_an_arm_that_looks_like_nothing_meets_nothing(tmp_path: Path) -> None:
+    bare = bar_arm(tmp_path / "bare", bare=("base", "shoulder", "elbow"))
+    robots = {"bare": (bare, placed(0.0)), "seen": (bar_arm(tmp_path / "seen"), placed(0.1))}
+    cell = build_cell(cell_of(robots, FIXTURES))
+    path = np.array([[0.0, 0.0], [1.0, 1.0]])
+    for robot, other in (("bare", "seen"), ("seen", "bare")):
+        along = near_along(cell, robot, path, {other: path}, within_m=WITHIN)
+        names = {name for each in along.encounters for name in each.pair}
+        assert not any(name.startswith("bare/") for name in names)
+    assert near_along(cell, "bare", path, {}, within_m=WITHIN).clearances.tolist() == [np.inf, np.inf]
+
+
+def test_nothing_around_is_infinitely_far(tmp_path: Path) -> None:
+    cell = build_cell(cell_of({"arm": (bar_arm(tmp_path), placed(0.0))}))
+    folded = np.array([0.0, pi])
+    along = near_along(cell, "arm", np.array([np.zeros(2), folded]), {}, within_m=WITHIN)
+    assert along.clearances.tolist() == [np.inf, np.inf]
+    (contact,) = along.encounters
+    assert contact.own
+    assert contact.pair == ("arm/base", "arm/elbow")
+    assert contact.samples.tolist() == [1]

@@ -1,0 +1,129 @@
+"""`robomesh mesh info` and `mesh convert`."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robots.meshes.mesh import bounds
+from robots.meshes.read import read_mesh
+from services.command_line.main import run
+
+BOX = """#VRML V2.0 utf8
+Shape { appearance Appearance { material DEF glass Material { diffuseColor 0.2 0.4 0.6 transparency 0.5 } }
+  geometry Box { size 100 200 300 } }
+"""
+
+
+@pytest.fixture
+def box(tmp_path: Path) -> Path:
+    path = tmp_path / "box.wrl"
+    path.write_text(BOX)
+    return path
+
+
+@pytest.mark.parametrize("ending", [".stl", ".obj", ".ply", ".wrl", ".3ds"])
+def test_shape_units_and_axes_stay(box: Path, ending: str, capsys: pytest.CaptureFixture[str]) -> None:
+    target = box.with_name(f"out{ending}")
+    assert run(["mesh", "convert", str(box), str(target)]) == 0
+    assert capsys.readouterr().out == f"{target}: 12 triangles\n"
+    mesh = read_mesh(target)
+    assert mesh.triangle_count == 12
+    np.testing.assert_allclose(bounds(mesh), [[-50, -100, -150], [50, 100, 150]])
+
+
+@pytest.mark.parametrize("ending", [".obj", ".ply", ".wrl", ".3ds"])
+def test_colour_and_transparency_stay(box: Path, ending: str) -> None:
+    target = box.with_name(f"out{ending}")
+    assert run(["mesh", "convert", str(box), str(target)]) == 0
+    (part,) = read_mesh(target).parts
+    assert part.material.diffuse == pytest.approx((0.2, 0.4, 0.6), abs=0.005)
+    assert part.material.transparency == pytest.approx(0.5, abs=0.005)
+
+
+def test_glb_is_in_metres_and_the_guess_is_said(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    target = box.with_name("out.glb")
+    assert run(["mesh", "convert", str(box), str(target)]) == 0
+    assert "taken for millimetres" in capsys.readouterr().err
+    np.testing.assert_allclose(bounds(read_mesh(target)), [[-0.05, -0.1, -0.15], [0.05, 0.1, 0.15]])
+
+
+def test_scale_and_up_are_taken(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    target = box.with_name("out.glb")
+    assert run(["mesh", "convert", str(box), str(target), "--scale", "0.01", "--up", "y"]) == 0
+    assert capsys.readouterr().err == ""
+    np.testing.assert_allclose(bounds(read_mesh(target)), [[-0.5, -1.5, -1.0], [0.5, 1.5, 1.0]])
+
+
+def test_what_is_lost_is_said(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["mesh", "convert", str(box), str(box.with_name("out.stl"))]) == 0
+    assert (
+        "out.stl: STL holds shape alone: colours, transparency and names are lost" in capsys.readouterr().err
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["out.dxf"], "ending '.dxf' is not written; .glb, .stl, .obj, .ply, .wrl, .3ds are"),
+        (["out.stl", "--up", "x"], "--up x: y or z is right"),
+        (["out.stl", "--scale", "-1"], "--scale -1.0: a number above 0 is right"),
+        (["box.wrl"], "box.wrl: is the file that is to be converted; name another"),
+        (["none/out.stl"], "cannot be written: No such file or directory"),
+    ],
+)
+def test_what_cannot_be_is_said_in_a_line(
+    box: Path, arguments: list[str], expected: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target = str(box.parent / arguments[0])
+    assert run(["mesh", "convert", str(box), target, *arguments[1:]]) == 2
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert error.startswith("robomesh: ")
+    assert expected in error
+
+
+def test_mesh_of_nothing_is_not_written(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    nothing = box.with_name("nothing.wrl")
+    nothing.write_text("#VRML V2.0 utf8\n")
+    assert run(["mesh", "convert", str(nothing), str(box.with_name("out.glb"))]) == 2
+    assert "holds nothing that can be drawn" in capsys.readouterr().err
+    assert not box.with_name("out.glb").exists()
+
+
+def test_failed_conversion_leaves_the_old_file_and_nothing_else(box: Path) -> None:
+    target = box.with_name("out.stl")
+    target.write_text("precious")
+    broken = box.with_name("broken.3ds")
+    broken.write_bytes(b"MM\0\0")
+    assert run(["mesh", "convert", str(broken), str(target)]) == 2
+    assert target.read_text() == "precious"
+    assert sorted(path.name for path in box.parent.iterdir()) == ["box.wrl", "broken.3ds", "out.stl"]
+
+
+def test_mesh_too_large_for_3ds_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    heights = " ".join("0" for _ in range(300 * 300))
+    path = tmp_path / "grid.wrl"
+    path.write_text(
+        "#VRML V2.0 utf8\nShape { geometry ElevationGrid { xDimension 300 zDimension 300"
+        f" height [ {heights} ] }} }}"
+    )
+    assert run(["mesh", "convert", str(path), str(tmp_path / "out.3ds")]) == 2
+    assert "more than 65535 vertices or triangles" in capsys.readouterr().err
+    assert not (tmp_path / "out.3ds").exists()
+
+
+def test_info_prints_the_agreed_json(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["mesh", "info", str(box), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {
+        "triangles": 12,
+        "min": [-50.0, -100.0, -150.0],
+        "max": [50.0, 100.0, 150.0],
+        "materials": ["glass"],
+        "warnings": [],
+    }
+
+
+def test_info_tells_people_the_unit_that_it_takes(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["mesh", "info", str(box)]) == 0
+    assert "taken for millimetres, for it says no unit: 300 mm large; z up taken" in capsys.readouterr().out

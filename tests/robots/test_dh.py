@@ -1,0 +1,224 @@
+"""Robots by URDF as D-H rows: the tool and the shapes stand where they stood."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robots.description import from_values, library_names, load
+from robots.dh import DhForm, dh_form
+from robots.errors import DescriptionError
+from robots.model import RobotModel, build_model, frame_placements, link_placements, tool_placement
+from robots.poses import rpy_rotation
+from robots.schema import DhDescription, UrdfDescription
+from robots.tree import tree_of
+from robots.urdf.write import to_urdf
+
+
+def urdf(*joints: tuple[str, str, str, str], tool: str = "0.1 0.2 0.3") -> str:
+    """A chain: each joint's type, origin xyz, rpy and axis; a ball of a shape on each link."""
+    ball = (
+        '<visual><origin xyz="0.1 0.2 0.3" rpy="1 2 3"/><geometry><sphere radius="0.1"/></geometry></visual>'
+    )
+    parts = [f'<link name="l0">{ball}</link>']
+    for number, (kind, xyz, rpy, axis) in enumerate(joints, start=1):
+        parts.append(f'<link name="l{number}">{ball}</link>')
+        parts.append(
+            f'<joint name="j{number}" type="{kind}"><origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>'
+            f'<parent link="l{number - 1}"/><child link="l{number}"/>'
+            '<limit lower="-1.5" upper="2" velocity="1" effort="1"/></joint>'
+        )
+    parts.append(
+        f'<link name="tool0"/><joint name="end" type="fixed"><origin xyz="{tool}" rpy="0.3 0.2 0.1"/>'
+        f'<parent link="l{len(joints)}"/><child link="tool0"/></joint>'
+    )
+    return f'<robot name="chain">{"".join(parts)}</robot>'
+
+
+def described(folder: Path, text: str, extra: str = "") -> UrdfDescription:
+    (folder / "arm.urdf").write_text(text)
+    (folder / "robot.toml").write_text(f'name = "arm"\nurdf = "arm.urdf"\n{extra}')
+    description = load(folder)
+    assert isinstance(description, UrdfDescription)
+    return description
+
+
+def rebuilt(form: DhForm, folder: Path) -> DhDescription:
+    description, problems = from_values(form.values, folder=folder)
+    assert problems == ()
+    assert isinstance(description, DhDescription)
+    return description
+
+
+Z_UP = ("revolute", "0 0 0.1", "0 0 0", "0 0 1")
+CHAINS = {
+    "parallel": urdf(Z_UP, ("revolute", "0.3 0.1 0.2", "0 0 0.4", "0 0 1")),
+    "antiparallel": urdf(Z_UP, ("revolute", "0.3 0 0.2", "0 0 0", "0 0 -1")),
+    "on one line": urdf(
+        ("revolute", "0 0 0.1", "0 0 0.2", "0 0 1"), ("revolute", "0 0 0.2", "0 0 0.3", "0 0 1")
+    ),
+    "intersecting": urdf(Z_UP, ("revolute", "0 0 0.2", "0 0 0.7", "0 1 0")),
+    "skew": urdf(Z_UP, ("revolute", "0.3 -0.1 0.2", "0.1 0.2 0.3", "1 2 3")),
+    "sliding": urdf(
+        Z_UP, ("prismatic", "0.3 -0.1 0.2", "0.1 0.2 0.3", "1 2 3"),
+        ("revolute", "0.1 0.2 0.2", "0.4 0 0", "1 0 0"), ("prismatic", "0 0 0.2", "0 0 0", "1 0 0"),
+    ),
+    "moved base": urdf(
+        ("revolute", "0.3 0.2 0.1", "0.1 0.2 0.3", "0 1 0"), ("revolute", "0 0 0.2", "0 0 0", "1 0 0")
+    ),
+    "base turned over": urdf(
+        ("revolute", "0 0 0.1", "0 0 0", "0 0 -1"), ("revolute", "0 0 0.2", "0 0 0", "1 0 0")
+    ),
+    "one joint": urdf(("prismatic", "0 0 0.1", "0 0 0", "1 0 0")),
+    "right angles as people write them": urdf(
+        ("revolute", "0 0 0.089159", "0 0 0", "0 0 1"),
+        ("revolute", "0 0.13585 0", "0 1.5707963267948966 0", "0 1 0"),
+        ("revolute", "0 -0.1197 0.425", "0 0 0", "0 1 0"),
+        ("revolute", "0 0 0.39225", "0 1.5707963267948966 0", "0 1 0"),
+        ("revolute", "0 0.093 0", "0 0 0", "0 0 1"), ("revolute", "0 0 0.09465", "0 0 0", "0 1 0"),
+    ),
+}  # fmt: skip
+
+
+def placed_base(form: DhForm) -> np.ndarray:
+    """The pose that the note on the base tells; where it stood if there is none."""
+    placement = np.eye(4)
+    for note in form.notes:
+        if "the base frame moves to" in note:
+            xyz, rpy = (
+                [float(number) for number in note.split(f"{key} = [")[1].split("]")[0].split(",")]
+                for key in ("xyz", "rpy")
+            )
+            placement[:3, :3] = rpy_rotation(*np.radians(rpy))
+            placement[:3, 3] = np.multiply(xyz, 0.001)
+    return placement
+
+
+@pytest.mark.parametrize("name", CHAINS)
+def test_tool_and_shapes_stand_where_they_stood_at_all_positions(name: str, tmp_path: Path) -> None:
+    before = described(tmp_path, CHAINS[name])
+    form = dh_form(before)
+    rows = build_model(rebuilt(form, tmp_path))
+    urdf_model = build_model(before)
+    base = exact_base(urdf_model, rows)
+    # The note is for people: six digits.
+    np.testing.assert_allclose(placed_base(form), base, atol=2e-6)
+    shapes = {link.name: link.shapes for link in tree_of(before).links}
+    random = np.random.default_rng(4)
+    for _ in range(50):
+        positions = random.uniform(rows.joints.lower, rows.joints.upper)
+        was, now = link_placements(urdf_model, positions), base @ link_placements(rows, positions)
+        np.testing.assert_allclose(
+            base @ tool_placement(rows, positions), tool_placement(urdf_model, positions), atol=1e-12
+        )
+        for index, link in enumerate(("base", *rows.link_names[1:])):
+            urdf_link = urdf_model.link_names[index]
+            (old,), (new,) = shapes[urdf_link], form.shapes[link]
+            np.testing.assert_allclose(
+                now[index] @ new.shape_to_link, was[index] @ old.shape_to_link, atol=1e-12
+            )
+
+
+def exact_base(before: RobotModel, after: RobotModel) -> np.ndarray:
+    """Where the rows' base stands in the URDF's: from the tool at one position."""
+    home = before.joints.home
+    base: np.ndarray = tool_placement(before, home) @ np.linalg.inv(tool_placement(after, home))
+    return base
+
+
+def test_known_arm_gives_the_known_rows(tmp_path: Path) -> None:
+    form = dh_form(described(tmp_path, CHAINS["right angles as people write them"]))
+    rows = [(row["a"], row["alpha"], row["d"]) for row in form.values["joint"]]
+    # The makers' table of this arm, but for the signs that the other way round of x and z gives.
+    assert [abs(a) for a, _, _ in rows] == pytest.approx([0, 425, 392.25, 0, 0, 0], abs=1e-9)
+    assert [abs(alpha) for _, alpha, _ in rows] == pytest.approx([90, 0, 0, 90, 90, 0], abs=1e-9)
+    assert [abs(d) for _, _, d in rows] == pytest.approx([89.159, 0, 0, 109.15, 94.65, 0], abs=1e-9)
+    assert not [note for note in form.notes if "base" in note]
+
+
+@pytest.mark.parametrize("robot", library_names())
+def test_rows_come_back_from_our_own_urdf(robot: str, tmp_path: Path) -> None:
+    original = load(robot)
+    assert isinstance(original, DhDescription)
+    form = dh_form(described(tmp_path, to_urdf(original)))
+    again = rebuilt(form, tmp_path)
+    for before, after in zip(original.joints, again.joints, strict=True):
+        keys = ("name", "type", "a", "alpha", "d", "theta", "link_name")
+        assert [getattr(after, key) for key in keys] == pytest.approx([getattr(before, key) for key in keys])
+        assert after.limits == pytest.approx(before.limits)
+    one, other = build_model(original), build_model(again)
+    assert other.link_names == one.link_names
+    assert other.frame_names == one.frame_names
+    random = np.random.default_rng(8)
+    for _ in range(50):
+        positions = random.uniform(one.joints.lower, one.joints.upper)
+        np.testing.assert_allclose(
+            link_placements(other, positions), link_placements(one, positions), atol=1e-12
+        )
+        frames = frame_placements(other, positions)
+        for name, placement in frame_placements(one, positions).items():
+            np.testing.assert_allclose(frames[name], placement, atol=1e-12)
+
+
+def test_nearly_parallel_axes_count_as_parallel_and_the_note_says_by_how_much(tmp_path: Path) -> None:
+    text = urdf(Z_UP, ("revolute", "1 0 0", "0.00001 0 0", "0 0 1"), tool="1 0 0")
+    form = dh_form(described(tmp_path, text))
+    assert form.values["joint"][0]["a"] == pytest.approx(1000)
+    # A metre beyond an axis that leans by 1e-5: at most 0.01 mm and a little.
+    (note,) = form.notes
+    assert note.startswith("axes that are nearly parallel are taken as parallel: the tool is up to ")
+    assert 0.0 < float(note.split("up to ")[1].split(" mm")[0]) < 0.02
+
+
+def test_any_chain_is_exact_or_says_that_it_is_not(tmp_path: Path) -> None:
+    random = np.random.default_rng(13)
+    angles = [0.0, 0.0, np.pi / 2, -np.pi / 2, np.pi, 1.5708, 1.570796, 0.7]
+    axes = ["1 0 0", "0 1 0", "0 0 1", "0 0 -1", "0.3 -2 1"]
+
+    def joint() -> tuple[str, str, str, str]:
+        kind = str(random.choice(["revolute", "revolute", "prismatic"]))
+        xyz, rpy = random.choice([0.0, 0.2, -0.3], 3), random.choice(angles, 3)
+        return kind, " ".join(map(str, xyz)), " ".join(map(str, rpy)), str(random.choice(axes))
+
+    told = 0
+    for _ in range(60):
+        before = described(tmp_path, urdf(*(joint() for _ in range(random.integers(1, 7)))))
+        form = dh_form(before)
+        if any("nearly parallel" in note for note in form.notes):
+            told += 1
+            continue
+        one, other = build_model(before), build_model(rebuilt(form, tmp_path))
+        base = exact_base(one, other)
+        for _ in range(5):
+            positions = random.uniform(one.joints.lower, one.joints.upper)
+            expected = tool_placement(one, positions)
+            np.testing.assert_allclose(base @ tool_placement(other, positions), expected, atol=1e-12)
+    assert told < 30
+
+
+def test_joints_beside_the_chain_stand_at_home_and_their_shapes_ride_on_it(tmp_path: Path) -> None:
+    side = (
+        '<link name="wing"><visual><geometry><sphere radius="1"/></geometry></visual></link>'
+        '<joint name="flap" type="prismatic"><origin xyz="0 0 1"/><axis xyz="1 0 0"/><parent link="l1"/>'
+        '<child link="wing"/><limit lower="0" upper="1" velocity="1"/></joint></robot>'
+    )
+    text = CHAINS["parallel"].replace("</robot>", side)
+    form = dh_form(described(tmp_path, text, '[[joint]]\nname = "flap"\nhome = 500\n'))
+    assert [row["name"] for row in form.values["joint"]] == ["j1", "j2"]
+    assert form.notes == ("not on the way to the tool, so no joints here, and still at home: flap",)
+    # Row 1 lies with its x along (0.3, 0.1), its origin on joint 2's axis.
+    wing = form.shapes["l1"][-1].shape_to_link
+    turn = np.arctan2(0.1, 0.3)
+    # In joint 1's frame, 0.1 m up, the wing is at (0.5, 0, 1); row 1 at (0.3, 0.1, -0.1).
+    x, y = 0.5 - 0.3, 0.0 - 0.1
+    expected = [x * np.cos(turn) + y * np.sin(turn), -x * np.sin(turn) + y * np.cos(turn), 1.1]
+    np.testing.assert_allclose(wing[:3, 3], expected, atol=1e-12)
+
+
+def test_chain_with_a_joint_that_follows_is_refused(tmp_path: Path) -> None:
+    text = CHAINS["parallel"].replace(
+        '<joint name="j2" type="revolute">', '<joint name="j2" type="revolute"><mimic joint="j1"/>'
+    )
+    description = described(tmp_path, text, '[tool]\nlink = "tool0"\n')
+    with pytest.raises(DescriptionError, match="joint 'j2' follows another on the way to 'tool0'"):
+        dh_form(description)

@@ -1,0 +1,151 @@
+"""The robots of example-robot-data: each loads, or is refused in words, and stands where Pinocchio has it."""
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio
+import pytest
+
+from robots.description import EXAMPLES, from_values, known_names, library_names, load
+from robots.dh import dh_form
+from robots.errors import DescriptionError
+from robots.example_robots import example_folder
+from robots.glb import link_meshes
+from robots.joints import violations
+from robots.model import RobotModel, build_model, link_placements, tool_placement
+from robots.schema import UrdfDescription
+from robots.urdf.write import to_urdf
+
+FOLDER = example_folder()
+installed = pytest.mark.skipif(FOLDER is None, reason="the extra example-robots is not installed")
+FILES = [] if FOLDER is None else sorted(str(path.relative_to(FOLDER)) for path in FOLDER.rglob("*.urdf"))
+NAMES = () if FOLDER is None else tuple(EXAMPLES)
+REFUSED = {
+    "alex_description/urdf/alex_psyonic_hands.urdf": "mimic joint 'index_q1': no such joint that moves",
+    "hector_description/robots/quadrotor_base.urdf": "has no joint that moves",
+    "iris_description/robots/iris_simple.urdf": "has no joint that moves",
+    "ur_description/urdf/ur3.urdf": "has no <link>",
+}
+
+
+def test_without_the_package_a_robot_of_it_is_told_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robots.example_robots.example_folder", lambda: None)
+    with pytest.raises(
+        DescriptionError, match=r"ur5: .* not installed .*: \./dev example-robots brings them"
+    ):
+        load("ur5")
+    assert known_names() == library_names()
+
+
+@installed
+def test_names_of_example_robots_are_told_beside_the_librarys() -> None:
+    assert {"pt600", "ur5", "panda"} <= set(known_names())
+    with pytest.raises(DescriptionError, match="did you mean 'panda'"):
+        load("pandda")
+
+
+@installed
+@pytest.mark.parametrize("file", FILES)
+def test_every_robot_stands_where_pinocchio_has_it_or_is_refused_in_words(file: str) -> None:
+    assert FOLDER is not None
+    if file in REFUSED:
+        with pytest.raises(DescriptionError, match=REFUSED[file]):
+            load(FOLDER / file)
+        return
+    description = load(FOLDER / file)
+    assert isinstance(description, UrdfDescription)
+    model = build_model(description)
+    compare(model, description, pinocchio.buildModelFromXML((FOLDER / file).read_text()))
+
+
+def compare(model: RobotModel, description: UrdfDescription, other: pinocchio.Model) -> None:
+    data = other.createData()
+    tree = description.robot.tree
+    names = [name for name in model.link_names if other.existFrame(name, pinocchio.FrameType.BODY)]
+    # All but those whose names were made safe.
+    assert len(names) >= len(model.link_names) - sum("is called" in note for note in description.robot.notes)
+    random = np.random.default_rng(2)
+    for _ in range(5):
+        own = dict(zip(model.joints.names, random.uniform(-1.0, 1.0, len(model.joints)), strict=True))
+        positions = pinocchio.neutral(other)
+        for joint in tree.joints:
+            if joint.mimic is None:
+                value = own[joint.name]
+            else:
+                leader = tree.joints[joint.mimic.leader].name
+                value = joint.mimic.multiplier * own[leader] + joint.mimic.offset
+            there = other.joints[other.getJointId(joint.name)]
+            if there.nq:  # the name may have been made safe
+                turned = [value] if there.nq == 1 else [np.cos(value), np.sin(value)]
+                positions[there.idx_q : there.idx_q + there.nq] = turned
+        pinocchio.framesForwardKinematics(other, data, positions)
+        placed = dict(zip(model.link_names, link_placements(model, list(own.values())), strict=True))
+        for name in names:
+            frame = other.getFrameId(name, pinocchio.FrameType.BODY)
+            np.testing.assert_allclose(placed[name], data.oMf[frame].homogeneous, atol=1e-12)
+
+
+@installed
+@pytest.mark.parametrize("name", NAMES)
+def test_named_robot_is_whole(name: str) -> None:
+    description = load(name)
+    assert isinstance(description, UrdfDescription)
+    assert description.robot.missing == ()
+    model = build_model(description)
+    assert violations(model.joints, model.joints.home) == ()
+    assert "example-robot-data" in description.provenance
+
+
+@installed
+@pytest.mark.parametrize("name", NAMES)
+def test_exported_robot_stands_where_it_stood(name: str, tmp_path: Path) -> None:
+    description = load(name)
+    (tmp_path / "again.urdf").write_text(to_urdf(description))
+    again = build_model(load(tmp_path / "again.urdf"))
+    model = build_model(description)
+    assert again.joints.names == model.joints.names
+    np.testing.assert_array_equal(again.joints.lower, model.joints.lower)
+    np.testing.assert_array_equal(again.joints.max_speed, model.joints.max_speed)
+    random = np.random.default_rng(6)
+    for _ in range(5):
+        positions = random.uniform(model.joints.lower, model.joints.upper)
+        before = dict(zip(model.link_names, link_placements(model, positions), strict=True))
+        after = dict(zip(again.link_names, link_placements(again, positions), strict=True))
+        for link, placement in before.items():
+            np.testing.assert_allclose(after[link], placement, atol=1e-12)
+        np.testing.assert_allclose(after["tool"], tool_placement(model, positions), atol=1e-12)
+
+
+@installed
+@pytest.mark.parametrize(
+    "name", ["ur3", "ur5", "ur10", "panda", "xarm7", "z1", "kinova", "so100", "talos_arm"]
+)
+def test_arms_become_rows_that_put_the_tool_where_it_was(name: str, tmp_path: Path) -> None:
+    description = load(name)
+    assert isinstance(description, UrdfDescription)
+    form = dh_form(description)
+    rows, problems = from_values(form.values, folder=tmp_path)
+    assert rows is not None, problems
+    assert not [note for note in form.notes if "nearly parallel" in note]
+    before, after = build_model(description), build_model(rows)
+    home = dict(zip(before.joints.names, before.joints.home, strict=True))
+
+    def tool_before(positions: np.ndarray) -> np.ndarray:
+        here = home | dict(zip(after.joints.names, positions, strict=True))
+        return tool_placement(before, [here[joint] for joint in before.joints.names])
+
+    base = tool_before(after.joints.home) @ np.linalg.inv(tool_placement(after, after.joints.home))
+    random = np.random.default_rng(9)
+    for _ in range(20):
+        positions = random.uniform(after.joints.lower, after.joints.upper)
+        np.testing.assert_allclose(
+            base @ tool_placement(after, positions), tool_before(positions), atol=1e-12
+        )
+
+
+@installed
+@pytest.mark.parametrize("name", ["ur5", "panda"])
+def test_links_of_an_example_robot_have_bodies(name: str, tmp_path: Path) -> None:
+    meshes = link_meshes(load(name), cache=tmp_path)
+    assert len(meshes) >= 7
+    assert all(glb.startswith(b"glTF") for glb in meshes.values())

@@ -1,0 +1,62 @@
+"""Units and upward axes on import."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robots.meshes.guess import file_to_link, guess
+from robots.meshes.mesh import Material, Mesh, Part
+from robots.meshes.normals import creased
+from robots.meshes.read import read_mesh
+from robots.meshes.solids import box
+from robots.meshes.write_glb import glb_of
+
+ODD = "odd for a robot's link"
+
+
+def a_cube(size: float, unit_m: float | None = None, up: str = "") -> Mesh:
+    part = Part("cube", Material(), *creased(*box(np.zeros(3), np.full(3, size)), 0.0))
+    return Mesh((part,), unit_m=unit_m, up=up)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "scale_m", "up", "sentence"),
+    [
+        (a_cube(300), 0.001, "z", "taken for millimetres, for it says no unit: 300 mm large; z up taken"),
+        (a_cube(0.3), 1.0, "z", "taken for metres, for it says no unit: 300 mm large; z up taken"),
+        (a_cube(4.9), 1.0, "z", "taken for metres, for it says no unit: 4.9 m large; z up taken"),
+        (a_cube(5.1), 0.001, "z", "taken for millimetres, for it says no unit: 5.1 mm large; z up taken"),
+        (
+            a_cube(60000),
+            0.001,
+            "z",
+            f"taken for millimetres, for it says no unit: 60 m large, {ODD}: check it; z up taken",
+        ),
+        (a_cube(0.3, 1.0, "y"), 1.0, "y", "in metres, as the file says: 300 mm large; y up"),
+        (a_cube(12, 0.0254, "z"), 0.0254, "z", "in inches, as the file says: 305 mm large; z up"),
+        (
+            a_cube(300, 1.0, "y"),
+            1.0,
+            "y",
+            "in metres, as the file says: 300 m large; odd for a robot's link; y up",
+        ),
+        (a_cube(1, 0.07), 0.07, "z", "in units of 0.07 m, as the file says: 70 mm large; z up taken"),
+        (Mesh(), 0.001, "z", "holds no triangles to judge by: taken for millimetres; z up taken"),
+    ],
+)
+def test_guess_says_what_and_why(mesh: Mesh, scale_m: float, up: str, sentence: str) -> None:
+    found = guess(mesh)
+    assert (found.scale_m, found.up, found.sentence) == (scale_m, up, sentence)
+
+
+def test_upward_y_is_turned_to_z_and_forward_stays_right_handed() -> None:
+    matrix = file_to_link(guess(a_cube(0.3, 0.5, "y")))
+    np.testing.assert_allclose(matrix[:3, :3] @ [1, 2, 3], [0.5, -1.5, 1.0])
+    assert np.linalg.det(matrix[:3, :3]) > 0
+
+
+def test_our_own_glb_comes_back_with_z_up(tmp_path: Path) -> None:
+    path = tmp_path / "own.glb"
+    path.write_bytes(glb_of(a_cube(0.3)))
+    assert guess(read_mesh(path)).up == "z"

@@ -1,0 +1,269 @@
+"""Inverse kinematics: every answer is put back through the forward kinematics."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robots.description import load, parse
+from robots.errors import JointCountError, PoseError
+from robots.example_robots import example_folder
+from robots.inverse import InverseSolver, Task, build_solver, follow, natural_task, solve, tool_pose
+from robots.joints import violations
+from robots.model import build_model, tool_placement
+from tests.robots.arms import allowed_positions, arm, dh_arm, reached, telescope
+
+installed = pytest.mark.skipif(example_folder() is None, reason="./dev example-robots is not installed")
+ARMS = ["pt500", "pt600", "puma560", "offsets", "crooked"] + [
+    pytest.param(name, marks=installed) for name in ("ur5", "panda", "xarm7")
+]
+
+
+@pytest.mark.parametrize("task", [Task.POSE_6D, Task.POSITION_AND_AXIS_5D])
+@pytest.mark.parametrize("name", ARMS)
+def test_where_the_tool_can_be_it_is_put_within_limits(name: str, task: Task) -> None:
+    _, model, solver = arm(name)
+    for positions in allowed_positions(model, 60):
+        target = tool_placement(model, positions)
+        result = solve(solver, target, task=task)
+        assert len(result.solutions) == 1, result.reason
+        assert result.reason == ""
+        assert max(result.residual_m, result.residual_rad) < 1e-8
+        assert reached(model, result.solutions[0], target, roll=task is Task.POSE_6D) < 1e-8
+        assert (result.solutions >= model.joints.lower).all()
+        assert (result.solutions <= model.joints.upper).all()
+        assert violations(model.joints, result.solutions[0]) == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "analytic"),
+    [("pt500", True), ("puma560", True), ("offsets", True), ("crooked", False)]
+    + [pytest.param(name, known, marks=installed) for name, known in (("ur5", True), ("panda", False))],
+)
+def test_closed_form_is_used_where_the_arms_family_has_one(name: str, analytic: bool) -> None:
+    _, model, solver = arm(name)
+    for positions in allowed_positions(model, 10):
+        assert solve(solver, tool_placement(model, positions), task=Task.POSE_6D).analytic is analytic
+
+
+def test_every_way_to_hold_a_puma_is_told_and_each_once() -> None:
+    _, model, solver = arm("offsets")  # nothing is beyond its limits
+    for positions in allowed_positions(model, 20):
+        target = tool_placement(model, positions)
+        found = solve(solver, target, task=Task.POSE_6D, near=positions, all_solutions=True).solutions
+        assert len(found) == 8
+        np.testing.assert_allclose(found[0], positions, atol=1e-7)
+        assert all(reached(model, each, target, roll=True) < 1e-8 for each in found)
+        turns = np.round(found / (2 * np.pi), 6) % 1.0
+        assert len(np.unique(np.round(turns, 5), axis=0)) == 8
+
+
+def test_solutions_come_nearest_first_and_one_alone_is_the_nearest() -> None:
+    _, model, solver = arm("puma560")
+    width = model.joints.upper - model.joints.lower
+    for positions, near in zip(
+        allowed_positions(model, 30), allowed_positions(model, 30, seed=5), strict=True
+    ):
+        target = tool_placement(model, positions)
+        found = solve(solver, target, task=Task.POSE_6D, near=near, all_solutions=True).solutions
+        distances = (np.square((found - near) / width)).sum(axis=1)
+        assert (np.diff(distances) >= 0).all()
+        np.testing.assert_array_equal(
+            solve(solver, target, task=Task.POSE_6D, near=near).solutions, found[:1]
+        )
+
+
+@pytest.mark.parametrize("turn", [-2 * np.pi, 0.0])
+def test_a_joint_that_turns_twice_around_is_answered_by_the_turn_near_by(turn: float) -> None:
+    _, model, solver = arm("offsets")
+    positions = np.array([2.0, 0.5, -1.0, 0.4, 1.2, 3.0]) + turn * np.array([1, 0, 0, 0, 0, 1])
+    found = solve(solver, tool_placement(model, positions), task=Task.POSE_6D, near=positions + 0.1)
+    np.testing.assert_allclose(found.solutions[0], positions, atol=1e-8)
+
+
+def test_free_roll_leaves_the_last_joint_where_it_was() -> None:
+    _, model, solver = arm("pt600")
+    near = model.joints.home.copy()
+    near[4] = 1.234
+    for positions in allowed_positions(model, 10):
+        target = tool_placement(model, positions)
+        found = solve(solver, target, task=Task.POSITION_AND_AXIS_5D, near=near, all_solutions=True)
+        assert found.analytic
+        assert (found.solutions[:, 4] == 1.234).all()
+
+
+def test_coupled_limits_choose_among_the_ways_to_hold_an_arm() -> None:
+    _, model, _ = arm("puma560")
+    text = (
+        load("puma560").text
+        + "\n[[constraint]]\njoints = { shoulder = 1.0, elbow = 1.0 }\nlimits = [60, 120]\n"
+    )
+    solver = build_solver(parse(text, load("puma560").source))
+    seen = 0
+    for positions in allowed_positions(model, 60):
+        target = tool_placement(model, positions)
+        result = solve(solver, target, task=Task.POSE_6D, near=positions, all_solutions=True)
+        free = solve(arm("puma560")[2], target, task=Task.POSE_6D, near=positions, all_solutions=True)
+        sums = np.degrees(free.solutions[:, 1:3].sum(axis=1))
+        assert len(result.solutions) == ((sums >= 60) & (sums <= 120)).sum()
+        if not len(result.solutions):
+            assert result.reason.startswith("limits: ")
+        seen += 0 < len(result.solutions) < len(free.solutions)
+    assert seen > 5
+
+
+@pytest.mark.parametrize("name", ["puma560", "pt600", pytest.param("ur5", marks=installed)])
+def test_singular_positions_are_found_again(name: str) -> None:
+    _, model, solver = arm(name)
+    random = np.random.default_rng(8)
+    for _ in range(40):
+        # Joints at zero or at home put axes in line.
+        chosen = random.random((2, len(model.joints))) < 0.5
+        positions = np.where(
+            chosen[0], np.where(chosen[1], 0.0, model.joints.home), random.uniform(-0.5, 0.5)
+        )
+        positions = np.clip(positions, model.joints.lower, model.joints.upper)
+        target = tool_placement(model, positions)
+        result = solve(solver, target, task=natural_task(model.joints))
+        assert len(result.solutions), result.reason
+        assert reached(model, result.solutions[0], target, roll=len(model.joints) > 5) < 2e-4
+
+
+@pytest.mark.parametrize("name", ["puma560", "pt500"])
+def test_a_pose_with_two_decimals_of_mm_and_degrees_is_reached_within_them(name: str) -> None:
+    """What people type, and controllers tell, is never exact."""
+    _, model, solver = arm(name)
+    for positions in allowed_positions(model, 20):
+        target = tool_placement(model, positions)
+        target[:3, 3] = np.round(target[:3, 3], 5)
+        result = solve(solver, target, task=Task.POSE_6D)
+        assert len(result.solutions), result.reason
+        assert max(result.residual_m, result.residual_rad) < 2e-4
+
+
+def test_sliding_and_following_joints_are_solved_and_the_finger_stays(tmp_path: Path) -> None:
+    description = telescope(tmp_path)
+    model, solver = build_model(description), build_solver(description)
+    near = model.joints.home.copy()
+    near[model.joints.names.index("grip")] = 0.07
+    for positions in allowed_positions(model, 30):
+        target = tool_placement(model, positions)
+        result = solve(solver, target, task=Task.POSE_6D, near=near)
+        assert len(result.solutions), result.reason
+        assert not result.analytic
+        assert reached(model, result.solutions[0], target, roll=True) < 1e-8
+        assert result.solutions[0, model.joints.names.index("grip")] == 0.07
+
+
+def test_an_arm_of_one_joint_is_solved() -> None:
+    description = parse(dh_arm("one", [(10.0, 100.0, 200.0, 30.0)], (-90.0, 90.0)), Path("robot.toml"))
+    model, solver = build_model(description), build_solver(description)
+    result = solve(solver, tool_placement(model, [0.7]), task=Task.POSE_6D)
+    np.testing.assert_allclose(result.solutions, [[0.7]], atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["puma560", "crooked"])
+def test_the_same_question_gets_the_same_answer_to_the_last_bit(name: str) -> None:
+    _, model, solver = arm(name)
+    again = build_solver(arm(name)[0])
+    for positions in allowed_positions(model, 10):
+        target = tool_placement(model, positions)
+        answers = [
+            solve(each, target, task=Task.POSE_6D, all_solutions=True, seed=3)
+            for each in (solver, solver, again)
+        ]
+        for other in answers[1:]:
+            np.testing.assert_array_equal(other.solutions, answers[0].solutions)
+
+
+def test_other_seeds_search_elsewhere() -> None:
+    _, model, solver = arm("crooked")
+    target = tool_placement(model, allowed_positions(model, 1)[0])
+    found = [solve(solver, target, task=Task.POSITION_3D, all_solutions=True, seed=seed) for seed in (0, 1)]
+    assert found[0].solutions.shape[0] > 10
+    assert not np.array_equal(found[0].solutions[:5], found[1].solutions[:5])
+
+
+@pytest.mark.parametrize("name", ["pt600", "puma560", "crooked"])
+def test_a_line_is_followed_on_one_branch(name: str) -> None:
+    _, model, solver = arm(name)
+    positions = model.joints.home + 0.2
+    step = np.full(len(model.joints), 0.004)
+    for _ in range(100):
+        expected = positions + step
+        target = tool_placement(model, expected)
+        found = follow(solver, target, task=natural_task(model.joints), near=positions)
+        assert found is not None
+        assert np.abs(found - positions).max() < 0.05
+        assert reached(model, found, target, roll=len(model.joints) > 5) < 1e-8
+        positions = found
+
+
+def test_following_to_another_branch_or_out_of_reach_gives_nothing() -> None:
+    _, model, solver = arm("puma560")
+    near = model.joints.home + 0.2
+    far = tool_placement(model, near + np.array([1.5, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    assert follow(solver, far, task=Task.POSE_6D, near=near) is None
+    away = tool_placement(model, near)
+    away[:3, 3] *= 10
+    assert follow(solver, away, task=Task.POSE_6D, near=near) is None
+
+
+@settings(max_examples=60, deadline=None)
+@given(shares=st.lists(st.floats(0.0, 1.0), min_size=6, max_size=6))
+def test_any_allowed_position_is_among_all_solutions_of_its_pose(shares: list[float]) -> None:
+    _, model, solver = arm("puma560")
+    positions = model.joints.lower + np.array(shares) * (model.joints.upper - model.joints.lower)
+    target = tool_placement(model, positions)
+    result = solve(solver, target, task=Task.POSE_6D, near=positions, all_solutions=True)
+    assert len(result.solutions), result.reason
+    assert min(reached(model, each, target, roll=True) for each in result.solutions) < 1e-6
+
+
+def exact(solver: InverseSolver, pose: object) -> None:
+    solve(solver, pose, task=Task.POSE_6D)  # type: ignore[arg-type]
+
+
+HERE = np.eye(4)
+
+
+@pytest.mark.parametrize(
+    ("pose", "said"),
+    [
+        ([1.0] * 15, "has 15 numbers; 16 are right"),
+        (np.eye(3), r"has numbers of shape \(3, 3\); 16 are right"),
+        ("nonsense", "takes 16 numbers"),
+        ([[1, 0], [0]], "takes 16 numbers"),
+        (HERE * np.nan, "holds nan; every number is to be finite"),
+        (np.where(HERE == 0, np.inf, HERE), "holds inf"),
+        (np.diag([1.0, 1.0, -1.0, 1.0]), "is mirrored"),
+        (np.diag([2.0, 1.0, 1.0, 1.0]), "has no rotation .* these have the lengths 2 1 1"),
+        (np.zeros((4, 4)), "has the last row 0 0 0 0; 0 0 0 1 is right"),
+        (np.diag([1.0, 1.0, 1.0, 2.0]), "has the last row 0 0 0 2"),
+        (np.diag([0.0, 0.0, 0.0, 1.0]), "has no rotation"),
+        (np.diag([1e300, 1e300, 1e300, 1.0]), "has no rotation"),
+        (HERE + np.outer([1, 0, 0, 0], [0, 0, 0, 1e9]), r"is 1e\+09 m away"),
+        ([10**400] * 16, "takes 16 numbers"),
+    ],
+)
+def test_what_is_no_pose_is_refused_in_words(pose: object, said: str) -> None:
+    with pytest.raises(PoseError, match=f"^the pose {said}"):
+        exact(arm("pt600")[2], pose)
+
+
+def test_a_rotation_with_few_decimals_is_made_exact() -> None:
+    pose = np.round(tool_placement(arm("puma560")[1], [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]), 4)
+    mended = tool_pose(pose)
+    np.testing.assert_allclose(mended[:3, :3] @ mended[:3, :3].T, np.eye(3), atol=1e-15)
+    np.testing.assert_allclose(mended, pose, atol=1e-4)
+
+
+def test_near_takes_one_finite_number_a_joint() -> None:
+    _, model, solver = arm("pt600")
+    target = tool_placement(model, model.joints.home)
+    with pytest.raises(JointCountError, match="takes \\(5,\\)"):
+        solve(solver, target, task=Task.POSE_6D, near=[0.0])
+    with pytest.raises(PoseError, match="not finite"):
+        follow(solver, target, task=Task.POSE_6D, near=[0.0, 0.0, np.nan, 0.0, 0.0])

@@ -1,0 +1,119 @@
+"""Motion from rest to rest: straight, as fast as the joints may, and known at every moment."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robots.description import load
+from robots.joints import joints_of
+from robots.motion import Motion, straight_motion
+
+JOINTS = joints_of(load("pt600"))
+# Ratios that differ from joint to joint: here motion in phase is no straight line of its own accord.
+UNEVEN = replace(
+    JOINTS,
+    max_acceleration=JOINTS.max_acceleration * np.array([1.0, 0.05, 1.0, 0.2, 3.0]),
+    max_jerk=JOINTS.max_jerk * np.array([1.0, 0.1, 0.03, 1.0, 2.0]),
+)
+shares = st.lists(st.floats(0.0, 1.0), min_size=5, max_size=5).map(np.array)
+
+
+@settings(max_examples=60, deadline=None)
+@given(shares, shares, st.floats(0.01, 1.0), st.sampled_from([JOINTS, UNEVEN]))
+def test_motion_from_rest_is_a_straight_line_within_all_limits(one, other, speed, joints):
+    start, target = (joints.lower + share * (joints.upper - joints.lower) for share in (one, other))
+    motion = Motion(joints, start)
+    motion.move(target, 3.0, speed=speed)
+    way = target - start
+    for now_s in np.linspace(3.0, motion.end_s, 30):
+        state = motion.state(now_s)
+        done = (state.positions - start) @ way / max(way @ way, 1e-300)
+        assert np.abs(state.positions - start - done * way).max() < 1e-9
+        assert np.all(np.abs(state.velocities) <= joints.max_speed * speed * (1 + 1e-6))
+        assert np.all(np.abs(state.accelerations) <= joints.max_acceleration * (1 + 1e-6))
+    assert np.array_equal(motion.state(motion.end_s).positions, target)
+
+
+interruptions = st.lists(
+    st.tuples(st.floats(0.0, 1.0), st.one_of(st.none(), st.floats(0.01, 1.0))), min_size=1, max_size=4
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(shares, shares, interruptions, st.sampled_from([JOINTS, UNEVEN]))
+def test_speeds_brakes_and_goings_on_keep_to_the_line_and_all_limits(one, other, interrupted, joints):
+    start, target = (joints.lower + share * (joints.upper - joints.lower) for share in (one, other))
+    motion, now_s, done = Motion(joints, start), 0.0, 0.0
+    motion.move(target, now_s, speed=1.0)
+    way = target - start
+    for after, speed in [*interrupted, (1.0, None), (1.0, 1.0), (1.0, None)]:
+        for at_s in np.linspace(now_s, until_s := now_s + after * (motion.end_s - now_s), 20):
+            state = motion.state(at_s)
+            before, done = done, (state.positions - start) @ way / max(np.linalg.norm(way), 1e-300)
+            assert np.abs((state.positions - start) * np.linalg.norm(way) - done * way).max() < 1e-8
+            assert before - 1e-6 <= done <= np.linalg.norm(way) + 1e-6
+            assert np.all(np.abs(state.velocities) <= joints.max_speed * (1 + 1e-6))
+            assert np.all(np.abs(state.accelerations) <= joints.max_acceleration * (1 + 1e-6))
+        now_s, moves = until_s, motion.state(until_s)
+        if speed is None:
+            motion.brake(now_s)
+        else:
+            motion.move(target, now_s, speed=speed)
+        assert motion.state(now_s).positions == pytest.approx(moves.positions, abs=1e-9)
+        assert motion.state(now_s).velocities == pytest.approx(moves.velocities, abs=1e-9)
+        assert motion.state(now_s).accelerations == pytest.approx(moves.accelerations, abs=1e-6)
+    assert np.array_equal(motion.state(motion.end_s).positions, target)
+
+
+@pytest.mark.parametrize(
+    ("after", "speed", "becomes_slow"),
+    # So near its target it is on its way to rest, and goes on with that.
+    [
+        (0.5, 0.04, True),
+        (0.12, 0.1, True),
+        (0.7, 0.1, True),
+        (0.75, 0.1, False),
+        (0.9, 0.02, False),
+        (0.97, 0.5, False),
+    ],
+)
+def test_what_is_slowed_down_never_goes_back(after, speed, becomes_slow):
+    target = JOINTS.home + np.radians([90.0, -45.0, 30.0, 0.0, 5.0])
+    motion = Motion(JOINTS, JOINTS.home)
+    motion.move(target, 0.0, speed=1.0)
+    now_s = after * motion.end_s
+    motion.move(target, now_s, speed=speed)
+    waist = [motion.state(at_s).velocities[0] for at_s in np.linspace(now_s, motion.end_s, 500)]
+    assert min(waist) > -1e-6
+    assert (motion.end_s > now_s + 0.36) == becomes_slow
+    # It takes 0.35 s from the greatest speed to none.
+    assert motion.state(now_s + 0.35).velocities[0] <= np.pi / 2 * speed + 1e-6
+
+
+def test_a_brake_takes_no_longer_way_than_accelerations_and_jerks_ask_for():
+    target = JOINTS.home + np.radians([90.0, 45.0, 0.0, 0.0, 0.0])
+    motion = Motion(JOINTS, JOINTS.home)
+    motion.move(target, 0.0, speed=1.0)
+    motion.brake(motion.end_s / 2)
+    # From 90°/s with 360°/s² and 3600°/s³: 0.25 s and 0.1 s, at half the speed in the mean.
+    end = motion.state(motion.end_s).positions
+    assert motion.end_s == pytest.approx(1.35 / 2 + 0.35, abs=1e-9)
+    assert np.degrees(end - JOINTS.home)[:2] == pytest.approx([45 + 15.75, (45 + 15.75) / 2], abs=1e-9)
+
+
+def test_a_cruise_takes_what_its_way_speed_acceleration_and_jerk_say():
+    target = JOINTS.home + np.radians([90.0, 0.0, 0.0, 0.0, 0.0])
+    motion = straight_motion(JOINTS, JOINTS.home, target, speed=1.0)
+    # 90°/s, 360°/s², 3600°/s³: 0.25 s and 0.1 s to get going, and as long to stop.
+    assert motion is not None
+    assert motion.duration == pytest.approx(90 / 90 + 0.25 + 0.1, abs=1e-9)
+    share, rate = motion.progress(np.array([0.0, motion.duration / 2, motion.duration]))
+    assert share == pytest.approx([0.0, 0.5, 1.0], abs=1e-9)
+    assert rate == pytest.approx([0.0, 1.0, 0.0], abs=1e-9)
+
+
+def test_going_nowhere_takes_no_time():
+    assert straight_motion(JOINTS, JOINTS.home, JOINTS.home.copy(), speed=1.0) is None

@@ -1,0 +1,127 @@
+"""Drawings as programs: the points that were drawn, where the frame has them."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import ezdxf
+import numpy as np
+import pytest
+
+from robots.description import load
+from robots.errors import MeshError
+from robots.joints import joints_of
+from robots.programs.dxf import DxfPath, program_from_dxf
+from robots.programs.statements import MoveJoints, MoveLine
+from robots.programs.text import parse_program, pose_of
+
+JOINTS = joints_of(load("pt600"))
+SQUARE = [(0.0, 0.0), (100.0, 0.0), (100.0, 50.0), (0.0, 50.0)]
+ASKED = DxfPath(layer="cut", approach_mm=20.0)
+
+
+def drawn(folder: Path, unit: int = 4) -> Path:
+    """A closed square on "cut", a chain drawn in any order on "seam", a circle on "hole"."""
+    drawing = ezdxf.new()
+    drawing.header["$INSUNITS"] = unit
+    space = drawing.modelspace()
+    space.add_lwpolyline(SQUARE, close=True, dxfattribs={"layer": "cut"})
+    space.add_line((10, 0), (20, 0), dxfattribs={"layer": "seam"})
+    space.add_line((20, 10), (20, 0), dxfattribs={"layer": "seam"})
+    space.add_line((0, 0), (10, 0), dxfattribs={"layer": "seam"})
+    space.add_circle((5, 5), 40, dxfattribs={"layer": "hole"})
+    path = folder / "part.dxf"
+    drawing.saveas(path)
+    return path
+
+
+def moves(text: str) -> list[tuple[type, np.ndarray]]:
+    """Each move and where it goes: (4, 4) [m]."""
+    return [(type(each), each.target.tool_to_base) for each in parse_program(text, JOINTS).statements]
+
+
+def test_a_polyline_comes_back_as_lines_through_its_points(tmp_path: Path) -> None:
+    frame = (400.0, 100.0, 250.0, 0.0, 90.0, 30.0)
+    found = moves(program_from_dxf(drawn(tmp_path), replace(ASKED, frame=frame, tool=(180.0, 0.0, 45.0))))
+    assert [kind for kind, _ in found] == [MoveJoints, *[MoveLine] * 6]
+    corners = [*SQUARE, SQUARE[0]]
+    wanted = [(*SQUARE[0], 20.0), *((x, y, 0.0) for x, y in corners), (*SQUARE[0], 20.0)]
+    for (_, pose), (x, y, z) in zip(found, wanted, strict=True):
+        assert pose == pytest.approx(pose_of(*frame) @ pose_of(x, y, z, 180.0, 0.0, 45.0), abs=1e-8)
+
+
+def test_lines_are_joined_where_they_meet_whichever_way_they_were_drawn(tmp_path: Path) -> None:
+    found = moves(program_from_dxf(drawn(tmp_path), replace(ASKED, layer="SEAM", approach_mm=0.0)))
+    places = [(1000 * pose[:2, 3]).round(6).tolist() for _, pose in found[1:-1]]
+    assert places == [[0, 0], [10, 0], [20, 0], [20, 10]]
+
+
+def test_a_circle_is_as_near_as_its_tolerance(tmp_path: Path) -> None:
+    text = program_from_dxf(drawn(tmp_path), replace(ASKED, layer="hole", tolerance_mm=0.5))
+    places = np.array([1000 * pose[:2, 3] - 5 for _, pose in moves(text)[1:-1]])
+    assert np.linalg.norm(places, axis=1) == pytest.approx(40.0, abs=1e-6)
+    assert places[0] == pytest.approx(places[-1])
+    middles = np.linalg.norm((places[:-1] + places[1:]) / 2, axis=1)
+    assert 39.5 <= middles.min() < 39.95
+    finer = program_from_dxf(drawn(tmp_path), replace(ASKED, layer="hole", tolerance_mm=0.05))
+    assert len(moves(finer)) > len(places) + 2
+
+
+@pytest.mark.parametrize("bulge", [1.0, -1.0])
+def test_a_polylines_arcs_are_followed_the_way_it_goes(tmp_path: Path, bulge: float) -> None:
+    drawing = ezdxf.new()
+    drawing.header["$INSUNITS"] = 4
+    corners = [(0, 0, 0), (50, 0, bulge), (50, 80, 0), (0, 80, 0)]
+    drawing.modelspace().add_lwpolyline(corners, format="xyb", dxfattribs={"layer": "cut"})
+    drawing.saveas(tmp_path / "part.dxf")
+    places = [1000 * pose[:2, 3] for _, pose in moves(program_from_dxf(tmp_path / "part.dxf", ASKED))[1:-1]]
+    assert np.array(places[:2]) == pytest.approx(np.array([[0, 0], [50, 0]]), abs=1e-6)
+    assert np.array(places[-2:]) == pytest.approx(np.array([[50, 80], [0, 80]]), abs=1e-6)
+    arc = np.array(places[1:-1]) - (50, 40)
+    assert np.linalg.norm(arc, axis=1) == pytest.approx(40.0, abs=1e-5)
+    assert (np.diff(arc[:, 1]) > 0).all()
+    assert (bulge * arc[1:-1, 0] > 0).all()
+
+
+def test_one_curve_is_chosen_by_its_handle(tmp_path: Path) -> None:
+    path = drawn(tmp_path)
+    handle = ezdxf.readfile(path).modelspace()[1].dxf.handle
+    found = moves(program_from_dxf(path, replace(ASKED, layer="", handle=handle.lower())))
+    assert [round(1000 * pose[0, 3]) for _, pose in found] == [10, 10, 20, 20]
+
+
+def test_the_drawings_unit_counts(tmp_path: Path) -> None:
+    found = moves(program_from_dxf(drawn(tmp_path, unit=1), ASKED))
+    assert found[2][1][0, 3] == pytest.approx(2.54)
+    with pytest.raises(MeshError, match=r"does not say its unit \(\$INSUNITS\): give it with --unit, in mm"):
+        program_from_dxf(drawn(tmp_path, unit=0), ASKED)
+    found = moves(program_from_dxf(drawn(tmp_path, unit=0), replace(ASKED, unit_mm=2.0)))
+    assert found[2][1][0, 3] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    ("asked", "sentence"),
+    [
+        (replace(ASKED, layer="ct"), "has no curve on layer 'ct'; did you mean 'cut'?"),
+        (
+            replace(ASKED, layer=""),
+            r"which curves\? Name a layer or a handle; there are curves on cut \(1\), hole \(1\), seam \(3\)",
+        ),
+        (replace(ASKED, handle="FFFF"), "has no curve of handle 'FFFF' in its model space"),
+        (
+            replace(ASKED, layer="hole", tolerance_mm=1e-5),
+            "more than a program holds: take a larger tolerance",
+        ),
+    ],
+)
+def test_what_cannot_be_followed_is_named(tmp_path: Path, asked: DxfPath, sentence: str) -> None:
+    with pytest.raises(MeshError, match=sentence):
+        program_from_dxf(drawn(tmp_path), asked)
+
+
+@pytest.mark.parametrize("content", [b"", b"solid a", b"0\nSECTION\n2\nENTITIES\n0\nLINE\n"])
+def test_what_is_no_drawing_is_refused_in_one_line(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "part.dxf"
+    path.write_bytes(content)
+    with pytest.raises(MeshError) as caught:
+        program_from_dxf(path, ASKED)
+    assert "\n" not in str(caught.value)

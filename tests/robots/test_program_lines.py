@@ -1,0 +1,104 @@
+"""Lines of the tool as joint moves: near the line everywhere, or a reason."""
+
+import numpy as np
+import pytest
+
+from robots.collision import build_cell
+from robots.inverse import build_solver, natural_task
+from robots.inverse.tasks import tool_misses
+from robots.model import tool_placement
+from robots.programs.lines import line_to
+from robots.programs.plan import plan_program
+from robots.programs.steps import LINE_DEG, LINE_M, StepKind, ViolationKind
+from robots.programs.text import parse_program
+from tests.robots.boxes import cell_of, placed
+
+ARMS = {name: build_cell(cell_of({name: (name, placed(0))})).arms[name] for name in ("pt600", "puma560")}
+SOLVERS = {name: build_solver(arm.description) for name, arm in ARMS.items()}
+
+
+def planned(robot: str, text: str):
+    arm = ARMS[robot]
+    return plan_program(parse_program(text, arm.joints), arm, SOLVERS[robot], arm.joints.home.copy())
+
+
+@pytest.mark.parametrize(
+    ("robot", "taught", "line"),
+    [
+        ("pt600", "move_joints 30 80 -80 -90 0", "move_line 400 -200 300 180 0 0"),
+        ("pt600", "move_joints -20 60 -70 -80 30", "move_line 450 100 200 180 0 90"),
+        ("puma560", "move_joints 0 -30 150 0 50 0", "move_line 500 -300 200 170 20 40"),
+        ("puma560", "move_line 500 -150 200 180 0 0", "move_line 500 -150 200 150 10 0"),
+    ],
+)
+def test_the_tool_stays_by_the_line_and_arrives(robot: str, taught: str, line: str) -> None:
+    model, task = ARMS[robot].model, natural_task(ARMS[robot].joints)
+    plan = planned(robot, f"{taught}\n{line}\n")
+    assert not plan.violations
+    assert not plan.notes
+    before = [step for step in plan.steps if step.line == 1][-1].target
+    parts = [step for step in plan.steps if step.line == 2]
+    assert all(step.kind is StepKind.MOVE and step.along_line for step in parts)
+    wanted = parse_program(line, ARMS[robot].joints).statements[0].target.tool_to_base
+    way = line_to(tool_placement(model, before), wanted, task)
+    at = before
+    for step in parts:
+        for look in np.linspace(0, 1, 15):
+            tool = tool_placement(model, at + look * (step.target - at))
+            # Where the tool only turns, how far it has turned says where on the line it is.
+            turned = tool_misses(tool, way.begin, task)[1] / max(float(np.linalg.norm(way.turn)), 1e-9)
+            away, angle = tool_misses(tool, way.pose(way.share_of(tool, turned)), task)
+            assert away <= LINE_M
+            assert angle <= np.radians(LINE_DEG)
+        at = step.target
+    away, angle = tool_misses(tool_placement(model, at), wanted, task)
+    assert away < 1e-6
+    assert angle < 1e-5
+
+
+def test_a_line_out_of_reach_ends_the_plan_where_it_is_and_says_why() -> None:
+    plan = planned("pt600", "move_line 400 0 300 180 0 0\nmove_line 1400 0 300 180 0 0\nhome\n")
+    (violation,) = plan.violations
+    assert (violation.kind, violation.line) == (ViolationKind.UNREACHABLE, 2)
+    assert violation.text.startswith("the line cannot be followed beyond ")
+    assert " of its 1000.0 mm: its end cannot be reached: out of reach: " in violation.text
+    assert plan.notes == ("nothing behind line 2 is checked: the program cannot get there",)
+    assert {step.line for step in plan.steps} == {1}
+    ((x, y, z),) = violation.points
+    assert 0.4 < x < 0.65
+    assert (y, z) == pytest.approx((0.0, 0.3), abs=1e-6)
+
+
+def test_a_pose_out_of_reach_names_the_point() -> None:
+    plan = planned("pt600", "point far = pose 3000 0 0 0 0 0\nmove_joints far\n")
+    (violation,) = plan.violations
+    assert violation.text.startswith("point far cannot be reached: ")
+    assert violation.points[0] == pytest.approx([3.0, 0.0, 0.0])
+
+
+def test_an_arm_of_five_joints_says_how_far_its_tool_leans_on_a_line() -> None:
+    plan = planned("pt600", "move_joints 30 80 -80 20 0\nmove_line 400 200 300 180 0 0\n")
+    assert not plan.violations
+    (note,) = plan.notes
+    assert note.startswith("line 2: between its ends the tool's axis is up to ")
+    assert note.endswith("° from an even turn: this arm cannot hold it there")
+
+
+def test_a_repeated_line_comes_to_the_same_moves_to_the_last_bit() -> None:
+    there, back = "move_line 400 200 300 180 0 0", "move_line 400 0 300 180 0 0"
+    plan = planned("pt600", f"{back}\nrepeat 3\n{there}\n{back}\nend")
+    rounds = [step.target.tobytes() for step in plan.steps if step.line in (3, 4)]
+    third = len(rounds) // 3
+    assert third > 2
+    assert rounds[third : 2 * third] == rounds[2 * third :]
+
+
+def test_a_program_that_names_no_speed_begins_with_one() -> None:
+    kinds = [(step.kind, step.percent) for step in planned("pt600", "trace on\nhome\nspeed 20\nhome").steps]
+    assert kinds == [
+        (StepKind.TRACE, None),
+        (StepKind.SPEED, 100.0),
+        (StepKind.HOME, None),
+        (StepKind.SPEED, 20.0),
+        (StepKind.HOME, None),
+    ]

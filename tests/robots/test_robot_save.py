@@ -1,0 +1,338 @@
+"""Saving a robot: the text that people read, and a folder that is whole whatever happens."""
+
+import io
+import os
+import signal
+import subprocess
+import sys
+import tomllib
+import zipfile
+from copy import deepcopy
+from pathlib import Path
+
+import pytest
+
+from robots.description import LIBRARY, load
+from robots.errors import DescriptionError, RobotExistsError, SaveError
+from robots.glb import link_meshes
+from robots.save import Saved, read_robot, refused_path, revision_of, write_description, zip_description
+from robots.save_text import description_text
+
+PT500 = (LIBRARY / "pt500" / "robot.toml").read_text(encoding="utf-8")
+
+SMALL = {
+    "name": "one",
+    "units": {"length": "mm", "angle": "deg"},
+    "base": {"mesh": "meshes/base.wrl", "mesh_pose": {"xyz": [0, 0, 1], "rpy": [0, 0, 90]}},
+    "joint": [{"name": "turn", "a": 0, "alpha": 0, "d": 100, "limits": [-90, 90], "link": {"name": "arm"}}],
+    "view": {"top": {"eye": [0, 0, 1], "target": [0, 0, 0], "up": [0, 1, 0]}},
+    "title": None,
+}
+
+
+def test_a_description_is_written_as_people_write_one():
+    assert description_text(SMALL) == (
+        'name = "one"\n'
+        'units = { length = "mm", angle = "deg" }\n'
+        "\n"
+        "[base]\n"
+        'mesh = "meshes/base.wrl"\n'
+        "mesh_pose = { xyz = [0.0, 0.0, 1.0], rpy = [0.0, 0.0, 90.0] }\n"
+        "\n"
+        "[[joint]]\n"
+        'name = "turn"\n'
+        "a = 0.0\n"
+        "alpha = 0.0\n"
+        "d = 100.0\n"
+        "limits = [-90.0, 90.0]\n"
+        'link = { name = "arm" }\n'
+        "\n"
+        "[view.top]\n"
+        "eye = [0.0, 0.0, 1.0]\n"
+        "target = [0.0, 0.0, 0.0]\n"
+        "up = [0.0, 1.0, 0.0]\n"
+    )
+
+
+@pytest.mark.parametrize("robot", ["pt500", "pt600", "puma560"])
+def test_the_librarys_own_files_come_back_as_they_were(robot):
+    text = (LIBRARY / robot / "robot.toml").read_text(encoding="utf-8")
+    values = tomllib.loads(text)
+    assert description_text(values, text) == text
+    assert tomllib.loads(description_text(values)) == values
+
+
+def test_texts_with_quotes_newlines_and_other_alphabets_are_kept():
+    values = {"name": "x", "title": 'a "b" \\ \n\t', "provenance": "гибкий 机器人 \x7f"}
+    assert tomllib.loads(description_text(values)) == values
+
+
+def test_comments_stay_with_their_joints_when_rows_move_change_and_go():
+    text = PT500.replace("limits = [-110.0, 110.0]", "limits = [-110.0, 110.0]  # hoses")
+    values = tomllib.loads(text)
+    waist, shoulder, elbow, wrist, _roll = values["joint"]
+    values["joint"] = [waist, elbow, deepcopy(shoulder) | {"name": "second"}, wrist]
+    elbow["limits"] = [-90, 90]
+    values["frame"] = [{"name": "camera", "link": "wrist", "xyz": [0, 0, 1]}]
+    del values["tool"]
+    written = description_text(values, text)
+    assert tomllib.loads(written) == values
+    assert written.startswith("# Five rotary joints")
+    assert "limits = [-90.0, 90.0]  # hoses\n" in written
+    assert written.index("# hoses") < written.index('name = "second"') < written.index('name = "wrist"')
+    assert 'name = "roll"' not in written
+    assert "[tool]" not in written
+
+
+def test_a_file_that_is_no_toml_any_more_is_written_anew():
+    assert description_text({"name": "x"}, "name = [") == 'name = "x"\n'
+
+
+# ---------------------------------------------------------------------------- folders
+
+
+def version(number: int) -> dict:
+    return {"name": "arm", "title": f"version {number}"}
+
+
+def content(number: int) -> bytes:
+    return bytes([number]) * 300_000
+
+
+def assert_whole(folder: Path, numbers) -> None:
+    values, files = read_robot(folder / "arm")
+    (number,) = (number for number in numbers if values == version(number))
+    assert set(files) == {"meshes/a.wrl", f"meshes/{number}.3ds"}
+    assert {path.read_bytes() for path in files.values()} == {content(number)}
+
+
+def save(folder: Path, number: int, **more) -> Saved:
+    files = {"meshes/a.wrl": content(number), f"meshes/{number}.3ds": content(number)}
+    return write_description(version(number), files, folder, **more)
+
+
+def test_a_saved_robot_is_the_one_that_was_described(tmp_path):
+    values, files = read_robot(LIBRARY / "pt500")
+    path = write_description(values | {"name": "mine"}, files, tmp_path / "robots").path
+    assert path == tmp_path / "robots" / "mine" / "robot.toml"
+    assert load(path).joints == load("pt500").joints
+    assert read_robot(path.parent)[1].keys() == files.keys()
+
+
+def test_a_robot_is_replaced_only_when_asked_and_then_whole(tmp_path):
+    save(tmp_path, 1)
+    with pytest.raises(RobotExistsError):
+        save(tmp_path, 2)
+    assert_whole(tmp_path, [1])
+    save(tmp_path, 2, overwrite=True)
+    assert_whole(tmp_path, [2])
+    assert [path.name for path in tmp_path.iterdir()] == ["arm"]
+
+
+def test_a_robot_is_replaced_without_a_question_while_it_is_the_one_that_was_seen(tmp_path):
+    first = save(tmp_path, 1).revision
+    second = save(tmp_path, 2, replaces=first).revision
+    assert second == revision_of(tmp_path / "arm") != first
+    with pytest.raises(RobotExistsError) as error:
+        save(tmp_path, 3, replaces=first)
+    assert error.value.changed
+    assert_whole(tmp_path, [2])
+
+
+@pytest.mark.parametrize("what", ["added", "changed", "gone", "renamed", "a link"])
+def test_whatever_is_changed_in_a_folder_changes_its_revision(tmp_path, what):
+    before = save(tmp_path, 1).revision
+    mesh = tmp_path / "arm" / "meshes" / "a.wrl"
+    if what == "added":
+        (tmp_path / "arm" / "README.md").write_text("hello")
+    elif what == "changed":
+        mesh.write_bytes(content(1)[:-1] + b"x")
+    elif what == "gone":
+        mesh.unlink()
+    elif what == "renamed":
+        mesh.rename(mesh.with_name("b.wrl"))
+    else:
+        (tmp_path / "arm" / "link").symlink_to(mesh)
+    assert revision_of(tmp_path / "arm") != before
+
+
+def test_a_robot_that_is_a_link_is_saved_where_it_leads_again_and_again(tmp_path):
+    save(tmp_path / "elsewhere", 1)
+    (tmp_path / "robots").mkdir()
+    (tmp_path / "robots" / "arm").symlink_to(tmp_path / "elsewhere" / "arm")
+    for number in (2, 3):
+        save(tmp_path / "robots", number, overwrite=True)
+        assert (tmp_path / "robots" / "arm").is_symlink()
+        assert_whole(tmp_path / "elsewhere", [number])
+    assert [path.name for path in (tmp_path / "elsewhere").iterdir()] == ["arm"]
+
+
+def test_what_a_save_left_behind_as_a_link_or_a_file_keeps_nobody_from_saving(tmp_path):
+    save(tmp_path, 1)
+    (tmp_path / ".arm.0000.saving").symlink_to(tmp_path / "arm")
+    (tmp_path / ".arm.0001.saving").write_text("")
+    save(tmp_path, 2, overwrite=True)
+    assert_whole(tmp_path, [2])
+    assert [path.name for path in tmp_path.iterdir()] == ["arm"]
+
+
+def test_a_file_called_robot_toml_is_neither_saved_nor_zipped_in_place_of_the_draft(tmp_path):
+    files = {"robot.toml": b'name = "another"'}
+    path = write_description(version(1), files, tmp_path).path
+    assert tomllib.loads(path.read_text()) == version(1)
+    with zipfile.ZipFile(io.BytesIO(zip_description(version(1), files))) as zipped:
+        assert zipped.namelist() == ["arm/robot.toml"]
+        assert tomllib.loads(zipped.read("arm/robot.toml").decode()) == version(1)
+
+
+def test_what_is_no_robot_is_not_replaced(tmp_path):
+    (tmp_path / "arm").mkdir()
+    (tmp_path / "arm" / "thesis.txt").write_text("years of work")
+    with pytest.raises(SaveError, match="is no robot's folder"):
+        save(tmp_path, 1, overwrite=True)
+    assert (tmp_path / "arm" / "thesis.txt").read_text() == "years of work"
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "",
+        "/etc/x.wrl",
+        "../x.wrl",
+        "a/../../x",
+        "a//b",
+        "./a",
+        "a/",
+        "c:/x",
+        "a\\b",
+        "a\0b",
+        "a\nb",
+        "x" * 300,
+    ],
+)
+def test_a_path_that_leads_out_of_the_folder_is_refused(path, tmp_path):
+    assert refused_path(path)
+    with pytest.raises(DescriptionError):
+        write_description(version(1), {path: b""}, tmp_path / "robots")
+    with pytest.raises(DescriptionError):
+        zip_description(version(1), {path: b""})
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", [None, "", "../x", "Arm", "a b", ".arm", 5, "a" * 101])
+def test_a_name_that_is_no_robots_is_refused(name, tmp_path):
+    with pytest.raises(DescriptionError, match="name"):
+        write_description({"name": name}, {}, tmp_path)
+
+
+def test_a_file_in_the_place_of_a_folder_is_refused_and_leaves_nothing(tmp_path):
+    with pytest.raises(SaveError):
+        write_description(version(1), {"a": b"1", "a/b": b"2"}, tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_zip_holds_the_same_folder_and_is_the_same_each_time():
+    files = {"meshes/a.wrl": b"mesh"}
+    archive = zip_description(version(1), files)
+    assert archive == zip_description(version(1), files)
+    with zipfile.ZipFile(io.BytesIO(archive)) as zipped:
+        assert zipped.namelist() == ["arm/robot.toml", "arm/meshes/a.wrl"]
+        assert zipped.read("arm/meshes/a.wrl") == b"mesh"
+        assert tomllib.loads(zipped.read("arm/robot.toml").decode()) == version(1)
+
+
+_SAVES_FOR_EVER = """
+import itertools, sys
+sys.path.insert(0, sys.argv[2])
+from pathlib import Path
+from tests.robots.test_robot_save import save
+print("ready", flush=True)
+for number in itertools.cycle([1, 2]):
+    save(Path(sys.argv[1]), number, overwrite=True)
+"""
+
+
+def test_a_kill_at_any_instant_leaves_one_whole_robot(tmp_path):
+    save(tmp_path, 1)
+    seen = set()
+    for round_ in range(15):
+        process = subprocess.Popen(
+            [sys.executable, "-c", _SAVES_FOR_EVER, str(tmp_path), str(Path(__file__).parents[2])],
+            stdout=subprocess.PIPE,
+        )
+        try:
+            assert process.stdout.readline() == b"ready\n"
+            with pytest.raises(subprocess.TimeoutExpired):
+                process.wait(0.02 + 0.0061 * round_)
+        finally:
+            process.send_signal(signal.SIGKILL)
+            process.communicate()
+        assert_whole(tmp_path, [1, 2])
+        seen |= {path.suffix for path in tmp_path.iterdir()}
+    assert seen <= {"", ".saving"}
+    save(tmp_path, 3, overwrite=True)
+    assert_whole(tmp_path, [3])
+    assert [path.name for path in tmp_path.iterdir()] == ["arm"], "what the killed ones left is gone"
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    if os.getuid() != 0:
+        pytest.skip("only root can mount a small disk")
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(folder)]
+    if subprocess.run(mount, capture_output=True).returncode != 0:
+        pytest.skip("this machine mounts no tmpfs")
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+def test_a_full_disk_is_told_in_words_and_the_old_robot_stays(small_disk):
+    save(small_disk, 1)
+    with pytest.raises(SaveError, match="arm: not saved, No space left on device"):
+        save(small_disk, 2, overwrite=True)
+    assert_whole(small_disk, [1])
+    assert [path.name for path in small_disk.iterdir()] == ["arm"]
+
+
+BOX = "#VRML V2.0 utf8\nShape { geometry Box { } }\n"
+
+
+def test_a_robot_that_is_confined_shows_no_file_of_another_folder(tmp_path):
+    (tmp_path / "outside.wrl").write_text(BOX)
+    robot = tmp_path / "arm"
+    robot.mkdir()
+    (robot / "base.wrl").write_text(f'{BOX}Inline {{ url "{tmp_path}/outside.wrl" }}\n')
+    values, _ = read_robot(LIBRARY / "pt500")
+    rows = [row | {"link": {}} for row in values["joint"]]
+    values |= {"base": {"mesh": "base.wrl"}, "joint": rows}
+    (robot / "robot.toml").write_text(description_text(values))
+    cache = tmp_path / "cache"
+    # Anybody else's GLB in the cache is not taken for it, nor the other way round.
+    free = link_meshes(load(robot), cache=cache)["base"]
+    confined = link_meshes(load(robot, confined=True), cache=cache)["base"]
+    (robot / "base.wrl").write_text(f'{BOX}Inline {{ url "{tmp_path}/none.wrl" }}\n')
+    assert len(confined) < len(free)
+    assert link_meshes(load(robot), cache=cache)["base"] == confined
+
+
+def test_a_confined_description_names_no_file_of_another_folder(tmp_path):
+    (tmp_path / "outside.wrl").write_text(BOX)
+    (tmp_path / "arm").mkdir()
+    text = PT500.replace("meshes/base.wrl", "../outside.wrl")
+    (tmp_path / "arm" / "robot.toml").write_text(text)
+    with pytest.raises(DescriptionError) as error:
+        load(tmp_path / "arm", confined=True)
+    assert any("must lie in the description's own folder" in text for text in error.value.problems)
+
+
+@pytest.mark.parametrize(
+    "value", ["9" * 5000, "0x" + "f" * 5000, "[" * 2000 + "]" * 2000], ids=["digits", "hex", "nested"]
+)
+def test_a_number_of_thousands_of_digits_is_told_in_words(tmp_path, value):
+    (tmp_path / "robot.toml").write_text(f"{PT500}\nodd = {value}\n".replace("\nodd", "\n[tool2]\nodd"))
+    (tmp_path / "other.toml").write_text(f"name = {value}\n")
+    for name in ("robot.toml", "other.toml"):
+        with pytest.raises(DescriptionError):
+            load(tmp_path / name)

@@ -1,0 +1,49 @@
+"""How near an arm is to a singular position: nothing where it is singular, the same in any unit of length."""
+
+import numpy as np
+import pytest
+
+from robots.description import load
+from robots.model import build_model
+from robots.singularity import reach_of, singularity_margin
+
+
+def margin(name, degrees):
+    description = load(name)
+    return singularity_margin(build_model(description), np.radians(degrees), reach=reach_of(description))
+
+
+def test_the_reach_is_the_arms_length_from_its_first_joint_to_its_tool():
+    # Pt600: rows d 0.35, a 0.30, a 0.30; tool 0.12.
+    assert reach_of(load("pt600")) == pytest.approx(0.35 + 0.30 + 0.30 + 0.12)
+
+
+@pytest.mark.parametrize(
+    ("name", "stretched", "bent"),
+    [
+        # A straight elbow cannot move the tool along the arm; a straight wrist cannot turn it one way.
+        ("pt600", [10, 40, 0, -40, 0], [10, 40, 60, -40, 0]),
+        ("puma560", [10, 40, 60, 0, 0, 0], [10, 40, 10, 30, 60, 20]),
+    ],
+)
+def test_it_is_nothing_where_the_arm_is_singular_and_something_elsewhere(name, stretched, bent):
+    assert margin(name, bent) > 0.02
+    assert margin(name, stretched) < 1e-9
+
+
+def test_an_arm_twice_as_large_is_as_near(tmp_path):
+    library = load("pt600").source
+    lines = library.read_text(encoding="utf-8").splitlines()
+    doubled = [
+        f"{key}= {2 * float(value)}" if (key := line.partition("=")[0]).strip() in ("a", "d") else line
+        for line in lines
+        for value in [line.partition("=")[2].partition("#")[0].strip()]
+    ]
+    text = "\n".join(doubled).replace("xyz = [0.0, 0.0, 120.0]", "xyz = [0.0, 0.0, 240.0]")
+    (tmp_path / "robot.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "meshes").symlink_to(library.parent / "meshes")
+    twice = load(tmp_path / "robot.toml")
+    assert reach_of(twice) == pytest.approx(2 * reach_of(load("pt600")))
+    positions = [10, 40, 60, -40, 5]
+    own = singularity_margin(build_model(twice), np.radians(positions), reach=reach_of(twice))
+    assert own == pytest.approx(margin("pt600", positions))

@@ -1,0 +1,78 @@
+"""Robots of a mesh as one URDF: read back by Pinocchio, each stands where its site has it."""
+
+from xml.etree import ElementTree as Xml
+
+import numpy as np
+import pinocchio
+import pytest
+
+from robots.description import load
+from robots.model import build_model, link_placements
+from robots.urdf.viewers import WORLD, Viewed, prefixed, together
+from robots.urdf.write import to_urdf
+
+POSES = {
+    "upright": pinocchio.SE3(pinocchio.rpy.rpyToMatrix(0.3, -0.4, 2.0), np.array([1.0, -2.0, 0.5])),
+    "nose-down": pinocchio.SE3(pinocchio.rpy.rpyToMatrix(0.7, np.pi / 2, 0.2), np.array([0.0, 1.0, 3.0])),
+    "nose-up": pinocchio.SE3(pinocchio.rpy.rpyToMatrix(0.0, -np.pi / 2, -1.0), np.zeros(3)),
+}
+
+
+def viewed(site, robot, pose):
+    urdf = to_urdf(load(robot))
+    return Viewed(site, robot, urdf, tuple(pose.homogeneous.ravel()), lambda link: f"file:///{link}.glb")
+
+
+@pytest.mark.parametrize("pose", POSES.values(), ids=POSES)
+def test_every_link_of_every_robot_is_where_its_site_has_it(pose):
+    robots = [viewed("hall", "pt600", pose), viewed("hall", "puma560", pinocchio.SE3.Identity())]
+    whole = pinocchio.buildModelFromXML(together(robots, plain_joints=False))
+    generator = np.random.default_rng(5)
+    for robot, base_to_site in (("pt600", pose), ("puma560", pinocchio.SE3.Identity())):
+        model = build_model(load(robot))
+        positions = generator.uniform(model.joints.lower, model.joints.upper)
+        told = pinocchio.neutral(whole)
+        for name, position in zip(model.joints.names, positions, strict=True):
+            told[whole.joints[whole.getJointId(f"hall/{robot}/{name}")].idx_q] = position
+        data = whole.createData()
+        pinocchio.framesForwardKinematics(whole, data, told)
+        for name, placement in zip(model.link_names, link_placements(model, positions), strict=True):
+            frame = whole.getFrameId(f"hall/{robot}/{name}", pinocchio.FrameType.BODY)
+            expected = base_to_site.homogeneous @ placement
+            np.testing.assert_allclose(data.oMf[frame].homogeneous, expected, atol=1e-7)
+
+
+def test_several_sites_hang_in_one_root_and_one_site_is_the_root_itself():
+    here, there = (viewed(site, "pt600", pinocchio.SE3.Identity()) for site in ("here", "there"))
+
+    def roots(text):
+        urdf = Xml.fromstring(text)
+        children = {each.get("link") for each in urdf.iter("child")}
+        return [link.get("name") for link in urdf.findall("link") if link.get("name") not in children]
+
+    assert roots(together([here], plain_joints=True)) == ["here"]
+    assert roots(together([here, there], plain_joints=False)) == [WORLD]
+    assert pinocchio.buildModelFromXML(together([here, there], plain_joints=False)).nq == 10
+
+
+def test_plain_joints_keep_their_names_and_the_meshes_are_those_of_the_mesh():
+    urdf = Xml.fromstring(together([viewed("here", "pt600", pinocchio.SE3.Identity())], plain_joints=True))
+    names = {joint.get("name") for joint in urdf.findall("joint")}
+    assert {"waist", "elbow"} <= names
+    assert {mesh.get("filename") for mesh in urdf.iter("mesh")} >= {"file:///base.glb"}
+    assert not list(urdf.iter("collision"))
+
+
+def test_a_mimicking_joint_follows_the_joint_by_its_new_name():
+    text = """<robot name="g"><link name="a"/><link name="b"/><joint name="two" type="revolute">
+    <parent link="a"/><child link="b"/><mimic joint="one"/></joint></robot>"""
+    joint = prefixed(text, "s/g/", lambda link: None, joints=True).find("joint")
+    assert (joint.get("name"), joint.find("mimic").get("joint")) == ("s/g/two", "s/g/one")
+
+
+def test_what_is_no_urdf_is_left_out_and_keeps_nobody_else_from_being_seen():
+    bad = Viewed("here", "bad", "<robot", (), lambda link: None)
+    text = together([bad, viewed("here", "pt600", pinocchio.SE3.Identity())], plain_joints=False)
+    assert "here/pt600/base" in text
+    with pytest.raises(ValueError, match="no URDF"):
+        prefixed("<robot", "", lambda link: None)

@@ -1,0 +1,143 @@
+"""Appearance (6.3), Material (6.27), ImageTexture (6.22); IndexedLineSet (6.24) and PointSet (6.36)."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robots.meshes.mesh import Material, Mesh, Wire
+
+Draw = Callable[[str], Mesh]
+
+
+def material(draw: Draw, appearance: str) -> Material:
+    (part,) = draw(f"Shape {{ appearance {appearance} geometry Box {{ }} }}").parts
+    return part.material
+
+
+def test_material_has_all_its_fields(draw: Draw) -> None:
+    found = material(
+        draw,
+        """Appearance { material DEF Steel Material { diffuseColor 0.1 0.2 0.3 specularColor 0.4 0.5 0.6
+        emissiveColor 0.7 0.8 0.9 shininess 0.25 transparency 0.5 ambientIntensity 0.9 } }""",
+    )
+    assert found == Material(
+        name="Steel",
+        diffuse=(0.1, 0.2, 0.3),
+        specular=(0.4, 0.5, 0.6),
+        emissive=(0.7, 0.8, 0.9),
+        shininess=0.25,
+        transparency=0.5,
+    )
+
+
+def test_material_without_fields_has_the_standards_values(draw: Draw) -> None:
+    found = material(draw, "Appearance { material Material { } }")
+    assert found == Material(
+        diffuse=(0.8, 0.8, 0.8), specular=(0, 0, 0), emissive=(0, 0, 0), shininess=0.2, transparency=0
+    )
+
+
+def test_colors_and_fractions_are_brought_into_zero_to_one(draw: Draw) -> None:
+    found = material(
+        draw, "Appearance { material Material { diffuseColor 2 -1 0.5 shininess 128 transparency -1 } }"
+    )
+    assert (found.diffuse, found.shininess, found.transparency) == ((1, 0, 0.5), 1, 0)
+
+
+@pytest.mark.parametrize("appearance", ["Appearance { }", "Appearance { material NULL }", "NULL"])
+def test_shape_without_a_material_is_white(draw: Draw, appearance: str) -> None:
+    # 6.3 and 6.41: an unlit object colour of (1, 1, 1).
+    assert material(draw, appearance).diffuse == (1, 1, 1)
+
+
+def test_texture_is_kept_by_name(draw: Draw, tmp_path: Path) -> None:
+    (tmp_path / "wood.png").write_bytes(b"")
+    text = 'Appearance { material Material { } texture ImageTexture { url [ "none.gif", "wood.png" ] } }'
+    mesh = draw(f"Shape {{ appearance {text} geometry Box {{ }} }}")
+    assert mesh.parts[0].material.texture == "none.gif"
+    assert mesh.warnings == ()
+
+
+def test_texture_that_is_missing_is_told_once(draw: Draw) -> None:
+    shape = 'Shape { appearance Appearance { texture ImageTexture { url "none.png" } } geometry Box { } }'
+    mesh = draw(f"{shape}\n{shape}")
+    assert mesh.parts[1].material.texture == "none.png"
+    assert mesh.warnings == ("line 2, column 41: ImageTexture: 'none.png': no such file",)
+
+
+# Lines and points
+
+POINTS = "coord Coordinate { point [ 0 0 0, 1 0 0, 1 1 0, 0 1 0 ] }"
+COLORS = "color Color { color [ 1 0 0, 0 1 0, 0 0 1, 1 1 1 ] }"
+RED, GREEN, BLUE, WHITE = [1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1], [1, 1, 1, 1]
+
+
+def wire(draw: Draw, geometry: str) -> Wire:
+    mesh = draw(f"Shape {{ geometry {geometry} }}")
+    assert mesh.parts == ()
+    (found,) = mesh.wires
+    return found
+
+
+def lines(found: Wire) -> list[list[list[float]]]:
+    segments: list[list[list[float]]] = found.vertices[found.segments].tolist()
+    return segments
+
+
+def test_line_set_joins_the_points_of_each_line(draw: Draw) -> None:
+    found = wire(draw, f"IndexedLineSet {{ {POINTS} coordIndex [ 0 1 2 -1 3 0 -1 1 -1 ] }}")
+    assert lines(found) == [
+        [[0, 0, 0], [1, 0, 0]],
+        [[1, 0, 0], [1, 1, 0]],
+        [[0, 1, 0], [0, 0, 0]],
+    ]
+    assert found.colors is None
+
+
+@pytest.mark.parametrize(
+    ("fields", "expected"),
+    [
+        ("", [[RED, GREEN], [GREEN, BLUE], [WHITE, RED]]),
+        ("colorIndex [ 3 3 0 -1 1 2 -1 ]", [[WHITE, WHITE], [WHITE, RED], [GREEN, BLUE]]),
+        ("colorPerVertex FALSE", [[RED, RED], [RED, RED], [GREEN, GREEN]]),
+        ("colorPerVertex FALSE colorIndex [ 2 0 ]", [[BLUE, BLUE], [BLUE, BLUE], [RED, RED]]),
+    ],
+)
+def test_lines_have_colors_by_vertex_and_by_line(
+    draw: Draw, fields: str, expected: list[list[list[float]]]
+) -> None:
+    found = wire(draw, f"IndexedLineSet {{ {POINTS} {COLORS} {fields} coordIndex [ 0 1 2 -1 3 0 -1 ] }}")
+    assert found.colors is not None
+    assert found.colors[found.segments].tolist() == expected
+
+
+def test_lines_to_points_that_are_not_there_are_left_out_with_a_warning(draw: Draw) -> None:
+    mesh = draw(f"Shape {{ geometry IndexedLineSet {{ {POINTS} coordIndex [ 0 1 7 2 3 ] }} }}")
+    assert lines(mesh.wires[0]) == [[[0, 0, 0], [1, 0, 0]], [[1, 1, 0], [0, 1, 0]]]
+    assert "coordIndex holds 7; there are 4 points, 0 to 3" in mesh.warnings[0]
+
+
+def test_points_stand_where_the_transform_puts_them(draw: Draw) -> None:
+    mesh = draw(
+        f"Transform {{ translation 0 0 5 children Shape {{ geometry PointSet {{ {POINTS} {COLORS} }} }} }}"
+    )
+    (found,) = mesh.wires
+    assert found.vertices[2].tolist() == [1, 1, 5]
+    assert len(found.segments) == 0
+    assert found.colors is not None
+    assert found.colors.tolist() == [RED, GREEN, BLUE, WHITE]
+
+
+def test_points_with_too_few_colors_have_none(draw: Draw) -> None:
+    mesh = draw(f"Shape {{ geometry PointSet {{ {POINTS} color Color {{ color [ 1 0 0 ] }} }} }}")
+    assert mesh.wires[0].colors is None
+    assert "1 colors for 4 points" in mesh.warnings[0]
+
+
+def test_lines_and_points_count_as_no_triangles(draw: Draw) -> None:
+    mesh = draw(f"Shape {{ geometry PointSet {{ {POINTS} }} }} Shape {{ geometry IndexedLineSet {{ }} }}")
+    assert mesh.triangle_count == 0
+    assert len(mesh.wires) == 1
+    np.testing.assert_array_equal(mesh.wires[0].vertices[1], [1, 0, 0])

@@ -1,0 +1,486 @@
+"""What holds shapes: grouping nodes, DEF and USE, PROTO and EXTERNPROTO (4.8), Inline (6.25)."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robots.errors import MeshError
+from robots.meshes.mesh import Mesh, bounds
+from robots.meshes.vrml.parser import parse_vrml
+from robots.meshes.vrml.read import read_vrml
+from robots.meshes.vrml.source import load
+from robots.meshes.vrml.values import nodes_of, strings
+
+Draw = Callable[[str], Mesh]
+
+# One triangle with corners at the origin, x = 1 and y = 1.
+SHAPE = """Shape { geometry IndexedFaceSet {
+  coord Coordinate { point [ 0 0 0, 1 0 0, 0 1 0 ] } coordIndex [ 0 1 2 ] } }"""
+BOX = "Shape { geometry Box { size 2 2 2 } }"
+
+
+def corners(mesh: Mesh) -> list[list[list[float]]]:
+    """The three corners of each triangle, rounded."""
+    return [
+        triangle
+        for part in mesh.parts
+        for triangle in (np.round(part.vertices[part.triangles], 9) + 0.0).tolist()
+    ]
+
+
+def extent(mesh: Mesh) -> list[list[float]]:
+    return [np.round(corner, 9).tolist() for corner in bounds(mesh)]
+
+
+def write(folder: Path, name: str, text: str) -> Path:
+    path = folder / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(f"#VRML V2.0 utf8\n{text}")
+    return path
+
+
+# Transform
+
+
+@pytest.mark.parametrize(
+    ("fields", "low", "high"),
+    [
+        ("translation 10 20 30", [9, 19, 29], [11, 21, 31]),
+        ("scale 1 2 3", [-1, -2, -3], [1, 2, 3]),
+        ("rotation 0 0 1 1.5707963267948966 scale 2 1 1", [-1, -2, -1], [1, 2, 1]),
+        # An axis need not have length one, and one of length zero turns nothing.
+        ("rotation 0 0 7 1.5707963267948966 scale 2 1 1", [-1, -2, -1], [1, 2, 1]),
+        ("rotation 0 0 0 1 scale 2 1 1", [-2, -1, -1], [2, 1, 1]),
+        # About (1, 1, 1): that corner stays, the others go to -1 - 2.
+        ("center 1 1 1 scale 2 2 2", [-3, -3, -3], [1, 1, 1]),
+        ("center 1 0 0 rotation 0 0 1 3.141592653589793", [1, -1, -1], [3, 1, 1]),
+        ("translation 10 0 0 rotation 0 0 1 1.5707963267948966 scale 2 1 1", [9, -2, -1], [11, 2, 1]),
+        ("scale -1 1 1", [-1, -1, -1], [1, 1, 1]),
+    ],
+)
+def test_transform_moves_what_is_in_it(draw: Draw, fields: str, low: list[float], high: list[float]) -> None:
+    assert extent(draw(f"Transform {{ {fields} children {BOX} }}")) == [low, high]
+
+
+def test_center_and_scale_orientation_follow_the_standard(draw: Draw) -> None:
+    # Stretched along the diagonal about (1, 1, 0): (0, 0) goes to (-1, -1), and (1, 0) across it stays.
+    mesh = draw(
+        f"""Transform {{ center 1 1 0 scaleOrientation 0 0 1 0.7853981633974483 scale 2 1 1
+        children {SHAPE} }}"""
+    )
+    assert corners(mesh) == [[[-1, -1, 0], [0.5, -0.5, 0], [-0.5, 0.5, 0]]]
+
+
+def test_transforms_apply_from_the_inside_outwards(draw: Draw) -> None:
+    mesh = draw(f"Transform {{ scale 2 2 2 children Transform {{ translation 1 0 0 children {SHAPE} }} }}")
+    assert corners(mesh) == [[[2, 0, 0], [4, 0, 0], [2, 2, 0]]]
+
+
+def test_mirroring_scale_keeps_faces_and_normals_outwards(draw: Draw) -> None:
+    (part,) = draw(f"Transform {{ scale -1 1 1 children {BOX} }}").parts
+    a, b, c = (part.vertices[part.triangles[:, corner]] for corner in range(3))
+    facing = np.cross(b - a, c - a)
+    assert (np.einsum("ij,ij->i", facing, a) > 0).all()
+    assert (np.einsum("ij,ikj->ik", facing, part.normals[part.triangles]) > 0).all()
+
+
+def test_uneven_scale_keeps_normals_square_to_their_face(draw: Draw) -> None:
+    (part,) = draw(
+        f"Transform {{ scale 3 1 1 children Transform {{ rotation 0 0 1 0.6 children {BOX} }} }}"
+    ).parts
+    a, b, c = (part.vertices[part.triangles[:, corner]] for corner in range(3))
+    facing = np.cross(b - a, c - a)
+    facing /= np.linalg.norm(facing, axis=1, keepdims=True)
+    np.testing.assert_allclose(part.normals[part.triangles[:, 0]], facing, atol=1e-12)
+
+
+# Groups
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Group { children %s }",
+        'Anchor { url "x.html" children [ %s ] }',
+        "Billboard { axisOfRotation 0 1 0 children [ %s ] }",
+        "Collision { collide FALSE children [ %s ] proxy Shape { geometry Box { } } }",
+        "LOD { range [ 10 ] level [ %s Shape { geometry Box { } } ] }",
+        "Switch { whichChoice 0 choice [ %s Shape { geometry Box { } } ] }",
+        "Switch { whichChoice 1 choice [ Shape { geometry Box { } } %s ] }",
+        "Group { children [ NULL %s NULL ] }",
+    ],
+)
+def test_group_draws_what_is_shown_of_it(draw: Draw, text: str) -> None:
+    assert corners(draw(text % SHAPE)) == [[[0, 0, 0], [1, 0, 0], [0, 1, 0]]]
+
+
+@pytest.mark.parametrize("which", ["", "whichChoice -1", "whichChoice 2", "whichChoice 1e9"])
+def test_switch_draws_nothing_unless_told_which(draw: Draw, which: str) -> None:
+    assert draw(f"Switch {{ {which} choice [ {BOX} {BOX} ] }}").parts == ()
+
+
+def test_switch_with_levels_is_read_as_if_they_were_choices(draw: Draw) -> None:
+    mesh = draw(f"Switch {{ whichChoice 1 level [ {BOX} {SHAPE} ] }}")
+    assert mesh.triangle_count == 1
+    assert mesh.warnings == ("line 2, column 1: Switch: has 'level', as LOD; it is taken for its 'choice'",)
+
+
+# DEF and USE
+
+
+def test_used_node_is_drawn_wherever_it_is_used(draw: Draw) -> None:
+    mesh = draw(f"DEF S {SHAPE} Transform {{ translation 5 0 0 children [ USE S, USE S ] }}")
+    assert mesh.triangle_count == 3
+    assert extent(mesh) == [[0, 0, 0], [6, 1, 0]]
+
+
+def test_coordinates_and_appearance_can_be_used_again(draw: Draw) -> None:
+    mesh = draw(
+        """Shape { appearance DEF A Appearance { material Material { diffuseColor 1 0 0 } }
+          geometry IndexedFaceSet {
+            coord DEF C Coordinate { point [ 0 0 0, 1 0 0, 0 1 0 ] } coordIndex [ 0 1 2 ] } }
+        Shape { appearance USE A geometry IndexedFaceSet { coord USE C coordIndex [ 2 1 0 ] } }"""
+    )
+    assert corners(mesh) == [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 0], [1, 0, 0], [0, 0, 0]]]
+    assert mesh.parts[1].material.diffuse == (1, 0, 0)
+
+
+def test_the_last_def_of_a_name_counts(draw: Draw) -> None:
+    mesh = draw(f"DEF S {BOX} DEF S {SHAPE} USE S")
+    assert mesh.triangle_count == 12 + 1 + 1
+
+
+@pytest.mark.parametrize("text", ["USE Nobody", "Group { children [ USE Nobody ] }"])
+def test_use_of_a_name_that_is_not_there_is_left_out_with_a_warning(draw: Draw, text: str) -> None:
+    mesh = draw(f"{text} {SHAPE}")
+    assert mesh.triangle_count == 1
+    column = text.index("USE") + 1
+    assert mesh.warnings == (
+        f"line 2, column {column}: USE Nobody: nothing of that name was DEFined before; left out",
+    )
+
+
+def test_node_cannot_use_itself(draw: Draw) -> None:
+    mesh = draw(f"DEF A Group {{ children [ {SHAPE} USE A ] }}")
+    assert mesh.triangle_count == 1
+    assert "USE A" in mesh.warnings[0]
+
+
+# PROTO
+
+PROTOS = """
+PROTO Part [ exposedField SFVec3f at 0 0 0  field MFNode shapes [ ]  eventIn SFTime now ] {
+  Transform { translation IS at children IS shapes set_scale IS now }
+  Shape { geometry Box { } }  # only the first node of the body is drawn
+}
+PROTO Painted [ field SFColor tint 1 0 0 ] {
+  Shape { appearance Appearance { material Material { diffuseColor IS tint } } geometry Box { } }
+}
+"""
+
+
+def test_proto_is_drawn_with_its_fields(draw: Draw) -> None:
+    mesh = draw(PROTOS + "Part { at 5 0 0 shapes [ Painted { tint 0 0 1 } Painted { } ] }")
+    assert [part.material.diffuse for part in mesh.parts] == [(0, 0, 1), (1, 0, 0)]
+    assert extent(mesh) == [[4, -1, -1], [6, 1, 1]]
+
+
+def test_proto_that_is_not_used_draws_nothing(draw: Draw) -> None:
+    assert draw(PROTOS).parts == ()
+
+
+def test_proto_inside_itself_as_a_field_is_no_cycle(draw: Draw) -> None:
+    mesh = draw(PROTOS + f"Part {{ at 1 0 0 shapes Part {{ at 0 2 0 shapes {SHAPE} }} }}")
+    assert extent(mesh) == [[1, 2, 0], [2, 3, 0]]
+
+
+def test_is_is_resolved_where_the_proto_is_used(draw: Draw) -> None:
+    # Inner's `at` is Outer's `where`; both call the other's field by its own name.
+    mesh = draw(
+        f"""PROTO Inner [ field SFVec3f at 9 9 9 ] {{ Transform {{ translation IS at children {SHAPE} }} }}
+        PROTO Outer [ field SFVec3f where 0 0 0 field SFVec3f at 7 7 7 ] {{ Inner {{ at IS where }} }}
+        Outer {{ where 1 2 3 }} Inner {{ }}"""
+    )
+    assert corners(mesh)[0][0] == [1, 2, 3]
+    assert corners(mesh)[1][0] == [9, 9, 9]
+
+
+def test_proto_can_hold_protos_of_its_own(draw: Draw) -> None:
+    mesh = draw(
+        f"""PROTO Outer [ ] {{
+          PROTO Inner [ field SFVec3f at 1 0 0 ] {{ Transform {{ translation IS at children {SHAPE} }} }}
+          Group {{ children [ Inner {{ }} Inner {{ at 2 0 0 }} ] }}
+        }}
+        Outer {{ }} Inner {{ }}"""
+    )
+    assert [triangle[0] for triangle in corners(mesh)] == [[1, 0, 0], [2, 0, 0]]
+    assert mesh.warnings == ("line 7, column 19: Inner: no node of VRML 2.0; read over",)
+
+
+def test_names_in_a_proto_are_its_own(draw: Draw) -> None:
+    mesh = draw(f"DEF S {BOX} PROTO P [ ] {{ Group {{ children [ DEF S {SHAPE} USE S ] }} }} P {{ }} USE S")
+    assert mesh.triangle_count == 12 + 2 + 12
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "PROTO N [ field SFFloat r 2 ] { Sphere { radius IS r } } Shape { geometry N { } }",
+        """PROTO N [ field SFColor c 0 1 0 ] { Material { diffuseColor IS c } }
+        Shape { appearance Appearance { material N { } } geometry Sphere { radius 2 } }""",
+        """PROTO N [ field SFNode m NULL ] { Appearance { material IS m } }
+        Shape { appearance N { m Material { } } geometry Sphere { radius 2 } }""",
+        """PROTO N [ field SFNode a NULL field SFNode g NULL ] { Shape { appearance IS a geometry IS g } }
+        N { g Sphere { radius 2 } }""",
+    ],
+)
+def test_proto_can_stand_for_any_node(draw: Draw, text: str) -> None:
+    mesh = draw(text)
+    assert extent(mesh) == [[-2, -2, -2], [2, 2, 2]]
+    if "c 0 1 0" in text:
+        assert mesh.parts[0].material.diffuse == (0, 1, 0)
+
+
+def test_proto_can_stand_for_coordinates(draw: Draw) -> None:
+    mesh = draw(
+        """PROTO C [ field MFVec3f p [ 0 0 0, 1 0 0, 0 1 0 ] ] { Coordinate { point IS p } }
+        Shape { geometry IndexedFaceSet { coord C { } coordIndex [ 0 1 2 ] } }
+        Shape { geometry IndexedFaceSet { coord C { p [ 0 0 9, 1 0 9, 0 1 9 ] } coordIndex [ 0 1 2 ] } }"""
+    )
+    assert extent(mesh) == [[0, 0, 0], [1, 1, 9]]
+
+
+def test_empty_proto_draws_nothing(draw: Draw) -> None:
+    assert draw("PROTO P [ ] { } P { } Shape { geometry P { } }").parts == ()
+
+
+def test_proto_without_a_field_of_its_own_has_the_nodes(draw: Draw) -> None:
+    # An event has no value: as if it were not written.
+    mesh = draw("PROTO P [ eventIn SFFloat r ] { Sphere { radius IS r } } Shape { geometry P { } }")
+    assert extent(mesh) == [[-1, -1, -1], [1, 1, 1]]
+
+
+@pytest.mark.parametrize(
+    "proto",
+    [
+        # Wide: nothing of the 2,000 is drawn, and each use makes them anew.
+        f"PROTO P [ field MFNode c [ ] ] {{ Switch {{ choice [ {'Group { } ' * 2000} ] children IS c }} }}",
+        # A node that is written once and stands there 2,000 times.
+        f"PROTO P [ field MFNode c [ ] ] {{ Switch {{ level [ DEF G Group {{}} {'USE G ' * 2000}] c IS c}}}}",
+        f"PROTO P [ {' '.join(f'field SFFloat f{i} 1' for i in range(3000))} ] {{ Group {{ }} }}",
+    ],
+    ids=["nodes", "uses", "fields"],
+)
+def test_uses_of_a_proto_that_make_millions_of_nodes_are_refused(tmp_path: Path, proto: str) -> None:
+    # In another file: all files of a scene count together.
+    write(tmp_path, "part.wrl", f"{proto} {'P { } ' * 1500}")
+    path = write(tmp_path, "a.wrl", f'{proto} {"P {} " * 1500} Inline {{ url "part.wrl" }}')
+    with pytest.raises(MeshError, match=r"part\.wrl.*PROTOs make more than 5000000 nodes and fields"):
+        read_vrml(path)
+
+
+# EXTERNPROTO
+
+LIBRARY = f"""PROTO First [ ] {{ Shape {{ geometry Box {{ }} }} }}
+PROTO At [ field SFVec3f at 3 0 0 field MFNode more [ ] ] {{
+  Transform {{ translation IS at children [ {SHAPE} Group {{ children IS more }} ] }} }}"""
+
+
+def test_externproto_is_read_from_its_file(tmp_path: Path) -> None:
+    write(tmp_path, "parts/library.wrl", LIBRARY)
+    declared = "[ field SFVec3f at exposedField MFNode more eventOut SFTime t ]"
+    path = write(
+        tmp_path,
+        "a.wrl",
+        f"""EXTERNPROTO Mine {declared} [ "http://x.org/l.wrl#At" "parts/library.wrl#At" ]
+        Mine {{ }} Mine {{ at 5 0 0 }}""",
+    )
+    mesh = read_vrml(path)
+    assert [triangle[0] for triangle in corners(mesh)] == [[3, 0, 0], [5, 0, 0]]
+    assert mesh.files == (tmp_path / "parts" / "library.wrl",)
+    assert mesh.warnings == ()
+
+
+def test_externproto_without_a_name_is_the_files_first(tmp_path: Path) -> None:
+    write(tmp_path, "library.wrl", LIBRARY)
+    path = write(tmp_path, "a.wrl", 'EXTERNPROTO Mine [ ] "library.wrl" Mine { }')
+    assert read_vrml(path).triangle_count == 12
+
+
+def test_externproto_of_an_externproto_is_followed(tmp_path: Path) -> None:
+    write(tmp_path, "library.wrl", LIBRARY)
+    write(tmp_path, "again.wrl", 'EXTERNPROTO At [ ] "library.wrl#At"')
+    path = write(tmp_path, "a.wrl", 'EXTERNPROTO At [ ] "again.wrl#At" At { at 1 1 1 }')
+    assert corners(read_vrml(path))[0][0] == [1, 1, 1]
+
+
+def test_inline_in_an_externproto_is_beside_its_own_file(tmp_path: Path) -> None:
+    write(tmp_path, "parts/shape.wrl", SHAPE)
+    write(tmp_path, "parts/library.wrl", 'PROTO P [ ] { Inline { url "shape.wrl" } }')
+    path = write(tmp_path, "a.wrl", 'EXTERNPROTO P [ ] "parts/library.wrl#P" P { }')
+    assert read_vrml(path).triangle_count == 1
+
+
+@pytest.mark.parametrize(
+    ("url", "trouble"),
+    [
+        ('"none.wrl#P"', "'none.wrl': no such file"),
+        ('"library.wrl#None"', "'library.wrl' holds no PROTO None"),
+        ('[ "none.wrl#P" "http://x.org/a.wrl#P" ]', "'http://x.org/a.wrl': no such file"),
+        ("[ ]", "has no address"),
+    ],
+)
+def test_externproto_that_is_not_found_is_left_out_with_a_warning(
+    tmp_path: Path, url: str, trouble: str
+) -> None:
+    write(tmp_path, "library.wrl", LIBRARY)
+    path = write(tmp_path, "a.wrl", f"EXTERNPROTO P [ ] {url} P {{ }} {SHAPE} P {{ }}")
+    mesh = read_vrml(path)
+    assert mesh.triangle_count == 1
+    assert f"P: EXTERNPROTO P: {trouble}" in mesh.warnings[0]
+    assert sum("EXTERNPROTO" in warning for warning in mesh.warnings) == 1
+
+
+def test_externprotos_that_lead_back_to_themselves_are_refused(tmp_path: Path) -> None:
+    write(tmp_path, "b.wrl", 'EXTERNPROTO P [ ] "a.wrl#P" PROTO Q [ ] { Group { children [ P { } P { } ] } }')
+    path = write(
+        tmp_path, "a.wrl", 'EXTERNPROTO Q [ ] "b.wrl#Q" PROTO P [ ] { Group { children Q { } } } P { }'
+    )
+    with pytest.raises(MeshError, match=r"EXTERNPROTO . leads back to itself"):
+        read_vrml(path)
+    itself = write(tmp_path, "c.wrl", 'EXTERNPROTO P [ ] "c.wrl#P" P { }')
+    with pytest.raises(MeshError, match="EXTERNPROTO P leads back to itself"):
+        read_vrml(itself)
+
+
+# Inline
+
+
+def test_inline_is_read_beside_the_file_that_names_it(tmp_path: Path) -> None:
+    write(tmp_path, "sub/deeper/shape.wrl", SHAPE)
+    write(
+        tmp_path, "sub/part.wrl", 'Transform { translation 0 1 0 children Inline { url "deeper/shape.wrl" } }'
+    )
+    path = write(
+        tmp_path, "a.wrl", 'Transform { translation 0 0 3 children Inline { url [ "sub/part.wrl" ] } }'
+    )
+    mesh = read_vrml(path)
+    assert corners(mesh)[0][0] == [0, 1, 3]
+    assert mesh.files == (tmp_path / "sub" / "part.wrl", tmp_path / "sub" / "deeper" / "shape.wrl")
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        r"sub\\my part.wrl",
+        "sub/my%20part.wrl",
+        "sub/my part.wrl",
+        "file:sub/my part.wrl",
+        "sub/../sub/my part.wrl",
+    ],
+)
+def test_inline_is_found_as_exporters_write_it(tmp_path: Path, url: str) -> None:
+    write(tmp_path, "sub/my part.wrl", SHAPE)
+    assert read_vrml(write(tmp_path, "a.wrl", f'Inline {{ url "{url}" }}')).triangle_count == 1
+
+
+def test_inline_takes_the_first_url_that_is_there(tmp_path: Path) -> None:
+    write(tmp_path, "b.wrl", SHAPE)
+    write(tmp_path, "c.wrl", BOX)
+    path = write(tmp_path, "a.wrl", 'Inline { url [ "http://x.org/b.wrl", "none.wrl", "b.wrl", "c.wrl" ] }')
+    assert read_vrml(path).triangle_count == 1
+
+
+def test_inline_that_is_missing_is_left_out_with_a_warning(tmp_path: Path) -> None:
+    path = write(tmp_path, "a.wrl", f'{SHAPE} Inline {{ url "none.wrl" }}\nInline {{ url "none.wrl" }}')
+    mesh = read_vrml(path)
+    assert mesh.triangle_count == 1
+    assert mesh.warnings == ("line 3, column 79: Inline: 'none.wrl': no such file; it is left out",)
+
+
+def test_file_of_which_everything_is_missing_is_empty_and_names_it(tmp_path: Path) -> None:
+    path = write(tmp_path, "a.wrl", 'Group { children [ Inline { url "x.wrl" } Inline { url "y.wrl" } ] }')
+    mesh = read_vrml(path)
+    assert mesh.triangle_count == 0
+    assert mesh.missing == ("x.wrl", "y.wrl")
+    assert mesh.warnings[0] == "line 2, column 20: Inline: 'x.wrl': no such file; it is left out"
+
+
+def test_inlines_that_lead_back_to_themselves_are_refused(tmp_path: Path) -> None:
+    write(tmp_path, "b.wrl", 'Inline { url "a.wrl" }')
+    with pytest.raises(MeshError, match=r"b\.wrl, line 2, column 1: Inline: 'a.wrl' leads back to itself"):
+        read_vrml(write(tmp_path, "a.wrl", 'Inline { url "b.wrl" }'))
+    with pytest.raises(MeshError, match="leads back to itself"):
+        read_vrml(write(tmp_path, "c.wrl", 'Inline { url "./c.wrl" }'))
+
+
+def test_inline_may_be_used_many_times_and_its_warnings_come_once(tmp_path: Path) -> None:
+    write(tmp_path, "b.wrl", f"{SHAPE} Company {{ }}")
+    path = write(tmp_path, "a.wrl", 'Inline { url "b.wrl" } Inline { url "b.wrl" } Company { }')
+    mesh = read_vrml(path)
+    assert mesh.triangle_count == 2
+    assert mesh.warnings == ("b.wrl, line 3, column 79: Company: no node of VRML 2.0; read over",)
+
+
+def test_error_in_an_inline_names_its_file(tmp_path: Path) -> None:
+    write(tmp_path, "b.wrl", "Shape {")
+    with pytest.raises(MeshError, match=r"b\.wrl, line 2, column 8: a field of Shape"):
+        read_vrml(write(tmp_path, "a.wrl", f'{SHAPE} Inline {{ url "b.wrl" }}'))
+
+
+def test_files_outside_the_folder_allowed_count_as_missing(tmp_path: Path) -> None:
+    write(tmp_path, "secret.wrl", BOX)
+    write(tmp_path, "open/part.wrl", SHAPE)
+    path = write(
+        tmp_path,
+        "open/a.wrl",
+        f"""Inline {{ url [ "../secret.wrl" ] }} Inline {{ url "{tmp_path}/secret.wrl" }}
+        Inline {{ url "part.wrl" }}""",
+    )
+    assert read_vrml(path, within=tmp_path / "open").triangle_count == 1
+    assert read_vrml(path).triangle_count == 25
+
+
+# Other nodes
+
+
+def test_nodes_that_draw_nothing_are_named_once(draw: Draw) -> None:
+    mesh = draw(
+        f"""WorldInfo {{ title "a {{ brace" info [ "x" "y" ] }}
+        DEF T TimeSensor {{ loop TRUE }}
+        DEF X Script {{ eventIn SFTime t field SFInt32 n 3 field SFNode self USE T
+          eventOut SFBool b url "javascript: f() {{}}" directOutput TRUE }}
+        ROUTE T.time TO X.set_t
+        PointLight {{ }} TimeSensor {{ }} Viewpoint {{ position 1 2 3 }}
+        {SHAPE} # the end"""
+    )
+    assert mesh.triangle_count == 1
+    assert mesh.warnings == (
+        "line 2, column 1: nothing is drawn of: WorldInfo, TimeSensor, Script, PointLight, Viewpoint",
+    )
+
+
+def test_nodes_that_nobody_knows_are_named_once_each(draw: Draw) -> None:
+    mesh = draw(
+        f"""Company {{ secret [ 1 2 3 ] other NULL nested Thing {{ }} flags [ TRUE FALSE ] }} Company {{ }}
+        Other {{ name "x" }} {SHAPE}
+        Shape {{ geometry NurbsSurface {{ }} }} Shape {{ geometry Text {{ string "hi" }} }}"""
+    )
+    assert mesh.triangle_count == 1
+    said = [warning.split(": ", 1)[1] for warning in mesh.warnings]
+    assert sorted(said) == [
+        "Company: no node of VRML 2.0; read over",
+        "NurbsSurface: is no geometry of VRML 2.0; left out",
+        "Other: no node of VRML 2.0; read over",
+        "Text: is not drawn",
+    ]
+
+
+def test_a_list_of_nodes_is_not_gone_through_at_each_use(tmp_path: Path) -> None:
+    """Thousands of uses of a list of thousands, of which each draws one, took minutes."""
+    path = write(tmp_path, "a.wrl", f"LOD {{ level [ {SHAPE} Group {{ }} ] }}")
+    (node,) = parse_vrml(load(path)).nodes
+    assert nodes_of(node, "level") is node.fields["level"]
+    assert strings(node, "level") == []

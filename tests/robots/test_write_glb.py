@@ -1,0 +1,119 @@
+"""GLB as it is written: read back by our reader, and by the renderer's."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from renderer.glb import read_glb
+from robots.meshes.lighten import lightened
+from robots.meshes.mesh import Material, Mesh, Part, Wire, bounds
+from robots.meshes.normals import creased
+from robots.meshes.read import read_mesh
+from robots.meshes.solids import ball, box
+from robots.meshes.write_glb import glb_of
+
+GLASS = Material("glass", (0.2, 0.4, 0.6), emissive=(0.0, 0.5, 0.0), transparency=0.25, texture="wood.png")
+
+
+def a_box(material: Material = GLASS) -> Part:
+    return Part("box", material, *creased(*box(np.zeros(3), np.array([1.0, 2.0, 3.0])), 0.0), two_sided=True)
+
+
+def a_ball(segments: int) -> Part:
+    return Part("ball", Material("paint"), *creased(*ball(1.0, segments), np.pi))
+
+
+def back(folder: Path, mesh: Mesh) -> Mesh:
+    path = folder / "made.glb"
+    path.write_bytes(glb_of(mesh))
+    return read_mesh(path)
+
+
+def test_material_and_shape_come_back(tmp_path: Path) -> None:
+    mesh = back(tmp_path, Mesh((a_box(),)))
+    (part,) = mesh.parts
+    assert len(part.triangles) == 12
+    np.testing.assert_array_equal(bounds(mesh), [[0, 0, 0], [1, 2, 3]])
+    assert part.material.diffuse == pytest.approx(GLASS.diffuse, abs=1e-6)
+    assert part.material.emissive == pytest.approx(GLASS.emissive, abs=0.01)
+    assert part.material.transparency == pytest.approx(0.25)
+    assert (part.material.name, part.material.texture, part.two_sided) == ("glass", "wood.png", True)
+    assert len(part.vertices) == 24  # the edges stay sharp
+
+
+def test_vrml_to_glb_keeps_triangles_bounds_colours_and_transparency(tmp_path: Path) -> None:
+    path = tmp_path / "some.wrl"
+    path.write_text(
+        "#VRML V2.0 utf8\nShape { appearance Appearance { material DEF M Material {"
+        " diffuseColor 0.9 0.1 0.3 transparency 0.5 } } geometry Cylinder { radius 0.123456 height 7 } }"
+        "Transform { translation 1 2 3 children Shape { geometry Box { } } }"
+    )
+    before = read_mesh(path)
+    after = back(tmp_path, before)
+    assert after.triangle_count == before.triangle_count
+    np.testing.assert_allclose(bounds(after), bounds(before), rtol=1e-7)
+    colors = {part.material.diffuse: part.material.transparency for part in before.parts}
+    for part in after.parts:
+        same = min(colors, key=lambda color: float(np.abs(np.subtract(color, part.material.diffuse)).max()))
+        assert part.material.diffuse == pytest.approx(same, abs=1e-6)
+        assert part.material.transparency == pytest.approx(colors[same])
+
+
+def test_colours_of_vertices_arrive_here_and_in_the_renderer(tmp_path: Path) -> None:
+    plain = a_box()
+    colors = np.tile([0.2, 0.4, 0.6, 1.0], (len(plain.vertices), 1))
+    colors[0] = [1.0, 0.0, 0.5, 0.5]
+    mesh = Mesh((replace(plain, colors=colors),))
+    (part,) = back(tmp_path, mesh).parts
+    assert part.colors is not None
+    np.testing.assert_allclose(part.colors, colors, atol=0.02)
+    (surface,) = read_glb(glb_of(mesh))
+    assert surface.colors is not None
+    assert surface.color == pytest.approx((1.0, 1.0, 1.0, 1.0))
+    np.testing.assert_allclose(surface.colors, colors, atol=1e-6)
+
+
+def test_lines_and_points_come_back_and_the_renderer_reads_over_them(tmp_path: Path) -> None:
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0]])
+    red = Material("red", (1.0, 0.0, 0.0))
+    lines = Wire("lines", red, corners, np.array([[0, 1], [1, 2]]))
+    points = Wire("points", red, corners + 5, np.zeros((0, 2), dtype=np.int64))
+    mesh = Mesh((a_box(),), wires=(lines, points))
+    found = back(tmp_path, mesh)
+    assert sorted(len(wire.vertices) for wire in found.wires if not len(wire.segments)) == [3]
+    drawn = next(wire for wire in found.wires if len(wire.segments))
+    ends = {tuple(sorted(map(tuple, drawn.vertices[pair].tolist()))) for pair in drawn.segments}
+    assert ends == {((0, 0, 0), (1, 0, 0)), ((1, 0, 0), (1, 1, 0))}
+    assert len(read_glb(glb_of(mesh))) == 1
+
+
+def test_empty_mesh_is_a_glb_all_the_same(tmp_path: Path) -> None:
+    mesh = back(tmp_path, Mesh())
+    assert mesh.triangle_count == 0
+    assert read_glb(glb_of(Mesh())) == ()
+
+
+def test_same_mesh_gives_the_same_bytes() -> None:
+    assert glb_of(Mesh((a_box(),))) == glb_of(Mesh((a_box(),)))
+
+
+def test_heavy_mesh_is_lightened_and_keeps_its_shape() -> None:
+    heavy = Mesh((a_ball(128), a_box()))
+    light = lightened(heavy, 2000)
+    assert light.triangle_count == pytest.approx(2000, rel=0.1)
+    assert len(light.parts[1].triangles) == 12  # what is small stays whole
+    np.testing.assert_allclose(bounds(light), bounds(heavy), atol=0.02)
+    radii = np.linalg.norm(light.parts[0].vertices, axis=1)
+    assert radii.min() > 0.98
+    assert lightened(heavy, 10**6) is heavy
+
+
+def test_lightened_vertices_keep_the_colours_of_their_places() -> None:
+    part = a_ball(128)
+    halves = np.where(part.vertices[:, 2:] > 0, [1.0, 0, 0, 1], [0.0, 0, 1, 1])
+    (light,) = lightened(Mesh((replace(part, colors=halves),)), 2000).parts
+    assert light.colors is not None
+    away = np.abs(light.vertices[:, 2]) > 0.15
+    np.testing.assert_array_equal(light.colors[away, 0] == 1.0, light.vertices[away, 2] > 0)

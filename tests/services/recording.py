@@ -1,0 +1,66 @@
+"""What the recorder's tests share: a recorder and the publishers of a robot, over a real router."""
+
+import asyncio
+from contextlib import asynccontextmanager
+
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import open_session
+from mcap_files.recover import State, state_of
+from services import recorder
+from services.recorder.settings import Settings
+
+Ask = schema.RecorderRequest
+KEY = "robomesh/site/arm/recorder/request"
+# On a busy machine a service takes its time to come alive.
+WITHIN_S = 20.0
+
+
+@asynccontextmanager
+async def recording_site(mesh, folder, **settings):
+    """A recorder, and a session that publishes for robot `arm`."""
+    async with open_session(mesh) as own, open_session(mesh) as gateway:
+        settings = Settings(site="site", robots=("arm",), folder=folder, **settings)
+        task = asyncio.create_task(recorder.serve(own, settings))
+        try:
+            yield gateway
+        finally:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+
+
+async def trace_on(session, **fields):
+    return await session.ask(KEY, Ask(action=Ask.TRACE_ON, **fields), timeout_s=WITHIN_S)
+
+
+async def trace_off(session):
+    return await session.ask(KEY, Ask(action=Ask.TRACE_OFF), timeout_s=WITHIN_S)
+
+
+async def put_states(publisher, numbers, *, hz=200.0):
+    for number in numbers:
+        message = JointStates()
+        message.timestamp.GetCurrentTime()
+        message.joints.add(name="waist", position=number)
+        publisher.put(message)
+        await asyncio.sleep(1 / hz)
+
+
+async def until(condition):
+    """Until it is so; a test has a deadline."""
+    while not condition():
+        await asyncio.sleep(0.02)
+
+
+async def until_indexed(path):
+    await until(lambda: path.exists() and state_of(path) is State.INDEXED)
+
+
+async def next_event(said, code):
+    """The next event of that code that a subscription brings."""
+    while True:
+        message = (await anext(said)).message()
+        for each in message.events if isinstance(message, schema.EventList) else [message]:
+            if each.code == code:
+                return each

@@ -1,0 +1,91 @@
+"""A console with accounts, and browsers before it that sign in: real sockets, no library's help."""
+
+import json
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from functools import cache
+from unittest.mock import patch
+
+from argon2 import PasswordHasher
+from websockets.asyncio.client import connect
+
+from services.console.accounts import passwords
+from services.console.accounts.desk import change_account
+from services.console.accounts.file import AccountRole
+from tests.services.test_console import Page, console, get
+
+PASSWORD = "three arms in a hall"
+ROLES = {"li": AccountRole.OPERATOR, "zhao": AccountRole.MONITOR, "chen": AccountRole.ADMIN}
+
+
+@cache
+def cheap_hasher():
+    """As the real one, but quick: tests sign in a hundred times."""
+    return PasswordHasher(time_cost=1, memory_cost=64, parallelism=1)
+
+
+@cache
+def hashed():
+    """Of the password."""
+    return cheap_hasher().hash(PASSWORD)
+
+
+def accounts_file(folder):
+    """A file with an operator li, a monitor zhao and an administrator chen."""
+    path = folder / "accounts.toml"
+    for name, role in ROLES.items():
+        change_account(path, "add", name, role=role, hashed=hashed())
+    return path
+
+
+@dataclass
+class Client:
+    """A browser's side: its cookie, and requests as a page sends them."""
+
+    address: str
+    cookie: str = ""
+
+    async def get(self, path, **headers):
+        return await get(self.address, path, **self._with_cookie(headers))
+
+    async def post(self, path, body=None, **headers):
+        """Status, headers and the JSON of the answer."""
+        data = body if isinstance(body, bytes) else json.dumps(body or {}).encode()
+        own = {"Origin": f"http://{self.address}", "Content-Type": "application/json"}
+        given = {**own, "Content-Length": str(len(data)), **headers}
+        status, answer, text = await get(
+            self.address, path, method="POST", body=data, **self._with_cookie(given)
+        )
+        told = json.loads(text) if answer.get("content-type") == "application/json" else text.decode()
+        return status, answer, told
+
+    async def sign_in(self, name, password=PASSWORD):
+        """As `post`; keeps the cookie."""
+        answer = await self.post("/account/sign-in", {"name": name, "password": password})
+        self.keep(answer[1])
+        return answer
+
+    def keep(self, headers):
+        if "set-cookie" in headers:
+            self.cookie = headers["set-cookie"].split(";")[0]
+
+    @asynccontextmanager
+    async def browse(self, **headers):
+        own = {"Cookie": self.cookie} if self.cookie else {}
+        origin = headers.pop("origin", f"http://{self.address}")
+        async with connect(
+            f"ws://{self.address}/mesh", origin=origin, additional_headers=own | headers, compression=None
+        ) as socket:
+            yield Page(socket)
+
+    def _with_cookie(self, headers):
+        return {"Cookie": self.cookie, **headers} if self.cookie else headers
+
+
+@asynccontextmanager
+async def guarded(mesh, page, folder, **settings):
+    """A running console with accounts: a client that is signed in nowhere yet, a session, the file."""
+    path = accounts_file(folder)
+    with patch.object(passwords, "_hasher", cheap_hasher):
+        async with console(mesh, page, accounts=path, **settings) as (address, other):
+            yield Client(address), other, path

@@ -1,0 +1,301 @@
+"""Alarms after ISA-18.2: the state machine alone, with the clock as an argument."""
+
+import json
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bus.keys import parse_key
+from bus.schemas.robomesh_pb2 import Alarm as Message
+from bus.schemas.robomesh_pb2 import Event
+from services.watch import kept
+from services.watch.alarms import LONGEST_SHELF_S, Alarm, AlarmError, Alarms
+from services.watch.intake import Intake
+
+UNACKNOWLEDGED, ACKNOWLEDGED = Message.UNACKNOWLEDGED, Message.ACKNOWLEDGED
+RETURNED, SHELVED = Message.RETURNED, Message.SHELVED
+
+
+def alarm(name: str = "arm:link", **values: object) -> Alarm:
+    told = {"priority": Message.HIGH, "since": 0.0, "last": 0.0, "by_state": True} | values
+    return Alarm(id=name, robot="arm", source="gateway", code="link.down", text="down", **told)
+
+
+def states(alarms: Alarms) -> dict[str, int]:
+    return {each.id: each.state for each in alarms.sorted()}
+
+
+# What happens, and what the alarm is then; None: it is forgotten.
+WAYS = (
+    (("come",), UNACKNOWLEDGED),
+    (("come", "come"), UNACKNOWLEDGED),
+    (("come", "ack"), ACKNOWLEDGED),
+    (("come", "ack", "come"), ACKNOWLEDGED),
+    (("come", "go"), RETURNED),
+    (("come", "go", "come"), UNACKNOWLEDGED),
+    (("come", "go", "ack"), None),
+    (("come", "ack", "go"), None),
+    (("come", "ack", "go", "come"), UNACKNOWLEDGED),
+    (("come", "shelve"), SHELVED),
+    (("come", "shelve", "come"), SHELVED),
+    (("come", "shelve", "go"), SHELVED),
+    (("come", "shelve", "unshelve"), UNACKNOWLEDGED),
+    (("come", "ack", "shelve", "unshelve"), ACKNOWLEDGED),
+    (("come", "shelve", "go", "unshelve"), RETURNED),
+    (("come", "shelve", "ack", "unshelve"), ACKNOWLEDGED),
+    (("come", "ack", "shelve", "go", "unshelve"), None),
+    (("come", "shelve", "an hour"), UNACKNOWLEDGED),
+    (("come", "shelve", "go", "an hour"), RETURNED),
+)
+
+
+@pytest.mark.parametrize(
+    ("happens", "state"),
+    WAYS,
+    ids=lambda each: "-".join(each) if each and isinstance(each, tuple) else str(each),
+)
+def test_the_table_of_states_is_so(happens, state):
+    alarms, now = Alarms(), 1000.0
+    for what in happens:
+        now += 100.0
+        do(alarms, what, now)
+    assert states(alarms).get("arm:link") == state
+
+
+def do(alarms: Alarms, what: str, now: float) -> None:
+    name = ["arm:link"]
+    match what:
+        case "come":
+            alarms.come(alarm(), now)
+        case "go":
+            alarms.go("arm:link", now)
+        case "ack":
+            alarms.acknowledge(name, "li", now)
+        case "shelve":
+            alarms.shelve(name, "li", now, for_s=3600.0, reason="service")
+        case "unshelve":
+            alarms.unshelve(name, "li", now)
+        case "an hour":
+            alarms.look(now + 3600.0)
+
+
+def test_an_alarm_that_comes_and_goes_is_counted_and_not_repeated():
+    alarms = Alarms()
+    alarms.come(alarm(), 0.0)
+    alarms.acknowledge(["arm:link"], "li", 1.0)
+    # Acknowledged and gone it is forgotten, and comes as a new one; three times in a minute is chatter.
+    alarms.go("arm:link", 2.0)
+    alarms.come(alarm(), 3.0)
+    for second in range(5, 60, 5):
+        alarms.go("arm:link", second)
+        alarms.come(alarm(), second + 1.0)
+    alarms.acknowledge(["arm:link"], "li", 61.0)
+    for second in range(62, 120, 5):
+        alarms.go("arm:link", second)
+        alarms.come(alarm(), second + 1.0)
+        assert states(alarms) == {"arm:link": ACKNOWLEDGED}
+    assert alarms.held["arm:link"].count == 1 + 11 + 12
+    alarms.go("arm:link", 125.0)
+    alarms.look(180.0)
+    assert states(alarms) == {"arm:link": ACKNOWLEDGED}
+    alarms.look(186.0)
+    assert states(alarms) == {}
+
+
+def test_what_only_happened_stands_until_somebody_acknowledges_it():
+    alarms = Alarms()
+    alarms.come(alarm(by_state=False, latching=True), 0.0)
+    alarms.look(1e6)
+    assert states(alarms) == {"arm:link": UNACKNOWLEDGED}
+    alarms.acknowledge(["arm:link"], "li", 1e6)
+    assert states(alarms) == {}
+
+
+def test_what_is_over_by_its_silence_returns_then_and_not_before():
+    alarms = Alarms()
+    alarms.come(alarm(by_state=False, over_after_s=60.0), 0.0)
+    alarms.come(alarm(by_state=False, over_after_s=60.0), 50.0)
+    alarms.look(109.0)
+    assert states(alarms) == {"arm:link": UNACKNOWLEDGED}
+    alarms.look(111.0)
+    assert states(alarms) == {"arm:link": RETURNED}
+    assert alarms.held["arm:link"].returned == 111.0
+
+
+def test_more_than_ten_in_ten_minutes_is_a_flood_until_they_are_few():
+    alarms = Alarms()
+    for number in range(10):
+        alarms.come(alarm(f"arm:{number}"), float(number))
+    alarms.look(10.0)
+    assert not alarms.flooding
+    alarms.come(alarm("arm:10"), 11.0)
+    alarms.look(12.0)
+    assert alarms.flooding
+    alarms.look(604.0)
+    assert alarms.flooding  # seven of them are not ten minutes old
+    alarms.look(609.5)
+    assert not alarms.flooding
+
+
+def test_the_most_urgent_stand_first_and_what_is_shelved_last():
+    alarms = Alarms()
+    for number, priority in enumerate((Message.LOW, Message.CRITICAL, Message.HIGH, Message.CRITICAL)):
+        alarms.come(alarm(f"arm:{number}", priority=priority), float(number))
+    alarms.acknowledge(["arm:3"], "li", 10.0)
+    alarms.shelve(["arm:1"], "li", 10.0, for_s=60.0, reason="service")
+    assert [each.id for each in alarms.sorted()] == ["arm:2", "arm:0", "arm:3", "arm:1"]
+
+
+@pytest.mark.parametrize(
+    ("for_s", "reason", "said"),
+    [
+        (60.0, " ", "reason"),
+        (0.0, "service", "more than 0"),
+        (-1.0, "service", "more than 0"),
+        (LONGEST_SHELF_S + 1, "service", "86400"),
+        (math.nan, "service", "nan"),
+    ],
+)
+def test_a_shelf_needs_a_reason_and_an_end(for_s, reason, said):
+    alarms = Alarms()
+    alarms.come(alarm(), 0.0)
+    with pytest.raises(AlarmError, match=said):
+        alarms.shelve(["arm:link"], "li", 1.0, for_s=for_s, reason=reason)
+    assert states(alarms) == {"arm:link": UNACKNOWLEDGED}
+
+
+def test_a_name_that_is_no_alarm_changes_nothing_of_the_others():
+    alarms = Alarms()
+    alarms.come(alarm(), 0.0)
+    with pytest.raises(AlarmError, match="arm:nothing"):
+        alarms.acknowledge(["arm:link", "arm:nothing"], "li", 1.0)
+    with pytest.raises(AlarmError, match="name at least one"):
+        alarms.acknowledge([], "li", 1.0)
+    with pytest.raises(AlarmError, match="not shelved"):
+        alarms.unshelve(["arm:link"], "li", 1.0)
+    assert states(alarms) == {"arm:link": UNACKNOWLEDGED}
+
+
+def test_what_cannot_all_be_held_goes_least_urgent_first():
+    alarms = Alarms()
+    alarms.come(alarm("arm:urgent", priority=Message.CRITICAL), 0.0)
+    for number in range(600):
+        alarms.come(alarm(f"arm:{number}", priority=Message.LOW), float(number))
+    assert len(alarms.held) == 500
+    assert "arm:urgent" in alarms.held
+
+
+STEPS = st.lists(
+    st.tuples(
+        st.sampled_from(["come", "go", "ack", "shelve", "unshelve", "look"]),
+        st.sampled_from(["a", "b"]),
+        st.floats(0.0, 200.0),
+    ),
+    max_size=40,
+)
+
+
+@settings(max_examples=200, deadline=None)
+@given(STEPS)
+def test_whatever_happens_nothing_unseen_is_forgotten(steps):
+    """A second, naive book: what has come since it was last seen must be in the list."""
+    alarms, now = Alarms(), 0.0
+    unseen, counts = set(), {"a": 0, "b": 0}
+    for what, name, passes in steps:
+        now += passes
+        alarms.look(now)
+        counts[name] = counts[name] if name in alarms.held else 0
+        match what:
+            case "come":
+                standing = name in alarms.held and alarms.held[name].stands
+                if not (standing and alarms.held[name].seen):
+                    unseen.add(name)
+                alarms.come(alarm(name), now)
+                counts[name] += 1
+            case "go":
+                alarms.go(name, now)
+            case "look":
+                alarms.look(now)
+            case _:
+                try:
+                    if what == "ack":
+                        alarms.acknowledge([name], "li", now)
+                        unseen.discard(name)
+                    elif what == "shelve":
+                        alarms.shelve([name], "li", now, for_s=500.0, reason="service")
+                    else:
+                        alarms.unshelve([name], "li", now)
+                except AlarmError:
+                    pass
+        assert unseen <= alarms.held.keys()
+        for held in alarms.held.values():
+            assert held.count == counts[held.id]
+            assert held.shelved_until is None or held.shelved_until > now - 1e-9
+            assert held.stands or not held.seen or held.shelved_until is not None
+
+
+def test_alarms_survive_in_their_file_as_they_were(tmp_path):
+    path = tmp_path / "watch" / "site.json"
+    alarms = Alarms()
+    alarms.come(alarm(values=(("joint", "Hüfte"),)), 5.0)
+    alarms.acknowledge(["arm:link"], "li", 6.0)
+    kept.save(path, alarms.held.values(), {"arm/events": 12345})
+    assert kept.load(path) == (alarms.held, {"arm/events": 12345})
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[]", '{"alarms": [{}], "told_ns": {}}', '{"alarms": 3}', "\x00"])
+def test_a_file_that_is_none_of_alarms_is_named(tmp_path, text):
+    path = tmp_path / "site.json"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=r"site\.json: not a file of alarms"):
+        kept.load(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("since", "yesterday"),
+        ("since", 1e300),
+        ("last", math.nan),
+        ("returned", False),
+        ("priority", None),
+        ("priority", 9),
+        ("count", -1),
+        ("stands", "no"),
+        ("robot", 3),
+        ("text", ["down"]),
+        ("text", "\ud800"),
+    ],
+    ids=str,
+)
+def test_a_file_of_alarms_with_a_value_that_cannot_be_is_named(tmp_path, name, value):
+    path = tmp_path / "site.json"
+    kept.save(path, [alarm()], {})
+    values = json.loads(path.read_text(encoding="utf-8"))
+    values["alarms"][0][name] = value
+    path.write_text(json.dumps(values), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"site\.json: not a file of alarms"):
+        kept.load(path)
+
+
+def test_one_event_of_the_future_silences_nothing_and_none_is_told_twice():
+    now, key = 1000.0, parse_key("robomesh/s/arm/events")
+    intake = Intake(Alarms())
+
+    def event(code: str, at_s: int) -> Event:
+        told = Event(severity=Event.ERROR, code=code)
+        told.timestamp.FromSeconds(at_s)
+        return told
+
+    before, ahead, away = event("before", 900), event("ahead", 5000), event("while.away", 1010)
+    intake.live(key, before, now)
+    intake.live(key, ahead, now)
+    intake.remembered(key, [before, ahead, away], now + 20.0)
+    counts = {each.code: each.count for each in intake.alarms.held.values()}
+    assert counts == {"before": 1, "ahead": 1, "while.away": 1}
+    # Nor when the list holds it no more.
+    intake.live(key, ahead, now + 30.0)
+    intake.remembered(key, [event("later", 1040)], now + 50.0)
+    assert "arm:later" in intake.alarms.held

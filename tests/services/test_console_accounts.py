@@ -1,0 +1,379 @@
+"""A console with accounts over a real router: who gets in, what each may ask, and what ends it."""
+
+import asyncio
+import json
+
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from bus.schemas import robomesh_pb2 as schema
+from services.console.accounts.desk import change_account
+from services.console.accounts.file import AccountRole
+from services.console.accounts.gate import SIGNED_OUT
+from tests.conftest import run
+from tests.services.signing_in import PASSWORD, Client, guarded
+from tests.services.test_console import console, page
+
+__all__ = ["page"]  # a fixture
+ACTION = schema.LeaseRequest.Action
+LEASE = "robomesh/s/r/lease/request"
+
+
+def owner(other):
+    """A gateway's answers; what it was asked."""
+    asked = []
+
+    async def lease(request):
+        asked.append(("lease", request.chunk, request.message))
+        return schema.LeaseAnswer(holder=request.chunk)
+
+    async def stop(request):
+        asked.append(("stop", "", request.message))
+        return schema.StopAnswer(sent=True, stop_id=1)
+
+    other.answer("s", "r", "lease/request/*", lease)
+    other.answer("s", "r", "stop", stop)
+    return asked
+
+
+def lease(action=ACTION.ACQUIRE):
+    return schema.LeaseRequest(action=action).SerializeToString()
+
+
+async def hello(browser):
+    await browser.until(lambda: browser.other)
+    return browser.other[0].hello
+
+
+async def closing(browser, timeout_s=10.0):
+    """The code and the reason of the close that comes."""
+    async with asyncio.timeout(timeout_s):
+        try:
+            while True:
+                await browser.socket.recv()
+        except ConnectionClosed as closed:
+            return closed.rcvd.code, closed.rcvd.reason
+
+
+async def fetch(client, path):
+    """All that comes of a GET until the connection ends, whole or not."""
+    host, port = client.address.split(":")
+    reader, writer = await asyncio.open_connection(host, int(port))
+    writer.write(f"GET {path} HTTP/1.1\r\nHost: {client.address}\r\nCookie: {client.cookie}\r\n\r\n".encode())
+    try:
+        return await reader.read()
+    except ConnectionError:
+        return b""
+    finally:
+        writer.close()
+
+
+def test_without_a_session_only_the_page_itself_and_the_sign_in_are_open(mesh, page, tmp_path):
+    async def main():
+        async with guarded(mesh, page, tmp_path) as (client, _, _):
+            for path in ("/", "/index.html", "/assets/index-1234.js", "/health", "/account/me"):
+                assert (await client.get(path))[0] == 200, path
+            for path in (
+                "/mesh/s/r/base",
+                "/video/s/r/top.mjpeg",
+                "/image/s/r/top.jpg",
+                "/recordings/s/a.mcap",
+                "/define/robots",
+                "/account/sessions",
+                "/account/accounts",
+                "/anything",
+            ):
+                status, _, body = await client.get(path)
+                assert (status, json.loads(body)["error"]) == (401, "sign_in"), path
+            with pytest.raises(InvalidStatus, match="403"):
+                async with client.browse():
+                    pass
+            assert (await client.post("/define/save"))[0] == 401
+
+    run(main())
+
+
+def test_whoever_signs_in_is_greeted_by_name_and_may_do_what_the_role_may(mesh, page, tmp_path):
+    async def main():
+        async with guarded(mesh, page, tmp_path) as (client, other, _):
+            asked = owner(other)
+            status, headers, me = await client.sign_in(" Li ")
+            assert (status, me["account"], me["role"], me["operator"]) == (200, "li", "operator", "li.s")
+            cookie = headers["set-cookie"]
+            assert "HttpOnly" in cookie
+            assert "SameSite=strict" in cookie
+            async with client.browse() as browser:
+                greeting = await hello(browser)
+                assert (greeting.account, greeting.operator, greeting.may_command) == ("li", "li.s", True)
+                answer = await browser.ask(1, f"{LEASE}/li.s", lease())
+                assert answer.ok, answer.error
+                assert asked[-1][1] == "li.s"
+                # Somebody else's name is not asked in, not even at the gateway.
+                answer = await browser.ask(2, f"{LEASE}/wang.s", lease())
+                assert (answer.ok, answer.error) == (
+                    False,
+                    "li asks in the name li.s only, not as wang.s",
+                )
+                assert len(asked) == 1
+
+    run(main())
+
+
+def test_a_monitor_sees_everything_and_asks_for_nothing_but_a_stop_in_its_own_name(mesh, page, tmp_path):
+    async def main():
+        async with guarded(mesh, page, tmp_path) as (client, other, _):
+            asked = owner(other)
+            await client.sign_in("zhao")
+            async with client.browse() as browser:
+                assert not (await hello(browser)).may_command
+                keys = (f"{LEASE}/zhao.s", "robomesh/s/r/command/zhao.s", "robomesh/s/r/recorder/request")
+                for number, key in enumerate(keys, 1):
+                    answer = await browser.ask(number, key, lease())
+                    assert not answer.ok
+                    assert "zhao is a monitor" in answer.error
+                    assert "needs an operator" in answer.error
+                forged = schema.StopRequest(by="li", reason="the page").SerializeToString()
+                assert (await browser.ask(9, "robomesh/s/r/stop", forged)).ok
+                assert [(what, message.by) for what, _, message in asked] == [("stop", "zhao.s")]
+            for path in ("/define/save", "/define/start", "/define/stop"):
+                status, _, told = await client.post(path, {"description": {}, "files": {}, "name": "r"})
+                assert (status, told) == (403, "zhao is a monitor: this needs an operator"), path
+
+    run(main())
+
+
+def test_a_wrong_password_and_a_name_that_nobody_has_are_refused_alike(mesh, page, tmp_path):
+    async def main():
+        async with guarded(mesh, page, tmp_path) as (client, _, _):
+            wrong = await client.sign_in("li", "not the password")
+            nobody = await client.sign_in("nobody", "not the password")
+            assert wrong[0] == nobody[0] == 401
+            assert wrong[2] == nobody[2]
+            assert client.cookie == ""
+
+    run(main())
+
+
+def test_a_session_is_over_everywhere_once_it_is_signed_out(mesh, page, tmp_path):
+    async def main():
+        async with guarded(mesh, page, tmp_path) as (client, _, _):
+            await client.sign_in("li")
+            async with client.browse() as browser:
+                await hello(browser)
+                stolen = Client(client.address, client.cookie)
+                assert (await client.post("/account/sign-out"))[0] == 200
+                assert await closing(browser) == (SIGNED_OUT, "signed_out")
+                assert (await stolen.get("/account/sessions"))[0] == 401
+                with pytest.raises(InvalidStatus):
+                    async with stolen.browse():
+                        pass
+
+    run(main())
+
+
+def test_what_is_being_fetched_for_a_session_ends_with_it(mesh, page, tmp_path):
+    async def main():
+        async with guarded(mesh, page, tmp_path) as (client, other, _):
+            begun, go_on = asyncio.Event(), asyncio.Event()
+
+            async def mesh_of_link(request):
+                begun.set()
+                await go_on.wait()
+                return b"glTF"
+
+            other.answer("s", "r", "mesh/*", mesh_of_link)
+            await client.sign_in("li")
+            fetched = asyncio.create_task(fetch(client, "/mesh/s/r/base"))
+            async with asyncio.timeout(10.0):
+                await begun.wait()
+            await client.post("/account/sign-out")
+            async with asyncio.timeout(10.0):
+                assert b"glTF" not in await fetched
+            go_on.set()
+
+    run(main())
+
+
+def test_signing_out_everywhere_ends_every_session_of_the_account_and_no_other(mesh, page, tmp_path):
+    async def main():
+        async with guarded(mesh, page, tmp_path) as (client, _, _):
+            second, zhao = Client(client.address), Client(client.address)
+            for each, name in ((client, "li"), (second, "li"), (zhao, "zhao")):
+                await each.sign_in(name)
+            async with second.browse() as browser:
+                await hello(browser)
+                await client.post("/account/sign-out", {"everywhere": True})
+                assert await closing(browser) == (SIGNED_OUT, "signed_out")
+            assert (await zhao.get("/account/sessions"))[0] == 200
+
+    run(main())
+
+
+def test_a_session_is_never_one_that_the_browser_came_with(mesh, page, tmp_path):
+    async def main():
+        async with guarded(mesh, page, tmp_path) as (client, _, _):
+            await client.sign_in("li")
+            first = client.cookie
+            planted = Client(client.address, first.split("=")[0] + "=planted-by-somebody-else")
+            await planted.sign_in("zhao")
+            assert "planted" not in planted.cookie
+            # And of a browser that was signed in, the old one ends.
+            await client.sign_in("li")
+            assert client.cookie != first
+            assert (await Client(client.address, first).get("/account/sessions"))[0] == 401
+
+    run(main())
+
+
+@pytest.mark.parametrize(
+    ("action", "values", "reason"),
+    [
+        ("disable", {}, "disabled"),
+        ("remove", {}, "removed"),
+        ("password", {"hashed": "$argon2id$v=19$m=8,t=1,p=1$c29tZXNhbHQ$AAAA"}, "password"),
+    ],
+)
+def test_a_change_of_the_accounts_file_ends_sessions_at_once(mesh, page, tmp_path, action, values, reason):
+    async def main():
+        async with guarded(mesh, page, tmp_path) as (client, _, path):
+            await client.sign_in("li")
+            async with client.browse() as browser:
+                await hello(browser)
+                change_account(path, action, "li", **values)
+                assert await closing(browser) == (SIGNED_OUT, reason)
+            assert (await client.sign_in("li"))[0] == 401
+
+    run(main())
+
+
+def test_a_lesser_role_holds_at_once_and_takes_control_away(mesh, page, tmp_path):
+    async def main():
+        async with guarded(mesh, page, tmp_path) as (client, other, path):
+            owner(other)
+            await client.sign_in("li")
+            async with client.browse() as browser:
+                await hello(browser)
+                assert (await browser.ask(1, f"{LEASE}/li.s", lease())).ok
+                change_account(path, "role", "li", role=AccountRole.MONITOR)
+                await browser.until(
+                    lambda: any(
+                        m.WhichOneof("message") == "hello" and not m.hello.may_command for m in browser.other
+                    ),
+                    10.0,
+                )
+                answer = await browser.ask(2, f"{LEASE}/li.s", lease(ACTION.RENEW))
+                assert "li is a monitor" in answer.error
+                async with asyncio.timeout(5.0):
+                    while [who for who in await other.present() if who.service == "operator"]:
+                        await asyncio.sleep(0.01)
+
+    run(main())
+
+
+def test_a_file_that_became_wrong_signs_nobody_out_and_is_told_of(mesh, page, tmp_path):
+    async def main():
+        async with guarded(mesh, page, tmp_path) as (client, other, path):
+            events = other.subscribe("robomesh/s/-/events/console", newest=100)
+            await client.sign_in("li")
+            path.write_text("[[account")
+            codes = []
+            async with asyncio.timeout(10.0):
+                async for sample in events:
+                    message = sample.message()
+                    told = getattr(message, "events", [message])
+                    codes += [event.code for event in told]
+                    if "accounts.unreadable" in codes:
+                        break
+            assert (await client.get("/account/sessions"))[0] == 200
+            events.close()
+
+    run(main())
+
+
+def test_signing_in_and_out_and_refusals_are_events_without_secrets(mesh, page, tmp_path):
+    async def main():
+        async with guarded(mesh, page, tmp_path) as (client, other, _):
+            events = other.subscribe("robomesh/s/-/events/console", newest=100)
+            await client.sign_in("my-password-in-the-wrong-field", "guess the first one")
+            await client.sign_in("li")
+            token = client.cookie.partition("=")[2]
+            await client.post("/account/sign-out")
+            told = {}
+            async with asyncio.timeout(10.0):
+                async for sample in events:
+                    message = sample.message()
+                    for event in getattr(message, "events", [message]):
+                        told[event.code] = event
+                    if len(told) == 3:
+                        break
+            assert set(told) == {"account.refused", "account.signed_in", "account.signed_out"}
+            assert told["account.signed_in"].values["account"] == "li"
+            text = " ".join(str(event) for event in told.values())
+            for secret in (PASSWORD, token, "guess", "wrong-field"):
+                assert secret not in text
+            events.close()
+
+    run(main())
+
+
+def test_a_new_password_of_ones_own_keeps_this_session_and_ends_the_others(mesh, page, tmp_path):
+    async def main():
+        async with guarded(mesh, page, tmp_path) as (client, _, _):
+            second = Client(client.address)
+            await client.sign_in("li")
+            await second.sign_in("li")
+            new = "four arms in a hall"
+            refused = await client.post("/account/password", {"password": "a wrong one", "new": new})
+            assert (refused[0], refused[2]["error"]) == (401, "wrong")
+            short = await client.post("/account/password", {"password": PASSWORD, "new": "short"})
+            assert short[0] == 422
+            assert "too short" in short[2]["text"]
+            done = await client.post("/account/password", {"password": PASSWORD, "new": new})
+            assert done[0] == 200, done[2]
+            assert (await client.get("/account/sessions"))[0] == 200
+            assert (await second.get("/account/sessions"))[0] == 401
+            assert (await second.sign_in("li", new))[0] == 200
+
+    run(main())
+
+
+def test_an_administrator_changes_accounts_and_nobody_else_does(mesh, page, tmp_path):
+    async def main():
+        async with guarded(mesh, page, tmp_path) as (client, _, _):
+            li = Client(client.address)
+            await li.sign_in("li")
+            for asked in (
+                {"action": "role", "name": "li", "role": "admin"},
+                {"action": "remove", "name": "zhao"},
+            ):
+                status, _, told = await li.post("/account/accounts", asked)
+                assert (status, told["error"]) == (403, "not_admin")
+            assert (await li.get("/account/accounts"))[0] == 403
+            await client.sign_in("chen")
+            add = {"action": "add", "name": "wang", "role": "operator", "password": PASSWORD}
+            status, _, told = await client.post("/account/accounts", add)
+            assert status == 200, told
+            assert "wang" in [each["name"] for each in told["accounts"]]
+            assert "argon2" not in json.dumps(told)
+            assert (await Client(client.address).sign_in("wang"))[0] == 200
+            status, _, told = await client.post("/account/accounts", {"action": "remove", "name": "chen"})
+            assert (status, "last administrator" in told["text"]) == (422, True)
+            # And another one's session is ended by the list.
+            _, _, body = await client.get("/account/sessions")
+            of_li = next(each["id"] for each in json.loads(body)["sessions"] if each["account"] == "li")
+            assert (await client.post("/account/sessions", {"end": of_li}))[0] == 200
+            assert (await li.get("/account/sessions"))[0] == 401
+
+    run(main())
+
+
+def test_a_console_without_accounts_asks_nobody_to_sign_in(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, _):
+            client = Client(address)
+            _, _, body = await client.get("/account/me")
+            me = json.loads(body)
+            assert (me["accounts"], me["may_command"], me["site"]) == (False, True, "s")
+            assert (await client.post("/account/sign-in", {"name": "li", "password": PASSWORD}))[0] == 405
+
+    run(main())

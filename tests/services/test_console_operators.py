@@ -1,0 +1,120 @@
+"""Whoever has control through a page is present on the mesh as long as the page's connection lasts."""
+
+import asyncio
+
+from bus.errors import RefusedError
+from bus.requests import ask_all
+from bus.schemas.robomesh_pb2 import LeaseAnswer, LeaseRequest
+from tests.conftest import run
+from tests.services.test_console import browse, console, page
+
+__all__ = ["page"]  # a fixture
+ACTION = LeaseRequest.Action
+KEY = "robomesh/s/r/lease/request/li"
+
+
+def asked(action):
+    return LeaseRequest(action=action).SerializeToString()
+
+
+def owner(other):
+    """Answers lease requests of a robot: all but TAKE are granted."""
+
+    async def lease(request):
+        if request.message.action == ACTION.TAKE:
+            raise RefusedError("TAKE needs a reason")
+        return LeaseAnswer(holder="li")
+
+    other.answer("s", "r", "lease/request/*", lease)
+
+
+async def until_present(session, *ids, timeout_s=30.0):
+    """Waits until just these operators are present."""
+    async with asyncio.timeout(timeout_s):
+        while [who.id for who in await session.present() if who.service == "operator"] != [*ids]:
+            await asyncio.sleep(0.01)
+
+
+async def session_of(browser):
+    await browser.until(lambda: browser.other)
+    return browser.other[0].hello.session
+
+
+def test_a_page_in_control_is_present_and_gone_with_its_connection(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, other):
+            owner(other)
+            async with browse(address) as browser, browse(address) as onlooker:
+                mine = await session_of(browser)
+                assert mine != await session_of(onlooker)
+                await onlooker.ask(1, KEY, asked(ACTION.ASK))
+                assert (await browser.ask(1, KEY, asked(ACTION.ACQUIRE))).ok
+                await until_present(other, mine)
+                # As a killed browser does: without a word.
+                browser.socket.transport.abort()
+                await until_present(other)
+
+    run(main())
+
+
+def test_a_page_that_is_refused_or_gives_control_back_is_not_present(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, other), browse(address) as browser:
+            owner(other)
+            mine = await session_of(browser)
+            assert (await browser.ask(1, KEY, asked(ACTION.ACQUIRE))).ok
+            await until_present(other, mine)
+            assert (await browser.ask(2, KEY, asked(ACTION.RELEASE))).ok
+            await until_present(other)
+            assert not (await browser.ask(3, KEY, asked(ACTION.TAKE))).ok
+            await until_present(other)
+
+    run(main())
+
+
+def test_nobody_is_present_at_a_robot_that_does_not_answer(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, other), browse(address) as browser:
+            answer = await browser.ask(1, KEY, asked(ACTION.ACQUIRE))
+            assert (answer.ok, answer.no_answer) == (False, True)
+            await until_present(other)
+
+    run(main())
+
+
+def test_a_lease_request_that_is_none_is_refused_in_words(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, _), browse(address) as browser:
+            answer = await browser.ask(1, KEY, b"\xff")
+            assert (answer.ok, answer.no_answer, answer.error) == (False, False, "this is no LeaseRequest")
+
+    run(main())
+
+
+def test_a_busy_gateway_is_to_the_page_one_that_does_not_answer_and_may_be_asked_again(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, other), browse(address) as browser:
+            begun, go_on = [], asyncio.Event()
+
+            async def lease(request):
+                begun.append(request)
+                await go_on.wait()
+                return LeaseAnswer(holder="li")
+
+            other.answer("s", "r", "lease/request/*", lease)
+            payload = asked(ACTION.RENEW)
+            waiting = [
+                asyncio.create_task(ask_all(other.zenoh_session, KEY, payload, timeout_s=20.0))
+                for _ in range(16)
+            ]
+            async with asyncio.timeout(40):
+                while len(begun) < 16:
+                    await asyncio.sleep(0.01)
+            answer = await browser.ask(1, KEY, payload, timeout_s=0.3)
+            assert (answer.ok, answer.no_answer) == (False, True)
+            assert "too many requests wait" in answer.error
+            go_on.set()
+            assert (await browser.ask(2, KEY, payload)).ok
+            await asyncio.gather(*waiting)
+
+    run(main())

@@ -1,0 +1,289 @@
+"""Pictures over HTTP: MJPEG, MP4 and stills of a robot, before a renderer that is played."""
+
+import asyncio
+import io
+from contextlib import asynccontextmanager, suppress
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+
+from bus.errors import RefusedError
+from bus.header import Header
+from bus.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
+from bus.subscription import Sample
+from renderer.errors import NoRoomError
+from services.console import pictures
+from services.console.lanes import NewestLane
+from services.console.streamed import Streamed
+from tests.conftest import run
+from tests.services.test_console import console, get, page  # noqa: F401
+
+WIDTH, HEIGHT = 160, 90
+
+
+def jpeg(shade):
+    codec = av.CodecContext.create("mjpeg", "w")
+    codec.width, codec.height, codec.pix_fmt, codec.time_base = WIDTH, HEIGHT, "yuvj420p", Fraction(1, 5)
+    picture = np.full((HEIGHT, WIDTH, 3), shade, dtype=np.uint8)
+    frame = av.VideoFrame.from_ndarray(picture, format="rgb24").reformat(format="yuvj420p")
+    (packet,) = codec.encode(frame)
+    return bytes(packet)
+
+
+class Video:
+    """Shades as H.264, each picture a packet."""
+
+    def __init__(self):
+        self._codec = av.CodecContext.create("libx264", "w")
+        self._codec.width, self._codec.height, self._codec.pix_fmt = WIDTH, HEIGHT + 6, "yuv420p"
+        self._codec.options = {"preset": "superfast", "tune": "zerolatency", "x264-params": "keyint=10"}
+
+    def packet(self, shade):
+        picture = np.full((HEIGHT + 6, WIDTH, 3), shade, dtype=np.uint8)
+        (packet,) = self._codec.encode(av.VideoFrame.from_ndarray(picture, format="rgb24"))
+        return CompressedVideo(data=bytes(packet), format="h264"), packet.is_keyframe
+
+
+@asynccontextmanager
+async def rendered(mesh, page):  # noqa: F811
+    """A console, and a renderer's part played: its views, its pictures 20 times a second while watched."""
+    async with console(mesh, page) as (address, other):
+
+        async def views(request):
+            if request.message.of != "front":
+                raise RefusedError(f"no view {request.message.of!r}; there are front")
+            if request.message.width > 1920:
+                raise RefusedError("a view of 2000 pixels: up to 1920 are possible")
+            if request.message == ViewRequest(of="front"):
+                return ViewAnswer(topic="video/front", image="image/front", width=160, height=90, fps=20)
+            if request.message.width == 1920:
+                raise RefusedError(str(NoRoomError("1 views were asked for already")))
+            return ViewAnswer(topic="video/free-1", image="image/free-1", width=160, height=90, fps=20)
+
+        other.answer("s", "r", "views", views)
+        images = [other.declare_publisher("s", "r", f"image/{name}") for name in ("front", "free-1")]
+        videos = [other.declare_publisher("s", "r", f"video/{name}") for name in ("front", "free-1")]
+
+        async def play():
+            video, shade = Video(), 0
+            while True:
+                shade = (shade + 5) % 250
+                message, key = video.packet(shade)
+                for publisher in videos:
+                    publisher.put(message, key_frame=key)
+                for publisher in images:
+                    publisher.put(CompressedImage(data=jpeg(shade), format="jpeg"))
+                await asyncio.sleep(0.05)
+
+        playing = asyncio.create_task(play())
+        try:
+            yield address, images, videos, playing
+        finally:
+            playing.cancel()
+            await asyncio.gather(playing, return_exceptions=True)
+
+
+async def stream(address, path, *, until_bytes, method="GET", timeout_s=15.0):
+    """Status, headers, the beginning of a stream's body, how to read on and how to end it."""
+    host, port = address.split(":")
+    reader, writer = await asyncio.open_connection(host, int(port))
+    text = f"{method} {path} HTTP/1.1\r\nHost: {address}\r\nAccept-Encoding: gzip\r\n\r\n"
+    writer.write(text.encode())
+    async with asyncio.timeout(timeout_s):
+        head = (await reader.readuntil(b"\r\n\r\n")).decode().lower()
+        body = await pieces_of(reader, until_bytes)
+    return head, body, (reader, writer)
+
+
+async def pieces_of(reader, until_bytes):
+    """Chunks of a body, until it is as long, or ends."""
+    body = b""
+    while len(body) < until_bytes and (size := int(await reader.readline(), 16)):
+        body += (await reader.readexactly(size + 2))[:-2]
+    return body
+
+
+async def unwatched(publishers, timeout_s=10.0):
+    async with asyncio.timeout(timeout_s):
+        while any(publisher.watched for publisher in publishers):
+            await asyncio.sleep(0.02)
+
+
+def test_mjpeg_is_one_picture_after_another_until_its_reader_goes(mesh, page):  # noqa: F811
+    async def main():
+        async with rendered(mesh, page) as (address, images, _, __):
+            head, body, (_, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=12_000)
+            assert "200 ok" in head
+            assert "multipart/x-mixed-replace; boundary=picture" in head
+            assert "content-encoding" not in head
+            with av.open(io.BytesIO(body), format="mpjpeg") as container:
+                shades = []
+                with suppress(av.FFmpegError):  # the last one may be cut
+                    shades += [frame.to_ndarray(format="gray").mean() for frame in container.decode(video=0)]
+            assert len({round(shade) for shade in shades}) > 2
+            # What everybody sees: nothing is drawn for this reader alone.
+            assert [publisher.watched for publisher in images] == [True, False]
+            writer.close()
+            await unwatched(images)
+
+    run(main())
+
+
+def test_an_mjpeg_whose_pictures_end_says_that_it_is_stale_and_then_ends(mesh, page, monkeypatch):  # noqa: F811
+    monkeypatch.setattr(pictures, "_STALE_AFTER_S", 0.25)
+    monkeypatch.setattr(pictures, "_SILENT_S", 0.75)
+
+    async def main():
+        async with rendered(mesh, page) as (address, _, __, playing):
+            _, body, (reader, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=1_000)
+            assert body.count(b"--picture\r\n") > body.count(pictures._STALE)
+            playing.cancel()
+            async with asyncio.timeout(40):
+                body = await pieces_of(reader, 1_000_000)
+            assert body.count(pictures._STALE) >= 2
+            assert body.endswith(pictures._STALE + b"\r\n")
+            writer.close()
+
+    run(main())
+
+
+def test_a_head_of_a_stream_ends_with_its_headers(mesh, page):  # noqa: F811
+    async def main():
+        async with rendered(mesh, page) as (address, *_):
+            for ending, kind in (("mjpeg", "multipart/x-mixed-replace"), ("mp4", "video/mp4")):
+                head, _, (reader, writer) = await stream(
+                    address, f"/video/s/r/front.{ending}", until_bytes=0, method="HEAD"
+                )
+                assert "200 ok" in head
+                assert kind in head
+                assert "content-length" not in head
+                # The connection is free for more.
+                writer.write(f"GET /none HTTP/1.1\r\nHost: {address}\r\n\r\n".encode())
+                async with asyncio.timeout(40):
+                    assert b"404" in await reader.readline()
+                writer.close()
+
+    run(main())
+
+
+def test_a_reader_that_takes_nothing_loses_its_stream():
+    ended = []
+
+    async def pieces():
+        while True:
+            yield b"picture"
+
+    async def send(_):
+        await asyncio.get_running_loop().create_future()
+
+    async def end():
+        ended.append(True)
+
+    run(Streamed(pieces(), {}, within_s=0.05, on_end=end).stream_response(send))
+    assert ended
+
+
+def test_mp4_plays_while_it_happens_until_its_reader_goes(mesh, page):  # noqa: F811
+    async def main():
+        async with rendered(mesh, page) as (address, _, videos, __):
+            head, body, (_, writer) = await stream(address, "/video/s/r/front.mp4", until_bytes=6_000)
+            assert "200 ok" in head
+            assert "video/mp4" in head
+            shades = []
+            with av.open(io.BytesIO(body), format="mp4") as container, suppress(av.FFmpegError):
+                shades += [frame.to_ndarray(format="gray").mean() for frame in container.decode(video=0)]
+            assert len({round(shade) for shade in shades}) > 5
+            writer.close()
+            await unwatched(videos)
+
+    run(main())
+
+
+def test_a_still_is_the_newest_picture_as_jpeg_or_png(mesh, page):  # noqa: F811
+    async def main():
+        async with rendered(mesh, page) as (address, images, *_):
+            for ending, kind in (("jpg", "image/jpeg"), ("png", "image/png")):
+                status, headers, body = await get(address, f"/image/s/r/front.{ending}")
+                assert (status, headers["content-type"]) == (200, kind)
+                with av.open(io.BytesIO(body)) as container:
+                    frame = next(container.decode(video=0))
+                assert (frame.width, frame.height) == (WIDTH, HEIGHT)
+            await unwatched(images)
+
+    run(main())
+
+
+@pytest.mark.parametrize(
+    ("path", "status", "words"),
+    [
+        ("image/s/r/back.jpg", 404, "no view 'back'; there are front"),
+        ("video/s/r/back.mjpeg", 404, "no view 'back'; there are front"),
+        ("video/s/r/back.mp4", 404, "no view 'back'; there are front"),
+        ("image/s/r/front.jpg?width=2000&height=1000", 400, "up to 1920 are possible"),
+        ("image/s/r/front.jpg?width=wide", 400, "width='wide' is no number of pixels"),
+        ("image/s/r/front.jpg?width=1920", 503, "no room: 1 views were asked for already"),
+        ("video/s/r/front.mp4?fps=fast", 400, "fps='fast' is no number"),
+        ("video/s/r/front.mp4?quality=5", 400, "width, height and fps"),
+        ("image/S!/r/front.jpg", 404, "S!"),
+    ],
+)
+def test_what_cannot_be_shown_is_said_in_words(mesh, page, path, status, words):  # noqa: F811
+    async def main():
+        async with rendered(mesh, page) as (address, *_):
+            answered, _, body = await get(address, f"/{path}")
+            assert answered == status
+            assert words in body.decode()
+
+    run(main())
+
+
+def test_without_a_renderer_the_answer_says_so(mesh, page, monkeypatch):  # noqa: F811
+    monkeypatch.setattr("services.console.views.TIMEOUT_S", 0.3)
+
+    async def main():
+        async with console(mesh, page) as (address, _):
+            status, _, body = await get(address, "/image/s/r/front.jpg")
+            assert status == 503
+            assert "no renderer draws s/r" in body.decode()
+
+    run(main())
+
+
+@pytest.mark.parametrize("most", ["_MOST_STREAMS", "_MOST_OF_ONE"])
+def test_more_streams_than_there_is_room_for_are_refused_and_room_comes_back(mesh, page, monkeypatch, most):  # noqa: F811
+    monkeypatch.setattr(pictures, most, 1)
+
+    async def main():
+        async with rendered(mesh, page) as (address, images, *_):
+            _, _, (_, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=100)
+            status, _, body = await get(address, "/video/s/r/front.mjpeg")
+            assert status == 503
+            assert "close one first" in body.decode()
+            writer.close()
+            await unwatched(images)
+            head, _, (_, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=100)
+            assert "200 ok" in head
+            writer.close()
+            await unwatched(images)
+
+    run(main())
+
+
+def test_what_a_slow_reader_is_given_next_is_the_newest():
+    class Feeds:
+        def join(self, key, sink):
+            self.sink = sink
+
+    async def main():
+        feeds = Feeds()
+        watch = pictures._Watch(feeds, "robomesh/s/r/image/front", NewestLane())
+        for number in range(100):
+            feeds.sink(Sample("robomesh/s/r/image/front", b"", Header(1, number, 0), True, 0.0))
+        assert (await watch.next(1.0)).header.sequence == 99
+        assert await watch.next(0.01) is None
+
+    run(main())

@@ -1,0 +1,119 @@
+"""A console's TLS: what it needs beyond loopback, cookies over it, renewed certificates, wrong ones."""
+
+import asyncio
+import json
+import ssl
+
+import pytest
+
+from services.console import server
+from services.errors import ListenError
+from tests.conftest import run
+from tests.services.certificates import self_signed
+from tests.services.signing_in import accounts_file
+from tests.services.test_console import console, page
+from tests.services.test_console_attacks import ENDS_S, connected, ended, http, told
+
+__all__ = ["page"]  # a fixture
+
+
+def test_over_tls_the_cookie_is_for_this_host_alone_and_browsers_come_back_by_tls(mesh, page, tmp_path):
+    certificate, key = self_signed(tmp_path)
+
+    async def main():
+        path = accounts_file(tmp_path)
+        settings = {"accounts": path, "certificate": certificate, "key": key}
+        async with console(mesh, page, **settings) as (address, _):
+            here = address.removeprefix("https://")
+            trusted = ssl.create_default_context(cafile=certificate)
+            body = json.dumps({"name": "li", "password": "three arms in a hall"}).encode()
+            own = [
+                ("Content-Type", "application/json"),
+                ("Content-Length", len(body)),
+                ("Connection", "close"),
+            ]
+            for origin, status in ((f"http://{here}", b"403"), (f"https://{here}", b"200")):
+                async with connected(here, ssl=trusted) as (reader, writer):
+                    assert writer.get_extra_info("ssl_object").version() in ("TLSv1.2", "TLSv1.3")
+                    asked = [("Origin", origin), *own]
+                    writer.write(http("POST", "/account/sign-in", here, asked, body))
+                    answer = await ended(reader)
+                assert answer.split()[1] == status
+            head = answer.partition(b"\r\n\r\n")[0].decode().lower()
+            assert "strict-transport-security: max-age=" in head
+            assert "set-cookie: __host-robomesh-s=" in head
+            assert "; secure" in head
+            # Who speaks plain HTTP there, or stops in mid-handshake, harms nobody.
+            assert await told(here, http("GET", "/", here, [])) == 0
+
+    run(main())
+
+
+@pytest.mark.parametrize(
+    ("has", "lacks"), [((), "accounts and without TLS"), (("accounts",), "TLS"), (("tls",), "accounts")]
+)
+def test_beyond_loopback_it_starts_with_accounts_and_tls_or_says_what_is_missing(
+    mesh, page, tmp_path, has, lacks
+):
+    certificate, key = self_signed(tmp_path)
+    settings = {"listen": "0.0.0.0:0"}
+    if "accounts" in has:
+        settings["accounts"] = accounts_file(tmp_path)
+    if "tls" in has:
+        settings |= {"certificate": certificate, "key": key}
+
+    async def main():
+        with pytest.raises(ListenError, match=f"without {lacks}: give it accounts"):
+            async with console(mesh, page, **settings):
+                pass
+        # In so many words it does, and says so on every page.
+        async with console(mesh, page, **settings, insecure=True) as (address, _):
+            assert address.endswith(address.rpartition(":")[2])
+
+    run(main())
+
+
+def test_a_renewed_certificate_is_taken_up_without_a_restart_and_half_a_one_is_not(
+    mesh, page, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(server, "_RENEWED_LOOK_EACH_S", 0.02)
+    certificate, key = self_signed(tmp_path)
+    (tmp_path / "next").mkdir()
+    renewed, renewed_key = self_signed(tmp_path / "next")
+    anyone = ssl.create_default_context()
+    anyone.check_hostname, anyone.verify_mode = False, ssl.CERT_NONE
+
+    async def main():
+        async with console(mesh, page, certificate=certificate, key=key) as (address, _):
+
+            async def shown():
+                async with connected(address.removeprefix("https://"), ssl=anyone) as (_, writer):
+                    return writer.get_extra_info("ssl_object").getpeercert(binary_form=True)
+
+            first = await shown()
+            renewed.replace(certificate)
+            for _ in range(5):
+                await asyncio.sleep(0.05)
+                assert await shown() == first
+            renewed_key.replace(key)
+            async with asyncio.timeout(ENDS_S):
+                while await shown() == first:
+                    await asyncio.sleep(0.02)
+
+    run(main())
+
+
+def test_a_certificate_that_is_none_is_named(mesh, page, tmp_path):
+    (tmp_path / "c.pem").write_text("no certificate")
+
+    async def main():
+        for certificate, why in (
+            (tmp_path / "c.pem", "not a certificate"),
+            (tmp_path / "d.pem", "No such file"),
+        ):
+            with pytest.raises(ListenError, match=why) as refused:
+                async with console(mesh, page, certificate=certificate, key=certificate):
+                    pass
+            assert certificate.name in str(refused.value)
+
+    run(main())

@@ -1,0 +1,62 @@
+"""A page that asks and does not read takes no memory: it is cut off."""
+
+import asyncio
+from dataclasses import dataclass, field
+
+from bus.schemas.robomesh_pb2 import FromPage, ToPage
+from bus.session import open_session
+from services.console.browser import Browser
+from services.console.feeds import Feeds
+from services.console.views import Views
+from tests.conftest import run
+from tests.services.test_console import browse, console, page
+
+__all__ = ["page"]  # a fixture
+LONG = "robomesh/s/r/" + "x" * 900_000
+
+
+@dataclass
+class Deaf:
+    """A WebSocket whose other end asks again and again, and takes nothing."""
+
+    asked: int = 0
+    sent: list = field(default_factory=list)
+
+    async def receive(self):
+        await asyncio.sleep(0)
+        self.asked += 1
+        ask = FromPage.Ask(id=self.asked, key="robomesh/s/r/no-such-request")
+        return {"type": "websocket.receive", "bytes": FromPage(ask=ask).SerializeToString()}
+
+    async def send_bytes(self, data):
+        self.sent.append(data)
+        await asyncio.Event().wait()
+
+    async def close(self, code, reason):
+        await asyncio.Event().wait()
+
+
+def test_a_page_that_asks_and_never_reads_is_cut_off(mesh, monkeypatch):
+    monkeypatch.setattr("services.console.browser._MOST_UNREAD", 20_000)
+    monkeypatch.setattr("services.console.browser._CLOSED_WITHIN_S", 0.05)
+
+    async def main():
+        async with open_session(mesh) as session:
+            feeds, deaf = Feeds(session), Deaf()
+            browser = Browser(session, feeds, Views(session), greet=lambda _: ToPage(), site="s")
+            async with asyncio.timeout(30.0):
+                await browser.run(deaf)
+            assert 10 < deaf.asked < 2000
+            assert sum(map(len, browser._messages)) <= 21_000
+            feeds.close()
+
+    run(main())
+
+
+def test_a_long_key_is_refused_without_being_repeated(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, _), browse(address) as browser:
+            answer = await browser.ask(1, LONG)
+            assert (answer.ok, answer.error) == (False, "a key of 900013 characters: 200 at most")
+
+    run(main())

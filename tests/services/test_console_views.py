@@ -1,0 +1,221 @@
+"""Less of a view for a slow line: what is asked of the renderer, and when."""
+
+import asyncio
+from types import SimpleNamespace
+
+import pytest
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+
+from bus.errors import RefusedError
+from bus.header import Header
+from bus.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
+from bus.session import open_session
+from bus.subscription import Sample
+from services.console import lanes, stepped
+from services.console.stepped import SteppedVideo
+from services.console.views import LOWEST_STEP, Views, less
+from tests.conftest import run
+
+KEY = "robomesh/s/r/video/top"
+KEY_FRAME = b"\0\0\0\1\x67\x42\xc0\x1f\0\0\0\1\x65\x88"
+DELTA = b"\0\0\0\1\x41\x9a\x01"
+WHOLE = ViewAnswer(topic="video/free-0", image="image/free-0", width=1280, height=720, fps=30)
+
+
+def sample(number, data, key=KEY):
+    return Sample(key, CompressedVideo(data=data).SerializeToString(), Header(1, number, 0), True, 0.0)
+
+
+@pytest.mark.parametrize("step", range(1, LOWEST_STEP + 1))
+def test_each_step_is_smaller_slower_and_of_fewer_bits_than_the_one_above(step):
+    above, below = (less(ViewRequest(of="top"), WHOLE, each) for each in (step - 1, step))
+    assert below.of == "top"
+    assert below.width < above.width
+    assert below.height < above.height
+    assert below.fps < above.fps
+    assert below.most_bits_per_s < (above.most_bits_per_s or 1e9)
+    assert below.width % 2 == below.height % 2 == 0
+
+
+def test_a_small_view_is_never_reduced_to_a_size_that_no_picture_has():
+    small = less(ViewRequest(), ViewAnswer(width=64, height=64, fps=1), LOWEST_STEP)
+    assert (small.width, small.height, small.fps) == (64, 64, 1.0)
+
+
+class Feeds:
+    """Who watches what."""
+
+    def __init__(self):
+        self.joined = {}
+        self.log = []
+
+    def join(self, key, sink):
+        self.joined.setdefault(key, []).append(sink)
+        self.log.append(key)
+
+    def leave(self, key, sink):
+        self.joined[key].remove(sink)
+        if not self.joined[key]:
+            del self.joined[key]
+
+    def give(self, key, sample):
+        for sink in tuple(self.joined[key]):
+            sink(sample)
+
+    def give_all(self, sample):
+        for key in tuple(self.joined):
+            self.give(key, sample)
+
+
+class Steps:
+    """A renderer's lower views; `refused`: it has none."""
+
+    def __init__(self, refused=False):
+        self.refused = refused
+
+    async def reduced(self, key, step):
+        if self.refused:
+            raise RefusedError("a recording's video is as it is")
+        return key if step == 0 else f"{key}-{step}"
+
+
+class Clock:
+    def __init__(self, monkeypatch):
+        self.now = 100.0
+        for module in (stepped, lanes):
+            monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now))
+
+
+def watch(feeds, views=None):
+    return SteppedVideo(KEY, feeds, views or Steps(), on_frame=lambda: None, on_starved=lambda key: None)
+
+
+async def settled():
+    for _ in range(10):
+        await asyncio.sleep(0)
+
+
+def test_who_takes_every_frame_is_never_reduced(monkeypatch):
+    async def main():
+        clock, feeds = Clock(monkeypatch), Feeds()
+        video = watch(feeds)
+        for number in range(300):
+            clock.now += 0.033
+            feeds.give(KEY, sample(number, DELTA if number % 60 else KEY_FRAME))
+            assert video.pop() is not None
+        await settled()
+        assert feeds.log == [KEY]
+        video.close()
+        assert feeds.joined == {}
+
+    run(main())
+
+
+def test_who_takes_none_is_stepped_down_and_is_sent_nothing_old(monkeypatch):
+    async def main():
+        clock, feeds = Clock(monkeypatch), Feeds()
+        video = watch(feeds)
+        for number in range(40):
+            clock.now += 0.033
+            feeds.give(KEY, sample(number, DELTA if number else KEY_FRAME))
+        await settled()
+        assert (video.step, list(feeds.joined)) == (1, [f"{KEY}-1"])
+        assert video.pop() is None
+        for number in range(40):
+            clock.now += 0.066
+            if f"{KEY}-1" in feeds.joined:
+                feeds.give(f"{KEY}-1", sample(number, DELTA if number else KEY_FRAME))
+            await settled()
+        assert (video.step, list(feeds.joined)) == (2, [f"{KEY}-2"])
+        video.close()
+        assert feeds.joined == {}
+
+    run(main())
+
+
+def test_a_view_that_cannot_be_reduced_goes_on_at_key_frames(monkeypatch):
+    async def main():
+        clock, feeds = Clock(monkeypatch), Feeds()
+        video = watch(feeds, Steps(refused=True))
+        for number in range(40):
+            clock.now += 0.033
+            feeds.give(KEY, sample(number, DELTA if number else KEY_FRAME))
+        await settled()
+        assert (video.step, list(feeds.joined)) == (0, [KEY])
+        assert video.pop() is None
+        feeds.give(KEY, sample(12, DELTA))
+        assert video.pop() is None
+        feeds.give(KEY, sample(13, KEY_FRAME))
+        assert video.pop().header.sequence == 13
+        video.close()
+
+    run(main())
+
+
+def test_who_takes_all_again_is_given_more_later_and_less_soon_after_too_much(monkeypatch):
+    async def main():
+        monkeypatch.setattr(stepped, "_MIND_EACH_S", 0.0)
+        clock, feeds = Clock(monkeypatch), Feeds()
+        video = watch(feeds)
+
+        async def choke():
+            for number in range(40):
+                clock.now += 0.033
+                feeds.give_all(sample(number, DELTA if number else KEY_FRAME))
+            await settled()
+
+        async def take(seconds):
+            until = clock.now + seconds
+            while clock.now < until:
+                clock.now += 0.5
+                feeds.give_all(sample(0, KEY_FRAME))
+                video.pop()
+                await settled()
+
+        await choke()
+        assert video.step == 1
+        await take(8.0)
+        assert video.step == 1
+        await take(4.0)
+        assert video.step == 0
+        await choke()
+        assert video.step == 1
+        # It was too much: it is tried again after twice the time.
+        await take(12.0)
+        assert video.step == 1
+        await take(10.0)
+        assert video.step == 0
+        video.close()
+
+    run(main())
+
+
+def test_a_renderer_is_asked_for_less_of_what_everybody_watches_and_of_what_a_page_asked_for(mesh):
+    async def main():
+        asked = []
+
+        async def answer(request):
+            asked.append(request.message)
+            number = len(asked)
+            return ViewAnswer(
+                topic=f"video/free-{number}",
+                image=f"image/free-{number}",
+                width=request.message.width or 1280,
+                height=request.message.height or 720,
+                fps=request.message.fps or 30,
+            )
+
+        async with open_session(mesh) as own, open_session(mesh) as other:
+            other.answer("s", "r", "views", answer)
+            views = Views(own)
+            assert await views.reduced(KEY, 1) == "robomesh/s/r/video/free-2"
+            assert (asked[-1].of, asked[-1].width, asked[-1].height, asked[-1].fps) == ("top", 640, 360, 15)
+            page_asked = ViewRequest(of="front", width=320, height=180, fps=10)
+            views.learn(
+                "robomesh/s/r", page_asked, ViewAnswer(topic="video/free-9", width=320, height=180, fps=10)
+            )
+            await views.reduced("robomesh/s/r/video/free-9", 1)
+            assert (asked[-1].of, asked[-1].width, asked[-1].fps) == ("front", 160, 5)
+            assert await views.reduced(KEY, 0) == KEY
+
+    run(main())

@@ -1,0 +1,264 @@
+"""What Define makes of files: meshes of every format, URDF, pairs of links."""
+
+import io
+import zipfile
+
+import ezdxf
+import numpy as np
+import pytest
+import trimesh
+import zenoh
+
+from bus.endpoints import router_config
+from bus.session import SessionSettings
+from robots.description import load
+from robots.urdf.write import to_urdf
+from tests.conftest import free_port
+from tests.robots.test_step import step_box
+from tests.services.defining import defining
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    mesh = SessionSettings(connect=(endpoint,), wait_s=5.0)
+    with (
+        zenoh.open(router_config((endpoint,))),
+        defining(mesh, tmp_path_factory.mktemp("define")) as page,
+    ):
+        yield page
+
+
+def converted(page, name, content, **others):
+    files = {name: page.upload(content)} | {path: page.upload(each) for path, each in others.items()}
+    return page.post("/mesh", {"file": name, "files": files})
+
+
+@pytest.mark.parametrize("ending", ["stl", "obj", "ply", "glb", "dae"])
+def test_a_box_of_any_format_is_converted(page, ending):
+    content = trimesh.creation.box((2.0, 4.0, 6.0)).export(file_type=ending)
+    answer = converted(page, f"box.{ending}", content.encode() if isinstance(content, str) else content)
+    assert answer.status == 200, answer.text
+    found = answer.json
+    assert (found["triangles"], found["min"], found["max"]) == (12, [-1, -2, -3], [1, 2, 3])
+    glb = trimesh.load(io.BytesIO(page.get(f"/glb/{found['glb']}").body), file_type="glb")
+    assert np.allclose(glb.extents, [2.0, 4.0, 6.0])
+
+
+def test_a_dxf_is_converted(page):
+    drawing = ezdxf.new()
+    drawing.modelspace().add_3dface([(0, 0, 0), (100, 0, 0), (0, 200, 0)])
+    text = io.StringIO()
+    drawing.write(text)
+    found = converted(page, "part.dxf", text.getvalue().encode()).json
+    assert (found["triangles"], found["max"]) == (1, [100, 200, 0])
+
+
+def test_a_step_file_is_converted_in_the_confined_worker(page):
+    found = converted(page, "box.step", step_box((10, 20, 30)).encode()).json
+    assert found["triangles"] == 12
+    assert np.allclose(found["max"], [10, 20, 30])
+
+
+def test_a_broken_step_file_is_told(page):
+    answer = converted(page, "part.step", b"ISO-10303-21;\nHEADER;\nnonsense")
+    assert answer.status == 422
+    assert answer.text.startswith("part.step: is no STEP that can be read")
+
+
+def test_scale_and_axis_are_guessed_with_a_reason(page):
+    box = trimesh.creation.box((200.0, 100.0, 50.0)).export(file_type="stl")
+    found = converted(page, "a.stl", box).json
+    assert (found["scale"], found["up"]) == (0.001, "z")
+    assert "millimetres" in found["guess"]
+    found = converted(page, "b.stl", trimesh.creation.box((0.2, 0.1, 0.3)).export(file_type="stl")).json
+    assert found["scale"] == 1.0
+
+
+def test_missing_files_are_asked_for_by_name(page):
+    outer = b'#VRML V2.0 utf8\nInline { url "part.wrl" }\nShape { geometry Box { } }\n'
+    found = converted(page, "a.wrl", outer).json
+    assert (found["triangles"], found["missing"]) == (12, ["part.wrl"])
+    found = converted(page, "b.wrl", b'#VRML V2.0 utf8\nInline { url "part.wrl" }\n').json
+    assert (found["triangles"], found["missing"]) == (0, ["part.wrl"])
+    assert page.get(f"/glb/{found['glb']}").body[:4] == b"glTF"
+    obj = b"mtllib paint.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    assert converted(page, "c.obj", obj).json["missing"] == ["paint.mtl"]
+
+
+def test_igs_is_refused_in_words_that_name_step(page):
+    answer = converted(page, "a.igs", b"S      1\n")
+    assert answer.status == 422
+    assert "STEP" in answer.text
+
+
+def test_pairs_of_links_are_sampled(page):
+    found = page.post("/collisions", page.draft()).json
+    kinds = {frozenset(pair["links"]): pair["kind"] for pair in found["pairs"]}
+    assert len(kinds) == 15, "6 links"
+    assert kinds[frozenset(("base", "column"))] == "adjacent"
+    # Its forearm reaches down past the column to the floor.
+    assert kinds[frozenset(("base", "forearm"))] == "sometimes"
+
+
+def test_pairs_are_not_judged_where_a_constraint_leaves_only_home(page):
+    draft = page.draft()
+    waist, shoulder = draft["description"]["joint"][:2]
+    names = waist["name"], shoulder["name"]
+    for row in (waist, shoulder):
+        row |= {"limits": [0, 90], "home": 0}
+    only_home = {"joints": dict.fromkeys(names, 1), "limits": [-30, 0]}
+    draft["description"]["constraint"] = [only_home]
+    answer = page.post("/collisions", draft)
+    assert answer.status == 422
+    assert answer.text == "the constraints leave 1 positions to try: too few to say which links never touch"
+
+
+def test_a_urdf_becomes_rows_that_put_every_link_where_it_was(page):
+    draft = page.draft("puma560")
+    description = load("puma560")
+    text = to_urdf(description, mesh_uri=lambda link: f"package://puma/meshes/{link}.stl")
+    box = page.upload(trimesh.creation.box((0.1, 0.1, 0.1)).export(file_type="stl"))
+    files = {"puma/puma.urdf": page.upload(text.encode())}
+    for link in ("base", "column"):
+        files[f"puma/meshes/{link}.stl"] = box
+    answer = page.post("/import", {"file": "puma/puma.urdf", "files": files})
+    assert answer.status == 200, answer.text
+    found = answer.json
+    assert {path.rsplit("/", 1)[-1] for path in found["missing"]} >= {"upper_arm.stl"}
+    assert found["files"].keys() == {"meshes/base.glb", "meshes/column.glb"}
+    found["description"]["name"] = "again"
+    joints = {"joints": [10, 20, 30, 40, 50, 60]}
+    one = page.post("/check", draft | joints).json
+    other = page.post("/check", {**found, **joints}).json
+    assert other["problems"] == []
+    assert np.allclose(one["tool"], other["tool"], rtol=0, atol=1e-9)
+    assert page.post("/save", {**found}).status == 200
+    assert load(page.folder / "robots" / "again").joints[1].name == description.joints[1].name
+
+
+OPENHRP = b"""#VRML V2.0 utf8
+DEF ARM Humanoid { name "arm" humanoidBody [
+  DEF ROOT Joint { jointType "fixed" children [
+    DEF BASE Segment { children Shape { geometry Box { size 0.1 0.1 0.1 } } }
+    DEF TURN Joint {
+      jointType "rotate" jointId 0 jointAxis 0 0 1 translation 0 0 0.5 llimit -1 ulimit 1
+      children [ DEF LINK Segment { children Shape { geometry Box { size 0.2 0.2 0.2 } } } ]
+    }
+  ] }
+] }
+"""
+
+
+def test_an_openhrp_file_gives_joints_axes_and_limits(page):
+    answer = page.post("/import", {"file": "arm.wrl", "files": {"arm.wrl": page.upload(OPENHRP)}})
+    assert answer.status == 200, answer.text
+    (row,) = answer.json["description"]["joint"]
+    assert row["limits"] == pytest.approx(np.degrees([-1.0, 1.0]))
+    assert len(answer.json["files"]) == 2
+    check = page.post("/check", answer.json).json
+    assert check["problems"] == []
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (b"<robot", "is not XML"),
+        (b'<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]><robot>&x;</robot>', "DOCTYPE"),
+        (b'<robot name="r"/>', "link"),
+    ],
+)
+def test_a_wrong_urdf_is_told_in_words(page, text, words):
+    answer = page.post("/import", {"file": "a.urdf", "files": {"a.urdf": page.upload(text)}})
+    assert answer.status == 422
+    assert words in answer.text
+    assert str(page.folder) not in answer.text
+
+
+def test_no_urdf_shows_a_file_of_the_servers(page):
+    secret = page.folder / "secret.stl"
+    secret.write_bytes(trimesh.creation.box((1, 1, 1)).export(file_type="stl"))
+    text = (
+        '<robot name="r"><link name="base"><visual><geometry><mesh filename="{}"/></geometry></visual></link>'
+        '<link name="arm"/><joint name="j" type="revolute"><parent link="base"/><child link="arm"/>'
+        '<axis xyz="0 0 1"/><limit lower="-1" upper="1" velocity="1" effort="0"/></joint></robot>'
+    )
+    for address in (str(secret), f"file://{secret}", "../../../secret.stl", "package://../../secret.stl"):
+        sha = page.upload(text.format(address).encode())
+        answer = page.post("/import", {"file": "a.urdf", "files": {"a.urdf": sha}})
+        assert answer.status == 200, answer.text
+        assert answer.json["files"] == {}
+        assert answer.json["missing"] == [address]
+
+
+def test_a_saved_robot_by_urdf_is_listed_and_opened_as_rows(page):
+    robot = page.folder / "robots" / "by-urdf"
+    robot.mkdir(parents=True)
+    (robot / "puma.urdf").write_text(to_urdf(load("puma560"), mesh_uri=lambda link: f"{link}.stl"))
+    (robot / "robot.toml").write_text('name = "by-urdf"\nurdf = "puma.urdf"\n')
+    rows = {row["name"]: row for row in page.get("/robots").json["robots"]}
+    assert rows["by-urdf"]["joints"] == 6
+    opened = page.get("/robots/by-urdf").json
+    assert len(opened["description"]["joint"]) == 6
+    assert opened["notes"] is not None
+
+
+def archive(files):
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as zipped:
+        for path, content in files.items():
+            zipped.writestr(path, content)
+    return data.getvalue()
+
+
+def unzipped(page, content):
+    return page.post("/unzip", {"file": "a.zip", "files": {"a.zip": page.upload(content)}})
+
+
+def test_a_downloaded_zip_opens_as_the_draft_that_it_was(page):
+    draft = page.get("/robots/pt500").json
+    draft["description"]["name"] = "mine"
+    files = unzipped(page, page.post("/zip", draft).body).json["files"]
+    assert files == {f"mine/{path}": sha for path, sha in draft["files"].items()} | {
+        "mine/robot.toml": files["mine/robot.toml"]
+    }
+    opened = page.post("/import", {"file": "mine/robot.toml", "files": files}).json
+    assert opened["description"] == draft["description"]
+    assert opened["files"] == draft["files"]
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "is no zip archive"),
+        (b"PK\x03\x04 and no more", "is no zip archive"),
+        (archive({"../up.wrl": b"x"}), "'../up.wrl': must be a path below"),
+        (archive({"/etc/x": b"x"}), "'/etc/x': must be a path below"),
+        (archive({f"{number}.wrl": b"" for number in range(2001)}), "2001 files"),
+        (archive({"bomb.wrl": bytes(501_000_000)}), "501 MB"),
+    ],
+    ids=["empty", "cut", "up", "root", "many", "bomb"],
+)
+def test_a_wrong_zip_is_refused_in_words(page, content, words):
+    answer = unzipped(page, content)
+    assert answer.status == 422
+    assert words in answer.text
+
+
+def test_a_zip_whose_entry_is_larger_than_it_says_is_refused(page):
+    content = bytearray(archive({"a.wrl": b"x" * 5000}))
+    at = content.rindex(b"PK\x01\x02") + 24  # the stated size, in the directory
+    content[at : at + 4] = (10).to_bytes(4, "little")
+    answer = unzipped(page, bytes(content))
+    assert answer.status == 422
+    assert "is no zip archive that can be read" in answer.text
+
+
+def test_a_robot_toml_in_a_dropped_folder_that_names_a_urdf_becomes_rows(page):
+    urdf = to_urdf(load("puma560"), mesh_uri=lambda link: f"{link}.stl").encode()
+    files = {
+        "puma/robot.toml": page.upload(b'name = "puma"\nurdf = "puma.urdf"\n'),
+        "puma/puma.urdf": page.upload(urdf),
+    }
+    opened = page.post("/import", {"file": "puma/robot.toml", "files": files}).json
+    assert len(opened["description"]["joint"]) == 6

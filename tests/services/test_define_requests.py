@@ -1,0 +1,375 @@
+"""What the page's Define asks of the console, over real HTTP."""
+
+import hashlib
+import io
+import shutil
+import zipfile
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+import zenoh
+
+from bus.endpoints import router_config
+from bus.session import SessionSettings
+from robots.description import LIBRARY, load
+from robots.save import read_robot, write_folder
+from services.command_line import roles
+from tests.conftest import free_port
+from tests.services.defining import defining
+
+TRIANGLE = (
+    b"#VRML V2.0 utf8\n"
+    b"Shape { geometry IndexedFaceSet { coord Coordinate { point [0 0 0, 2 0 0, 0 3 0] } "
+    b"coordIndex [0 1 2 -1] } }\n"
+)
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    mesh = SessionSettings(connect=(endpoint,), wait_s=5.0)
+    with (
+        zenoh.open(router_config((endpoint,))),
+        defining(mesh, tmp_path_factory.mktemp("define")) as page,
+    ):
+        yield page
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["files?name=a.wrl", "mesh", "check", "collisions", "import", "unzip", "save", "zip", "start", "stop"],
+)
+@pytest.mark.parametrize("origin", ["", "null", "http://evil.example", "http://127.0.0.1:1"])
+def test_what_another_page_asks_for_is_not_done(page, path, origin):
+    answer = page.post(f"/{path}", {}, Origin=origin)
+    assert answer.status == 403
+    assert "is not this page's" in answer.text
+
+
+def test_a_foreign_host_name_is_refused(page):
+    assert page.get("/robots", Host="evil.example").status == 421
+
+
+def test_the_librarys_robots_can_be_opened(page):
+    found = page.get("/robots").json
+    assert {"name": "pt500", "title": "Pt500", "origin": "library", "joints": 5, "running": False} in found[
+        "robots"
+    ]
+    assert found["can_start"]
+    draft = page.get("/robots/pt500").json
+    assert draft["description"]["joint"][1]["name"] == "shoulder"
+    assert sorted(draft["files"])[0] == "meshes/base.wrl"
+
+
+@pytest.mark.parametrize("name", ["none", "..", "%2e%2e", "..%2fpt500", ".git", "*"])
+def test_a_robot_that_is_not_there_is_told(page, name):
+    assert page.get(f"/robots/{name}").status == 404
+
+
+def test_a_file_is_kept_by_its_content(page):
+    answer = page.post("/files?name=links/a.wrl", TRIANGLE)
+    assert answer.json == {"sha": hashlib.sha256(TRIANGLE).hexdigest(), "size": len(TRIANGLE)}
+
+
+@pytest.mark.parametrize("name", ["", "/etc/passwd", "../a.wrl", "a/../../b", "a%00b", "a%5cb"])
+def test_a_file_whose_name_leads_elsewhere_is_refused(page, name):
+    assert page.post(f"/files?name={name}", b"x").status == 422
+    sha = page.upload(b"x")
+    assert page.post("/mesh", {"file": name, "files": {name: sha}}).status == 422
+
+
+def test_a_mesh_is_converted_in_its_own_units(page):
+    answer = page.post("/mesh", {"file": "m/a.wrl", "files": {"m/a.wrl": page.upload(TRIANGLE)}}).json
+    assert (answer["triangles"], answer["min"], answer["max"]) == (1, [0, 0, 0], [2, 3, 0])
+    glb = page.get(f"/glb/{answer['glb']}")
+    assert glb.body[:4] == b"glTF"
+    assert hashlib.sha256(glb.body).hexdigest() == answer["glb"]
+
+
+def test_an_inlined_file_is_found_beside_the_other(page):
+    outer = b'#VRML V2.0 utf8\nInline { url "parts/in ner.wrl" }\n'
+    files = {"m/a.wrl": page.upload(outer), "m/parts/in ner.wrl": page.upload(TRIANGLE)}
+    assert page.post("/mesh", {"file": "m/a.wrl", "files": files}).json["triangles"] == 1
+
+
+def test_a_broken_mesh_is_told_with_its_place_and_without_the_servers_folders(page):
+    broken = page.post("/mesh", {"file": "a.wrl", "files": {"a.wrl": page.upload(TRIANGLE[:-9])}})
+    assert broken.status == 422
+    assert broken.text.startswith("a.wrl")
+    assert str(page.folder) not in broken.text
+
+
+@pytest.mark.parametrize("address", ["{}/secret.wrl", "../../../secret.wrl", "file://{}/secret.wrl"])
+def test_no_mesh_shows_a_file_of_the_servers(page, address):
+    (page.folder / "secret.wrl").write_bytes(TRIANGLE)
+    text = f'#VRML V2.0 utf8\nInline {{ url "{address.format(page.folder)}" }}\n'
+    answer = page.post("/mesh", {"file": "a.wrl", "files": {"a.wrl": page.upload(text.encode())}})
+    assert answer.status == 422 or answer.json["triangles"] == 0
+
+
+def test_no_description_names_a_file_of_the_servers(page):
+    (page.folder / "secret.wrl").write_bytes(TRIANGLE)
+    draft = page.draft()
+    for mesh in (f"{page.folder}/secret.wrl", "../../../secret.wrl", "meshes/../../x.wrl"):
+        draft["description"]["base"]["mesh"] = mesh
+        (problem,) = page.post("/check", draft).json["problems"]
+        assert problem["path"] == ["base", "mesh"]
+        assert page.post("/save", draft).status == 422
+
+
+def test_a_right_draft_has_no_problems_and_its_tool_is_where_the_arm_ends(page):
+    draft = page.draft()
+    answer = page.post("/check", draft | {"joints": [0.0, 90.0, 0.0, 0.0, 0.0]}).json
+    assert answer["problems"] == []
+    # Straight up: 300 + 250 + 250 + 100 mm.
+    assert [row[3] for row in answer["tool"]] == pytest.approx([0.0, 0.0, 0.9, 1.0], abs=1e-12)
+    assert list(answer["links"]) == ["base", "column", "upper_arm", "forearm", "wrist", "flange"]
+
+
+def test_problems_are_told_with_their_places_and_the_links_are_still_shown(page):
+    draft = page.draft() | {"files": {}}
+    draft["description"] = draft["description"] | {"base": {}}
+    answer = page.post("/check", draft).json
+    assert ["joint", 0, "link", "mesh"] in [problem["path"] for problem in answer["problems"]]
+    assert answer["tool"] is not None
+    draft["description"]["joint"][2]["limits"] = [1, 0]
+    answer = page.post("/check", draft).json
+    assert ["joint", 2, "limits"] in [problem["path"] for problem in answer["problems"]]
+    assert answer["tool"] is None
+
+
+@pytest.mark.parametrize("joints", [[1.0], [0, 0, 0, 0, None], "home", [0, 0, 0, 0, 1e999]])
+def test_joints_of_another_robot_are_refused(page, joints):
+    answer = page.post("/check", page.draft() | {"joints": joints})
+    assert answer.status == 422
+    assert "5 in all" in answer.text
+
+
+@pytest.mark.parametrize(
+    ("body", "status", "words"),
+    [
+        (b"{", 400, "not JSON"),
+        (b"[" * 100_000, 400, "not JSON"),
+        (b"[]", 400, "must be a JSON object"),
+        (b'{"description": 5}', 422, "description"),
+        (b'{"description": {}, "files": []}', 422, "files"),
+        (b'{"description": {}, "files": {"a.wrl": "../../x"}}', 410, "not here"),
+        (b'{"description": {}, "files": {"a.wrl": "' + b"0" * 64 + b'"}}', 410, "a.wrl: not here"),
+        (b" " * 4_000_001, 413, "larger than 4 MB"),
+    ],
+)
+def test_a_wrong_request_is_refused_in_words(page, body, status, words):
+    answer = page.post("/check", body)
+    assert answer.status == status
+    assert words in answer.text
+    assert answer.headers["Content-Type"].startswith("text/plain")
+
+
+def test_a_draft_is_saved_replaced_when_told_so_and_opened_again(page):
+    draft = page.draft(name="saved")
+    saved = page.post("/save", draft).json
+    assert (saved["name"], saved["folder"]) == ("saved", f"{page.folder}/robots/saved")
+    again = page.post("/save", draft)
+    assert again.status == 409
+    assert (again.json["exists"], again.json["changed"]) == (True, False)
+    draft["description"]["title"] = "Mine"
+    assert page.post("/save", draft | {"overwrite": True}).status == 200
+    assert load(page.folder / "robots" / "saved").title == "Mine"
+    opened = page.get("/robots/saved").json
+    assert opened["description"] == draft["description"]
+    assert opened["files"] == draft["files"]
+    assert [row for row in page.get("/robots").json["robots"] if row["origin"] == "site"] == [
+        {"name": "saved", "title": "Mine", "origin": "site", "joints": 5, "running": False}
+    ]
+
+
+def test_who_saves_what_another_has_changed_is_asked(page):
+    first = page.draft(name="shared")
+    assert page.post("/save", first).status == 200
+    one, other = page.get("/robots/shared").json, page.get("/robots/shared").json
+    assert one["revision"] == other["revision"]
+    one["description"]["title"] = "One's"
+    after = page.post("/save", one)
+    assert after.status == 200, "nobody had changed it"
+    other["description"]["title"] = "The other's"
+    asked = page.post("/save", other)
+    assert (asked.status, asked.json["exists"], asked.json["changed"]) == (409, True, True)
+    assert load(page.folder / "robots" / "shared").title == "One's"
+    # Who saved last goes on without a question.
+    one["description"]["title"] = "One's again"
+    again = page.post("/save", one | {"revision": after.json["revision"]})
+    assert again.status == 200
+    assert page.get("/robots/shared").json["revision"] == again.json["revision"]
+    assert page.post("/save", other | {"overwrite": True}).status == 200
+
+
+def test_what_was_put_into_a_robots_folder_since_it_was_opened_is_not_lost(page):
+    page.post("/save", page.draft(name="visited"))
+    opened = page.get("/robots/visited").json
+    folder = page.folder / "robots" / "visited"
+    (folder / "README.md").write_text("weeks of work")
+    assert page.post("/save", opened).json["changed"] is True
+    assert (folder / "README.md").read_text() == "weeks of work"
+    assert page.post("/save", page.get("/robots/visited").json).status == 200
+    assert (folder / "README.md").read_text() == "weeks of work"
+
+
+def test_two_that_save_over_the_same_at_once_do_not_both_win(page):
+    page.post("/save", page.draft(name="raced"))
+    opened = page.get("/robots/raced").json
+    drafts = [{**opened, "description": opened["description"] | {"title": f"{n}"}} for n in range(4)]
+    with ThreadPoolExecutor(4) as pool:
+        statuses = list(pool.map(lambda draft: page.post("/save", draft).status, drafts))
+    assert sorted(statuses) == [200, 409, 409, 409]
+    assert load(page.folder / "robots" / "raced").title == str(statuses.index(200))
+
+
+@pytest.mark.parametrize(
+    ("file", "content"),
+    [
+        ("meshes/base.wrl", b"garbage"),
+        ("meshes/base.3ds", b"junk"),
+        ("meshes/base.wrl", b"#VRML V2.0 utf8\n"),
+    ],
+    ids=["garbage", "junk", "empty"],
+)
+def test_a_draft_whose_mesh_cannot_be_drawn_is_not_saved(page, file, content):
+    draft = page.draft(name="unreadable")
+    draft["files"][file] = page.upload(content)
+    draft["description"]["base"] = {"mesh": file}
+    answer = page.post("/save", draft)
+    assert answer.status == 422
+    (problem,) = answer.json["problems"]
+    assert problem["path"] == ["base", "mesh"]
+    assert problem["text"].startswith(f"{file}: ")
+    assert str(page.folder) not in problem["text"]
+    assert not (page.folder / "robots" / "unreadable").exists()
+
+
+@pytest.mark.parametrize("value", ["1979-05-27", "nan", "[1.0, -inf]", "9" * 400])
+def test_a_saved_robot_that_holds_no_robots_value_is_told_in_words(page, value):
+    robot = page.folder / "robots" / "dated"
+    robot.mkdir(parents=True, exist_ok=True)
+    (robot / "robot.toml").write_text(f'name = "dated"\nprovenance = {value}\n')
+    answer = page.get("/robots/dated")
+    assert answer.status == 422
+    assert "provenance" in answer.text
+    dropped = {"dated/robot.toml": page.upload((robot / "robot.toml").read_bytes())}
+    answer = page.post("/import", {"file": "dated/robot.toml", "files": dropped})
+    assert answer.status == 422
+    assert "provenance" in answer.text
+    shutil.rmtree(robot)
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [("9" * 400, "a number of 400 digits"), ("[" * 900 + "]" * 900, "nested too deeply")],
+    ids=["digits", "nested"],
+)
+def test_a_zip_of_what_no_robot_holds_is_refused_in_words(page, value, words):
+    answer = page.post("/zip", f'{{"description": {{"name": "a", "title": {value}}}}}'.encode())
+    assert answer.status in (400, 422)
+    assert words in answer.text
+
+
+def test_a_draft_of_one_file_under_many_names_is_not_grown(page):
+    sha = page.upload(bytes(2_000_000))
+    files = {f"{number}.bin": sha for number in range(251)}
+    answer = page.post("/check", {"description": {}, "files": files})
+    assert answer.status == 413
+    assert answer.text == "251 files of 502 MB: 500 MB at most"
+
+
+def test_a_wrong_draft_is_not_saved_and_its_problems_come_with_their_places(page):
+    draft = page.draft(name="wrong")
+    draft["description"]["joint"][0]["home"] = 500
+    answer = page.post("/save", draft)
+    assert answer.status == 422
+    assert answer.json["problems"][0]["path"] == ["joint", 0, "home"]
+    assert not (page.folder / "robots" / "wrong").exists()
+
+
+def test_a_library_robots_name_is_not_taken(page):
+    answer = page.post("/save", page.draft(name="pt500"))
+    assert answer.status == 422
+    assert answer.json["problems"][0]["path"] == ["name"]
+
+
+def test_a_draft_comes_as_one_zip(page):
+    answer = page.post("/zip", page.draft(name="mine"))
+    assert answer.headers["Content-Type"] == "application/zip"
+    with zipfile.ZipFile(io.BytesIO(answer.body)) as zipped:
+        assert "mine/robot.toml" in zipped.namelist()
+        assert "mine/meshes/base.wrl" in zipped.namelist()
+
+
+def test_half_a_character_is_refused_in_words(page):
+    draft = page.draft()
+    draft["description"]["title"] = "\ud800"
+    assert page.post("/save", draft).status == 422
+    assert "half a character" in page.post("/zip", draft).text
+
+
+def test_starting_writes_down_what_the_supervisor_follows(page):
+    page.post("/save", page.draft(name="runner"))
+    assert page.post("/start", {"name": "runner"}).json == {"site": "s", "robot": "runner"}
+    started = page.folder / "robots" / "started.toml"
+    assert 'model = "runner/robot.toml"' in started.read_text()
+    assert page.post("/start", {"name": "runner"}).status == 409
+    assert {row["name"] for row in page.get("/robots").json["robots"] if row["running"]} == {"runner"}
+    assert page.post("/stop", {"name": "runner"}).status == 200
+    assert "runner" not in started.read_text()
+    assert "was not started" in page.post("/stop", {"name": "runner"}).text
+
+
+def test_a_robot_of_the_sites_own_name_is_not_started(page):
+    page.post("/save", page.draft(name="arm"))
+    answer = page.post("/start", {"name": "arm"})
+    assert answer.status == 409
+    assert "has a robot arm already" in answer.text
+
+
+def test_a_robot_whose_mesh_cannot_be_read_is_not_started(page):
+    assert page.post("/save", page.draft(name="torn")).status == 200
+    (page.folder / "robots" / "torn" / "meshes" / "base.wrl").write_bytes(TRIANGLE[:-9])
+    answer = page.post("/start", {"name": "torn"})
+    assert answer.status == 422
+    assert answer.text.startswith("meshes/base.wrl")
+
+
+def test_without_a_supervisor_the_lines_for_the_site_file_are_told(mesh, tmp_path):
+    with defining(mesh, tmp_path, can_start=False) as page:
+        assert page.get("/robots").json["can_start"] is False
+        page.post("/save", page.draft(name="later"))
+        answer = page.post("/start", {"name": "later"})
+    assert answer.status == 409
+    assert f'[[robot]]\nname = "later"\nmodel = "{tmp_path}/robots/later/robot.toml"' in answer.text
+
+
+def test_a_running_robot_of_the_pages_reads_its_own_folder_only(tmp_path, monkeypatch):
+    begun = []
+    monkeypatch.setattr(roles.service, "run", lambda serve, settings, **_: begun.append(settings))
+    monkeypatch.setattr(roles.service, "log_to_stderr", lambda: None)
+    robots = tmp_path / "robots"
+    for folder in (robots / "mine", tmp_path / "own"):
+        folder.mkdir(parents=True)
+        values, files = read_robot(LIBRARY / "pt500")
+        write_folder(values, files, folder / "pt500")
+    (tmp_path / "site.toml").write_text(
+        'site = "s"\n[define]\nfolder = "robots"\n'
+        '[[robot]]\nname = "listed"\nmodel = "robots/mine/pt500/robot.toml"\ncontroller = "simulated"\n'
+        '[[robot]]\nname = "own"\nmodel = "own/pt500/robot.toml"\ncontroller = "simulated"\n'
+        '[[robot]]\nname = "known"\nmodel = "pt600"\ncontroller = "simulated"\n'
+    )
+    (robots / "started.toml").write_text(
+        'site = "s"\n[[robot]]\nname = "mine"\nmodel = "mine/pt500/robot.toml"\ncontroller = "simulated"\n'
+    )
+    roles.kinematics(tmp_path / "site.toml", "tcp/127.0.0.1:1", "")
+    roles.kinematics(tmp_path / "site.toml", "tcp/127.0.0.1:1", "mine")
+    found = {
+        each.name: each.confined
+        for settings in begun
+        for robot in settings.robots
+        for each in robot.place.robots
+    }
+    assert found == {"listed": True, "own": False, "known": False, "mine": True}

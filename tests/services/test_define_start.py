@@ -1,0 +1,195 @@
+"""A robot defined on the page, started beside a running site's own: real processes throughout."""
+
+import json
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.services.defining import Page
+from tests.site import alive, kill, robomesh, running_site, wait_until
+
+pytestmark = pytest.mark.processes
+
+
+def processes(site) -> dict[str, int]:
+    """Process ids of all that `up` runs, by service and robot: "gateway mine"."""
+    found = subprocess.run(
+        ["ps", "-ww", "--ppid", str(site.process.pid), "-o", "pid=,args="], capture_output=True, text=True
+    ).stdout
+    named = {}
+    for line in found.splitlines():
+        pid, *words = line.split()
+        if "services.command_line.main" not in words:
+            continue  # one that is just going, or not there yet
+        service = words[words.index("services.command_line.main") + 1]
+        robot = words[words.index("--started") + 1] if "--started" in words else ""
+        if service == "simulate" and "mine" in line:
+            robot = "mine"
+        named[f"{service} {robot}".strip()] = int(pid)
+    return named
+
+
+def on_the_mesh(site) -> dict[str, str]:
+    """Each robot's link to its controller."""
+    found = json.loads(site.command("list", "--json").stdout)
+    return {robot["robot"]: robot["link"] for robot in found["robots"]}
+
+
+def answers(page: Page) -> bool:
+    """Whether the console is there."""
+    try:
+        return page.get("/robots").status == 200
+    except OSError:
+        return False
+
+
+def descendants(pid: int) -> list[int]:
+    """Every process below one."""
+    found = subprocess.run(["ps", "--ppid", str(pid), "-o", "pid="], capture_output=True, text=True).stdout
+    children = [int(word) for word in found.split()]
+    return [*children, *(below for child in children for below in descendants(child))]
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    with running_site(tmp_path_factory.mktemp("site")) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def page(site):
+    return Page(site.console.rstrip("/"), site.folder)
+
+
+@pytest.fixture(scope="module")
+def mine(site, page):
+    """A started robot named mine."""
+    before = processes(site)
+    draft = page.draft(name="mine")
+    assert page.post("/save", draft).status == 200
+    assert page.post("/start", {"name": "mine"}).status == 200
+    wait_until(lambda: on_the_mesh(site).get("mine") == "up")
+    after = processes(site)
+    assert {name: after[name] for name in before} == before, "nobody else was disturbed"
+    assert set(after) - set(before) == {"simulate mine", "gateway mine", "kinematics mine"}
+    return draft
+
+
+def test_it_is_commanded_drawn_and_recorded_as_any_other(site, page, mine, tmp_path):
+    assert site.command("send", "mine", "home").returncode == 0
+    picture = tmp_path / "front.png"
+    assert site.command("snapshot", "mine", "front", str(picture)).returncode == 0
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+    assert site.command("send", "mine", "trace", "on").returncode == 0
+    wait_until(lambda: list((site.folder / "recordings" / "mine").glob("*.mcap")))
+    assert site.command("send", "mine", "move", "10", "80", "-80", "0", "0").returncode == 0
+    assert site.command("send", "mine", "trace", "off").returncode == 0
+
+    def recorded():
+        rows = site.command("recordings", "list", "--json").stdout.splitlines()
+        return [row for row in map(json.loads, rows) if row["robot"] == "mine" and not row["open"]]
+
+    wait_until(recorded)
+    counts = {topic["topic"].rsplit("/", 1)[-1]: topic["messages"] for topic in recorded()[0]["topics"]}
+    assert counts["joints"] > 50
+    assert robomesh("audit", "verify", str(site.folder / "audit" / "test" / "mine.jsonl")).returncode == 0
+
+
+def test_saved_anew_it_starts_anew_and_nobody_else_does(site, page, mine):
+    before = processes(site)
+    mine["description"]["joint"][0]["limits"] = [-60, 60]
+    assert page.post("/save", mine | {"overwrite": True}).status == 200
+    own = {"simulate mine", "gateway mine", "kinematics mine"}
+    wait_until(lambda: own & set(processes(site)) == own and not any(alive(before[name]) for name in own))
+    wait_until(lambda: on_the_mesh(site).get("mine") == "up")
+    after = processes(site)
+    assert {name: pid for name, pid in after.items() if name not in own} == {
+        name: pid for name, pid in before.items() if name not in own
+    }
+    assert site.command("send", "mine", "home").returncode == 0
+    refused = site.command("send", "mine", "move", "61", "80", "-80", "0", "0")
+    assert refused.returncode == 1
+    assert "60.00" in refused.stdout
+
+
+@pytest.mark.parametrize("name", ["gateway mine", "simulate mine", "console"])
+def test_what_is_killed_comes_back(site, page, mine, name):
+    before = processes(site)
+    workers = descendants(before["console"])
+    kill(before[name])
+    wait_until(lambda: processes(site).get(name, before[name]) != before[name])
+    wait_until(lambda: on_the_mesh(site).get("mine") == "up")
+    if name == "console":
+        wait_until(lambda: not any(map(alive, workers)), what="its workers outlive it")
+        wait_until(lambda: answers(page))
+    else:
+        assert processes(site)["gateway"] == before["gateway"]
+
+
+def test_a_half_edited_file_ends_nothing(site, page, mine):
+    file = site.folder / "robots" / "started.toml"
+    text, before = file.read_text(), processes(site)
+    lines = len(site.log)
+    file.write_text(text + "[[robot]]\nname = ")
+    wait_until(lambda: any("stay as they are" in line for line in site.log[lines:]))
+    assert processes(site) == before
+    answer = page.post("/stop", {"name": "mine"})
+    assert answer.status == 409
+    assert "started.toml: not TOML" in answer.text
+    file.write_text(text)
+
+
+def test_a_robot_that_cannot_start_stops_nothing_and_starts_when_it_is_mended(site, page, mine):
+    broken = site.folder / "robots" / "broken" / "robot.toml"
+    broken.parent.mkdir()
+    broken.write_text("name = 5")
+    file = site.folder / "robots" / "started.toml"
+    text = file.read_text()
+    file.write_text(text + '\n[[robot]]\nname = "broken"\nmodel = "broken/robot.toml"\n')
+    wait_until(
+        lambda: any(line.startswith("gateway broken") and "could not start" in line for line in site.log)
+    )
+    assert on_the_mesh(site)["mine"] == "up"
+    draft = page.draft(name="broken")
+    assert page.post("/save", draft | {"overwrite": True}).status == 200
+    wait_until(lambda: on_the_mesh(site).get("broken") == "up")
+    assert page.post("/stop", {"name": "broken"}).status == 200
+    wait_until(lambda: "broken" not in on_the_mesh(site))
+
+
+def test_taken_out_its_processes_end(site, page, mine):
+    before = processes(site)
+    assert page.post("/stop", {"name": "mine"}).status == 200
+    wait_until(lambda: not any(alive(pid) for name, pid in before.items() if name.endswith(" mine")))
+    wait_until(lambda: "mine" not in on_the_mesh(site))
+    assert on_the_mesh(site)["arm"] == "up"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_it_is_there_at_the_next_up_and_nothing_is_left_after(site, page, mine, number, tmp_path):
+    folder = tmp_path / "second"
+    robots = folder / "robots"
+    robots.mkdir(parents=True)
+    (site.folder / "robots" / "mine").rename(robots / "mine")
+    try:
+        (robots / "started.toml").write_text(
+            'site = "test"\n[[robot]]\nname = "mine"\nmodel = "mine/robot.toml"\n'
+        )
+        with running_site(folder) as second:
+            other = Page(second.console.rstrip("/"), folder)
+            other.post("/check", other.draft())
+            wait_until(lambda: on_the_mesh(second).get("mine") == "up")
+            # 8 of the site, 3 of the robot, Define's worker, and what checks motions of each gateway.
+            wait_until(lambda: len(descendants(second.process.pid)) >= 14)
+            everything = descendants(second.process.pid)
+            begun = time.monotonic()
+            second.process.send_signal(number)
+            second.process.wait(10.0)
+            if number == signal.SIGINT:
+                assert time.monotonic() - begun < 3.0
+            wait_until(lambda: not any(map(alive, everything)))
+    finally:
+        Path(robots / "mine").rename(site.folder / "robots" / "mine")

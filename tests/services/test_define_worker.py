@@ -1,0 +1,250 @@
+"""Define's workers: what hangs, dies or grows over a file harms nobody else."""
+
+import contextlib
+import os
+import shutil
+import signal
+import subprocess
+import threading
+import time
+
+import pytest
+
+from robots.description import load
+from robots.urdf.write import to_urdf
+from services.console.define import store
+from services.console.define.errors import RefusedRequest
+from services.console.define.workshop import Limits, Worker, Workshop
+from tests.conftest import run
+from tests.robots.test_step import step_box
+from tests.services.defining import defining
+from tests.site import alive
+
+POINTS = b"#VRML V2.0 utf8\nShape { geometry PointSet { coord Coordinate { point [ %s ] } } }\n"
+LIMITS = Limits(quick_s=5.0, slow_s=5.0)
+
+
+def workers() -> list[int]:
+    """Process ids of this process's workers, the oldest first."""
+    found = subprocess.run(
+        ["ps", "-ww", "--ppid", str(os.getpid()), "-o", "pid=,args="], capture_output=True, text=True
+    ).stdout
+    return [int(line.split()[0]) for line in found.splitlines() if "define.worker" in line]
+
+
+@pytest.fixture
+def page(mesh, tmp_path):
+    with defining(mesh, tmp_path, limits=LIMITS) as page:
+        yield page
+
+
+def test_a_hanging_worker_is_ended_and_the_next_request_is_answered(page):
+    draft = page.draft()
+    mesh = {"file": "meshes/base.wrl", "files": draft["files"]}
+    assert page.post("/check", draft).status == 200
+    (quick,) = workers()
+    assert page.post("/mesh", mesh).status == 200
+    (slow,) = set(workers()) - {quick}
+    os.kill(slow, signal.SIGSTOP)
+    answers = []
+    asking = threading.Thread(
+        target=lambda: answers.append(page.post("/mesh", mesh | {"file": "meshes/wrist.wrl"}))
+    )
+    asking.start()
+    # Whoever types goes on meanwhile.
+    begun = time.monotonic()
+    assert page.post("/check", draft).status == 200
+    assert time.monotonic() - begun < LIMITS.slow_s
+    assert asking.is_alive()
+    asking.join(30.0)
+    assert (answers[0].status, answers[0].text) == (422, "this took more than 5 s and was ended")
+    assert not alive(slow)
+    assert page.post("/mesh", mesh | {"file": "meshes/forearm.3ds"}).status == 200
+
+
+def test_a_worker_that_is_killed_is_replaced_and_nobody_notices(page):
+    draft = page.draft()
+    assert page.post("/check", draft).status == 200
+    (first,) = workers()
+    os.kill(first, signal.SIGSTOP)
+    answers = []
+    asking = threading.Thread(target=lambda: answers.append(page.post("/check", draft)))
+    asking.start()
+    # Before the request lies in its pipe or after: any instant is right.
+    os.kill(first, signal.SIGKILL)
+    asking.join(30.0)
+    assert answers[0].status == 200
+    (second,) = workers()
+    os.kill(second, signal.SIGKILL)
+    assert page.post("/check", draft).status == 200
+
+
+def test_a_request_over_which_every_worker_dies_is_told_so(mesh, tmp_path):
+    # Not even the libraries fit into this.
+    with defining(mesh, tmp_path, limits=Limits(memory_bytes=20 * 1024**2)) as page:
+        answer = page.post("/check", page.draft())
+        assert answer.status == 422
+        assert "ended the process that reads" in answer.text
+        assert page.get("/robots").status == 200
+
+
+def test_a_file_that_needs_too_much_memory_is_told_so(mesh, tmp_path):
+    limits = Limits(memory_bytes=400 * 1024**2)
+    with defining(mesh, tmp_path, limits=limits) as page:
+        sha = page.upload(POINTS % (b"1 2 3 " * 6_000_000))
+        answer = page.post("/mesh", {"file": "a.wrl", "files": {"a.wrl": sha}})
+        assert answer.status == 422
+        assert "memory" in answer.text
+        assert page.post("/check", page.draft()).json["problems"] == []
+
+
+def test_what_a_hanging_worker_started_is_ended_with_it(mesh, tmp_path):
+    with defining(mesh, tmp_path, limits=Limits(slow_s=4.0)) as page:
+        # Open CASCADE, in a process of the worker's, hangs on a length that is no number.
+        endless = step_box((10, 20, 30)).replace("10.000000", "nan").encode()
+        answer = page.post("/mesh", {"file": "a.step", "files": {"a.step": page.upload(endless, "a.step")}})
+        assert (answer.status, answer.text) == (422, "this took more than 4 s and was ended")
+        everything = subprocess.run(["ps", "-ww", "-eo", "args="], capture_output=True, text=True).stdout
+        mine = [line for line in everything.splitlines() if str(tmp_path) in line]
+        assert mine == []
+
+
+def test_no_worker_outlives_the_console(mesh, tmp_path):
+    with defining(mesh, tmp_path) as page:
+        page.post("/check", page.draft())
+        page.post("/mesh", {"file": "meshes/base.wrl", "files": page.draft()["files"]})
+        both = workers()
+        assert len(both) == 2
+    assert not any(alive(pid) for pid in both)
+
+
+def test_too_large_a_file_is_refused_before_it_is_kept(mesh, tmp_path):
+    with defining(mesh, tmp_path, most_file_bytes=1000) as page:
+        answer = page.post("/files?name=a.wrl", b"x" * 1001)
+        assert (answer.status, answer.text) == (413, "the file is larger than 0.001 MB")
+        assert page.post("/files?name=a.wrl", b"x" * 1000).status == 200
+    assert len(list((tmp_path / "store" / "files").iterdir())) == 1
+    assert [path.name for path in (tmp_path / "store").iterdir() if path.is_file()] == []
+
+
+def test_what_nobody_waits_for_any_more_is_not_done(tmp_path):
+    kept = store.open_store(tmp_path / "store")
+
+    async def main():
+        worker = Worker(kept.folder, longest_s=5.0, memory_bytes=LIMITS.memory_bytes)
+
+        async def nobody():
+            return False
+
+        with pytest.raises(RefusedRequest, match="nobody waits"):
+            await worker.do("check", kept.folder, {}, wanted=nobody)
+        assert worker.pid is None
+        await worker.close()
+
+    run(main())
+
+
+def test_a_cancelled_request_leaves_no_answer_for_the_next(tmp_path):
+    kept = store.open_store(tmp_path / "store")
+    folder = store.lay_out(kept, {"a.wrl": store.put(kept, POINTS % b"0 0 0")})
+
+    async def main():
+        import asyncio
+
+        workshop = Workshop(kept.folder, LIMITS)
+        try:
+            first = asyncio.create_task(workshop.slow.do("mesh", folder, {"file": "a.wrl"}))
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(first, 0.05)
+            with pytest.raises(RefusedRequest, match=r"none\.wrl"):
+                await workshop.slow.do("mesh", folder, {"file": "none.wrl"})
+        finally:
+            await workshop.close()
+
+    run(main())
+
+
+# ------------------------------------------------------------------------------ the store
+
+
+def test_the_oldest_files_go_when_there_are_too_many(tmp_path):
+    kept = store.open_store(tmp_path / "store", most_bytes=2500)
+    first, second = (store.put(kept, letter * 1000) for letter in (b"a", b"b"))
+    os.utime(kept.files / first, (1, 1))
+    os.utime(kept.files / second, (2, 2))
+    assert store.stored(kept, first) is not None  # used again, so the second is the oldest now
+    third = store.put(kept, b"c" * 1000)
+    assert [store.stored(kept, sha) is not None for sha in (first, second, third)] == [True, False, True]
+
+
+def test_drafts_do_not_keep_what_must_go(tmp_path):
+    kept = store.open_store(tmp_path / "store", most_bytes=2500)
+    drafts = [store.lay_out(kept, {"a": store.put(kept, bytes([number]) * 400)}) for number in range(6)]
+    for number, folder in enumerate(drafts):
+        os.utime(folder, (number, number))
+    store.put(kept, b"x" * 2000)
+    assert [folder.is_dir() for folder in drafts] == [False, False, True, True, True, True]
+
+
+def test_the_store_is_its_owners_alone_and_never_anothers(tmp_path):
+    folder = tmp_path / "store"
+    assert store.open_store(folder).folder == folder
+    assert folder.stat().st_mode & 0o777 == 0o700
+    (tmp_path / "link").symlink_to(folder)
+    other = store.open_store(tmp_path / "link").folder
+    assert other != tmp_path / "link"
+    (other / "files").rmdir()
+    (other / "drafts").rmdir()
+    other.rmdir()
+
+
+def test_drafts_of_the_same_files_share_a_folder_and_the_oldest_go(tmp_path, monkeypatch):
+    monkeypatch.setattr(store, "MOST_DRAFTS", 2)
+    kept = store.open_store(tmp_path / "store")
+    shas = [store.put(kept, letter) for letter in (b"a", b"b", b"c")]
+    one = store.lay_out(kept, {"x": shas[0]})
+    assert store.lay_out(kept, {"x": shas[0]}) == one
+    os.utime(one, (1, 1))
+    two, three = (store.lay_out(kept, {"x": sha}) for sha in shas[1:])
+    assert [folder.is_dir() for folder in (one, two, three)] == [False, True, True]
+    assert (three / "x").read_bytes() == b"c"
+
+
+def test_a_draft_that_goes_is_never_seen_half_removed(tmp_path, monkeypatch):
+    kept = store.open_store(tmp_path / "store")
+    files = {f"{number}": store.put(kept, b"x") for number in range(3)}
+    folder = store.lay_out(kept, files)
+    removed = []
+    remove = shutil.rmtree
+
+    def noted(path, **options):
+        removed.append(path)
+        remove(path, **options)
+
+    monkeypatch.setattr(store.shutil, "rmtree", noted)
+    monkeypatch.setattr(store, "MOST_DRAFTS", 1)
+    os.utime(folder, (1, 1))
+    other = store.lay_out(kept, {"other": files["0"]})
+    assert removed
+    assert folder not in removed, "it had another name by then"
+    assert [path.name for path in kept.drafts.iterdir()] == [other.name]
+    assert not list(kept.folder.glob("tmp*"))
+
+
+def test_the_console_reads_no_urdf_itself_to_list_a_robot(mesh, tmp_path):
+    with defining(mesh, tmp_path) as page:
+        robot = tmp_path / "robots" / "outside"
+        robot.mkdir(parents=True)
+        (tmp_path / "arm.urdf").write_text(to_urdf(load("puma560"), mesh_uri=lambda link: f"{link}.stl"))
+        (robot / "robot.toml").write_text('name = "outside"\nurdf = "../arm.urdf"\n')
+
+        def joints():
+            return {row["name"]: row["joints"] for row in page.get("/robots").json["robots"]}["outside"]
+
+        assert joints() == 0, "it is outside of the robot's own folder"
+        (tmp_path / "arm.urdf").rename(robot / "arm.urdf")
+        (robot / "robot.toml").write_text('name = "outside"\nurdf = "arm.urdf"\n')
+        assert joints() == 6
+        (once,) = workers()
+        assert joints() == 6
+        assert workers() == [once]

@@ -1,0 +1,69 @@
+"""`robomesh fault` towards a real simulator on a real mesh, and what `monitor` says of a link."""
+
+import asyncio
+import json
+from pathlib import Path
+
+from bus.schemas import robomesh_pb2 as schema
+from services.command_line.monitor import link_words
+from services.simulator.fault_requests import Mesh
+from services.simulator.fault_table import FAULTS
+from services.simulator.simulator import Settings, serve
+from tests.conftest import run
+from tests.site import robomesh
+
+STATE = schema.ControllerState
+
+
+async def ask(*arguments):
+    return await asyncio.to_thread(robomesh, *arguments)
+
+
+def test_faults_are_begun_ended_and_listed_from_the_command_line(mesh, router):
+    async def main():
+        own = Mesh(site="hall", robot="arm", session=mesh)
+        ready = asyncio.get_running_loop().create_future()
+        task = asyncio.create_task(serve(Settings(robot="pt600", mesh=own), ready=ready.set_result))
+        await ready
+        try:
+            to = ("--connect", router)
+            begun = await ask("fault", "arm", "garbage", *to)
+            assert (begun.returncode, begun.stdout) == (0, "faults now: garbage\n"), begun.stderr
+            listed = await ask("fault", "arm", *to)
+            assert [line[2:].split()[0] for line in listed.stdout.splitlines()] == list(FAULTS)
+            assert "* garbage" in listed.stdout
+            told = json.loads((await ask("fault", "hall/arm", "garbage", "--off", "--json", *to)).stdout)
+            assert told == {"active": [], "known": list(FAULTS)}
+            unknown = await ask("fault", "arm", "melt", *to)
+            assert unknown.returncode == 2
+            assert "'melt' is unknown; there are freeze, garbage" in unknown.stderr
+            assert unknown.stderr.count("\n") == 1
+        finally:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+
+    run(main(), timeout_s=60.0)
+
+
+def test_a_simulator_for_a_robot_without_a_site_is_refused_in_one_line():
+    done = robomesh("simulate", "--for", "arm", "--listen", "127.0.0.1:0")
+    assert (done.returncode, done.stderr) == (
+        2,
+        "robomesh: --for arm: SITE/ROBOT is right, as in demo/pt600\n",
+    )
+
+
+def test_monitor_says_what_is_known_of_a_link_and_what_is_wrong():
+    state = STATE(link=STATE.UP, rate_hz=99.7, last_unit_age_s=0.01)
+    assert link_words(state) == "100 units/s"
+    state.health.jitter_s, state.health.answer_s = 0.0004, 0.012
+    state.counters.units_lost, state.health.flooding = 3, True
+    assert link_words(state) == "100 units/s, jitter 0.4 ms, answer 12.0 ms, 3 lost, FLOODING"
+    silent = STATE(link=STATE.SILENT, rate_hz=0.0, last_unit_age_s=2.3)
+    assert link_words(silent) == "0 units/s, 2.3 s old"
+
+
+def test_the_document_of_faults_says_of_each_what_the_simulator_does():
+    text = (Path(__file__).parents[2] / "docs" / "faults.md").read_text(encoding="utf-8")
+    rows = [line.split(" | ")[:2] for line in text.splitlines() if line.startswith("| `")]
+    assert rows == [[f"| `{name}`", fault.what] for name, fault in FAULTS.items()]

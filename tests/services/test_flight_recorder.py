@@ -1,0 +1,218 @@
+"""The flight recorder: the last minutes are there when something happens, also after a kill."""
+
+import asyncio
+import json
+import threading
+import time
+
+import pytest
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+
+from bus.errors import RefusedError
+from bus.header import Header
+from bus.schemas import robomesh_pb2 as schema
+from bus.topics import topic
+from mcap_files.capture import Capture
+from mcap_files.files import describe_file
+from mcap_files.finish import rewrite
+from services.recorder import flight
+from services.recorder.settings import Flight
+from tests.conftest import run
+from tests.services.recording import (
+    KEY,
+    WITHIN_S,
+    Ask,
+    next_event,
+    put_states,
+    recording_site,
+    until,
+    until_indexed,
+)
+
+S = schema.Event.Severity
+SAVED = "arm/*.mcap"
+JOINTS = "robomesh/site/arm/joints"
+
+
+def positions(path):
+    with path.open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        decoded = reader.iter_decoded_messages(topics=["robomesh/site/arm/joints"])
+        return [message.joints[0].position for _, _, _, message in decoded]
+
+
+async def saved(folder):
+    """The one file that was saved."""
+    await until(lambda: len(list(folder.glob(SAVED))) == 1)
+    (path,) = folder.glob(SAVED)
+    await until_indexed(path)
+    return path
+
+
+def test_an_event_keeps_what_was_before_it_and_what_followed(mesh, tmp_path, monkeypatch):
+    # Saves go on until the test says so: a busy machine may take any time.
+    ended = threading.Event()
+    monkeypatch.setattr(flight.FlightRecorder, "_long", lambda recorder, now: ended.is_set())
+
+    async def main():
+        async with recording_site(mesh, tmp_path, flight=Flight(after_s=3600.0)) as session:
+            joints = session.declare_publisher("site", "arm", "joints")
+            events = session.declare_publisher("site", "arm", "events")
+            await until(lambda: joints.watched and events.watched)
+            await put_states(joints, range(50), hz=500)
+            events.put(event(S.WARNING, "not grave enough"))
+            events.put(event(S.ERROR, "drive 3 failed"))
+            await put_states(joints, range(50, 100), hz=500)
+            events.put(event(S.ERROR, "drive 4 failed"))
+            await put_states(joints, range(100, 120), hz=500)
+            while await joints_listed(session) < 120:
+                await asyncio.sleep(0.02)
+            ended.set()
+            path = await saved(tmp_path)
+            # A second save has only what came since.
+            await put_states(joints, range(200, 210), hz=500)
+            answer = await session.ask(KEY, Ask(action=Ask.SAVE, name="by-hand"), timeout_s=WITHIN_S)
+            assert (answer.name, answer.cause, answer.open) == ("by-hand", "asked for", True)
+            await until(lambda: (tmp_path / "arm" / answer.file).exists())
+            await until_indexed(tmp_path / "arm" / answer.file)
+            return path, tmp_path / "arm" / answer.file
+
+    path, by_hand = run(main(), timeout_s=60.0)
+    assert positions(path) == list(range(120))
+    assert positions(by_hand) == list(range(200, 210))
+    recording = describe_file(path)
+    assert recording.cause == "drive 3 failed"
+    assert recording.started_by == "flight"
+    assert sum(each.lost for each in recording.topics) == 0
+
+
+async def joints_listed(session):
+    """How many joint states the file that is being saved has so far."""
+    listed = await session.ask("robomesh/site/-/recordings/list", timeout_s=WITHIN_S)
+    assert listed.flight
+    rows = [row for recording in listed.recordings for row in recording.topics if row.topic == JOINTS]
+    return sum(row.messages for row in rows)
+
+
+def event(severity, text):
+    message = schema.Event(severity=severity, code="test", text=text, source="gateway")
+    message.timestamp.GetCurrentTime()
+    return message
+
+
+ABOUT = {"site": "site", "robot": "arm", "name": "flight", "started_by": "flight"}
+
+
+def segment_in(folder, number, *, end):
+    """A segment that an earlier process left: of one message, this number; `end`: it was closed."""
+    path = folder / ".flight" / "arm" / f"2026-01-01T00-00-0{number}.000000Z.mcap"
+    capture = Capture(path, ABOUT, start_ns=time.time_ns())
+    state = JointStates()
+    state.joints.add(name="waist", position=number)
+    capture.add(
+        JOINTS,
+        topic("joints"),
+        Header(1, number, number),
+        state.SerializeToString(),
+        received_ns=time.time_ns(),
+    )
+    if end:
+        capture.finish({})
+    else:
+        capture.hand_over()
+        capture.write_out()
+        capture.give_up()
+    return path
+
+
+def test_what_a_killed_flight_recorder_left_is_saved_at_the_next_start(mesh, tmp_path):
+    segment = segment_in(tmp_path, 1, end=False)
+    unreadable = segment.with_name("2026-01-01T00-00-00.000000Z.mcap")
+    unreadable.write_bytes(bytes(4096))  # as a power loss leaves one
+
+    async def main():
+        async with recording_site(mesh, tmp_path, flight=Flight()):
+            path = await saved(tmp_path)
+            await until(lambda: not segment.exists())
+            return path
+
+    path = run(main())
+    assert "killed" in describe_file(path).cause
+    assert positions(path) == [1]
+    assert unreadable.with_suffix(".damaged").exists()
+
+
+def test_what_a_kill_left_of_a_save_that_was_done_is_not_saved_again(mesh, tmp_path):
+    first, second = (segment_in(tmp_path, number, end=True) for number in (1, 2))
+    (tmp_path / "arm").mkdir()
+    rewrite([first, second], tmp_path / "arm" / "done.mcap", about={"name": "done"})
+    noted = {"about": {"name": "done", "cause": "drive"}, "segments": [first.name, second.name]}
+    mark = first.with_name("done.save.json")
+    mark.write_text(json.dumps(noted))
+    first.unlink()  # killed here
+
+    async def main():
+        async with recording_site(mesh, tmp_path, flight=Flight()) as session:
+            joints = session.declare_publisher("site", "arm", "joints")
+            await until(lambda: joints.watched)
+
+    run(main())
+    assert not second.exists()
+    assert not mark.exists()
+    assert [path.name for path in tmp_path.glob(SAVED)] == ["done.mcap"]
+
+
+def test_a_save_that_fails_is_told_kept_and_tried_again(mesh, tmp_path, monkeypatch):
+    monkeypatch.setattr(flight, "_SAVE_AGAIN_AFTER_S", 0.1)
+    (tmp_path / "arm").write_bytes(b"")  # no folder can be made there
+
+    async def main():
+        async with recording_site(mesh, tmp_path, flight=Flight(after_s=0.0)) as session:
+            said = session.subscribe("robomesh/site/arm/events/recorder", newest=100)
+            joints = session.declare_publisher("site", "arm", "joints")
+            await until(lambda: joints.watched)
+            await put_states(joints, range(5))
+            for name in ("shift/3", "x" * 300):
+                with pytest.raises(RefusedError, match="at most 81 letters"):
+                    await session.ask(KEY, Ask(action=Ask.SAVE, name=name), timeout_s=WITHIN_S)
+            await session.ask(KEY, Ask(action=Ask.SAVE, name="kept"), timeout_s=WITHIN_S)
+            told = await next_event(said, "recorder.not_saved")
+            (tmp_path / "arm").unlink()
+            path = await saved(tmp_path)
+            await next_event(said, "recorder.saved")
+            return told, path
+
+    told, path = run(main(), timeout_s=60.0)
+    assert told.severity == S.CRITICAL
+    assert "kept is not saved" in told.text
+    assert positions(path) == list(range(5))
+    assert not list((tmp_path / ".flight" / "arm").glob("*.json"))
+
+
+def test_old_segments_are_removed_and_nothing_else(mesh, tmp_path, monkeypatch):
+    monkeypatch.setattr(flight, "_SHORTEST_S", 0.2)
+
+    async def main():
+        async with recording_site(mesh, tmp_path, flight=Flight(minutes=0.01)) as session:
+            joints = session.declare_publisher("site", "arm", "joints")
+            await until(lambda: joints.watched)
+            folder = tmp_path / ".flight" / "arm"
+            first = min(folder.glob("*.mcap"))
+            while first.exists():
+                await put_states(joints, range(10))
+            return len(list(folder.glob("*.mcap")))
+
+    # 0.6 s in segments of 0.2 s, and what a busy machine is late with.
+    assert 1 <= run(main()) <= 8
+    assert not list(tmp_path.glob(SAVED))
+
+
+def test_without_a_flight_recorder_a_save_is_refused_in_words(mesh, tmp_path):
+    async def main():
+        async with recording_site(mesh, tmp_path) as session:
+            with pytest.raises(RefusedError, match=r"no flight recorder here: \[recorder\] flight"):
+                await session.ask(KEY, Ask(action=Ask.SAVE), timeout_s=WITHIN_S)
+
+    run(main())

@@ -1,0 +1,257 @@
+"""What every process tells of itself, and what Prometheus reads of it."""
+
+import asyncio
+import json
+import os
+import re
+import urllib.request
+from pathlib import Path
+
+import pytest
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from prometheus_client.parser import text_string_to_metric_families
+
+import bus.subscription
+from bus.clock import Clock, Reading, hops_of, read_clock, reading_of
+from bus.errors import NoAnswerError, SessionError
+from bus.health import Served, own_version, present
+from bus.latencies import Latencies
+from bus.metrics import SessionMetrics, serve_metrics
+from bus.schemas.robomesh_pb2 import ServiceHealth
+from bus.session import open_session
+from services.watch.rules import RULES
+from tests.conftest import free_port, run
+from tests.site import robomesh
+
+ROOT = Path(__file__).resolve().parents[2]
+GATEWAY = Served(service="gateway", present_for=(("s", "arm"), ("s", "other")))
+
+
+async def scraped(url: str) -> dict[str, dict[tuple[tuple[str, str], ...], float]]:
+    """By sample's name and labels, as Prometheus's own parser reads them."""
+
+    def get() -> str:
+        with urllib.request.urlopen(url, timeout=10.0) as answer:
+            return answer.read().decode()
+
+    found: dict[str, dict[tuple[tuple[str, str], ...], float]] = {}
+    for family in text_string_to_metric_families(await asyncio.to_thread(get)):
+        for sample in family.samples:
+            found.setdefault(sample.name, {})[tuple(sorted(sample.labels.items()))] = sample.value
+    return found
+
+
+def test_a_process_tells_who_it_is_and_what_it_has_done(mesh):
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            gateway.measure("captures", "of its own", lambda: 7)
+            gateway.measure("link_up", "of each robot", lambda: {"arm": 1.0})
+            async with present(gateway, GATEWAY):
+                joints = gateway.declare_publisher("s", "arm", "joints")
+                for _ in range(5):
+                    joints.put(JointStates())
+                async for sample in monitor.subscribe("robomesh/s/-/health/*", newest=10):
+                    health = sample.message()
+                    if health.published >= 5:
+                        break
+                there = {("arm", "gateway"), ("other", "gateway")}
+                while not there <= {(key.robot, key.service) for key in await monitor.present()}:
+                    await asyncio.sleep(0.05)
+            assert sample.key == f"robomesh/s/-/health/gateway.{gateway.identity}"
+            assert (health.service, health.id, health.pid) == ("gateway", gateway.identity, os.getpid())
+            assert list(health.robots) == ["arm", "other"]
+            assert health.version == own_version()
+            assert health.memory_bytes > 1e6
+            assert health.open_files > 3
+            # What is a number for each robot is in its topics and its metrics.
+            assert dict(health.values) == {"captures": 7.0}
+
+    run(main())
+
+
+def test_prometheus_reads_counts_ages_latencies_and_the_services_own(mesh):
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            gateway.measure("units_received_total", "of each robot", lambda: {"arm": 12.0})
+            gateway.measure("captures", "of its own", lambda: 3)
+            url = serve_metrics(gateway, "127.0.0.1", 0, {"service": "gateway"})
+            monitored = serve_metrics(monitor, "127.0.0.1", 0, {"service": "monitor"})
+            async with present(gateway, GATEWAY):
+                subscription = monitor.subscribe("robomesh/*/*/joints", newest=100)
+                joints = gateway.declare_publisher("s", "arm", "joints")
+                while not joints.watched:
+                    await asyncio.sleep(0.01)
+                for _ in range(4):
+                    joints.put(JointStates())
+                for _ in range(4):
+                    await anext(subscription)
+                await read_clock(monitor, "s", gateway.identity)
+                joints.close()
+                # What is closed stays counted, also when something else is declared.
+                gateway.declare_publisher("s", "arm", "lease")
+                found, there = await scraped(url), await scraped(monitored)
+            topic = (("topic", "joints"),)
+            assert found["robomesh_published_total"][topic] == 4
+            assert found["robomesh_units_received_total"] == {(("robot", "arm"),): 12.0}
+            assert found["robomesh_captures"] == {(): 3.0}
+            assert found["robomesh_connected"] == {(): 1.0}
+            clock = (("request", "clock/*"),)
+            assert found["robomesh_request_seconds_count"][clock] == 1
+            steps = [
+                value
+                for labels, value in found["robomesh_request_seconds_bucket"].items()
+                if dict(labels)["request"] == "clock/*"
+            ]
+            assert steps == sorted(steps)
+            assert steps[-1] == 1
+            assert found["process_resident_memory_bytes"][()] > 1e6
+            assert there["robomesh_received_total"][topic] == 4
+            assert there["robomesh_lost_total"][topic] == 0
+            age = there["robomesh_age_seconds"][(("robot", "arm"), ("site", "s"), ("topic", "joints"))]
+            assert 0.0 <= age < 30.0
+
+    run(main())
+
+
+def test_processes_that_come_and_go_leave_neither_series_nor_keys(mesh, monkeypatch):
+    monkeypatch.setattr(bus.subscription, "_LOOK_EACH_S", 0.0)
+    monkeypatch.setattr(bus.subscription, "_FORGOTTEN_AFTER_S", 0.0)
+
+    async def main():
+        async with open_session(mesh) as service, open_session(mesh) as monitor:
+            healths = monitor.subscribe("robomesh/s/-/health/*", newest=1, history=False)
+            for n in range(3):
+                publisher = service.declare_publisher("s", "-", f"health/gateway.{n}")
+                while not publisher.watched:
+                    await asyncio.sleep(0.01)
+                publisher.put(ServiceHealth(service="gateway"))
+                while healths.received <= n:
+                    await asyncio.sleep(0.01)
+            assert healths.keys == ("robomesh/s/-/health/gateway.2",)
+            assert (healths.received, healths.skipped) == (3, 2)
+            ages = next(
+                each for each in SessionMetrics(monitor, {}).collect() if each.name == "robomesh_age_seconds"
+            )
+            row = {"site": "s", "robot": "-", "topic": "health/*"}
+            assert [sample.labels for sample in ages.samples] == [row]
+
+    run(main())
+
+
+def test_metrics_that_cannot_listen_say_where(mesh):
+    async def main():
+        port = free_port()
+        async with open_session(mesh) as session:
+            serve_metrics(session, "127.0.0.1", port, {})
+            with pytest.raises(SessionError, match=f"--metrics 127.0.0.1:{port}: cannot listen there"):
+                serve_metrics(session, "127.0.0.1", port, {})
+
+    run(main())
+
+
+def test_only_the_process_that_is_asked_answers_for_its_clock(mesh):
+    async def main():
+        async with open_session(mesh) as one, open_session(mesh) as other, open_session(mesh) as asker:
+            async with present(one, GATEWAY), present(other, GATEWAY):
+                for each in (one, other):
+                    reading = await read_clock(asker, "s", each.identity, hops=True, timeout_s=10.0)
+                    assert abs(reading.offset_s) <= reading.round_trip_s / 2 + 1e-3
+                    # To the router, and from it to the process.
+                    assert len(reading.hops) == 2
+                    assert reading.hops[0][1] == reading.hops[1][0]
+                    assert all(seconds >= 0 for _, _, seconds in reading.hops)
+            with pytest.raises(NoAnswerError, match="nobody answered"):
+                await read_clock(asker, "s", "nobody", timeout_s=0.2)
+
+    run(main())
+
+
+@pytest.mark.parametrize(
+    ("times", "offset_s", "round_trip_s"),
+    [
+        ((0, 10, 10, 20), 0.0, 20.0),
+        ((0, 110, 110, 20), 100.0, 20.0),
+        ((0, -90, -90, 20), -100.0, 20.0),
+        ((0, 110, 150, 60), 100.0, 20.0),  # what its owner took is no part of the way
+        ((0, 15, 15, 20), 5.0, 20.0),  # an uneven way: off by less than half the round trip
+        ((0, 10, 40, 20), 15.0, 0.0),  # a clock that was set meanwhile
+    ],
+)
+def test_offset_and_round_trip_come_from_four_times(times, offset_s, round_trip_s):
+    reading = reading_of(*(round(each * 1e9) for each in times))
+    assert reading.offset_s == pytest.approx(offset_s)
+    assert reading.round_trip_s == pytest.approx(round_trip_s)
+
+
+def test_of_several_readings_the_quickest_counts():
+    clock = Clock()
+    assert clock.best is None
+    for round_trip_s in (0.3, 0.1, 0.2):
+        clock.readings.append(Reading(round_trip_s / 2, round_trip_s))
+    assert clock.best == Reading(0.05, 0.1)
+
+
+def test_hops_are_measured_across_clocks_that_differ():
+    # a -> r -> b and back; r's clock is 100 s ahead, each way of a hop takes 1 s and 2 s.
+    there = [("a", 0.0), ("a", 0.5), ("r", 101.5), ("r", 101.75), ("b", 3.75)]
+    back = [("b", 4.0), ("r", 106.0), ("r", 106.5), ("a", 7.5)]
+    assert hops_of([*there, *back]) == (("a", "r", 1.0), ("r", "b", 2.0))
+    # A way back by another router tells nothing of each hop.
+    assert hops_of([*there, ("b", 4.0), ("q", 5.0), ("a", 7.0)]) == ()
+    assert hops_of([]) == ()
+
+
+def test_latencies_are_counted_in_steps():
+    latencies = Latencies()
+    for seconds in (0.0005, 0.001, 0.02, 99.0, -1.0):
+        latencies.add(seconds)
+    assert latencies.count == 5
+    assert (latencies.counts[0], latencies.counts[3], latencies.counts[-1]) == (3, 1, 1)
+
+
+def test_the_dashboard_asks_for_metrics_that_there_are():
+    """Every name in the dashboard's queries is told somewhere, and its file is what Grafana takes."""
+    dashboard = json.loads((ROOT / "deploy" / "grafana" / "robomesh.json").read_text(encoding="utf-8"))
+    assert dashboard["title"]
+    assert len({panel["id"] for panel in dashboard["panels"]}) == len(dashboard["panels"])
+    asked = set()
+    for panel in dashboard["panels"]:
+        for target in panel.get("targets", ()):
+            asked |= set(re.findall(r"\b(?:robomesh|process)_[a-z_]+", target["expr"]))
+    told = {
+        f"{prefix}{name}"
+        for name in re.findall(r"`(?:robomesh_|process_)?([a-z_]+)`", METRICS)
+        for prefix in ("robomesh_", "process_")
+    }
+    assert asked
+    assert asked <= told, asked - told
+
+
+METRICS = (ROOT / "docs" / "monitoring.md").read_text(encoding="utf-8")
+
+
+def test_every_measure_of_a_service_is_in_the_documentation():
+    measured = set()
+    for file in ROOT.glob("[a-z]*/**/*.py"):
+        if file.parts[len(ROOT.parts)] in ("services", "renderer", "protocol_gateway"):
+            measured |= set(re.findall(r'measure\(\s*"([a-z_]+)"', file.read_text(encoding="utf-8")))
+    assert {"browsers", "views", "captures", "link_up"} <= measured
+    for name in measured:
+        assert f"`robomesh_{name}`" in METRICS, name
+
+
+def test_every_alarm_says_what_to_do():
+    for code, rule in RULES.items():
+        assert (rule.priority is None) == (rule.advice == ""), code
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [("0.0.0.0:9100", "others can reach"), ("nonsense", "HOST:PORT is right")],
+    ids=["beyond loopback", "no address"],
+)
+def test_metrics_stay_on_this_machine_unless_the_site_says_otherwise(given, said):
+    result = robomesh("watch", "--metrics", given)
+    assert result.returncode == 2
+    assert said in result.stderr
+    assert len(result.stderr.splitlines()) == 1

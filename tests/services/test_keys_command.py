@@ -1,0 +1,321 @@
+"""`robomesh keys` as people use it, and a whole site that runs by its keys."""
+
+import json
+import stat
+from concurrent.futures import ThreadPoolExecutor
+from datetime import datetime, timedelta
+from itertools import chain
+
+import pytest
+import zenoh
+
+from bus.endpoints import router_config
+from bus.identity import read_identity
+from bus.topics import Role
+from services.command_line import main, up
+from services.keys import Folder, deeds
+from services.keys.errors import KeysError
+from services.router.router import read_access
+from services.site import load
+from tests.conftest import free_port
+from tests.site import ONE_ARM, robomesh, running_site, site_file
+
+
+def a_site(folder):
+    return site_file(
+        folder,
+        name="hall",
+        robots=ONE_ARM,
+        router=f"tcp/127.0.0.1:{free_port()}",
+        console=f"127.0.0.1:{free_port()}",
+    )
+
+
+@pytest.fixture
+def site(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return a_site(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A site with keys, for what changes nothing."""
+    path = a_site(tmp_path_factory.mktemp("made"))
+    assert keys("init", str(path)) == 0
+    return path.parent
+
+
+def keys(*arguments):
+    return main.run(["keys", *arguments])
+
+
+def records(capsys):
+    return {row["name"]: row for row in map(json.loads, capsys.readouterr().out.splitlines())}
+
+
+def test_init_makes_a_certificate_for_each_service_switches_the_site_to_tls_and_does_it_once(site, capsys):
+    before = site.read_text()
+    assert keys("init", str(site)) == 0
+    assert "is written into it" in capsys.readouterr().out
+    assert site.read_text() == before + '\n[keys]\nfolder = "keys"\n'
+    read = load(site)
+    assert read.listened[0].startswith("tls/127.0.0.1:")
+    for service in (
+        "router",
+        "gateway",
+        "started",
+        "kinematics",
+        "recorder",
+        "player",
+        "renderer",
+        "console",
+    ):
+        assert read.tls_of(service).certificate == site.parent / "keys" / f"{service}.pem"
+    written = {file: file.read_bytes() for file in (site.parent / "keys").rglob("*.*")}
+    assert keys("init", str(site)) == 0
+    assert "0 new certificates" in capsys.readouterr().out
+    assert {file: file.read_bytes() for file in written} == written
+
+
+def test_a_robot_that_the_site_file_gains_is_the_gateways_after_the_next_init(site, capsys):
+    keys("init", str(site))
+    site.write_text(site.read_text() + ONE_ARM.replace('"arm"', '"arm-2"'))
+    capsys.readouterr()
+    assert keys("init", str(site)) == 0
+    assert "1 new certificates: gateway.hall" in capsys.readouterr().out
+    keys("list", "--json")
+    listed = records(capsys)
+    assert listed["gateway.hall"]["robots"] == ["arm", "arm-2"]
+    assert listed["started.hall"]["robots"] == []
+
+
+def test_whoever_was_started_from_the_page_is_named_in_the_rules_without_the_authoritys_key(site, tmp_path):
+    keys("init", str(site))
+    folder = Folder(tmp_path / "keys")
+    folder.authority_key.unlink()
+    following = up._Started(load(site), site, load(site).listened[0])
+    file = tmp_path / "robots" / "started.toml"
+    file.parent.mkdir()
+
+    def rights():
+        following.wanted()
+        control = read_access(folder.access)["access_control"]
+        (policy,) = (each for each in control["policies"] if each["subjects"] == ["started.hall"])
+        rules = (rule for rule in control["rules"] if rule["id"] in policy["rules"])
+        answered = (rule["key_exprs"] for rule in rules if "declare_queryable" in rule["messages"])
+        return {each for each in chain(*answered) if each.endswith("/stop")}
+
+    always = {"robomesh/hall/-/stop", "robomesh/hall/matrix-probe/stop"}
+    assert rights() == always
+    file.write_text('site = "hall"' + ONE_ARM.replace('"arm"', '"mine"'))
+    assert rights() == always | {"robomesh/hall/mine/stop"}
+    assert keys("init", str(site)) == 0
+    assert rights() == always | {"robomesh/hall/mine/stop"}
+    file.unlink()
+    assert rights() == always
+
+
+def test_a_bundle_knows_where_the_routers_are(site):
+    keys("init", str(site))
+    keys("issue", "li", "--role", "operator")
+    file = Folder(site.parent / "keys").person("li")
+    assert read_identity(file).routers == load(site).listened
+    site.write_text(site.read_text().replace("[router]\n", '[router]\npublic = ["tls/hall.example:7447"]\n'))
+    keys("init", str(site))
+    keys("renew", "li")
+    assert read_identity(file).routers == ("tls/hall.example:7447",)
+
+
+def test_secrets_are_their_owners_only(site):
+    keys("init", str(site))
+    keys("issue", "li", "--role", "operator")
+    keys("issue", "--guest", "elsewhere")
+    folder = site.parent / "keys"
+    for path in (folder, *folder.rglob("*")):
+        assert stat.S_IMODE(path.stat().st_mode) == (0o700 if path.is_dir() else 0o600), path
+
+
+def test_issue_renew_revoke_and_list_tell_what_they_did(site, capsys):
+    keys("init", str(site))
+    assert keys("issue", "li", "--role", "operator", "--days", "5") == 0
+    assert keys("issue", "mo", "--role", "monitor") == 0
+    capsys.readouterr()
+    keys("list", "--json")
+    first = records(capsys)
+    assert keys("renew") == 0
+    # Who was let in for five days is not let in for ever by a timer.
+    assert "li.hall" not in capsys.readouterr().out
+    assert keys("renew", "li") == 0
+    assert capsys.readouterr().out.endswith("1 renewed\n")
+    assert keys("revoke", "mo") == 0
+    capsys.readouterr()
+    keys("list", "--json")
+    then = records(capsys)
+    assert then["li.hall"]["expires"] >= first["li.hall"]["expires"]
+    lives = [datetime.fromisoformat(then["li.hall"][at]) for at in ("issued", "expires")]
+    assert lives[1] - lives[0] < timedelta(days=6)
+    assert then["li.hall"]["serial"] != first["li.hall"]["serial"]
+    assert then["mo.hall"]["revoked"]
+    rules = Folder(site.parent / "keys").access.read_text()
+    assert "li.hall" in rules
+    assert "mo.hall" not in rules
+    assert keys("list") == 0
+    assert "mo.hall                     monitor    revoked 20" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("issue", "li"), "a name and --role are needed"),
+        (("issue", "li", "--role", "boss"), "--role boss: there are gateway, kinematics"),
+        (("issue", "li.wang", "--role", "operator"), "li.wang.hall cannot be: names are letters, digits"),
+        (("issue", "gateway", "--role", "operator"), "gateway.hall is gateway already"),
+        (("issue", "two", "--role", "gateway"), "which robots does this gateway speak for? --robots a,b"),
+        (("issue", "li", "--role", "operator", "--robots", "a"), "--robots is for gateways"),
+        (("issue", "--guest", "hall"), "hall is this site"),
+        (("issue", "--guest", "Hall"), "site 'Hall' cannot be used"),
+        (("issue", "li", "--guest", "there"), "--guest goes alone"),
+        (("revoke", "nobody"), "nobody has no certificate of this site"),
+        (("renew", "nobody"), "nobody has no certificate of this site"),
+        (("accept", "site.toml"), "site.toml: no bundle of a private key"),
+        (("accept", "not-there.pem"), "not-there.pem: cannot be read"),
+        (("accept", "keys/router.pem"), "hall is this site"),
+        (("list", "--folder", "elsewhere"), "elsewhere/principals.toml is not there"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(made, monkeypatch, capsys, arguments, text):
+    monkeypatch.chdir(made)
+    assert keys(*arguments) == 2
+    error = capsys.readouterr().err
+    assert text in error
+    assert error.count("\n") == 1
+
+
+def test_without_the_authoritys_key_nothing_is_issued_and_rules_are_still_written(site, capsys):
+    keys("init", str(site))
+    keys("issue", "li", "--role", "operator")
+    folder = Folder(site.parent / "keys")
+    folder.authority_key.unlink()
+    assert keys("issue", "mo", "--role", "monitor") == 2
+    assert "the authority's key signs; bring it back for this" in capsys.readouterr().err
+    assert keys("revoke", "li") == 0
+    assert deeds.principals_of(folder).find("li").revoked is not None
+
+
+def test_a_list_that_somebody_spoiled_is_told_with_its_file_and_key(site, capsys):
+    keys("init", str(site))
+    listed = Folder(site.parent / "keys").principals
+    listed.write_text(listed.read_text().replace('role = "watch"', 'role = "king"'))
+    capsys.readouterr()
+    assert keys("list") == 2
+    assert "principals.toml: principal." in (error := capsys.readouterr().err)
+    assert "'king'" in error
+
+
+def test_a_revoked_name_is_given_to_nobody_while_a_certificate_of_it_is_good(made, monkeypatch, capsys):
+    monkeypatch.chdir(made)
+    assert keys("issue", "wang", "--role", "operator", "--days", "90") == 0
+    assert keys("issue", "wang", "--role", "operator", "--days", "1") == 0  # the first is good all the same
+    keys("revoke", "wang")
+    capsys.readouterr()
+    for role in ("operator", "monitor"):
+        assert keys("issue", "wang", "--role", role) == 2
+        assert "would be let in again; issue wang-2 in its place" in (error := capsys.readouterr().err)
+    listed = deeds.principals_of(Folder(made / "keys")).find("wang")
+    assert listed.good_until - listed.expires > timedelta(days=88)
+    assert f"is good until {listed.good_until:%Y-%m-%d %H:%M} UTC" in error
+    assert keys("renew", "wang") == 2
+    assert keys("issue", "wang-2", "--role", "operator") == 0
+
+
+def test_a_revoked_name_is_free_when_its_certificates_have_expired(made):
+    folder = Folder(made / "keys")
+    deeds.issue(folder, "zhou", Role.OPERATOR, lives=timedelta(seconds=-60))
+    deeds.revoke(folder, "zhou")
+    assert deeds.issue(folder, "zhou", Role.MONITOR).revoked is None
+
+
+def test_a_revoked_guest_comes_back_neither_by_a_new_file_nor_by_one_that_its_site_gives(tmp_path):
+    here, there = Folder(tmp_path / "here"), Folder(tmp_path / "there")
+    for folder in (here, there):
+        deeds.prepare(folder, folder.path.name, robots=[], border="open", routers=[])
+    deeds.issue_guest(here, "there")
+    deeds.issue_guest(there, "here")
+    deeds.revoke(here, "router.there")
+    with pytest.raises(KeysError, match="a new authority alone keeps the old one out"):
+        deeds.issue_guest(here, "there")
+    with pytest.raises(KeysError, match="would be let in again"):
+        deeds.accept(here, there.guest("here").read_bytes())
+    assert "router.there" not in here.access.read_text()
+
+
+def test_deeds_at_the_same_time_lose_nothing_of_each_other(made):
+    folder = Folder(made / "keys")
+    deeds.issue(folder, "thief", Role.OPERATOR)
+    several = [f"p{number}" for number in range(12)]
+    with ThreadPoolExecutor(4) as pool:
+        done = [pool.submit(deeds.issue, folder, name, Role.MONITOR) for name in several]
+        done.append(pool.submit(deeds.revoke, folder, "thief"))
+        for each in done:
+            each.result()
+    principals, rules = deeds.principals_of(folder), folder.access.read_text()
+    assert all(principals.find(name) and f'"{name}.hall"' in rules for name in several)
+    assert "thief.hall" not in rules
+
+
+@pytest.mark.parametrize("connect", ["beijing", "beijing=tls/10.0.0.1:7447"])
+def test_a_link_to_a_site_that_did_not_let_us_in_says_how_to_get_there(site, connect):
+    keys("init", str(site))
+    text = site.read_text().replace("[router]\n", f'[router]\nconnect = ["{connect}"]\n')
+    site.write_text(text)
+    with pytest.raises(Exception, match="robomesh keys issue --guest OURS at site beijing"):
+        _ = load(site).links
+
+
+def test_doctor_tries_every_certificate_and_finds_what_a_router_does_otherwise(site, capsys):
+    keys("init", str(site))
+    keys("issue", "mo", "--role", "monitor")
+    folder, endpoint = Folder(site.parent / "keys"), load(site).listened[0]
+    keys("issue", "li", "--role", "operator")
+    rules = folder.access.read_text()
+    spoiled = rules
+    for right, wrong in (
+        ('"robomesh/*/*/command/li.hall"', '"robomesh/*/*/command/*"'),
+        ('"robomesh/*/*/stop"', '"robomesh/**/stop"'),
+        ('"robomesh/hall/matrix-probe/joints"', '"robomesh/hall/*/joints"'),
+    ):
+        assert right in spoiled
+        spoiled = spoiled.replace(right, wrong)
+    key = "robomesh/hall/matrix-probe"
+    for text, status, found in (
+        (rules, 0, ["certificates tried: all as the table says"]),
+        (
+            spoiled,
+            1,
+            [
+                f"WRONG: li.hall can ask {key}/command/nobody.hallx, and should not",
+                f"WRONG: mo.hall can ask {key}/command/stop, and should not",
+                f"WRONG: gateway.hall can publish {key}$*/joints, and should not",
+                f"WRONG: started.hall can answer {key}$*/joints, and should not",
+            ],
+        ),
+    ):
+        folder.access.write_text(text)
+        with zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access))):
+            capsys.readouterr()
+            assert main.run(["doctor", "--security", "--connect", endpoint]) == status
+            told = capsys.readouterr().out
+            assert [line for line in found if line not in told] == []
+
+
+@pytest.mark.processes
+def test_a_site_with_keys_runs_over_tls(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    deeds.prepare(Folder(tmp_path / "keys"), "test", robots=[], border="open", routers=[])
+    assert keys("issue", "mo", "--role", "monitor") == 0
+    with running_site(tmp_path, robots="", more='[keys]\nfolder = "keys"\n') as site:
+        router = site.router.replace("tcp/", "tls/")
+        mo = str(tmp_path / "keys" / "people" / "mo.pem")
+        listed = robomesh("list", "--json", "--connect", router, "--keys", mo)
+        services = {row["service"] for row in json.loads(listed.stdout)["services"]}
+        assert {"router", "console", "recorder"} <= services

@@ -1,0 +1,242 @@
+"""Kinematics of a cell: how near arms are to things and to each other, and what of it is an event."""
+
+import asyncio
+from contextlib import asynccontextmanager
+
+import numpy as np
+import pytest
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+
+from bus.errors import RefusedError
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import open_session
+from bus.worker import Worker
+from robots.cells import CellDescription, CellRobot, Fixture
+from robots.collision import build_cell, outside_clearance, own_nearest
+from robots.model import tool_placement
+from services import kinematics
+from services.kinematics import answers
+from services.kinematics.place import Place
+from services.site_fixtures import Fixture as FixtureRow
+from services.site_fixtures import fixture_shape
+from tests.conftest import run
+from tests.site import alive
+
+NAMES = ("waist", "shoulder", "elbow", "wrist", "roll")
+HOME = np.radians([0.0, 90.0, -90.0, 0.0, 0.0])
+
+
+def at(x, y, z):
+    placement = np.eye(4)
+    placement[:3, 3] = x, y, z
+    return placement
+
+
+POST = fixture_shape(FixtureRow(cell="a", name="post", cylinder=(40.0, 1000.0), color="#c9a227"))
+CELL = CellDescription(
+    robots=(
+        CellRobot(name="left", model="pt600", base_to_site=at(0.0, 0.45, 0.0)),
+        CellRobot(name="right", model="pt600", base_to_site=at(0.0, -0.45, 0.0)),
+    ),
+    fixtures=(Fixture("post", (POST,), at(0.6, 0.0, 0.5), POST.color),),
+)
+BUILT = build_cell(CELL)
+
+
+@asynccontextmanager
+async def hall(mesh):
+    """The service of the cell, a session for its gateways and one for who asks."""
+    async with open_session(mesh) as own, open_session(mesh) as gateway, open_session(mesh) as monitor:
+        robots = tuple(
+            kinematics.RobotSettings(name=robot.name, place=CELL, cell="a", simulated=True)
+            for robot in CELL.robots
+        )
+        task = asyncio.create_task(kinematics.serve(own, kinematics.Settings(site="hall", robots=robots)))
+        try:
+            yield gateway, monitor
+        finally:
+            task.cancel()
+            (outcome,) = await asyncio.gather(task, return_exceptions=True)
+            assert isinstance(outcome, asyncio.CancelledError), outcome
+
+
+@asynccontextmanager
+async def telling(gateway, places):
+    """Joint states at 50 Hz of where the robots are, by name; changing the dictionary moves them."""
+
+    async def tell():
+        publishers = {}
+        while True:
+            for name, positions in list(places.items()):
+                if name not in publishers:
+                    publishers[name] = gateway.declare_publisher("hall", name, "joints")
+                message = JointStates()
+                message.timestamp.GetCurrentTime()
+                for joint, position in zip(NAMES, positions, strict=True):
+                    message.joints.add(name=joint, position=position)
+                publishers[name].put(message)
+            await asyncio.sleep(0.02)
+
+    task = asyncio.create_task(tell())
+    try:
+        yield places
+    finally:
+        task.cancel()
+
+
+async def until(session, topic, right):
+    """The first live message of a topic of the left arm that is right."""
+    async for sample in session.subscribe(f"robomesh/hall/left/{topic}", newest=10):
+        if sample.live and right(message := sample.message()):
+            return message
+    raise AssertionError("the subscription ended")
+
+
+def test_the_description_tells_what_stands_in_the_cell_with_meshes_that_are_answered(mesh):
+    async def main():
+        async with hall(mesh) as (_, monitor):
+            for robot in ("left", "right"):
+                description = await monitor.last(f"robomesh/hall/{robot}/description", timeout_s=10.0)
+                (fixture,) = description.fixtures
+                assert (fixture.name, fixture.color, description.cell) == ("post", "#c9a227", "a")
+                assert fixture.fixture_to_site == at(0.6, 0.0, 0.5).ravel().tolist()
+                assert (description.warning_distance, description.stop_distance) == (0.05, 0.01)
+                glb = await monitor.ask_bytes(f"robomesh/hall/{robot}/mesh/{fixture.mesh}", timeout_s=10.0)
+                assert glb.startswith(b"glTF")
+
+    run(main())
+
+
+def test_clearance_is_live_and_counts_the_other_robot_only_while_it_tells_where_it_is(mesh):
+    left = np.radians([-57.0, 90.0, -67.0, 0.0, 0.0])
+    right = np.radians([69.0, 79.0, -73.0, 0.0, 0.0])
+
+    async def main():
+        async with (
+            hall(mesh) as (gateway, monitor),
+            telling(gateway, {"left": left, "right": right}) as places,
+        ):
+            state = await until(
+                monitor, "kinematics", lambda m: m.HasField("clearance") and not m.not_counted
+            )
+            expected = outside_clearance(BUILT, "left", left, {"right": right})
+            assert expected.pair[1].startswith("right/")
+            assert state.clearance.distance == pytest.approx(expected.distance_m, abs=1e-9)
+            assert (state.clearance.first, state.clearance.second) == tuple(
+                f"hall/{name}" for name in expected.pair
+            )
+            points = [(p.x, p.y, p.z) for p in (state.clearance.first_point, state.clearance.second_point)]
+            assert np.subtract(*points) @ np.subtract(*points) == pytest.approx(expected.distance_m**2)
+            own = own_nearest(BUILT, "left", left)
+            assert state.own_clearance.distance == pytest.approx(own.distance_m, abs=1e-9)
+            del places["right"]
+            state = await until(monitor, "kinematics", lambda m: m.not_counted)
+            assert list(state.not_counted) == ["right"]
+            assert state.clearance.second == "hall/post"
+            event = await until(monitor, "events/kinematics", lambda m: m.code == "kinematics.not_counted")
+            assert "nobody knows where it is now" in event.text
+            places["right"] = right
+            await until(monitor, "kinematics", lambda m: not m.not_counted)
+
+    run(main())
+
+
+def test_an_arm_that_comes_near_a_post_is_an_event_that_late_joiners_hear_of(mesh):
+    async def main():
+        near = np.radians([-36.87, 15.0, -30.0, 0.0, 0.0])
+        assert 0 < outside_clearance(BUILT, "left", near, {}).distance_m < 0.01
+        async with hall(mesh) as (gateway, monitor), telling(gateway, {"left": HOME}) as places:
+            await until(monitor, "kinematics", lambda m: m.HasField("clearance"))
+            places["left"] = near
+            await until(monitor, "events/kinematics", lambda m: m.code == "kinematics.clearance.stop")
+            places["left"] = HOME
+            await until(monitor, "events/kinematics", lambda m: m.code == "kinematics.clearance.stop.over")
+            events = (await monitor.last("robomesh/hall/left/events/kinematics")).events
+            told = [(event.severity, event.code) for event in events if "clearance" in event.code]
+            assert told == [
+                (schema.Event.WARNING, "kinematics.clearance.warning"),
+                (schema.Event.ERROR, "kinematics.clearance.stop"),
+                (schema.Event.INFO, "kinematics.clearance.warning.over"),
+                (schema.Event.INFO, "kinematics.clearance.stop.over"),
+            ]
+            assert {event.values["second"] for event in events if "clearance" in event.code} == {"post"}
+
+    run(main())
+
+
+def test_frames_place_the_fixtures_too_about_once_a_second(mesh):
+    async def main():
+        async with hall(mesh) as (gateway, monitor), telling(gateway, {"left": HOME}):
+            told_ns, between = [], 0
+            async for sample in monitor.subscribe("robomesh/hall/left/frames", newest=100):
+                frames = {each.child_frame_id: each for each in sample.message().transforms}
+                assert "hall/left/tool" in frames
+                if "hall/post" in frames:
+                    told_ns.append(sample.header.source_time_ns)
+                else:
+                    between += bool(told_ns)
+                if len(told_ns) == 2:
+                    break
+            assert frames["hall/post"].parent_frame_id == "hall"
+            assert frames["hall/post"].translation.x == pytest.approx(0.6)
+            assert between
+            assert told_ns[1] - told_ns[0] > 0.8e9
+
+    run(main())
+
+
+def test_inverse_and_check_are_answered_by_processes_that_end_with_the_service(mesh, monkeypatch):
+    workers = []
+
+    def keep(*args, **kwargs):
+        workers.append(Worker(*args, **kwargs))
+        return workers[-1]
+
+    async def main():
+        async with hall(mesh) as (gateway, monitor), telling(gateway, {"left": HOME}):
+            await until(monitor, "frames", lambda m: True)
+            key = "robomesh/hall/left/kinematics"
+            pose = tool_placement(BUILT.arms["left"].model, HOME).ravel().tolist()
+            request = schema.InverseRequest(pose=pose, task=2, near=HOME)
+            answer = await monitor.ask(f"{key}/inverse", request, timeout_s=20.0)
+            assert answer.solutions[0].joint_positions == pytest.approx(HOME.tolist(), abs=1e-6)
+            request = schema.CheckRequest(program="move_joints 30 90 -90 0 0\nhome\n")
+            answer = await monitor.ask(f"{key}/check", request, timeout_s=20.0)
+            assert answer.ok, answer
+            assert answer.duration_s > 1.0
+            assert "right is left out: nobody knows where it is now" in answer.notes
+            with pytest.raises(RefusedError, match="start: 2 given, left has 5 joints"):
+                await monitor.ask(f"{key}/check", schema.CheckRequest(program="home", start=[0.0, 0.0]))
+            with pytest.raises(RefusedError, match="start: nobody knows where right is now; give it"):
+                await monitor.ask("robomesh/hall/right/kinematics/check", schema.CheckRequest(program="home"))
+            with pytest.raises(RefusedError, match="the pose has 3 numbers"):
+                await monitor.ask(f"{key}/inverse", schema.InverseRequest(pose=[1.0] * 3, task=1))
+            children = [each.pid for each in workers]
+            assert all(alive(pid) for pid in children)
+            monkeypatch.setattr(answers, "_CHECK_S", 1e-6)
+            with pytest.raises(RefusedError, match="given up: no answer within 1e-06 s"):
+                await monitor.ask(f"{key}/check", schema.CheckRequest(program="home"))
+            return children
+
+    monkeypatch.setattr(kinematics.kinematics, "Worker", keep)
+    children = run(main(), timeout_s=60.0)
+    assert len(children) == 2
+    assert not any(alive(pid) for pid in children)
+
+
+def test_what_has_not_moved_is_not_looked_at_again():
+    now = [0.0]
+    place = Place({"left": 1.0, "right": 2.0}, lambda: now[0])
+    assert place.positions("left") is None
+    place.take("left", HOME)
+    place.take("right", HOME)
+    near = place.near(BUILT, "left", HOME)
+    place.take("left", HOME.copy())
+    assert place.near(BUILT, "left", HOME.copy()) is near
+    place.take("right", HOME + 0.1)
+    assert place.near(BUILT, "left", HOME) is not near
+    now[0] = 1.5
+    assert place.positions("left") is None
+    assert place.others("left")[1] == ()
+    now[0] = 2.5
+    assert place.near(BUILT, "left", HOME).not_counted == ("right",)

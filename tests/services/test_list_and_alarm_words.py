@@ -1,0 +1,91 @@
+"""What `robomesh list` and `robomesh alarms` make of what the watches tell; sites that are gone too."""
+
+import asyncio
+
+import pytest
+
+from bus.keys import PresenceKey
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import open_session
+from services.command_line import alarms, find, listing, listing_words
+from services.command_line.alarm_lists import gone_sites, lists
+from tests.conftest import run
+
+Alarm = schema.Alarm
+LONG = "service.silent:recorder.0123456789abcdef0123456789abcdef"
+
+
+def alarm(name="arm:link", code="link.down", *, robot="arm", state=Alarm.UNACKNOWLEDGED, at_s=1e9, **values):
+    told = {"source": "gateway", "text": "connecting to 10.0.0.7:5400", "priority": Alarm.HIGH}
+    made = Alarm(id=name, code=code, robot=robot, state=state, **(told | values))
+    made.since.FromSeconds(round(at_s))
+    return made
+
+
+def gone(site="beijing", **values):
+    text = f"site {site} is gone: nothing of it is seen at shanghai any more"
+    values = {"source": "watch", "text": text, "values": {"site": site}} | values
+    return alarm(f"-:site.gone:{site}", "site.gone", robot="-", **values)
+
+
+SHANGHAI = schema.AlarmList(site="shanghai", alarms=[gone(), alarm()])
+WUHAN = schema.AlarmList(site="wuhan", alarms=[gone(at_s=9e8), gone("hub", state=Alarm.RETURNED)])
+ALIVE = [PresenceKey(site, "-", "watch", f"w-{site}") for site in ("shanghai", "wuhan")]
+
+
+def test_a_site_that_is_gone_stays_in_the_list_with_the_time_that_a_watch_tells_first():
+    rows = {row["site"]: row for row in listing._sites(ALIVE, [SHANGHAI, WUHAN])}
+    assert rows.keys() == {"beijing", "shanghai", "wuhan"}
+    assert rows["beijing"]["gone_since"] == 9e8
+    assert listing_words._site(rows["beijing"]).startswith("beijing — gone since 1998-07-")
+    assert rows["shanghai"]["gone_since"] is None
+    # What is unacknowledged is said, and not only how much of it.
+    assert "-:site.gone:beijing: site beijing is gone" in listing_words._site(rows["shanghai"])
+
+
+def test_a_site_that_is_back_is_not_gone():
+    alive = [*ALIVE, PresenceKey("beijing", "-", "router", "r")]
+    (row,) = (row for row in listing._sites(alive, [SHANGHAI]) if row["site"] == "beijing")
+    assert row["gone_since"] is None
+    assert not gone_sites([schema.AlarmList(site="a", alarms=[gone(state=Alarm.RETURNED)])])
+
+
+def test_who_asks_for_a_robot_of_a_site_that_is_gone_is_told_so(mesh):
+    async def main():
+        async with open_session(mesh) as watch, open_session(mesh) as monitor:
+            watch.declare_publisher("shanghai", "-", "alarms").put(SHANGHAI)
+            while not await lists(monitor):
+                await asyncio.sleep(0.02)
+            with pytest.raises(find.NoSuchRobotError, match=r"no robot 'beijing/pt500-1'.*; gone.*beijing"):
+                await find.find(monitor, "beijing/pt500-1")
+
+    run(main())
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["arm:link", "shanghai/arm:link", "link.down", "gateway · link.down", "arm:link.down"],
+)
+def test_an_alarm_is_known_by_its_id_and_by_what_the_page_calls_it(name):
+    assert alarms._by_site([name], [SHANGHAI]) == {"shanghai": ["arm:link"]}
+
+
+def test_a_name_that_several_alarms_have_is_refused_with_theirs():
+    both = schema.AlarmList(site="shanghai", alarms=[alarm(), alarm("arm-2:link", robot="arm-2")])
+    with pytest.raises(alarms.NoSuchAlarmError, match=r"shanghai/arm:link, shanghai/arm-2:link"):
+        alarms._by_site(["link.down"], [both])
+    with pytest.raises(alarms.NoSuchAlarmError, match=r"there are: arm:link \(gateway · link\.down\)"):
+        alarms._by_site(["nothing"], [both])
+
+
+def test_an_alarms_name_is_never_broken_and_its_text_takes_the_whole_width(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "80")
+    text = "word " * 30
+    told = alarm(f"-:{LONG}", "service.silent", text=text, advice="Look at it.", count=3, by="li")
+    alarms._print([schema.AlarmList(site="a-site-with-a-name-that-is-long", alarms=[told])])
+    lines = capsys.readouterr().out.splitlines()
+    assert f"  a-site-with-a-name-that-is-long/-:{LONG}" in lines
+    assert lines[0].startswith("HIGH  unacknowledged  2001-09-")
+    assert lines[0].endswith("gateway · service.silent")
+    assert [line.strip() for line in lines[-2:]] == ["3 times, by li", "Look at it."]
+    assert len(lines) == 6

@@ -1,0 +1,97 @@
+"""What `robomesh monitor` says beside the joints."""
+
+import pytest
+from google.protobuf.timestamp_pb2 import Timestamp
+
+from bus.schemas.robomesh_pb2 import Clearance, ControllerState, Description, KinematicState, ProgramState
+from services.command_line.monitor_words import (
+    check_words,
+    clearance_record,
+    near_words,
+    program_record,
+    program_words,
+)
+
+ARM = Description(warning_distance=0.05, stop_distance=0.01)
+
+
+def near(distance):
+    return KinematicState(
+        clearance=Clearance(distance=distance, first="hall/arm/flange", second="hall/mate/wrist"),
+        own_clearance=Clearance(distance=0.1, first="hall/arm/base", second="hall/arm/flange"),
+        not_counted=["third"],
+    )
+
+
+@pytest.mark.parametrize(
+    ("distance", "text", "style"),
+    [
+        (0.2, "200.0 mm", ""),
+        (0.0499, "49.9 mm", "bold yellow"),
+        (0.0099, "9.9 mm", "bold red"),
+        (0.0, "touching", "bold red"),
+    ],
+)
+def test_how_near_things_are_is_told_with_what_and_coloured_by_the_robots_distances(distance, text, style):
+    clearance, own, missing = near_words(near(distance), ARM, "hall/arm")
+    assert clearance == (f"clearance {text} (flange - mate wrist)", style)
+    assert own == ("own links 100.0 mm (base - flange)", "")
+    assert missing == ("not counted, nobody knows where: third", "bold yellow")
+
+
+def test_a_check_that_cannot_be_made_says_what_becomes_of_motions():
+    assert check_words(ControllerState()) is None
+    assert check_words(ControllerState(check=ControllerState.REQUIRE)) == (
+        "motions: checked, refused unless free",
+        "",
+    )
+    cannot = ControllerState(check=ControllerState.REQUIRE, check_text="no collision meshes")
+    assert check_words(cannot) == ("motions: refused now: no collision meshes", "bold yellow")
+    cannot.check = ControllerState.WARN
+    assert check_words(cannot) == ("motions: not checked now: no collision meshes", "bold yellow")
+
+
+def test_a_program_is_told_with_its_step_its_line_and_its_time_and_how_it_ended():
+    assert program_words(ProgramState()) is None
+    state = ProgramState(
+        outcome=ProgramState.RUNNING,
+        name="weld",
+        operator="li",
+        since=Timestamp(seconds=100),
+        timestamp=Timestamp(seconds=172, nanos=900_000_000),
+        line=7,
+        statement="move_line part",
+        step=12,
+        steps=40,
+        duration_s=125.5,
+    )
+    told = "program weld: step 12 of 40, line 7: move_line part; by li, 01:12 of 02:05"
+    assert program_words(state) == (told, "bold")
+    assert program_words(state, stale=True) == (told, "dim strike")
+    state.outcome, state.text = ProgramState.ENDED, "stopped by wang"
+    assert program_words(state) == (
+        "program weld, by li: ended at line 7: move_line part: stopped by wang",
+        "bold yellow",
+    )
+    state.outcome = ProgramState.DONE
+    assert program_words(state) == ("program weld: done, by li", "")
+    assert program_record(state) == {
+        "outcome": "done",
+        "name": "weld",
+        "operator": "li",
+        "line": 7,
+        "step": 12,
+        "steps": 40,
+        "text": "stopped by wang",
+    }
+
+
+def test_programs_are_told_what_is_near_and_what_runs_or_that_nobody_says():
+    assert clearance_record(near(0.25), "hall/arm") == {
+        "distance_m": 0.25,
+        "pair": ["arm/flange", "mate/wrist"],
+    }
+    assert clearance_record(KinematicState(), "hall/arm") is None
+    assert clearance_record(None, "hall/arm") is None
+    assert program_record(ProgramState()) is None
+    assert program_record(None) is None

@@ -1,0 +1,130 @@
+"""What of the mesh should not be so: pure, from what processes told."""
+
+import pytest
+
+from bus.keys import PresenceKey
+from bus.schemas.robomesh_pb2 import ServiceHealth
+from services import site as site_file
+from services.errors import SiteFileError
+from services.watch.conditions import Condition, Judge
+from services.watch.mesh import Mesh
+from services.watch.quarrels import Expected, mesh_conditions
+
+
+def mesh_of(*told: ServiceHealth, site: str = "s") -> Mesh:
+    mesh = Mesh()
+    for health in told:
+        mesh.come(PresenceKey(site, "-", health.service, health.id))
+        mesh.see(site, health, 0.0)
+    return mesh
+
+
+def found(mesh: Mesh, *, now_s: float = 1.0, begun: frozenset[str] = frozenset()) -> dict[str, str]:
+    conditions = mesh_conditions(mesh, "s", here="me", expected=Expected(), begun=begun, now_s=now_s)
+    return {condition.id: condition.text for condition in conditions}
+
+
+def health(service: str = "recorder", **values: object) -> ServiceHealth:
+    return ServiceHealth(service=service, id="a1", host="host-a", version="1.0", **values)
+
+
+def test_all_is_well_when_all_is_well():
+    assert found(mesh_of(health())) == {}
+
+
+def test_a_process_that_is_there_and_says_nothing_hangs():
+    mesh = mesh_of(health())
+    assert "recorder of s at host-a" in found(mesh, now_s=11.0)["-:service.silent:recorder.a1"]
+
+
+def test_losses_are_told_above_a_mark_and_until_another():
+    mesh = mesh_of(health(received=1000))
+    name = "-:mesh.loss:recorder.a1"
+    mesh.see("s", health(received=2000, lost=4), 1.0)
+    assert found(mesh) == {}  # a few
+    mesh.see("s", health(received=3000, lost=40), 2.0)
+    assert "2.0 %" in found(mesh)[name]
+    for second in range(40):
+        mesh.see("s", health(received=13000 + 100 * second, lost=50), 3.0 + second)
+    assert name not in found(mesh)
+    mesh.see("s", health(received=18000, lost=60), 43.0)
+    assert name not in found(mesh)
+    assert name in found(mesh, begun=frozenset({name}))
+
+
+@pytest.mark.parametrize(("left_s", "said"), [(864000 - 60.0, "in 10 days"), (-60.0, "has expired")])
+def test_a_certificate_that_ends_soon_is_told(left_s, said):
+    assert found(mesh_of(health(values={"certificate_seconds": 900000.0}))) == {}
+    told = found(mesh_of(health(values={"certificate_seconds": left_s})))
+    assert said in told["-:certificate.expires:recorder.a1"]
+
+
+def test_a_router_that_misses_a_link_is_told():
+    assert found(mesh_of(health("router", values={"links": 2.0, "links_wanted": 2.0}))) == {}
+    told = found(mesh_of(health("router", values={"links": 1.0, "links_wanted": 2.0})))
+    assert "reaches 1 of the 2 routers" in told["-:router.unlinked:a1"]
+
+
+def test_a_site_that_is_seen_no_more_is_gone_once():
+    mesh, expected, judge = mesh_of(health("router"), site="beijing"), Expected(), Judge()
+
+    def judged(now_s: float) -> tuple[list[Condition], list[Condition]]:
+        conditions = mesh_conditions(
+            mesh, "s", here="me", expected=expected, begun=frozenset(), now_s=now_s, settled_s=5.0
+        )
+        began, _, over = judge.judge(conditions, now_s)
+        return began, over
+
+    assert judged(0.0) == ([], [])
+    mesh.go(PresenceKey("beijing", "-", "router", "a1"))
+    assert judged(1.0) == ([], [])
+    (gone,), _ = judged(6.0)
+    assert gone.id == "-:site.gone:beijing"
+    assert judged(7.0) == ([], [])
+    mesh.come(PresenceKey("beijing", "-", "router", "b2"))
+    _, (over,) = judged(8.0)
+    assert over.over == "site beijing is there again"
+
+
+@pytest.mark.parametrize(
+    ("service", "robot", "missed"),
+    [
+        ("gateway", "arm", True),
+        ("recorder", "-", True),
+        ("foxglove", "-", False),
+        ("ros2", "-", False),
+        ("simulator", "arm", False),
+        ("player", "replay-1", False),
+    ],
+    ids=str,
+)
+def test_who_is_ended_on_purpose_is_not_missed(service, robot, missed):
+    mesh, expected, who = Mesh(), Expected(), PresenceKey("s", robot, service, "a1")
+
+    def gone() -> list[str]:
+        conditions = mesh_conditions(
+            mesh, "s", here="me", expected=expected, begun=frozenset(), now_s=0.0, settled_s=0.0
+        )
+        return [condition.code for condition in conditions]
+
+    mesh.come(who)
+    assert gone() == []
+    mesh.go(who)
+    assert gone() == ["service.gone"] * missed
+    # Nor is one that was missed at the watch's restart, by a file of before.
+    then = Condition(
+        code="service.gone", text=f"{service} of s is gone", values=(("service", service), ("robots", robot))
+    )
+    expected = Expected()
+    expected.remember([then])
+    assert gone() == ["service.gone"] * missed
+
+
+def test_a_router_that_is_to_link_to_itself_is_refused(tmp_path):
+    path = tmp_path / "site.toml"
+    path.write_text(
+        'site = "x"\n[router]\nlisten = ["tcp/127.0.0.1:7447"]\nconnect = ["tcp/localhost:7447"]\n',
+        encoding="utf-8",
+    )
+    with pytest.raises(SiteFileError, match="localhost:7447 is given twice, to the router and to another"):
+        site_file.load(path)

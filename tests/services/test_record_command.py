@@ -1,0 +1,70 @@
+"""`robomesh record`: how it ends, by Ctrl-C and without us, and what it says then."""
+
+import asyncio
+import os
+import signal
+from contextlib import asynccontextmanager
+
+from services.command_line.find import Robot
+from services.command_line.recordings.record import _record
+from services.command_line.send import joined
+from tests.conftest import run
+from tests.services.recording import put_states, recording_site, trace_off
+from tests.services.test_recorder import fill_disk_under
+
+
+@asynccontextmanager
+async def arm_recorded(mesh, folder):
+    """A recorder that is ready, of an arm that is there."""
+    async with recording_site(mesh, folder) as other:
+        other.declare_presence("site", "arm", "gateway")
+        while await other.last("robomesh/site/arm/recording") is None:
+            pass
+        yield other
+
+
+async def until_told(capsys, words):
+    told = ""
+    while words not in told:
+        told += capsys.readouterr().err
+        await asyncio.sleep(0.02)
+
+
+def test_ctrl_c_ends_it_and_a_line_says_what_there_is(mesh, router, tmp_path, capsys):
+    async def main():
+        async with arm_recorded(mesh, tmp_path) as other:
+            recording = asyncio.create_task(_record("arm", "trial", ["-"], router))
+            await until_told(capsys, "recording site/arm as trial; Ctrl-C ends it")
+            while not await joined(other, Robot("site", "arm")):
+                pass
+            os.kill(os.getpid(), signal.SIGINT)
+            return await recording
+
+    done = run(main())
+    assert (done.recording.name, done.problem) == ("trial", "")
+    assert (tmp_path / "arm" / done.recording.file).is_file()
+
+
+def test_what_another_ended_is_told_as_such(mesh, router, tmp_path, capsys):
+    async def main():
+        async with arm_recorded(mesh, tmp_path) as other:
+            recording = asyncio.create_task(_record("arm", "trial", ["-"], router))
+            await until_told(capsys, "Ctrl-C ends it")
+            await trace_off(other)
+            return await recording
+
+    assert run(main()).problem == "recording trial was ended by another"
+
+
+def test_a_disk_that_takes_no_more_ends_it_with_its_own_words(mesh, router, tmp_path, capsys):
+    async def main():
+        async with arm_recorded(mesh, tmp_path) as other:
+            recording = asyncio.create_task(_record("arm", "full", ["-"], router))
+            await until_told(capsys, "Ctrl-C ends it")
+            fill_disk_under(tmp_path / "arm")
+            await put_states(other.declare_publisher("site", "arm", "joints"), range(20))
+            return await recording
+
+    problem = run(main()).problem
+    assert problem.lower().startswith("recording full ended: no space left")
+    assert problem.endswith("; what was written is kept")

@@ -1,0 +1,103 @@
+"""The disk of a recorder: what it refuses ends one file, and no other."""
+
+import errno
+import threading
+
+import pytest
+
+from bus.header import Header
+from bus.topics import topic
+from mcap_files.capture import Capture
+from mcap_files.recover import State, state_of
+from services.recorder.disk import Disk
+from services.recorder.settings import Marks
+
+KEY = "robomesh/site/arm/joints"
+FULL = OSError(errno.ENOSPC, "No space left on device")
+WITHIN_S = 20.0
+
+
+@pytest.fixture
+def failed():
+    return []
+
+
+@pytest.fixture
+def disk(tmp_path, failed):
+    disk = Disk(tmp_path, Marks(warn=0, no_video=0, states_only=0), lambda capture, _: failed.append(capture))
+    yield disk
+    disk.end()
+
+
+def opened(disk, name):
+    capture = Capture(disk.folder / name, {}, start_ns=1)
+    capture.add(KEY, topic("joints"), Header(1, 1, 1), b"AAAA", received_ns=5)
+    capture.hand_over()
+    disk.open(capture)
+    return capture
+
+
+def refuse(capture, monkeypatch, attempt="write_out"):
+    """From now on the disk takes no more of a file; a wait until that was noticed."""
+    given_up = threading.Event()
+    give_up = capture.give_up
+
+    def refused():
+        raise FULL
+
+    def give_up_and_tell(error=None):
+        give_up(error)
+        given_up.set()
+
+    monkeypatch.setattr(capture, "give_up", give_up_and_tell)
+    monkeypatch.setattr(capture, attempt, refused)
+    assert given_up.wait(WITHIN_S)
+
+
+def test_a_file_that_failed_is_closed_without_a_byte_into_the_next_one(disk, failed, monkeypatch):
+    first = opened(disk, "a.mcap")
+    while first.waiting_bytes:
+        first.write_out()
+    refuse(first, monkeypatch)
+    second = opened(disk, "b.mcap")  # has the first one's descriptor
+    with pytest.raises(OSError, match="No space left"):
+        disk.close(first, {})
+    disk.close(second, {})
+    assert failed == [first]
+    assert state_of(first.path) is State.CLOSED, "it was given an end"
+    assert state_of(second.path) is State.CLOSED
+    assert second.path.read_bytes().count(b"AAAA") == 1
+
+
+def test_a_file_that_the_disk_took_nothing_of_is_removed(disk, monkeypatch):
+    capture = Capture(disk.folder / "a.mcap", {}, start_ns=1)
+
+    def refused(missed):
+        raise FULL
+
+    monkeypatch.setattr(capture, "write_out", lambda: None)
+    monkeypatch.setattr(capture, "finish", refused)
+    disk.open(capture)
+    with pytest.raises(OSError, match="No space left"):
+        disk.close(capture, {})
+    assert not capture.path.exists()
+
+
+def test_a_file_can_be_opened_while_the_disk_takes_nothing(disk, monkeypatch):
+    hangs, goes_on = threading.Event(), threading.Event()
+    first = Capture(disk.folder / "a.mcap", {}, start_ns=1)
+
+    def hang():
+        hangs.set()
+        goes_on.wait(WITHIN_S)
+
+    monkeypatch.setattr(first, "write_out", hang)
+    disk.open(first)
+    assert hangs.wait(WITHIN_S)
+    opening = threading.Thread(target=disk.open, args=(Capture(disk.folder / "b.mcap", {}, start_ns=1),))
+    opening.start()
+    opening.join(WITHIN_S)
+    stood = opening.is_alive() or goes_on.is_set()
+    goes_on.set()
+    opening.join()
+    assert not stood

@@ -1,0 +1,136 @@
+"""What the recorder takes from the mesh: to whom it gives what, what it keeps, and which time it gives it."""
+
+import asyncio
+import time
+from types import SimpleNamespace
+
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+
+from bus.header import Header, pack
+from bus.schemas.robomesh_pb2 import Event, EventList
+from bus.session import open_session
+from bus.topics import topic
+from mcap_files.capture import Capture
+from mcap_files.reading import RecordingFile
+from services.recorder import intake
+from services.recorder.disk import Taken
+from services.recorder.part import Part
+from tests.conftest import run
+from tests.recordings import KEY_PICTURE, PICTURE, START_NS
+from tests.services.recording import until
+
+ARM = "robomesh/site/arm"
+JOINTS, VIDEO, EVENTS = f"{ARM}/joints", f"{ARM}/video/front", f"{ARM}/events"
+
+
+class Sink:
+    def __init__(self):
+        self.taken = []
+
+    def take(self, key, row, header, payload, received_ns):
+        self.taken.append((key, header.sequence))
+
+    def swept(self):
+        pass
+
+
+def picture(data):
+    return CompressedVideo(format="h264", data=data).SerializeToString()
+
+
+def test_who_takes_a_robots_joints_is_given_no_video_and_misses_none_of_it(mesh):
+    async def main():
+        async with open_session(mesh) as own, open_session(mesh) as other:
+
+            def put(key, number, data=b""):
+                other.zenoh_session.put(key, data, attachment=pack(Header(7, number, number)))
+
+            taking = intake.Intake(own.zenoh_session, "site")
+            states, all_of_it, later = Sink(), Sink(), Sink()
+            try:
+                with taking.lock:
+                    robot = taking.robot("arm")
+                    robot.attach(states, frozenset({"joints"}))
+                    robot.attach(all_of_it, frozenset({"joints", "video/front"}))
+                while len(all_of_it.taken) < 2:  # until the router knows who listens
+                    put(JOINTS, 1)
+                    put(VIDEO, 1, picture(KEY_PICTURE))
+                    await asyncio.sleep(0.02)
+                put(VIDEO, 5, picture(KEY_PICTURE))
+                put(JOINTS, 9)
+                await until(lambda: len(all_of_it.taken) >= 4)
+                with taking.lock:
+                    lost = [robot.lost(sink) for sink in (states, all_of_it)]
+                    robot.detach(all_of_it)
+                    robot.attach(later, frozenset({"joints", "video/front"}))
+                    afresh = robot.lost(later)
+                return states.taken, all_of_it.taken, lost, afresh
+            finally:
+                taking.close()
+
+    states, all_of_it, lost, afresh = run(main())
+    assert [key for key, _ in states] == [JOINTS] * 2
+    assert {key for key, _ in all_of_it} == {JOINTS, VIDEO}
+    assert lost == [{JOINTS: 7}, {JOINTS: 7, VIDEO: 3}]
+    assert afresh == {}
+
+
+def test_a_long_time_between_key_frames_is_kept_whole_or_not_at_all(monkeypatch):
+    kept = intake._Kept()
+    for number in range(1000):
+        kept.add((Header(7, number, 0), PICTURE, 0))
+    assert len(kept.entries) == 1000
+    monkeypatch.setattr(intake, "_MOST_KEPT_BYTES", 1000)
+    kept.add((Header(7, 1000, 0), PICTURE, 0))
+    kept.add((Header(7, 1001, 0), PICTURE, 0))
+    assert kept.entries == [], "what begins in its middle cannot be decoded"
+    kept.begin()
+    kept.add((Header(7, 1002, 0), KEY_PICTURE, 0))
+    assert len(kept.entries) == 1
+
+
+def test_a_clock_that_is_set_while_it_is_recorded_moves_no_message(tmp_path):
+    path = tmp_path / "a.mcap"
+    about = {"site": "site", "robot": "arm", "name": "trial", "started_by": "request"}
+    capture = Capture(path, about, start_ns=START_NS)  # whatever the clock says now
+    begun_ns = time.monotonic_ns()
+    part = Part(capture, SimpleNamespace(taken=Taken.ALL))
+    for number, at_ns in enumerate((-5_000_000_000, 0, 1_000_000_000, 2_000_000_000)):
+        part.take(JOINTS, topic("joints"), Header(7, number, 0), b"", begun_ns + at_ns)
+    capture.finish({})
+    with RecordingFile(path) as file:
+        times = [message.received_ns - START_NS for message in file.messages()]
+    assert times[:2] == [0, 0], "what was told before stands at the beginning"
+    assert times[3] - times[2] == 1_000_000_000
+
+
+def test_an_event_is_recorded_though_its_publishers_clock_is_behind_and_a_list_tells_it_first(mesh):
+    async def main():
+        async with open_session(mesh) as own, open_session(mesh) as other:
+            list_of = EventList(events=[Event(code=f"{number}") for number in (1, 2)]).SerializeToString()
+
+            def tell(query):
+                query.reply(EVENTS, list_of, attachment=pack(Header(7, 2, 0)))
+
+            queryable = other.zenoh_session.declare_queryable(EVENTS, tell)
+            taking, sink = intake.Intake(own.zenoh_session, "site"), Sink()
+            try:
+                with taking.lock:
+                    robot = taking.robot("arm")
+                    robot.attach(sink, frozenset({"events"}))
+                    tap = robot._taps["events"]
+                await until(lambda: EVENTS in tap._seen)
+                while not sink.taken:  # until the router knows who listens
+                    other.zenoh_session.put(EVENTS, b"", attachment=pack(Header(7, 2, 0)))
+                    await asyncio.sleep(0.02)
+                other.zenoh_session.put(EVENTS, b"", attachment=pack(Header(7, 4, 0)))
+                await until(lambda: len(sink.taken) >= 2)
+                with taking.lock:
+                    return sink.taken, robot.lost(sink)
+            finally:
+                taking.close()
+                queryable.undeclare()
+
+    taken, lost = run(main())
+    assert taken == [(EVENTS, 2), (EVENTS, 4)]
+    assert lost == {EVENTS: 1}

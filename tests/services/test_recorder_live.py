@@ -1,0 +1,189 @@
+"""What a recorder tells while it records, how it splits, what it takes, what it gets back after an outage."""
+
+import asyncio
+
+import pytest
+import zenoh
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+from mcap.reader import make_reader
+
+from bus.endpoints import router_config
+from bus.errors import RefusedError
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import SessionSettings
+from mcap_files.files import describe_file
+from services.recorder.settings import Marks, Split
+from tests.conftest import free_port, run
+from tests.services.recording import put_states, recording_site, trace_off, trace_on, until, until_indexed
+
+JOINTS, VIDEO = "robomesh/site/arm/joints", "robomesh/site/arm/video/front"
+KEY_FRAME, OTHER = b"\0\0\1\x67key", b"\0\0\1\x41other"
+
+
+def published(session, *names):
+    return [session.declare_publisher("site", "arm", name) for name in names]
+
+
+def payloads(path, topic):
+    with path.open("rb") as stream:
+        return [message.data for _, _, message in make_reader(stream).iter_messages(topics=[topic])]
+
+
+async def told(session, condition):
+    """The first thing that the recorder tells of the arm that is so."""
+    subscription = session.subscribe("robomesh/site/arm/recording", newest=100)
+    try:
+        async for sample in subscription:
+            if condition(sample.message()):
+                return sample.message()
+    finally:
+        subscription.close()
+
+
+def test_everybody_sees_what_is_recorded_and_lost_while_it_goes_on(mesh, tmp_path):
+    async def main():
+        async with recording_site(mesh, tmp_path) as session:
+            joints = session.declare_publisher("site", "arm", "joints")
+            await trace_on(session, name="seen", views=["-"])
+            await until(lambda: joints.watched)
+            await put_states(joints, range(3))
+            joints._sequence += 4  # what a full link drops, nobody hears of
+            await put_states(joints, range(3))
+            seen = await told(session, lambda now: now.open and any(row.lost for row in now.topics))
+            (row,) = [row for row in seen.topics if row.topic == JOINTS]
+            assert (seen.name, row.messages, row.lost) == ("seen", 6, 4)
+            await trace_off(session)
+            ended = await told(session, lambda now: not now.open and not now.HasField("indexing"))
+            assert (ended.name, ended.problem) == ("seen", "")
+
+    run(main())
+
+
+def test_a_capture_goes_on_in_numbered_files_and_video_in_each_begins_with_a_key_frame(mesh, tmp_path):
+    async def main():
+        split = Split(minutes=0.01)
+        async with recording_site(mesh, tmp_path, split=split, views=("front",)) as session:
+            joints, video = (
+                session.declare_publisher("site", "arm", name) for name in ("joints", "video/front")
+            )
+            session.declare_publisher("site", "arm", "description").put(schema.Description(name="arm"))
+            await trace_on(session, name="long")
+            await until(lambda: joints.watched and video.watched)
+            number, folder = 0, tmp_path / "arm"
+            while len(list(folder.glob("*.mcap"))) < 3:
+                data = (KEY_FRAME if number % 10 == 0 else OTHER) + bytes([number % 250])
+                video.put(CompressedVideo(data=data, format="h264"), key_frame=number % 10 == 0)
+                await put_states(joints, [number], hz=50)
+                number += 1
+            await trace_off(session)
+            files = sorted(folder.glob("*.mcap"))
+            for file in files:
+                await until_indexed(file)
+            return number, files
+
+    number, files = run(main())
+    assert [describe_file(file).part for file in files] == list(range(1, len(files) + 1))
+    told = [payloads(file, JOINTS) for file in files]
+    assert sum(map(len, told)) == number, "nothing is lost between two files, and nothing twice"
+    for file in files:
+        pictures = [CompressedVideo.FromString(data).data for data in payloads(file, VIDEO)]
+        assert pictures[0].startswith(KEY_FRAME)
+        assert len(payloads(file, "robomesh/site/arm/description")) == 1
+        assert all(row.lost == 0 for row in describe_file(file).topics)
+
+
+def test_video_is_listened_to_only_while_it_is_recorded(mesh, tmp_path):
+    async def main():
+        async with recording_site(mesh, tmp_path, views=("front",)) as session:
+            front, top = (
+                session.declare_publisher("site", "arm", f"video/{name}") for name in ("front", "top")
+            )
+            await trace_on(session, views=["top"])
+            await until(lambda: top.watched)
+            assert not front.watched
+            await trace_off(session)
+            await until(lambda: not top.watched)
+            await trace_on(session)
+            await until(lambda: front.watched)
+            await trace_off(session)
+            with pytest.raises(RefusedError, match="view 'a/b' cannot be used"):
+                await trace_on(session, views=["a/b"])
+            view = schema.View(name="front")
+            description = schema.Description(name="arm", views=[view])
+            session.declare_publisher("site", "arm", "description").put(description)
+            with pytest.raises(RefusedError, match="no view 'side' of arm: there are front"):
+                await ask_again_and_again(session, views=["side"])
+
+    run(main())
+
+
+async def ask_again_and_again(session, **fields):
+    """Until the description has come by which it is refused."""
+    while True:
+        await trace_on(session, **fields)
+        await trace_off(session)
+
+
+def test_below_the_mark_video_is_given_up_counted_and_told(mesh, tmp_path):
+    async def main():
+        marks = Marks(warn=0, no_video=1 << 62, states_only=0)
+        async with recording_site(mesh, tmp_path, marks=marks, views=("front",)) as session:
+            joints, video = (
+                session.declare_publisher("site", "arm", name) for name in ("joints", "video/front")
+            )
+            events = session.subscribe("robomesh/site/-/events/recorder", newest=100)
+            await trace_on(session)
+            await until(lambda: joints.watched and video.watched)
+            video.put(CompressedVideo(data=KEY_FRAME), key_frame=True)
+            await put_states(joints, range(5))
+            done = await trace_off(session)
+            message = (await anext(events)).message()
+            said = message.events if isinstance(message, schema.EventList) else [message]
+            return said[0], {row.topic: (row.messages, row.lost) for row in done.topics}
+
+    event, topics = run(main())
+    assert event.code == "recorder.gives_up"
+    assert event.severity == schema.Event.Severity.CRITICAL
+    assert "video is recorded no more" in event.text
+    assert topics[JOINTS] == (5, 0)
+    assert topics[VIDEO] == (0, 1)
+
+
+def test_events_of_an_outage_are_in_the_file_and_counted_back(tmp_path):
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    mesh = SessionSettings(connect=(endpoint,), wait_s=10.0)
+
+    async def main():
+        first = zenoh.open(router_config((endpoint,)))
+        try:
+            async with recording_site(mesh, tmp_path) as session:
+                events = session.declare_publisher("site", "arm", "events")
+                session.declare_presence("site", "arm", "gateway")
+                await trace_on(session)
+                await until(lambda: events.watched)
+                put_event(events, "before")
+                await asyncio.to_thread(first.close)
+                for number in range(5):
+                    put_event(events, f"meanwhile {number}")
+                first = zenoh.open(router_config((endpoint,)))
+                await until(lambda: session.connected and events.watched)
+                put_event(events, "after")
+                await told(session, lambda now: any(row.messages == 7 for row in now.topics))
+                done = await trace_off(session)
+                path = tmp_path / "arm" / done.file
+                await until_indexed(path)
+                return path
+        finally:
+            first.close()
+
+    path = run(main(), timeout_s=60.0)
+    said = [schema.Event.FromString(data).text for data in payloads(path, "robomesh/site/arm/events")]
+    assert sorted(said) == sorted(["before", *(f"meanwhile {number}" for number in range(5)), "after"])
+    (row,) = describe_file(path).topics
+    assert row.lost == 0
+
+
+def put_event(publisher, text):
+    event = schema.Event(severity=schema.Event.Severity.INFO, text=text)
+    event.timestamp.GetCurrentTime()
+    publisher.put(event)

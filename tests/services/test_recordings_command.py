@@ -1,0 +1,240 @@
+"""`robomesh recordings`: tables, video and plots of a recording, and what bad input gets."""
+
+import asyncio
+import csv
+import json
+import math
+from datetime import datetime
+
+import av
+import numpy as np
+import pytest
+
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import open_session
+from mcap_files.capture import Capture
+from robots.description import load
+from robots.glb import link_meshes
+from robots.urdf.write import to_urdf
+from services.command_line.main import run
+from services.command_line.recordings.output import whole_file
+from services.kinematics.describe import describe
+from services.recorder.serving import Serving
+from tests.conftest import run as run_async
+from tests.recordings import START_NS, Written, joints, write_recording
+
+SIZE, FPS = (160, 120), 10
+
+
+@pytest.fixture(scope="module")
+def moving(tmp_path_factory):
+    """A Pt600 that swings its waist for 2 s, told as its gateway and kinematics would."""
+    description = load("pt600")
+    glbs = link_meshes(description)
+    message = describe(
+        description, urdf=to_urdf(description), meshes=glbs, base_to_site=np.eye(4), cell="", simulated=True
+    )
+    path = tmp_path_factory.mktemp("moving") / "moving.mcap"
+    with Written(path) as file:
+        file.put("description", message, 0.0)
+        for name, glb in glbs.items():
+            file.attach(f"mesh/{name}", glb)
+        for number in range(201):
+            at_s = number / 100
+            home = {joint.name: joint.home for joint in message.joints}
+            state = joints(**home | {"waist": math.sin(at_s)})
+            file.put("joints", state, at_s)
+            file.put("controller", schema.ControllerState(link=schema.ControllerState.UP), at_s)
+        file.put("events", schema.Event(severity=schema.Event.WARNING, code="odd"), 1.0)
+    return path
+
+
+def test_a_table_holds_the_files_numbers(moving, tmp_path, capsys):
+    out = tmp_path / "out.csv"
+    assert run(["recordings", "export", str(moving), str(out), "--from", "0.5", "--to", "1", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["rows"] == 51
+    with out.open() as stream:
+        header, *rows = csv.reader(stream)
+    waist = header.index("waist [rad]")
+    assert [float(row[waist]) for row in rows] == [math.sin(number / 100) for number in range(50, 101)]
+    assert [float(row[1]) for row in rows] == [number / 100 for number in range(50, 101)]
+
+
+def test_a_table_has_a_row_a_state_whatever_else_was_recorded(tmp_path):
+    source, out = tmp_path / "trial.mcap", tmp_path / "out.csv"
+    with Written(source) as file:
+        # What stood when the recording began is told at once, the oldest first.
+        for waist in (0.1, 0.2, 0.3):
+            file.put("joints", joints(waist=waist), 0.0)
+        file.put("kinematics", schema.KinematicState(tool_to_base=range(16)), 0.0)
+        file.put("joints", joints(waist=0.4), 0.01)
+        file.put("joints", joints(waist=0.4), 0.01)
+        file.put("joints", schema.RecorderRequest(name="\x07"), 0.02)  # no joints, in their place
+        file.put("joints", joints(waist=0.4), 0.02)
+    assert run(["recordings", "export", str(source), str(out)]) == 0
+    with out.open() as stream:
+        header, *rows = csv.reader(stream)
+    column = [header.index(name) for name in ("t [s]", "waist [rad]", "tool x [m]")]
+    assert [[float(row[index]) for index in column] for row in rows] == [
+        [0.0, 0.3, 3.0],
+        [0.01, 0.4, 3.0],
+        [0.02, 0.4, 3.0],
+    ]
+
+
+def test_video_is_rendered_afresh_from_the_joints(moving, tmp_path):
+    out = tmp_path / "out.mp4"
+    size = "x".join(map(str, SIZE))
+    assert (
+        run(
+            [
+                "recordings",
+                "export",
+                str(moving),
+                str(out),
+                "--size",
+                size,
+                "--fps",
+                str(FPS),
+                "--view",
+                "top",
+            ]
+        )
+        == 0
+    )
+    with av.open(str(out)) as video:
+        frames = [frame.to_ndarray(format="rgb24").astype(int) for frame in video.decode(video=0)]
+        (stream,) = video.streams
+        assert (stream.width, stream.height) == SIZE
+    assert len(frames) == 2 * FPS + 1
+    assert np.abs(frames[0] - frames[12]).max() > 60
+
+
+def test_recorded_video_is_taken_as_it_is_and_what_is_none_is_refused(tmp_path, capsys):
+    source = write_recording(tmp_path / "trial.mcap")
+    assert run(["recordings", "export", str(source), str(tmp_path / "out.mp4"), "--recorded", "top"]) == 2
+    assert "no video/top in it; it has" in capsys.readouterr().err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["trial.mcap"]
+
+
+def test_plots_mark_what_happened(moving, tmp_path):
+    out = tmp_path / "out.svg"
+    assert run(["recordings", "export", str(moving), str(out)]) == 0
+    text = out.read_text()
+    assert text.startswith("<?xml")
+    assert "#b37400" in text  # the warning's mark
+    assert "<!-- odd -->" in text  # and its name
+    assert f"<!-- site/arm   moving   {datetime.fromtimestamp(START_NS * 1e-9).astimezone():%Y-%m-%d}" in text
+
+
+def test_more_values_than_a_plot_takes_are_drawn_as_far_as_they_go(tmp_path):
+    source, out = tmp_path / "trial.mcap", tmp_path / "out.svg"
+    with Written(source) as file:
+        for at_s in (0.0, 1.0):
+            file.put("joints", joints(**{f"j{number}": at_s for number in range(66)}), at_s)
+    assert run(["recordings", "export", str(source), str(out)]) == 0
+    assert "<!-- the first 64 of 66 -->" in out.read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["out.txt"], "a name ends in .csv (joints and tool), .mp4 (video)"),
+        (["out.csv", "--from", "9"], "--from 9: moving.mcap goes from 0 to 2.000 s"),
+        (["out.mp4", "--view", "inside"], "no view 'inside'; there are"),
+        (["out.mp4", "--size", "161x120"], "--size 161x120: even, and from 64 to 4096 a side"),
+        (["out.mp4", "--size", "big"], "--size big: WIDTHxHEIGHT is right"),
+        (["out.mp4", "--fps", "0"], "--fps 0: from 1 to 120 is right"),
+        (["none/out.csv"], "cannot be written: No such file or directory"),
+    ],
+)
+def test_what_cannot_be_exported_gets_one_line_and_leaves_no_file(moving, tmp_path, capsys, arguments, words):
+    name, *options = arguments
+    assert run(["recordings", "export", str(moving), str(tmp_path / name), *options]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert words in line
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_file_that_is_none_is_told_by_every_command(tmp_path, capsys):
+    text = tmp_path / "notes.mcap"
+    text.write_text("not a recording")
+    for command in (["info", str(text)], ["export", str(text), "out.csv"], ["recover", str(text)]):
+        assert run(["recordings", *command]) == 2
+        assert "notes.mcap: no MCAP file: it does not begin as one" in capsys.readouterr().err
+
+
+def test_interrupted_work_leaves_nothing_under_the_final_name(tmp_path):
+    out = tmp_path / "out.csv"
+
+    def write():
+        with whole_file(out) as partial:
+            partial.write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_cut_file_is_recovered_and_the_whole_one_is_left_alone(tmp_path, capsys):
+    path = write_recording(tmp_path / "trial.mcap", chunked=False)
+    path.write_bytes(path.read_bytes()[:-30_000])
+    assert run(["recordings", "recover", str(path)]) == 0
+    assert "recovered" in capsys.readouterr().out
+    assert run(["recordings", "info", str(path), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["problem"], told["recovered"]) == ("", True)
+    assert run(["recordings", "recover", str(path)]) == 0
+    assert "whole already" in capsys.readouterr().out
+
+
+def test_a_file_that_is_being_recorded_is_not_recovered_away(tmp_path, capsys):
+    path = tmp_path / "trial.mcap"
+    capture = Capture(path, {"site": "hall", "robot": "arm", "name": "trial"}, start_ns=START_NS)
+    try:
+        capture.write_out()
+        before = path.stat().st_ino, path.read_bytes()
+        assert run(["recordings", "recover", str(path)]) == 2
+        assert "trial.mcap: is being recorded now" in capsys.readouterr().err
+        assert (path.stat().st_ino, path.read_bytes()) == before
+        assert run(["recordings", "info", str(path), "--json"]) == 0
+        told = json.loads(capsys.readouterr().out)
+        assert (told["open"], told["problem"]) == (True, "")
+    finally:
+        capture.finish({})
+
+
+def test_a_recording_of_a_site_has_one_name_for_every_command(mesh, router, tmp_path, capsys):
+    folder = tmp_path / "recordings"
+    (folder / "arm").mkdir(parents=True)
+    source = write_recording(folder / "arm" / "2026_trial.mcap", seconds=0.5)
+
+    async def main():
+        async with open_session(mesh) as own:
+            serving = Serving(own, "site", folder, open_now=dict, flight=lambda: False)
+            own.declare_presence("site", "-", "recorder")
+            try:
+                for what, command in (
+                    ("site/2026_trial", ["info"]),
+                    ("2026_trial.mcap", ["fetch", str(tmp_path)]),
+                    ("2026_trial", ["export", str(tmp_path / "out.csv")]),
+                ):
+                    name, *more = command
+                    arguments = ["recordings", name, what, *more, "--connect", router]
+                    assert await asyncio.to_thread(run, arguments) == 0, capsys.readouterr().err
+                assert await asyncio.to_thread(run, ["recordings", "info", "no", "--connect", router]) == 2
+                assert await asyncio.to_thread(run, ["recordings", "list", "--connect", router]) == 0
+            finally:
+                await serving.close()
+
+    run_async(main())
+    told = capsys.readouterr()
+    assert "site/arm/joints: 50" in told.out
+    assert "site/arm/video/front: 10, 20.4 pictures/s" in told.out
+    header, row, _ = told.out.splitlines()[-3:]
+    assert header.split() == ["recorded", "length", "size", "robot", "name"]
+    assert row.split()[-3:] == ["MB", "site/arm", "2026_trial"]
+    assert "no recording 'no', neither a file here nor in robomesh recordings list" in told.err
+    assert (tmp_path / "2026_trial.mcap").read_bytes() == source.read_bytes()
+    assert len((tmp_path / "out.csv").read_text().splitlines()) == 51

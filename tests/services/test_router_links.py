@@ -1,0 +1,205 @@
+"""Routers that link: two sites and what each may bring in, a hub, a slow border, two routers of one site."""
+
+import asyncio
+import json
+from datetime import timedelta
+
+import pytest
+import zenoh
+
+from bus.endpoints import Link, bundle, client_config, router_config
+from bus.keys import robot_key
+from bus.topics import Role
+from services.keys import certificates, deeds
+from services.router.router import read_access
+from services.router.turn import neighbours, our_turn
+from tests.conftest import free_port, run
+from tests.services.test_router_rules import attached, names, prepared, routing, settings_of, until
+
+
+def one_link(endpoint, file):
+    config = client_config((endpoint,), bundle(file))
+    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    return config
+
+
+async def linked_sites(tmp_path, border="open", sites=()):
+    """Folders and endpoints of two sites; the second links to the first as its guest."""
+    here, at_here = prepared(tmp_path, "here", border)
+    there, at_there = prepared(tmp_path, "there")
+    deeds.issue_guest(here, "there")
+    assert deeds.accept(there, here.guest("there").read_bytes(), sites=sites) == "here"
+    link = Link(endpoint=at_here, tls=there.tls_of_link("here"), site="here")
+    return (here, at_here), (there, at_there), link
+
+
+def test_two_sites_meet_and_each_speaks_for_itself_alone(tmp_path):
+    async def main():
+        (here, at_here), (there, at_there), link = await linked_sites(tmp_path)
+        deeds.issue(there, "li", Role.OPERATOR)
+        async with (
+            routing(settings_of(here, at_here), settings_of(there, at_there, link)),
+            attached(at_here, here.service("gateway")) as ours,
+            attached(at_there, there.person("li")) as li,
+        ):
+            asked = []
+
+            async def answer(request):
+                asked.append(request.chunk)
+                return deeds_answer()
+
+            ours.answer("here", "arm", "command/*", answer)
+
+            async def sees():
+                return {("here", "router"), ("there", "router")} <= await names(li)
+
+            await until(sees)
+            await li.ask(robot_key("here", "arm", "command/li.there"), command(), timeout_s=20.0)
+            assert asked == ["li.there"]
+
+    from bus.schemas.robomesh_pb2 import CommandAnswer, CommandRequest
+
+    def deeds_answer():
+        return CommandAnswer(accepted=True)
+
+    def command():
+        return CommandRequest(command=CommandRequest.HOME)
+
+    run(main(), timeout_s=60.0)
+
+
+def test_a_slow_border_lets_thinned_joints_and_the_far_view_out_and_nothing_that_is_fast(tmp_path):
+    small, fast = (
+        ("joints/slow", "video/far", "controller", "events"),
+        ("joints", "video/top", "frames", "image/x"),
+    )
+
+    async def main():
+        (here, at_here), (there, at_there), link = await linked_sites(tmp_path, "slow")
+        async with routing(settings_of(here, at_here), settings_of(there, at_there, link)):
+            heard = set()
+            with (
+                zenoh.open(one_link(at_there, there.service("recorder"))) as far,
+                zenoh.open(one_link(at_here, here.service("router"))) as near,
+            ):
+                for topic in (*small, *fast):
+                    far.declare_subscriber(
+                        f"robomesh/*/*/{topic}", lambda sample: heard.add(str(sample.key_expr))
+                    )
+
+                async def all_small():
+                    for topic in (*fast, *small):
+                        near.put(f"robomesh/here/arm/{topic}", b"")
+                    return {f"robomesh/here/arm/{topic}" for topic in small} <= heard
+
+                await until(all_small)
+                assert heard == {f"robomesh/here/arm/{topic}" for topic in small}
+
+    run(main(), timeout_s=60.0)
+
+
+def test_a_hub_brings_everybody_but_us(tmp_path):
+    async def main():
+        (here, at_here), (hub, at_hub), _ = await linked_sites(tmp_path)
+        deeds.issue_guest(hub, "here")
+        deeds.accept(here, hub.guest("here").read_bytes(), sites=("*",))
+        link = Link(endpoint=at_hub, tls=here.tls_of_link("there"), site="there")
+        async with routing(settings_of(hub, at_hub), settings_of(here, at_here, link)):
+            heard = set()
+            with (
+                zenoh.open(one_link(at_here, here.service("recorder"))) as ours,
+                zenoh.open(one_link(at_hub, hub.service("router"))) as bad,
+            ):
+                ours.declare_subscriber(
+                    "robomesh/*/arm/joints", lambda sample: heard.add(str(sample.key_expr))
+                )
+                keys = [f"robomesh/{site}/arm/joints" for site in ("here", "third", "there")]
+
+                async def others():
+                    for key in keys:
+                        bad.put(key, b"")
+                    return set(keys[1:]) <= heard
+
+                await until(others)
+                assert heard == set(keys[1:])
+
+    run(main(), timeout_s=60.0)
+
+
+@pytest.mark.parametrize("name", ["gateway.there", "router-2.there"])
+def test_a_neighbour_that_shows_one_of_our_own_names_is_cut_off_and_our_own_router_is_not(
+    tmp_path, caplog, name
+):
+    async def main():
+        (here, at_here), (there, at_there), link = await linked_sites(tmp_path)
+        # The other site's authority signs what it likes.
+        authority = certificates.read_authority(here.authority_key.read_bytes(), here.authority.read_bytes())
+        made = certificates.issue(
+            authority, name, "router", now=deeds.now(), lives=timedelta(days=1), serves=True
+        )
+        forged = here.service("forged")
+        forged.write_bytes(made.key + made.certificate + here.authority.read_bytes())
+        deeds.issue(there, "router-2", Role.ROUTER)
+        second = f"tls/127.0.0.1:{free_port()}"
+        own = bundle(there.service("router-2"))
+        with (
+            zenoh.open(router_config((at_here,), (), bundle(forged))) as imposter,
+            zenoh.open(router_config((second,), (), own)) as ours,
+        ):
+            async with routing(settings_of(there, at_there, second, link)):
+
+                async def cut():
+                    return f"shows a certificate of {name}" in caplog.text
+
+                await until(cut)
+
+                async def alone():
+                    return not list(imposter.info.links())
+
+                async def with_ours():
+                    return "router.there" in {link.auth_identifier for link in ours.info.links()}
+
+                await until(alone)
+                await until(with_ours)
+
+    run(main(), timeout_s=60.0)
+
+
+def test_of_two_routers_of_a_site_the_second_waits_until_the_first_serves_again(tmp_path):
+    folder, first = prepared(tmp_path)
+    deeds.issue(folder, "router-2", Role.ROUTER)
+    second = f"tls/127.0.0.1:{free_port()}"
+    tls = {first: folder.tls_of("router"), second: bundle(folder.service("router-2"))}
+    configs = {
+        first: router_config((first,), (), tls[first], read_access(folder.access)),
+        second: router_config((second,), (first,), tls[second], read_access(folder.access)),
+    }
+
+    async def main():
+        routers = {endpoint: zenoh.open(config) for endpoint, config in configs.items()}
+        try:
+
+            async def linked():
+                return all(list(each.info.routers_zid()) for each in routers.values())
+
+            await until(linked)
+            early, late = sorted(routers, key=lambda endpoint: str(routers[endpoint].info.zid()))
+            others = {endpoint: neighbours(routers[endpoint], tls[endpoint]) for endpoint in routers}
+            assert others[early] == {str(routers[late].info.zid())}
+            await our_turn(routers[early], tls[early], others[early], settled_s=0.0)
+            waiting = asyncio.create_task(our_turn(routers[late], tls[late], others[late], settled_s=0.0))
+            routers[early].close()
+
+            async def gone():
+                return not list(routers[late].info.routers_zid())
+
+            await until(gone)
+            assert not waiting.done()
+            routers[early] = zenoh.open(configs[early])
+            await waiting
+            assert str(routers[early].info.zid()) in neighbours(routers[late], tls[late])
+        finally:
+            for each in routers.values():
+                each.close()
+
+    run(main(), timeout_s=60.0)

@@ -1,0 +1,288 @@
+"""A router follows its rules and keys while it runs; who is not on its list gets nothing, and is told why."""
+
+import asyncio
+import json
+from contextlib import asynccontextmanager
+from datetime import timedelta
+
+import pytest
+import zenoh
+
+from bus.endpoints import bundle, router_config
+from bus.errors import NoRightError, SessionError
+from bus.keys import robot_key
+from bus.session import SessionSettings, open_session
+from bus.topics import Role
+from services import router as service
+from services.keys import Folder, certificates, deeds
+from services.router.router import AccessError, read_access
+from tests.conftest import free_port, run
+
+SITE = "here"
+
+
+def prepared(path, site=SITE, border="open"):
+    folder = Folder(path / site / "keys")
+    endpoint = f"tls/127.0.0.1:{free_port()}"
+    deeds.prepare(folder, site, robots=["arm"], border=border, routers=[endpoint])
+    return folder, endpoint
+
+
+def settings_of(folder, endpoint, *links):
+    return service.Settings(
+        site=deeds.principals_of(folder).site,
+        listen=(endpoint,),
+        connect=links,
+        tls=folder.tls_of("router"),
+        access=folder.access,
+    )
+
+
+@asynccontextmanager
+async def routing(*every):
+    """Routers that run as the service does."""
+    ready = [asyncio.Event() for _ in every]
+    tasks = [
+        asyncio.create_task(service.serve(settings, ready=lambda text, there=there: there.set()))
+        for settings, there in zip(every, ready, strict=True)
+    ]
+    try:
+        for there in ready:
+            await there.wait()
+        yield
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+def attached(endpoint, file, wait_s=10.0):
+    return open_session(SessionSettings(connect=(endpoint,), tls=bundle(file), wait_s=wait_s))
+
+
+async def until(condition):
+    """Until an awaitable answers true; the test's deadline ends it."""
+    while not await condition():
+        await asyncio.sleep(0.05)
+
+
+async def names(session):
+    return {(who.site, who.service) for who in await session.present()}
+
+
+def test_who_is_revoked_is_cut_off_while_the_router_runs_and_who_is_issued_a_certificate_comes_in(tmp_path):
+    folder, endpoint = prepared(tmp_path)
+    deeds.issue(folder, "li", Role.OPERATOR)
+
+    async def main():
+        async with routing(settings_of(folder, endpoint)), attached(endpoint, folder.person("li")) as li:
+            await until(lambda: there(li, (SITE, "router")))
+            async with attached(endpoint, folder.service("watch")) as watch:
+                events = watch.subscribe("robomesh/*/-/events/*", newest=100)
+                deeds.revoke(folder, "li")
+                async for event in events:
+                    if "router.without_rights" in str(event.message()):
+                        assert "li.here is attached, and has no right here" in str(event.message())
+                        break
+            await until(lambda: nobody(li))
+            deeds.issue(folder, "mo", Role.MONITOR)
+            async with attached(endpoint, folder.person("mo")) as mo:
+                await until(lambda: there(mo, (SITE, "router")))
+                assert await nobody(li)
+
+    async def there(session, who):
+        return who in await names(session)
+
+    async def nobody(session):
+        return not await names(session)
+
+    run(main(), timeout_s=60.0)
+
+
+def test_broken_rules_are_not_taken_and_the_router_goes_on(tmp_path, caplog):
+    folder, endpoint = prepared(tmp_path)
+    deeds.issue(folder, "mo", Role.MONITOR)
+    good = folder.access.read_text()
+
+    async def refused():
+        return "goes on with the rules that it has" in caplog.text
+
+    async def main():
+        async with routing(settings_of(folder, endpoint)), attached(endpoint, folder.person("mo")) as mo:
+            for broken in ("{", good.replace('"deny"', '"allow"')):
+                caplog.clear()
+                folder.access.write_text(broken)
+                await until(refused)
+                await until(lambda: present(mo))
+
+    async def present(session):
+        return (SITE, "router") in await names(session)
+
+    run(main(), timeout_s=60.0)
+
+
+KEPT = {"enabled": True, "default_permission": "deny", "subjects": [{"cert_common_names": ["li.here"]}]}
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"default_permission": "allow"},
+        {"enabled": False},
+        {"enabled": None},
+        {"subjects": []},
+        {"subjects": None},
+        {"subjects": [{"id": "anybody"}]},
+        {"subjects": ["li.here"]},
+    ],
+    ids=str,
+)
+def test_rules_that_let_everybody_in_are_no_rules(tmp_path, changed):
+    path = tmp_path / "access.json5"
+    path.write_text(json.dumps({"access_control": KEPT}))
+    assert read_access(path)
+    path.write_text(json.dumps({"access_control": KEPT | changed}))
+    with pytest.raises(AccessError, match="robomesh keys writes it anew"):
+        read_access(path)
+
+
+@pytest.mark.parametrize("text", ["{", "[]", "{}"])
+def test_what_are_no_rules_at_all_is_told_so(tmp_path, text):
+    path = tmp_path / "access.json5"
+    path.write_text(text)
+    with pytest.raises(AccessError, match="robomesh keys writes it anew"):
+        read_access(path)
+
+
+def test_an_expired_certificate_is_refused_by_its_holder_in_words_and_by_the_router(tmp_path):
+    folder, endpoint = prepared(tmp_path)
+    deeds.issue(folder, "old", Role.MONITOR, lives=timedelta(seconds=-60))
+    # As made elsewhere: nobody at this end sees its date.
+    text = folder.person("old").read_text()
+    unsaid = tmp_path / "unsaid.pem"
+    unsaid.write_text(text[text.index("-----BEGIN") :])
+    with zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access))):
+
+        async def main():
+            with pytest.raises(SessionError, match=r"old\.pem: the certificate of old\.here expired on 20"):
+                async with attached(endpoint, folder.person("old")):
+                    pass
+            with pytest.raises(SessionError, match="it has expired: robomesh keys renew"):
+                async with attached(endpoint, unsaid, wait_s=0.0):
+                    pass
+
+        run(main())
+
+
+def test_a_link_ends_with_its_certificate_and_comes_back_with_the_renewed_one(tmp_path):
+    folder, endpoint = prepared(tmp_path)
+    deeds.issue(folder, "mo", Role.MONITOR, lives=timedelta(seconds=3))
+    with zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access))):
+
+        async def main():
+            async with attached(endpoint, folder.person("mo")) as mo:
+
+                async def away():
+                    return not mo.connected
+
+                async def back():
+                    return mo.connected
+
+                await until(away)
+                deeds.renew(folder, ["mo"])
+                await until(back)
+
+        run(main(), timeout_s=60.0)
+
+
+def test_another_authoritys_certificate_and_none_at_all_open_no_session(tmp_path):
+    folder, endpoint = prepared(tmp_path)
+    stranger, _ = prepared(tmp_path, "elsewhere")
+    deeds.issue(stranger, "mo", Role.MONITOR)
+    # It trusts the right router, and shows a certificate that the router does not know.
+    forged = stranger.person("mo").read_text().rpartition("-----BEGIN")[0] + folder.authority.read_text()
+    (tmp_path / "forged.pem").write_text(forged)
+    with zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access))):
+
+        async def main():
+            for file, why in (
+                (stranger.person("mo"), "does not vouch for"),
+                (tmp_path / "forged.pem", "another site's authority signed it"),
+            ):
+                with pytest.raises(SessionError, match=why):
+                    async with attached(endpoint, file, wait_s=0.0):
+                        pass
+            for address in (endpoint, endpoint.replace("tls/", "tcp/")):
+                with pytest.raises(SessionError, match="--keys FILE"):
+                    async with open_session(SessionSettings(connect=(address,), wait_s=0.0)):
+                        pass
+
+        run(main())
+
+
+def test_no_certificate_but_a_routers_passes_for_a_router(tmp_path):
+    folder, endpoint = prepared(tmp_path)
+    deeds.issue(folder, "li", Role.OPERATOR)
+    imposter = router_config((endpoint,), (), bundle(folder.person("li")))
+    with zenoh.open(imposter):
+
+        async def main():
+            with pytest.raises(SessionError, match="does not vouch for"):
+                async with attached(endpoint, folder.service("gateway"), wait_s=0.0):
+                    pass
+
+        run(main())
+
+
+def test_what_a_certificate_may_not_do_is_said_in_words_before_anybody_is_asked(tmp_path):
+    folder, endpoint = prepared(tmp_path)
+    for name, role in (("li", Role.OPERATOR), ("mo", Role.MONITOR)):
+        deeds.issue(folder, name, role)
+    with zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access))):
+
+        async def main():
+            async with (
+                attached(endpoint, folder.person("mo")) as mo,
+                attached(endpoint, folder.person("li")) as li,
+                attached(endpoint, folder.service("gateway")) as gateway,
+            ):
+                with pytest.raises(
+                    NoRightError, match=r"mo\.here is a monitor: it may not ask command/mo\.here"
+                ):
+                    await mo.ask(robot_key(SITE, "arm", "command/mo.here"))
+                with pytest.raises(NoRightError, match=r"which is another's name; command/li\.here"):
+                    await li.ask(robot_key(SITE, "arm", "command/wang.here"))
+                with pytest.raises(
+                    NoRightError, match="an operator: it may not publish joints; a gateway or"
+                ):
+                    li.declare_publisher(SITE, "arm", "joints")
+                with pytest.raises(NoRightError, match="may not publish joints of other; its robots are arm"):
+                    gateway.declare_publisher(SITE, "other", "joints")
+                gateway.declare_publisher(SITE, "arm", "joints")
+
+        run(main())
+
+
+def test_the_configuration_for_zenohd_is_what_our_router_runs_with(tmp_path):
+    folder, endpoint = prepared(tmp_path)
+    out = tmp_path / "zenohd.json5"
+    assert "restart it after robomesh keys" in service.write_config(settings_of(folder, endpoint), out)
+    config = zenoh.Config.from_file(str(out))
+    assert json.loads(config.get_json("listen/endpoints")) == [endpoint]
+    assert json.loads(config.get_json("access_control"))["default_permission"] == "deny"
+    with zenoh.open(config):
+
+        async def main():
+            async with attached(endpoint, folder.service("gateway")) as session:
+                assert session.connected
+
+        run(main())
+    assert "PRIVATE" not in out.read_text()
+
+
+def test_a_certificate_shows_whose_it_is_and_who_signed_it(tmp_path):
+    folder, _ = prepared(tmp_path)
+    entry = deeds.issue(folder, "li", Role.OPERATOR)
+    shown = certificates.show(folder.person("li").read_bytes())
+    assert (shown.name, shown.role, shown.authority) == ("li.here", "operator", "here")
+    assert entry.expires == shown.expires

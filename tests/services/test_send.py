@@ -1,0 +1,158 @@
+"""`robomesh send` keeps its lease for as long as it is given, and stays with what it sent to the end."""
+
+import asyncio
+import signal
+
+from bus.errors import RefusedError
+from bus.lease import control
+from bus.requests import ask_all
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import open_session
+from services.command_line import find, send
+from tests.conftest import run
+from tests.protocol_gateway.hall import A, until
+
+KEY = "robomesh/hall/arm/lease/request/li"
+
+
+class Owner:
+    """A gateway's end: grants a lease, renews it for as long as it likes, and lets who asks for it wait."""
+
+    def __init__(self, session):
+        self.renewed = self.waiting = 0
+        self.taken, self.end = False, asyncio.Event()
+        session.answer("hall", "arm", "lease/request/*", self._answer)
+
+    async def _answer(self, request):
+        match request.message.action:
+            case A.ASK:
+                self.waiting += 1
+                await self.end.wait()
+            case A.RENEW if self.taken:
+                raise RefusedError("eve has control")
+            case A.RENEW:
+                self.renewed += 1
+        return schema.LeaseAnswer(lease="secret")
+
+
+def test_a_renewal_that_finds_no_place_is_asked_again_and_one_that_is_refused_ends_control_in_words(mesh):
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as li, open_session(mesh) as eve:
+            owner = Owner(gateway)
+            async with control(li, "hall", "arm", "li") as own:
+                assert own.lease == "secret"
+                await until(lambda: owner.renewed)
+                asks, asked = schema.LeaseRequest(action=A.ASK).SerializeToString(), []
+                async with asyncio.timeout(40):
+                    while owner.waiting < 16:
+                        one = ask_all(eve.zenoh_session, KEY, asks, timeout_s=20.0)
+                        asked.append(asyncio.create_task(one))
+                        await asyncio.sleep(0.01)
+                before = owner.renewed
+                # Two renewals, each asked again for half a second.
+                await asyncio.wait((own.renewing,), timeout=2.2)
+                assert owner.renewed == before
+                assert not own.renewing.done()
+                owner.end.set()
+                await until(lambda: owner.renewed > before)
+                owner.taken = True
+                assert await own.renewing == "eve has control"
+                await asyncio.gather(*asked)
+
+    run(main())
+
+
+class Gateway(Owner):
+    """A gateway's end that takes commands too: a program is answered when `ready` is set."""
+
+    def __init__(self, session, *states, text="RUN_PROGRAM: it runs"):
+        super().__init__(session)
+        self.asked, self.stops, self.ready = [], [], asyncio.Event()
+        self._states, self._text = states, text
+        self._program = session.declare_publisher("hall", "arm", "program")
+        session.answer("hall", "arm", "command/*", self._command)
+        session.answer("hall", "arm", "stop", self._stop)
+
+    async def _command(self, request):
+        self.asked.append(request.message)
+        await self.ready.wait()
+        return schema.CommandAnswer(accepted=True, text=self._text)
+
+    async def _stop(self, request):
+        self.stops.append(request.message.reason)
+        return schema.StopAnswer(sent=True, text="stop 1 is sent")
+
+    async def tell(self):
+        """Say its states, again and again."""
+        while True:
+            for state in self._states:
+                self._program.put(state)
+                await asyncio.sleep(0.05)
+
+
+def sent(li):
+    """What `robomesh send hall/arm run` says of a program, in a task of its own."""
+    request = schema.CommandRequest(command=schema.CommandRequest.RUN_PROGRAM, program="home")
+    robot = find.Robot("hall", "arm")
+
+    async def main():
+        async with control(li, *robot, "li") as own:
+            return await send._to_its_end(li, robot, "li", request, own.renewing)
+
+    return asyncio.create_task(main())
+
+
+def test_ctrl_c_stops_a_program_that_is_still_being_checked(mesh):
+    async def main():
+        async with open_session(mesh) as session, open_session(mesh) as li:
+            gateway = Gateway(session)
+            outcome = sent(li)
+            await until(lambda: gateway.asked)
+            signal.raise_signal(signal.SIGINT)
+            assert await outcome == (False, "interrupted: stop 1 is sent")
+            assert gateway.stops == ["Ctrl-C in robomesh send"]
+            gateway.ready.set()
+
+    run(main())
+
+
+RUNNING = schema.ProgramState(
+    outcome=schema.ProgramState.RUNNING, line=2, statement="wait 1", step=7, steps=90
+)
+
+
+def test_a_gateway_that_began_anew_is_told_with_what_to_do_and_warnings_come_before_all(mesh, capsys):
+    async def main():
+        async with open_session(mesh) as session, open_session(mesh) as li:
+            gateway = Gateway(
+                session, RUNNING, schema.ProgramState(), text="RUN_PROGRAM: it runs; mind: arm touches post"
+            )
+            gateway.ready.set()
+            telling = asyncio.create_task(gateway.tell())
+            accepted, text = await sent(li)
+            telling.cancel()
+            return accepted, text
+
+    accepted, text = run(main())
+    assert not accepted
+    assert text.startswith("the gateway began anew: nobody runs the program any more")
+    assert "`robomesh send hall/arm stop`" in text
+    assert text.endswith("; mind: arm touches post")
+    first, *rest = capsys.readouterr().err.splitlines()
+    assert first == "mind: arm touches post"
+    assert all(line == "step 7 of 90, line 2: wait 1" for line in rest)
+
+
+def test_what_to_do_about_a_refusal_is_told_as_a_command_to_type():
+    def said(text):
+        return send.in_words_of_the_command_line(text, find.Robot("hall", "arm"))
+
+    assert said("stop 3 is latched (li: why not): see to it, then send RESET with stop_id 3") == (
+        "stop 3 is latched (li: why not): see to it, then `robomesh send hall/arm reset`"
+    )
+    other = "li is in control with another lease (another window or program?): this one is not valid"
+    assert said(f"{other}.") == (
+        f"{other}. Only that window or program can hold what it moves; Ctrl-C there, or "
+        "`robomesh send hall/arm stop`, ends it"
+    )
+    assert said("link down") == "link down"

@@ -1,0 +1,84 @@
+"""The simulated arm's motion as a function of time."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from protocol_gateway.core.records import AbsolutePositions, Command
+from robots.description import load
+from robots.joints import joints_of, violations
+from robots.model import build_model, tool_placement
+from robots.motion import Motion
+from services.simulator.controller import Controller
+from services.simulator.demo import demo_tour
+
+PT600 = load("pt600")
+JOINTS = joints_of(PT600)
+
+
+positions = st.lists(st.floats(0.0, 1.0), min_size=5, max_size=5).map(
+    lambda parts: JOINTS.lower + np.array(parts) * (JOINTS.upper - JOINTS.lower)
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(positions, st.floats(0.02, 2.0), st.floats(0.01, 1.0)), min_size=1, max_size=5))
+def test_motion_keeps_limits_speeds_and_accelerations_however_it_is_interrupted(legs):
+    motion, now_s = Motion(JOINTS, JOINTS.home.copy()), 0.0
+    top = 0.0
+    for target, after_s, speed in legs:
+        motion.move(target, now_s, speed=speed)
+        # A motion that is slowed first brakes down to its new speed.
+        top = max(top, speed)
+        for at_s in np.linspace(now_s, now_s + after_s, 25):
+            state = motion.state(at_s)
+            assert np.all(state.positions >= JOINTS.lower - 1e-6)
+            assert np.all(state.positions <= JOINTS.upper + 1e-6)
+            assert np.all(np.abs(state.velocities) <= JOINTS.max_speed * top + 1e-6)
+            assert np.all(np.abs(state.accelerations) <= JOINTS.max_acceleration + 1e-6)
+        now_s += after_s
+    motion.brake(now_s)
+    assert motion.end_s - now_s < 1.0
+    assert np.all(motion.state(motion.end_s).velocities == 0.0)
+
+
+@pytest.mark.parametrize("robot", ["pt500", "pt600", "puma560"])
+def test_the_demo_tours_several_poses_within_limits_and_above_the_floor(robot):
+    description = load(robot)
+    joints, model = joints_of(description), build_model(description)
+    tour = list(itertools.islice(demo_tour(description), 30))
+    assert len({tuple(pose) for pose in tour}) >= 6
+    motion, now_s = Motion(joints, joints.home.copy()), 0.0
+    for pose in tour[:10]:
+        motion.move(pose, now_s, speed=1.0)
+        for at_s in np.linspace(now_s, motion.end_s, 20):
+            positions = motion.state(at_s).positions
+            assert not violations(joints, positions)
+            assert tool_placement(model, positions)[2, 3] > 0.1
+        now_s = motion.end_s
+
+
+def test_speed_hold_resume_and_stop_in_mid_motion_keep_to_the_line_that_was_checked():
+    target = np.array([140.0, 20.0, 60.0, -80.0, -170.0])
+    controller = Controller(JOINTS, codes={}, demo=None, now_s=0.0)
+    told = []
+    # Each word at a hundredth of a second; braking is under way when some of them come.
+    words = {0.4: "speed=30", 0.8: "hold", 0.85: "resume", 0.9: "hold", 2.0: "speed=90", 2.5: "resume"}
+    words |= {3.2: "stop"}
+    controller.obey((AbsolutePositions(tuple(target)),), 0.0)
+    for tick in range(400):
+        now_s = tick / 100
+        if word := words.get(now_s):
+            assert controller.obey((Command((word,)),), now_s) is None
+        controller.tick(now_s)
+        told.append(controller.told(now_s)[0].values)
+    start, way = np.degrees(JOINTS.home), target - np.degrees(JOINTS.home)
+    shares = (np.array(told) - start) @ way / (way @ way)
+    # Six decimals are told.
+    assert np.abs(np.array(told) - start - shares[:, None] * way).max() < 2e-6
+    assert np.all(np.diff(shares) > -1e-7)
+    assert 0.2 < shares[-1] < 0.9
+    assert controller.told(4.0)[2].words[0] == "stopped"

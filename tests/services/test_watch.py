@@ -1,0 +1,362 @@
+"""The watch of a site over a real router: alarms held and acknowledged, the mesh looked at."""
+
+import asyncio
+import time
+from contextlib import asynccontextmanager
+
+import pytest
+import zenoh
+
+from bus.clock import answer_clock
+from bus.endpoints import router_config
+from bus.errors import RefusedError
+from bus.health import Served, present
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import SessionSettings, open_session
+from services.watch import Settings, serve
+from tests.conftest import free_port, run
+
+State = schema.ControllerState
+Alarm, Request = schema.Alarm, schema.AlarmRequest
+
+
+class Desk:
+    """What a page would see: the newest list and the newest mesh, and all events of the watch."""
+
+    def __init__(self, session):
+        self.session = session
+        self.alarms, self.mesh, self.events = {}, schema.MeshState(), []
+        self.working = []
+
+    async def follow(self):
+        async with asyncio.TaskGroup() as group:
+            for topic in ("alarms", "mesh", "events/watch"):
+                group.create_task(self._follow(self.session.subscribe(f"robomesh/s/-/{topic}", newest=100)))
+
+    async def _follow(self, subscription):
+        async for sample in subscription:
+            message = sample.message()
+            match message:
+                case schema.AlarmList():
+                    self.alarms = {each.id: each for each in message.alarms}
+                case schema.MeshState():
+                    self.mesh = message
+                case schema.Event():
+                    self.events.append(message)
+                case schema.EventList():
+                    self.events += message.events
+
+    async def until(self, condition, timeout_s=30.0):
+        try:
+            async with asyncio.timeout(timeout_s):
+                while not condition():
+                    for task in self.working:
+                        if task.done():
+                            task.result()  # what ended it is what went wrong
+                    await asyncio.sleep(0.02)
+        except TimeoutError:
+            raise AssertionError(f"{self.alarms}\n{self.mesh}\n{self.events}") from None
+
+    async def ask(self, by="li.s", **request):
+        answer = await self.session.ask(
+            f"robomesh/s/-/alarms/request/{by}", Request(**request), timeout_s=10.0
+        )
+        return {each.id: each for each in answer.alarms}
+
+    def codes(self):
+        return [event.code for event in self.events]
+
+
+@asynccontextmanager
+async def watched(mesh, folder, *, settled_s=0.2):
+    """A watch of site `s`, and a desk that follows it."""
+    async with open_session(mesh) as own, open_session(mesh) as others:
+        desk = Desk(others)
+        served = Served(service="watch", present_for=(("s", "-"),))
+        async with present(own, served):
+            tasks = desk.working = [
+                asyncio.create_task(serve(own, Settings(site="s", folder=folder, settled_s=settled_s))),
+                asyncio.create_task(desk.follow()),
+            ]
+            try:
+                yield desk
+            finally:
+                for task in tasks:
+                    task.cancel()
+                await asyncio.gather(*tasks, return_exceptions=True)
+
+
+@asynccontextmanager
+async def controller(session, **state):
+    """A gateway's `controller` of robot `arm`, told again and again; its state may be changed."""
+    publisher = session.declare_publisher("s", "arm", "controller")
+    told = State(**({"link": State.UP, "activity": State.IDLE, "mode": State.REMOTE} | state))
+
+    async def tell():
+        while True:
+            publisher.put(told)
+            await asyncio.sleep(0.2)
+
+    task = asyncio.create_task(tell())
+    try:
+        yield told
+    finally:
+        task.cancel()
+
+
+def event(severity, code, text="something", **values):
+    told = schema.Event(severity=severity, code=code, text=text, source="test", values=values)
+    told.timestamp.GetCurrentTime()
+    return told
+
+
+def test_a_link_that_is_down_is_an_alarm_until_it_is_up_and_seen(mesh, tmp_path):
+    async def main():
+        async with (
+            watched(mesh, tmp_path) as desk,
+            open_session(mesh) as gateway,
+            controller(gateway, link=State.DOWN, link_text="connecting to 10.0.0.7:5400") as state,
+        ):
+            await desk.until(lambda: "arm:link" in desk.alarms)
+            alarm = desk.alarms["arm:link"]
+            assert (alarm.site, alarm.robot, alarm.code) == ("s", "arm", "link.down")
+            assert (alarm.priority, alarm.state) == (Alarm.HIGH, Alarm.UNACKNOWLEDGED)
+            assert "10.0.0.7:5400" in alarm.text
+            assert alarm.advice
+            answered = await desk.ask(action=Request.ACKNOWLEDGE, ids=["arm:link"])
+            assert (answered["arm:link"].state, answered["arm:link"].by) == (Alarm.ACKNOWLEDGED, "li.s")
+            await desk.until(lambda: "alarm.acknowledged" in desk.codes())
+            state.link = State.UP
+            await desk.until(lambda: not desk.alarms)
+
+    run(main(), timeout_s=90.0)
+
+
+def test_a_restart_forgets_neither_an_acknowledgement_nor_what_was_put_aside(mesh, tmp_path):
+    async def main():
+        async with (
+            open_session(mesh) as gateway,
+            controller(gateway, link=State.DOWN, fault="E 17") as state,
+        ):
+            async with watched(mesh, tmp_path) as desk:
+                await desk.until(lambda: {"arm:link", "arm:controller.fault"} <= desk.alarms.keys())
+                await desk.ask(action=Request.ACKNOWLEDGE, ids=["arm:link"])
+                await desk.ask(
+                    action=Request.SHELVE, ids=["arm:controller.fault"], shelve_s=600.0, reason="service"
+                )
+            async with watched(mesh, tmp_path) as desk:
+                await desk.until(lambda: len(desk.alarms) == 2)
+                shelved = desk.alarms["arm:controller.fault"]
+                assert (shelved.state, shelved.reason, shelved.by) == (Alarm.SHELVED, "service", "li.s")
+                assert desk.alarms["arm:link"].state == Alarm.ACKNOWLEDGED
+                # What stood at the restart ends as it would have without one.
+                state.link, state.fault = State.UP, ""
+                await desk.until(lambda: "arm:link" not in desk.alarms)
+
+    run(main(), timeout_s=90.0)
+
+
+def test_events_are_alarms_by_the_table_and_end_as_it_says(mesh, tmp_path):
+    async def main():
+        async with watched(mesh, tmp_path) as desk, open_session(mesh) as recorder:
+            await desk.until(lambda: desk.mesh.site)
+            said = recorder.declare_publisher("s", "-", "events/recorder")
+            said.put(event(schema.Event.WARNING, "recorder.space", "little space is left"))
+            said.put(event(schema.Event.CRITICAL, "recorder.ended", "recording a ended"))
+            said.put(event(schema.Event.WARNING, "kinematics.limit", joint="waist", limit="upper"))
+            said.put(event(schema.Event.WARNING, "kinematics.limit", joint="elbow", limit="upper"))
+            said.put(event(schema.Event.ERROR, "nobody.knows", "not in the table"))
+            said.put(event(schema.Event.INFO, "recorder.saved", "no alarm"))
+            names = {
+                "-:recorder.space",
+                "-:recorder.ended",
+                "-:kinematics.limit:waist",
+                "-:kinematics.limit:elbow",
+                "-:nobody.knows",
+            }
+            await desk.until(lambda: desk.alarms.keys() == names)
+            assert desk.alarms["-:recorder.ended"].priority == Alarm.HIGH
+            said.put(event(schema.Event.INFO, "recorder.space", "there is space again"))
+            said.put(event(schema.Event.INFO, "kinematics.limit.over", joint="waist", limit="upper"))
+            await desk.until(lambda: desk.alarms["-:recorder.space"].state == Alarm.RETURNED)
+            await desk.until(lambda: desk.alarms["-:kinematics.limit:waist"].state == Alarm.RETURNED)
+            assert desk.alarms["-:kinematics.limit:elbow"].state == Alarm.UNACKNOWLEDGED
+            # What happened, and nothing will end, is over when somebody has seen it.
+            left = await desk.ask(action=Request.ACKNOWLEDGE, ids=sorted(names))
+            assert left.keys() == {"-:kinematics.limit:elbow"}
+
+    run(main(), timeout_s=90.0)
+
+
+@pytest.mark.parametrize(
+    ("request_", "said"),
+    [
+        ({"action": Request.ACKNOWLEDGE, "ids": ["arm:none"]}, "no alarm 'arm:none'"),
+        ({"action": Request.ACKNOWLEDGE}, "name at least one alarm"),
+        ({"action": Request.SHELVE, "ids": ["arm:link"], "shelve_s": 60.0}, "reason"),
+        ({"ids": ["arm:link"]}, "ACKNOWLEDGE, SHELVE, UNSHELVE"),
+    ],
+    ids=["unknown", "none", "no reason", "no action"],
+)
+def test_what_cannot_be_done_with_alarms_is_refused_in_words(mesh, tmp_path, request_, said):
+    async def main():
+        async with watched(mesh, tmp_path) as desk:
+            with pytest.raises(RefusedError, match=said):
+                await desk.ask(**request_)
+
+    run(main(), timeout_s=60.0)
+
+
+async def seem(session, service, *, robot="-", host="host-b", version="0.1.0", ahead_s=0.0):
+    """A process on another machine: its health, and a clock that is ahead; until cancelled."""
+    session.declare_presence("s", robot, service)
+    answer_clock(session, "s", wall_ns=lambda: time.time_ns() + round(ahead_s * 1e9))
+    publisher = session.declare_publisher("s", "-", f"health/{service}.{session.identity}")
+    health = schema.ServiceHealth(service=service, id=session.identity, host=host, version=version)
+    while True:
+        publisher.put(health)
+        await asyncio.sleep(0.3)
+
+
+@asynccontextmanager
+async def seeming(mesh, *args, **values):
+    async with open_session(mesh) as session:
+        task = asyncio.create_task(seem(session, *args, **values))
+        try:
+            yield session
+        finally:
+            task.cancel()
+
+
+def test_a_clock_that_is_off_is_measured_and_both_machines_are_named(mesh, tmp_path):
+    async def main():
+        async with (
+            watched(mesh, tmp_path) as desk,
+            seeming(mesh, "recorder", ahead_s=3.0) as other,
+            seeming(mesh, "player", host="host-c", ahead_s=-0.2) as near,
+        ):
+
+            def measured():
+                seen = {each.id: each for each in desk.mesh.services}
+                return {other.identity, near.identity} <= {
+                    name for name, each in seen.items() if each.HasField("clock_offset_s")
+                }
+
+            await desk.until(measured)
+            for each in desk.mesh.services:
+                if each.id in (other.identity, near.identity):
+                    offset = {other.identity: 3.0, near.identity: -0.2}[each.id]
+                    assert abs(each.clock_offset_s - offset) <= each.round_trip_s / 2 + 1e-3
+            await desk.until(lambda: "-:clock.off:host-b" in desk.alarms)
+            text = desk.alarms["-:clock.off:host-b"].text
+            assert "host-b is 3.0 s ahead" in text
+            assert any(each.host in text for each in desk.mesh.services if each.service == "watch")
+            assert "-:clock.off:host-c" not in desk.alarms
+            assert desk.codes().count("clock.off") == 1
+
+    run(main(), timeout_s=90.0)
+
+
+def test_a_name_used_twice_and_versions_that_differ_are_told_once_with_both_sides(mesh, tmp_path):
+    async def main():
+        async with watched(mesh, tmp_path) as desk, seeming(mesh, "gateway", robot="arm", host="host-a"):
+            async with seeming(mesh, "gateway", robot="arm", host="host-b", version="9.9"):
+                await desk.until(lambda: "arm:mesh.twice:gateway" in desk.alarms)
+                text = desk.alarms["arm:mesh.twice:gateway"].text
+                assert "host-a" in text
+                assert "host-b" in text
+                await desk.until(lambda: "-:mesh.versions" in desk.alarms)
+                assert "9.9: gateway of s at host-b" in desk.alarms["-:mesh.versions"].text
+                assert "0.1.0: " in desk.alarms["-:mesh.versions"].text
+            await desk.until(lambda: {"mesh.twice.over", "mesh.versions.over"} <= set(desk.codes()))
+            assert desk.codes().count("mesh.twice") == 1
+            assert desk.alarms["arm:mesh.twice:gateway"].state == Alarm.RETURNED
+
+    run(main(), timeout_s=90.0)
+
+
+def test_a_site_name_used_twice_is_told_by_both_watches(mesh, tmp_path):
+    async def main():
+        async with watched(mesh, tmp_path / "a") as desk, watched(mesh, tmp_path / "b"):
+            await desk.until(lambda: any("site s is used twice" in each.text for each in desk.events))
+
+    run(main(), timeout_s=60.0)
+
+
+def test_a_service_that_is_gone_is_an_alarm_until_it_is_back_or_known(mesh, tmp_path):
+    async def main():
+        async with watched(mesh, tmp_path) as desk:
+            async with seeming(mesh, "recorder"):
+                await desk.until(lambda: any(each.service == "recorder" for each in desk.mesh.services))
+            await desk.until(lambda: "-:service.gone:recorder" in desk.alarms)
+            assert "recorder of s at host-b" in desk.alarms["-:service.gone:recorder"].text
+            async with seeming(mesh, "recorder"):
+                await desk.until(lambda: desk.alarms["-:service.gone:recorder"].state == Alarm.RETURNED)
+            await desk.until(lambda: desk.alarms["-:service.gone:recorder"].state == Alarm.UNACKNOWLEDGED)
+            # Taken away for good: who acknowledges it knows.
+            assert not await desk.ask(action=Request.ACKNOWLEDGE, ids=["-:service.gone:recorder"])
+
+    run(main(), timeout_s=90.0)
+
+
+def test_a_robot_whose_gateway_is_gone_is_forgotten_once_somebody_knows(mesh, tmp_path):
+    async def main():
+        async with watched(mesh, tmp_path) as desk:
+            async with (
+                seeming(mesh, "gateway", robot="arm") as gateway,
+                controller(gateway, mode=State.LOCAL),
+            ):
+                await desk.until(lambda: "arm:controller.local" in desk.alarms)
+                # Who was never seen is never missed.
+                await desk.until(lambda: any(each.service == "gateway" for each in desk.mesh.services))
+            gone = "-:service.gone:gateway.arm"
+            await desk.until(lambda: gone in desk.alarms)
+            # What it was in when the gateway went, it may be in still.
+            assert desk.alarms["arm:controller.local"].state == Alarm.UNACKNOWLEDGED
+            await desk.ask(action=Request.ACKNOWLEDGE, ids=[gone, "arm:controller.local"])
+            await desk.until(lambda: not desk.alarms)
+
+    run(main(), timeout_s=90.0)
+
+
+def test_what_was_so_in_a_replay_is_no_alarm_now(mesh, tmp_path):
+    async def main():
+        async with watched(mesh, tmp_path) as desk, open_session(mesh) as others:
+            told = {
+                (robot, topic): others.declare_publisher("s", robot, topic)
+                for robot in ("replay-1", "arm")  # the replay first: it has come when the arm has
+                for topic in ("controller", "events", "events/kinematics")
+            }
+            state = State(link=State.UP, mode=State.LOCAL)
+            while not {"arm:controller.local", "arm:a", "arm:b"} <= desk.alarms.keys():
+                for (_, topic), publisher in told.items():
+                    code = {"events": "a", "events/kinematics": "b"}.get(topic)
+                    publisher.put(event(schema.Event.ERROR, code) if code else state)
+                await asyncio.sleep(0.1)
+            assert not [name for name in desk.alarms if "replay" in name]
+
+    run(main(), timeout_s=60.0)
+
+
+def test_a_router_that_was_away_is_no_alarm_of_everybody_behind_it(tmp_path):
+    async def main():
+        endpoint = f"tcp/127.0.0.1:{free_port()}"
+        mesh = SessionSettings(connect=(endpoint,), wait_s=5.0)
+        router = await asyncio.to_thread(zenoh.open, router_config((endpoint,)))
+        try:
+            async with watched(mesh, tmp_path, settled_s=3.0) as desk:
+                recorder = Served(service="recorder", present_for=(("s", "-"),))
+                async with open_session(mesh) as session, present(session, recorder):
+                    await desk.until(lambda: {"recorder", "watch"} <= {s.service for s in desk.mesh.services})
+                    await asyncio.to_thread(router.close)
+                    await asyncio.sleep(3.5)  # longer than who comes and goes has time for
+                    router = await asyncio.to_thread(zenoh.open, router_config((endpoint,)))
+                    before = desk.mesh.timestamp.ToNanoseconds()
+                    await desk.until(lambda: desk.mesh.timestamp.ToNanoseconds() > before + 5 * 10**9)
+                    assert not desk.alarms, desk.alarms
+                # And who really goes is told, as before.
+                await desk.until(lambda: "-:service.gone:recorder" in desk.alarms)
+        finally:
+            await asyncio.to_thread(router.close)
+
+    run(main())

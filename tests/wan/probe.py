@@ -1,0 +1,160 @@
+"""A monitor and operator on a host of the tests' network: told on standard input, answers there.
+
+Arguments: routers, comma between, and the file with its keys where they take TLS. A line is a JSON list, a
+function below and its arguments; each is answered with one line of JSON.
+"""
+
+import asyncio
+import json
+import random
+import sys
+import threading
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import zenoh
+from google.protobuf import json_format
+
+from bus import messages
+from bus.endpoints import bundle
+from bus.errors import BusError
+from bus.messages import PROTOBUF
+from bus.session import Session, SessionSettings, open_session
+from bus.subscription import Subscription
+from bus.topics import request
+
+
+class Probe:
+    """What it watches, and how late each sample was."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._subscriptions: dict[str, Subscription] = {}
+        self._readers: list[asyncio.Task[None]] = []
+        self._newest: dict[str, int] = {}
+        self._seen: dict[str, list[tuple[float, float, bool, int, float | None]]] = {}
+
+    async def watch(self, expression: str) -> bool:
+        """Listen from now on."""
+        self._subscriptions[expression] = subscription = self._session.subscribe(expression, newest=2000)
+        self._seen[expression] = []
+        self._readers.append(asyncio.create_task(self._read(expression, subscription)))
+        return True
+
+    async def _read(self, expression: str, subscription: Subscription) -> None:
+        async for sample in subscription:
+            lag_s = (time.time_ns() - sample.header.source_time_ns) * 1e-9
+            age_s = sample.late_s + time.monotonic() - sample.received if sample.live else None
+            self._newest[sample.key] = sample.header.sequence
+            self._seen[expression].append((time.monotonic(), lag_s, sample.live, len(sample.payload), age_s))
+
+    async def samples(self, expression: str) -> list[tuple[float, float, bool, int, float | None]]:
+        """Since the last question: (monotonic time, lag behind its source's time, live, bytes, age then)."""
+        seen, self._seen[expression] = self._seen[expression], []
+        return seen
+
+    async def state(self, expression: str, key: str) -> dict[str, Any]:
+        """Age and losses now."""
+        subscription = self._subscriptions[expression]
+        return {"age_s": subscription.age_s(key), "lost": subscription.lost(key), "at": time.monotonic()}
+
+    async def sequence(self, expression: str, key: str) -> dict[str, int]:
+        """The newest number of a key whose publisher stays the same, and what came and did not until then."""
+        subscription = self._subscriptions[expression]
+        lost, received = subscription.lost(key), subscription.received
+        return {"number": self._newest[key], "lost": lost, "received": received}
+
+    async def until(self, expression: str, key: str, stale_s: float, stale: bool, timeout_s: float) -> Any:
+        """When a key went stale, or live again [monotonic s]; None: not in time."""
+        deadline = time.monotonic() + timeout_s
+        while time.monotonic() < deadline:
+            age_s = self._subscriptions[expression].age_s(key)
+            if (age_s is None or age_s > stale_s) == stale:
+                return time.monotonic()
+            await asyncio.sleep(0.01)
+        return None
+
+    async def ask(self, key: str, values: dict[str, Any], timeout_s: float) -> Any:
+        """A request's answer, or why there is none; and how long it took."""
+        schema = request(key.split("/", 3)[3]).request
+        assert schema is not None
+        began = time.monotonic()
+        try:
+            message = json_format.ParseDict(values, schema())
+            answer = await self._session.ask(key, message, timeout_s=timeout_s)
+        except BusError as error:
+            return {"error": str(error), "began": began, "took_s": time.monotonic() - began}
+        return {"answer": as_json(answer), "began": began, "took_s": time.monotonic() - began}
+
+    async def pour(self, site: str, robot: str, view: str, mbit_per_s: float, pictures_per_s: float) -> bool:
+        """Publish what a view of that rate is to the network, from now on."""
+        publisher = self._session.declare_publisher(site, robot, f"video/{view}")
+        size = round(mbit_per_s * 1e6 / 8 / pictures_per_s)
+
+        async def put() -> None:
+            next_s, count = time.monotonic(), 0
+            while True:
+                # A key frame is some times the others, each 2 s.
+                key_frame = count % round(2 * pictures_per_s) == 0
+                payload = random.randbytes(size * (5 if key_frame else 1))
+                publisher.put_bytes(payload, source_time_ns=time.time_ns(), key_frame=key_frame)
+                count, next_s = count + 1, next_s + 1 / pictures_per_s
+                await asyncio.sleep(max(next_s - time.monotonic(), 0.0))
+
+        self._readers.append(asyncio.create_task(put()))
+        return True
+
+    async def stop_over_one_link(self, key: str) -> dict[str, float]:
+        """A stop asked as any other request is, to compare."""
+        began = time.monotonic()
+        get = self._session.zenoh_session.get
+        await asyncio.to_thread(
+            lambda: list(
+                get(key, priority=zenoh.Priority.REAL_TIME, timeout=5.0, payload=b"", encoding=PROTOBUF)
+            )
+        )
+        return {"began": began, "took_s": time.monotonic() - began}
+
+    async def last(self, key: str, timeout_s: float) -> Any:
+        """The last value of a topic."""
+        message = await self._session.last(key, timeout_s=timeout_s)
+        return None if message is None else as_json(message)
+
+    async def present(self) -> list[str]:
+        """Who is alive."""
+        return ["/".join(map(str, each)) for each in await self._session.present()]
+
+
+def as_json(message: Any) -> Any:
+    """A message as others see it."""
+    return json.loads(messages.encode(message, as_json=True))
+
+
+async def main() -> None:
+    """Do what standard input says, one at a time, until it ends."""
+    loop = asyncio.get_running_loop()
+    lines: asyncio.Queue[str] = asyncio.Queue()
+
+    def read() -> None:
+        for line in sys.stdin:
+            loop.call_soon_threadsafe(lines.put_nowait, line)
+        with suppress(RuntimeError):
+            loop.call_soon_threadsafe(lines.put_nowait, "")
+
+    threading.Thread(target=read, daemon=True).start()
+    routers, *keys = sys.argv[1:]
+    settings = SessionSettings(
+        connect=tuple(routers.split(",")), tls=bundle(Path(keys[0])) if keys else None, wait_s=120.0
+    )
+    async with open_session(settings) as session:
+        probe = Probe(session)
+        print("ready", flush=True)
+        while line := await lines.get():
+            name, *arguments = json.loads(line)
+            print(json.dumps(await getattr(probe, name)(*arguments)), flush=True)
+
+
+if __name__ == "__main__":
+    asyncio.run(main())
