@@ -155,7 +155,7 @@ def test_a_status_told_once_in_the_midst_of_a_flood_is_heeded_and_reaches_old_cl
                 say("1#STATUS*idle;local;homed@1#STATUS*idle;remote;homed@" + UNIT % 1.0)
                 await until(lambda: len(plant.events("controller.local")) == 4)  # not even one of a moment
                 say("1#STATUS*idle;local;homed@" + UNIT % 1.0)
-                await until(lambda: plant.controller.mode == STATE.LOCAL)
+                await until(lambda: len(plant.events("controller.local")) == 5)
                 move = plant.command(C.MOVE_ABSOLUTE, joint_positions=[0.1, 0, 0, 0, 0])
                 assert "local mode" in await refusal(move)
             assert b"ABSOLUTE" not in heard

@@ -276,6 +276,10 @@ def test_everybody_with_a_right_reads_topics_row_by_row_and_who_was_revoked_read
     once_all_listen_to("robomesh/**")
     for each in keys:
         witness.session.put(each, "to all")
+    # Else one of them, still on its way, finds those who listen to rows.
+    to_all = {("to all", each) for each in keys}
+    routers = [who for who in everybody.values() if who.role is Role.ROUTER]
+    assert all(to_all <= arrived[who.name].once_there(to_all) for who in routers)
     once_all_listen_to(*(f"robomesh/*/*/{row}" for row in TOPICS))
     for each in keys:
         witness.session.put(each, "to rows")
