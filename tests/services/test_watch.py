@@ -63,6 +63,12 @@ class Desk:
         )
         return {each.id: each for each in answer.alarms}
 
+    async def sees(self, service):
+        """Until the watch has looked at who is there, that service among them."""
+        await self.until(lambda: any(each.service == service for each in self.mesh.services))
+        told = self.mesh.timestamp.ToNanoseconds()
+        await self.until(lambda: self.mesh.timestamp.ToNanoseconds() > told)
+
     def codes(self):
         return [event.code for event in self.events]
 
@@ -287,7 +293,7 @@ def test_a_service_that_is_gone_is_an_alarm_until_it_is_back_or_known(mesh, tmp_
     async def main():
         async with watched(mesh, tmp_path) as desk:
             async with seeming(mesh, "recorder"):
-                await desk.until(lambda: any(each.service == "recorder" for each in desk.mesh.services))
+                await desk.sees("recorder")
             await desk.until(lambda: "-:service.gone:recorder" in desk.alarms)
             assert "recorder of s at host-b" in desk.alarms["-:service.gone:recorder"].text
             async with seeming(mesh, "recorder"):
@@ -308,7 +314,7 @@ def test_a_robot_whose_gateway_is_gone_is_forgotten_once_somebody_knows(mesh, tm
             ):
                 await desk.until(lambda: "arm:controller.local" in desk.alarms)
                 # Who was never seen is never missed.
-                await desk.until(lambda: any(each.service == "gateway" for each in desk.mesh.services))
+                await desk.sees("gateway")
             gone = "-:service.gone:gateway.arm"
             await desk.until(lambda: gone in desk.alarms)
             # What it was in when the gateway went, it may be in still.
