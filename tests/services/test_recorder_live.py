@@ -176,7 +176,7 @@ def test_events_of_an_outage_are_in_the_file_and_counted_back(tmp_path):
         finally:
             first.close()
 
-    path = run(main(), timeout_s=60.0)
+    path = run(main(), timeout_s=120.0)
     said = [schema.Event.FromString(data).text for data in payloads(path, "robomesh/site/arm/events")]
     assert sorted(said) == sorted(["before", *(f"meanwhile {number}" for number in range(5)), "after"])
     (row,) = describe_file(path).topics
