@@ -1,0 +1,182 @@
+"""Long answers, in pieces: whoever asks takes them at the pace of the line between.
+
+A message longer than one of Zenoh's batches is dropped when its fragments wait longer than 51 ms for places
+in a link's queue: an answer of megabytes would never pass a slow line. To wait there (`BLOCK`) would hold up
+what comes behind it at every router on the way, and close the link after 5 s. A piece finds its place or is
+lost alone, and what was lost is asked for again.
+
+    get KEY?pieces                the answer, or its first piece; attached: a token, and how long the whole is
+    get KEY?piece=TOKEN:OFFSET    the piece that begins there
+"""
+
+import asyncio
+import secrets
+import struct
+import time
+from collections import OrderedDict
+from dataclasses import dataclass
+from threading import Lock
+
+import zenoh
+
+from bus.endpoints import first_line
+from bus.errors import NoAnswerError
+
+# Two of them fit into one of Zenoh's batches.
+PIECE_BYTES = 30_000
+_ASKING = "pieces"
+_PIECE = "piece"
+_OF_WHOLE = struct.Struct("<8sQ")
+# What an owner keeps for those who are still taking it: this much, for so long after it was last asked for.
+_KEPT_BYTES = 64 << 20
+_KEPT_S = 60.0
+# At once: twice as many after each round that came whole, half as many after one that did not.
+_MOST_AT_ONCE = 16
+# What has not come by then counts as lost; longer after a round of which nothing came.
+_LOST_AFTER_S = 2.0
+# Zenoh says at once that there is no owner.
+_AGAIN_S = 0.05
+# No answer of the mesh is longer; whoever says so must not fill the asker's memory.
+_LONGEST_BYTES = 256 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class First:
+    """The first piece of a long answer, and what names the others."""
+
+    key: str
+    data: bytes
+    token: str
+    length: int
+
+
+class LongAnswers:
+    """An owner's answers that somebody is taking in pieces."""
+
+    def __init__(self) -> None:
+        self._kept: OrderedDict[str, tuple[float, bytes]] = OrderedDict()
+        self._lock = Lock()  # pieces are answered on Zenoh's thread
+
+    def reply(self, query: zenoh.Query, key: str, answer: bytes, encoding: str) -> None:
+        """Answer a request, by a first piece where the whole is long and who asks takes pieces."""
+        if len(answer) <= PIECE_BYTES or _ASKING not in _names(query):
+            query.reply(key, answer, encoding=encoding)
+            return
+        token = secrets.token_bytes(8)
+        with self._lock:
+            self._kept[token.hex()] = time.monotonic(), answer
+            self._forget()
+        whole = _OF_WHOLE.pack(token, len(answer))
+        query.reply(key, answer[:PIECE_BYTES], encoding=encoding, attachment=whole)
+
+    def reply_piece(self, query: zenoh.Query) -> bool:
+        """Answer a question for a piece; False: it is none."""
+        asked = query.parameters.get(_PIECE)
+        if asked is None:
+            return False
+        token, _, offset = asked.partition(":")
+        with self._lock:
+            _, answer = self._kept.pop(token, (0.0, b""))
+            if answer:
+                self._kept[token] = time.monotonic(), answer
+        with query:
+            if not answer or not offset.isascii() or not offset.isdigit() or int(offset) >= len(answer):
+                query.reply_err(f"{asked} is no piece of an answer here: ask anew".encode())
+            else:
+                begin = int(offset)
+                query.reply(str(query.key_expr), answer[begin : begin + PIECE_BYTES])
+        return True
+
+    def _forget(self) -> None:
+        """The oldest, but for the newest of all."""
+        kept, now = sum(len(answer) for _, answer in self._kept.values()), time.monotonic()
+        for token, (used, answer) in list(self._kept.items())[:-1]:
+            if kept <= _KEPT_BYTES and now - used < _KEPT_S:
+                return
+            del self._kept[token]
+            kept -= len(answer)
+
+
+def selector(key: str) -> str:
+    """What asks for a key and takes a long answer in pieces."""
+    return f"{key}?{_ASKING}"
+
+
+def first_of(sample: zenoh.Sample) -> First | None:
+    """What a reply is the first piece of; None: it is whole."""
+    attached = b"" if sample.attachment is None else sample.attachment.to_bytes()
+    if len(attached) != _OF_WHOLE.size:
+        return None
+    token, length = _OF_WHOLE.unpack(attached)
+    data = sample.payload.to_bytes()
+    if len(data) != PIECE_BYTES or not PIECE_BYTES < length <= _LONGEST_BYTES:
+        return None
+    return First(str(sample.key_expr), data, token.hex(), length)
+
+
+async def whole(
+    session: zenoh.Session, first: First, priority: zenoh.Priority, *, timeout_s: float
+) -> bytes | None:
+    """Take the rest of a long answer; None: its owner has it no more, or no piece came for `timeout_s`."""
+    missing = list(range(PIECE_BYTES, first.length, PIECE_BYTES))
+    taken = {0: first.data}
+    at_once, patience_s, came = 1, _LOST_AFTER_S, time.monotonic()
+    while missing:
+        left_s = came + timeout_s - time.monotonic()
+        if left_s <= 0:
+            return None
+        now, later = missing[:at_once], missing[at_once:]
+        selectors = [f"{first.key}?{_PIECE}={first.token}:{offset}" for offset in now]
+        asked = [_ask(session, each, priority, min(patience_s, left_s)) for each in selectors]
+        lost = []
+        for offset, piece in zip(now, await asyncio.gather(*asked), strict=True):
+            if piece is None:
+                lost.append(offset)
+            elif len(piece) != min(PIECE_BYTES, first.length - offset):
+                return None  # refused, or another's nonsense
+            else:
+                taken[offset], came = piece, time.monotonic()
+        at_once = max(at_once // 2, 1) if lost else min(2 * at_once, _MOST_AT_ONCE)
+        patience_s = 2 * patience_s if len(lost) == len(now) else _LOST_AFTER_S
+        missing = lost + later
+        if lost:
+            await asyncio.sleep(_AGAIN_S)
+    return b"".join(taken[offset] for offset in sorted(taken))
+
+
+async def _ask(
+    session: zenoh.Session, asked: str, priority: zenoh.Priority, timeout_s: float
+) -> bytes | None:
+    """A piece; None: nothing came; empty: it was refused."""
+    loop = asyncio.get_running_loop()
+    done: asyncio.Future[bytes | None] = loop.create_future()
+    answers: list[bytes] = []
+
+    def on_reply(reply: zenoh.Reply) -> None:
+        answers.append(b"" if reply.ok is None else reply.ok.payload.to_bytes())
+
+    def finish() -> None:
+        if not done.done():
+            done.set_result(answers[0] if answers else None)
+
+    def on_end() -> None:
+        if not loop.is_closed():
+            loop.call_soon_threadsafe(finish)
+
+    try:
+        session.get(
+            asked,
+            zenoh.handlers.Callback(on_reply, on_end),
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            congestion_control=zenoh.CongestionControl.DROP,
+            priority=priority,
+            timeout=timeout_s,
+        )
+    except zenoh.ZError as error:
+        raise NoAnswerError(f"{asked} could not be asked: {first_line(error)}") from None
+    return await done
+
+
+def _names(query: zenoh.Query) -> list[str]:
+    return str(query.parameters).split(";")
