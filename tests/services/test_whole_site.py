@@ -5,6 +5,7 @@ import json
 import signal
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from math import degrees, radians
 
 import pytest
@@ -298,31 +299,21 @@ def test_no_orphan_outlives_a_killed_supervisor(tmp_path):
         wait_until(lambda: not any(alive(pid) for pid in children.values()), 5.0, "orphans")
 
 
-def test_a_monitor_at_a_second_site_sees_the_firsts_robot(tmp_path):
-    first, second = tmp_path / "first", tmp_path / "second"
-    first.mkdir()
-    second.mkdir()
-    with (
-        running_site(first, name="first") as one,
-        running_site(
-            second,
-            name="second",
-            robots=ONE_ARM.replace('"arm"', '"other"'),
-            more=f'connect = ["{one.router}"]',
-        ) as two,
-    ):
+def test_a_monitor_at_a_second_site_sees_the_firsts_robot(site, tmp_path):
+    robots = ONE_ARM.replace('"arm"', '"other"')
+    with running_site(tmp_path, name="second", robots=robots, more=f'connect = ["{site.router}"]') as second:
 
         def both_seen() -> bool:
-            found = json.loads(two.command("list", "--json").stdout)["robots"]
+            found = json.loads(second.command("list", "--json").stdout)["robots"]
             return {(row["site"], row["robot"], row["link"]) for row in found} == {
-                ("first", "arm", "up"),
+                ("test", "arm", "up"),
                 ("second", "other", "up"),
             }
 
-        wait_until(both_seen, 30.0)
-        rows = two.command("monitor", "first/arm", "--json", "--count", "3").stdout.splitlines()
-        assert all(json.loads(row)["key"] == "robomesh/first/arm/joints" for row in rows)
-        assert two.command("send", "first/arm", "home").returncode == 0
+        wait_until(both_seen)
+        rows = second.command("monitor", "test/arm", "--json", "--count", "3").stdout.splitlines()
+        assert all(json.loads(row)["key"] == "robomesh/test/arm/joints" for row in rows)
+        assert second.command("send", "test/arm", "home").returncode == 0
 
 
 def test_bad_input_is_one_line_that_names_it_and_exit_status_2(tmp_path):
@@ -347,25 +338,29 @@ def test_bad_input_is_one_line_that_names_it_and_exit_status_2(tmp_path):
     )
     mesh = tmp_path / "base.wrl"
     mesh.write_text("not a mesh")
-    for arguments, words in (
-        (("up", str(tmp_path / "none.toml")), "none.toml"),
-        (("up", str(unreadable)), "broken.toml"),
-        (("kinematics", "--site", str(unknown)), "pt6000"),
-        (("gateway", "--site", str(no_address)), "--controller arm="),
+    said = {
+        ("up", str(tmp_path / "none.toml")): "none.toml",
+        ("up", str(unreadable)): "broken.toml",
+        ("kinematics", "--site", str(unknown)): "pt6000",
+        ("gateway", "--site", str(no_address)): "--controller arm=",
         (
-            ("gateway", "--site", str(two), "--controller", f"arm={there}", "--controller", f"arm-2={there}"),
-            "127.0.0.1:5400 is given twice, to robot arm's controller and to robot arm-2's controller",
-        ),
-        (("list", "--connect", router), "no router"),
-        (("list", "--connect", "nonsense"), "nonsense"),
-        (("monitor", "arm", "--connect", router), "no router"),
-        (("send", "arm", "jump"), "jump"),
-        (("mesh", "info", str(mesh)), "base.wrl"),
-        (("simulate", "--listen", "nowhere"), "nowhere"),
-        (("simulate", "--robot", "pt6000"), "pt6000"),
-        (("robot", "show", "pt6000"), "pt6000"),
-    ):
-        result = robomesh(*arguments)
+            "gateway",
+            "--site",
+            str(two),
+            *("--controller", f"arm={there}", "--controller", f"arm-2={there}"),
+        ): "127.0.0.1:5400 is given twice, to robot arm's controller and to robot arm-2's controller",
+        ("list", "--connect", router): "no router",
+        ("list", "--connect", "nonsense"): "nonsense",
+        ("monitor", "arm", "--connect", router): "no router",
+        ("send", "arm", "jump"): "jump",
+        ("mesh", "info", str(mesh)): "base.wrl",
+        ("simulate", "--listen", "nowhere"): "nowhere",
+        ("simulate", "--robot", "pt6000"): "pt6000",
+        ("robot", "show", "pt6000"): "pt6000",
+    }
+    with ThreadPoolExecutor(4) as together:
+        results = list(together.map(lambda arguments: robomesh(*arguments), said))
+    for (arguments, words), result in zip(said.items(), results, strict=True):
         assert result.returncode == 2, (arguments, result)
         assert words in result.stderr, (arguments, result.stderr)
         assert "Traceback" not in result.stderr
