@@ -64,17 +64,18 @@ class Door:
         self._origins = (*ORIGINS, *origins)
         self.inside = 0
         self._open: Counter[str] = Counter()
+        self._visits: set[asyncio.Task[None]] = set()
 
     @asynccontextmanager
     async def open(self, host: str, port: int, tls: ssl.SSLContext | None) -> AsyncIterator[int]:
-        """Listen while the block runs; on which port.
+        """Listen while the block runs, and no visit outlives it; on which port.
 
         Raises:
             ListenError: If it cannot.
         """
         try:
             listener = await asyncio.start_server(
-                self._serve, host, port, ssl=tls, limit=_MOST_HEAD, ssl_handshake_timeout=_tls_within(tls)
+                self._came, host, port, ssl=tls, limit=_MOST_HEAD, ssl_handshake_timeout=_tls_within(tls)
             )
         except OSError as error:
             reason = os.strerror(error.errno) if error.errno else str(error)
@@ -85,6 +86,15 @@ class Door:
             yield listener.sockets[0].getsockname()[1]
         finally:
             listener.close()
+            for visit in self._visits:
+                visit.cancel()
+            await asyncio.gather(*self._visits, return_exceptions=True)
+
+    def _came(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        # A task of ours: of one that asyncio makes itself, Python 3.11 logs a traceback when it is cancelled.
+        visit = asyncio.create_task(self._serve(reader, writer))
+        self._visits.add(visit)
+        visit.add_done_callback(self._visits.discard)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         address = str((writer.get_extra_info("peername") or ("",))[0])

@@ -168,3 +168,17 @@ def test_places_of_those_who_went_are_free_again(monkeypatch):
                 writer.close()
 
     run(main())
+
+
+def test_a_door_that_is_closed_ends_its_visits_without_a_word_of_error(caplog):
+    async def main():
+        before = Door("127.0.0.1", 1, ())
+        async with before.open("127.0.0.1", 0, None) as port:
+            reader, writer = await asyncio.open_connection("127.0.0.1", port)
+            while not before._open:
+                await asyncio.sleep(0.01)
+        assert await reader.read() == b""
+        writer.close()
+
+    run(main())
+    assert not [record for record in caplog.records if record.name == "asyncio"]
