@@ -177,6 +177,7 @@ def test_a_door_that_is_closed_ends_its_visits_without_a_word_of_error(caplog):
             reader, writer = await asyncio.open_connection("127.0.0.1", port)
             while not before._open:
                 await asyncio.sleep(0.01)
+        assert not before._open
         assert await reader.read() == b""
         writer.close()
 
