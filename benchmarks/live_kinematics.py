@@ -146,7 +146,9 @@ async def ask_checks(session: Session, checked: list[float]) -> None:
     while True:
         with contextlib.suppress(BusError):
             await session.ask(
-                "robomesh/bench/arm-0/kinematics/check", CheckRequest(program=PROGRAM), timeout_s=60.0
+                f"robomesh/bench/arm-0/kinematics/check/{session.own_name}",
+                CheckRequest(program=PROGRAM),
+                timeout_s=60.0,
             )
             checked.append(time.monotonic())
 

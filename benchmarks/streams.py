@@ -125,7 +125,7 @@ async def asked_ms(monitor: Session, number: int) -> float:
     """From asking for a view of one's own, of a size that nobody has, to its first packet."""
     began = time.monotonic()
     request = ViewRequest(of="free", width=480 + 16 * number, height=320)
-    answer = await monitor.ask(f"{ARM}/views", request, timeout_s=5.0)
+    answer = await monitor.ask(f"{ARM}/views/{monitor.own_name}", request, timeout_s=5.0)
     assert isinstance(answer, ViewAnswer)
     video = monitor.subscribe(f"{ARM}/{answer.topic}", history=False)
     async with asyncio.timeout(10):

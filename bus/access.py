@@ -17,7 +17,7 @@ import zenoh
 from bus import keys
 from bus.errors import KeyNameError
 from bus.identity import Identity
-from bus.topics import EVERYONE, REQUESTS, SERVICES, TOPICS, Request, Role, Topic
+from bus.topics import REQUESTS, SERVICES, TOPICS, Request, Role, Topic
 
 Act = Literal[
     "put",
@@ -259,9 +259,6 @@ def _guest(principal: Principal, site: str, border: Border) -> Iterator[Rule]:
     # Its people may ask and command here, in their own names, as our own roles may.
     names = ("*",) if hub else tuple(f"$*.{each}" for each in principal.sites)
     asked = dict.fromkeys(key for name in names for key in _asked(Role.CONSOLE, name))
-    asked |= dict.fromkeys(
-        f"{keys.ROOT}/*/*/{row.name}" for row in REQUESTS.values() if row.askers == EVERYONE
-    )
     yield Rule(acts=("query",), keys=tuple(asked))
     yield Rule(acts=_LOOK, keys=(f"{keys.ROOT}/**/@adv/**",))
     yield Rule(acts=_PRESENT, keys=(f"{keys.ROOT}/*/*/alive/*/*",))

@@ -7,6 +7,7 @@ BusError
 ├── SessionError            a session that cannot be opened as it is configured
 ├── RefusedError            a request that its owner refused, with the reason
 │   ├── BusyError           a request that its owner has not begun: too many wait
+│   ├── QuotaError          more than one name may ask for; it may be asked again later
 │   └── NoRightError        what this end's certificate may not do: it was not even asked
 └── NoAnswerError           a request that nobody answered in time
 """
@@ -41,6 +42,18 @@ class RefusedError(BusError):
 
 class BusyError(RefusedError):
     """A request that its owner has not begun, because too many wait; it may be asked again."""
+
+
+class QuotaError(RefusedError):
+    """More than one name may ask for; the text names the quota and when to ask again.
+
+    Attributes:
+        again_s: When there is something left again, as far as its owner knows [s].
+    """
+
+    def __init__(self, text: str, *, again_s: float) -> None:
+        super().__init__(text)
+        self.again_s = again_s
 
 
 class NoRightError(RefusedError):

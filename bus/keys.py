@@ -2,7 +2,7 @@
 
 robomesh/<site>/<robot>/<topic>                 a robot's topic: robomesh/shanghai/pt600-1/joints
 robomesh/<site>/-/<topic>                       what belongs to a whole site
-robomesh/<site>/<robot>/<request>/<operator>    a request made in an operator's name: .../command/li
+robomesh/<site>/<robot>/<request>/<asker>       a request made in somebody's name: .../command/li
 robomesh/<site>/<robot>/alive/<service>/<id>    presence: a liveliness token
 """
 

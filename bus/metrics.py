@@ -57,14 +57,19 @@ class SessionMetrics(Collector):
         away = CounterMetricFamily(
             "robomesh_turned_away", "Requests that found no place, by request", labels=["request"]
         )
+        over = CounterMetricFamily(
+            "robomesh_over_quota", "Requests of who has had its quota, by request", labels=["request"]
+        )
         took = HistogramMetricFamily(
             "robomesh_request_seconds", "From a request's coming to its answer", labels=["request"]
         )
         for request, count in sorted(tally.turned_away.items()):
             away.add_metric([request], count)
+            over.add_metric([request], tally.over_quota[request])
             latencies = tally.latencies[request]
             took.add_metric([request], _buckets(latencies), latencies.sum_s)
         yield away
+        yield over
         yield took
         for measure in tuple(self._session.measures):
             yield _own(measure)

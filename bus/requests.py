@@ -12,9 +12,9 @@ from threading import Lock
 import zenoh
 from google.protobuf.message import Message
 
-from bus import keys, topics
+from bus import keys, pieces, topics
 from bus.endpoints import ON_THE_SECOND_LINK, first_line, settle
-from bus.errors import BusyError, MessageError, NoAnswerError, RefusedError
+from bus.errors import BusyError, MessageError, NoAnswerError, QuotaError, RefusedError
 from bus.latencies import Latencies
 from bus.messages import JSON, PROTOBUF, TEXT, decode, decode_request, encode, is_json
 
@@ -30,6 +30,8 @@ _MARK_BYTES = 8
 _MOST_MARKS = 256
 _BUSY = "too many requests wait for this owner already: ask again, and less often"
 _BUSY_TEXT = f"{TEXT};busy"
+# Behind it: when to ask again [s].
+_QUOTA_TEXT = f"{TEXT};quota="
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +40,7 @@ class Request:
 
     Attributes:
         message: Of the request's schema; None where it has none.
-        chunk: What stood in the place of the row's `*`: the operator, the view, the mesh.
+        chunk: What stood in the place of the row's first `*`: the operator, the view, the mesh.
         received_ns: When it came, before it waited for anything; ns since the Unix epoch.
     """
 
@@ -46,6 +48,11 @@ class Request:
     message: Message | None
     chunk: str
     received_ns: int = 0
+
+    @property
+    def asker(self) -> str:
+        """In whose name it is asked, where its row is `in_name`."""
+        return self.key.topic.rpartition("/")[2]
 
 
 Handler = Callable[[Request], Awaitable[Message | bytes]]
@@ -73,6 +80,7 @@ class Answerer:
 
     Attributes:
         turned_away: How many were told that too many wait.
+        over_quota: How many were told that their asker has had its quota.
         latencies: How long the others took, from coming to their answer.
     """
 
@@ -93,11 +101,12 @@ class Answerer:
         self._loop = asyncio.get_running_loop()
         self._tasks: set[asyncio.Task[None]] = set()
         self._begun: dict[bytes, asyncio.Future[Message | bytes]] = {}
+        self._long = pieces.LongAnswers()
         # By the key that was asked, so by asker where the row has a place for one.
         self._unanswered = Counter[str]()
         self._most_of_one = _MOST_OF_ONE if "*" in name else _MOST
         self._counting = Lock()  # Zenoh's thread counts up, the loop's down
-        self.turned_away = 0
+        self.turned_away = self.over_quota = 0
         self.latencies = Latencies()
         self._closed = False
         # `*` in the row is the asker's: one chunk.
@@ -123,6 +132,8 @@ class Answerer:
         return self._row.name
 
     def _hand_over(self, query: zenoh.Query) -> None:
+        if self._long.reply_piece(query):
+            return
         received_ns = time.time_ns()
         asked = str(query.key_expr)
         with self._counting:
@@ -160,6 +171,10 @@ class Answerer:
             try:
                 request = self._read(key, query, encoding, received_ns)
                 answer = await self._handled(request, query)
+            except QuotaError as error:
+                self.over_quota += 1
+                query.reply_err(str(error).encode(), encoding=f"{_QUOTA_TEXT}{error.again_s:.3f}")
+                return
             except (RefusedError, MessageError) as error:
                 query.reply_err(str(error).encode(), encoding=TEXT)
                 return
@@ -171,9 +186,10 @@ class Answerer:
                 return
             as_json = is_json(encoding)
             if isinstance(answer, bytes):
-                query.reply(str(key), answer, encoding=_OCTETS)
+                self._long.reply(query, str(key), answer, _OCTETS)
             else:
-                query.reply(str(key), encode(answer, as_json=as_json), encoding=JSON if as_json else PROTOBUF)
+                payload = encode(answer, as_json=as_json)
+                self._long.reply(query, str(key), payload, JSON if as_json else PROTOBUF)
 
     async def _handled(self, request: Request, query: zenoh.Query) -> Message | bytes:
         """The handler's answer; of two copies of one request, which came over two links, the same."""
@@ -249,10 +265,16 @@ async def ask_all(
         answers = max(answers, await done, key=len)
         if answers:
             break
-    return answers
+    found: list[tuple[str, bytes | None, RefusedError | None]] = []
+    for owner, answer, refused in answers:
+        if isinstance(answer, pieces.First):
+            answer = await pieces.whole(session, answer, _zenoh(row.priority), timeout_s=timeout_s)
+        if answer is not None or refused is not None:
+            found.append((owner, answer, refused))
+    return found
 
 
-_Answers = list[tuple[str, bytes | None, RefusedError | None]]
+_Answers = list[tuple[str, bytes | pieces.First | None, RefusedError | None]]
 
 
 def _get(
@@ -272,10 +294,10 @@ def _get(
         if reply.ok is not None:
             # Zenoh sees to it that it is a key that was asked.
             if not keys.has_wildcard(str(reply.ok.key_expr)):
-                answers.append((str(reply.ok.key_expr), reply.ok.payload.to_bytes(), None))
+                answer = pieces.first_of(reply.ok) or reply.ok.payload.to_bytes()
+                answers.append((str(reply.ok.key_expr), answer, None))
         elif reply.err is not None and (encoding := str(reply.err.encoding)).startswith(TEXT):
-            error = BusyError if encoding == _BUSY_TEXT else RefusedError
-            answers.append((key, None, error(reply.err.payload.to_string())))
+            answers.append((key, None, _refused(reply.err.payload.to_string(), encoding)))
 
     def finish() -> None:
         if not done.done():
@@ -286,7 +308,7 @@ def _get(
             loop.call_soon_threadsafe(finish)
 
     session.get(
-        key,
+        pieces.selector(key),
         zenoh.handlers.Callback(on_reply, on_end),
         payload=payload,
         encoding=PROTOBUF,
@@ -296,33 +318,55 @@ def _get(
         consolidation=zenoh.ConsolidationMode.NONE,
         # The default, BLOCK, would stall joint states on a full link.
         congestion_control=zenoh.CongestionControl.DROP,
-        priority=getattr(zenoh.Priority, priority.value),
+        priority=_zenoh(priority),
         timeout=timeout_s,
     )
 
 
+def _zenoh(priority: topics.Priority) -> zenoh.Priority:
+    found: zenoh.Priority = getattr(zenoh.Priority, priority.value)
+    return found
+
+
+def _refused(text: str, encoding: str) -> RefusedError:
+    """What an owner's refusal means, by how it is encoded."""
+    if encoding == _BUSY_TEXT:
+        return BusyError(text)
+    if encoding.startswith(_QUOTA_TEXT):
+        try:
+            return QuotaError(text, again_s=max(float(encoding.removeprefix(_QUOTA_TEXT)), _AGAIN_S))
+        except ValueError:
+            pass  # another's nonsense: a refusal all the same
+    return RefusedError(text)
+
+
 async def ask_bytes(session: zenoh.Session, key: str, payload: bytes, *, timeout_s: float) -> bytes:
-    """The one answer to a request, as bytes; an owner who is busy or starting is asked again.
+    """The one answer to a request, as bytes.
+
+    An owner who is busy or starting is asked again, and so is one whose quota gives something in time.
 
     Raises:
         RefusedError: With the owner's words.
         BusyError: If the owner had no place for it, until the end.
+        QuotaError: If the quota gives nothing before the end.
         NoAnswerError: If nobody answered in time.
     """
     loop = asyncio.get_running_loop()
     deadline = loop.time() + timeout_s
-    busy: BusyError | None = None
+    busy: BusyError | QuotaError | None = None
     while (left_s := deadline - loop.time()) > 0:
-        busy = None
+        # Zenoh answers at once that there is no owner.
+        busy, again_s = None, _AGAIN_S
         for _, answer, error in await ask_all(session, key, payload, timeout_s=left_s):
             if isinstance(error, BusyError):
                 busy = error
+            elif isinstance(error, QuotaError) and error.again_s < deadline - loop.time():
+                busy, again_s = error, error.again_s
             elif error is not None:
                 raise error
             elif answer is not None:
                 return answer
-        # Zenoh answers at once that there is no owner.
-        await asyncio.sleep(min(_AGAIN_S, left_s))
+        await asyncio.sleep(min(again_s, left_s))
     if busy is not None:
         raise busy
     raise NoAnswerError(f"nobody answered {key} within {timeout_s:g} s: is its service running?")

@@ -66,6 +66,11 @@ class Session:
         """Whether a router is there now."""
         return bool(self.zenoh_session.info.routers_zid())
 
+    @property
+    def own_name(self) -> str:
+        """In whose name it asks: its certificate's; without one any name goes, and it is this process's."""
+        return self.identity if self.principal is None else self.principal.name
+
     def declare_publisher(
         self, site: str, robot: str, topic: str, *, on_get: OnGet | None = None
     ) -> Publisher:

@@ -39,6 +39,7 @@ class Tally:
     skipped: Counter[str] = field(default_factory=Counter)
     malformed: Counter[str] = field(default_factory=Counter)
     turned_away: Counter[str] = field(default_factory=Counter)
+    over_quota: Counter[str] = field(default_factory=Counter)
     latencies: defaultdict[str, Latencies] = field(default_factory=lambda: defaultdict(Latencies))
 
     def add(self, declared: object) -> None:
@@ -54,12 +55,13 @@ class Tally:
                 self.malformed[name] += declared.malformed
             case Answerer():
                 self.turned_away[declared.name] += declared.turned_away
+                self.over_quota[declared.name] += declared.over_quota
                 self.latencies[declared.name].add_all(declared.latencies)
 
     def copy(self) -> "Tally":
         """One of its own."""
         tally = Tally()
-        for name in ("published", "received", "lost", "skipped", "malformed", "turned_away"):
+        for name in ("published", "received", "lost", "skipped", "malformed", "turned_away", "over_quota"):
             getattr(tally, name).update(getattr(self, name))
         for request, latencies in self.latencies.items():
             tally.latencies[request].add_all(latencies)

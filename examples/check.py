@@ -20,8 +20,8 @@ ROUTER = sys.argv[3] if len(sys.argv) > 3 else "tcp/127.0.0.1:7447"
 async def main() -> int:
     """Do it."""
     async with open_session(SessionSettings(connect=(ROUTER,), wait_s=2.0)) as session:
-        request = CheckRequest(program=PROGRAM)
-        answer = await session.ask(f"robomesh/{ROBOT}/kinematics/check", request, timeout_s=30.0)
+        key = f"robomesh/{ROBOT}/kinematics/check/{session.own_name}"
+        answer = await session.ask(key, CheckRequest(program=PROGRAM), timeout_s=30.0)
     for each in answer.violations:
         print(f"line {each.line}, {each.time_s:.2f} s: {each.kind}: {each.text}")
     print(f"{answer.duration_s:.2f} s, {'nothing wrong' if answer.ok else 'not as it should be'}")

@@ -11,8 +11,9 @@ from functools import partial
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
-from bus.errors import RefusedError
+from bus.errors import QuotaError, RefusedError
 from bus.keys import WHOLE_SITE
+from bus.quotas import DEFAULT_QUOTAS, Quota, Quotas
 from bus.requests import Answerer, Request
 from bus.schemas.robomesh_pb2 import Event, KeyFrameAnswer, ViewAnswer, ViewRequest
 from bus.session import Session
@@ -37,7 +38,7 @@ _TIDY_EACH_S = 1.0
 # A view of one's own: so long for the first watcher to come, and for another after the last one.
 _COMES_WITHIN_S, _COMES_BACK_WITHIN_S = 10.0, 5.0
 # Of as many views as may be asked for, so many may be as large and fast as the renderer's own, or as this.
-_FULL_VIEWS = 0.25
+_FULL_VIEWS = 0.125
 _FULL_PIXELS_PER_S = 1280 * 720 * 30.0
 
 
@@ -54,6 +55,7 @@ class Settings:
         shading: "fast" or "full".
         device: Number of the EGL device; None: EGL's own choice.
         most_views: That may be asked for beside its own, of all robots together.
+        quotas: Of each asker.
         folder: Where meshes are kept.
     """
 
@@ -65,7 +67,8 @@ class Settings:
     samples: int = 4
     shading: str = "fast"
     device: int | None = None
-    most_views: int = 16
+    most_views: int = 32
+    quotas: Quotas = DEFAULT_QUOTAS
     folder: Path = field(default_factory=cache_folder)
 
 
@@ -131,6 +134,7 @@ class _Renderer:
         self._active: set[Stream] = set()
         self._wake = asyncio.Event()
         self._pace = Pace()
+        self._key_frames = Quota("key_frames", a_minute=settings.quotas.key_frames_a_minute)
         self._pictures = 0
         self._events = session.declare_publisher(settings.site, WHOLE_SITE, "events/renderer")
         session.measure("views", "Views that can be watched", lambda: len(self._streams))
@@ -168,9 +172,9 @@ class _Renderer:
         self._open(state, far(self._first(state), size=settings.size, fps=settings.fps))
         self._answerers[state.name] = [
             self._session.answer(
-                state.site, state.name, "video/*/keyframe", partial(self._answer_key_frame, state)
+                state.site, state.name, "video/*/keyframe/*", partial(self._answer_key_frame, state)
             ),
-            self._session.answer(state.site, state.name, "views", partial(self._answer_view, state)),
+            self._session.answer(state.site, state.name, "views/*", partial(self._answer_view, state)),
         ]
         log.info("%s/%s: views %s", state.site, state.name, ", ".join((*names, FAR)))
 
@@ -213,8 +217,8 @@ class _Renderer:
     async def finish(self, drawn: Drawn, order: Order) -> Finished:
         return await _in(self._encoding, self._finishing.finish, drawn.picture, drawn.camera, order)
 
-    def _open(self, state: RobotState, shot: Shot) -> Stream:
-        stream = self._streams[state.name, shot.name] = Stream(self._session, state, shot, self)
+    def _open(self, state: RobotState, shot: Shot, asker: str = "") -> Stream:
+        stream = self._streams[state.name, shot.name] = Stream(self._session, state, shot, self, asker=asker)
         return stream
 
     def _close(self, key: tuple[str, str]) -> None:
@@ -236,7 +240,11 @@ class _Renderer:
             streams = [each for each in self._streams.values() if each.state is state]
             known = [each.shot.name for each in streams if not each.shot.requested]
             raise RefusedError(str(UnknownViewError(request.chunk, known)))
-        return KeyFrameAnswer(forced=stream.ask_key_frame())
+        self._key_frames.check(request.asker, 1.0)
+        forced = stream.ask_key_frame()
+        if forced:
+            self._key_frames.count(request.asker, 1.0)
+        return KeyFrameAnswer(forced=forced)
 
     async def _answer_view(self, state: RobotState, request: Request) -> ViewAnswer:
         wanted, settings = request.message, self._settings
@@ -250,8 +258,8 @@ class _Renderer:
                 )
                 stream = self._streams.get((state.name, shot.name))
             if stream is None:
-                self._check_room(shot)
-                stream = self._open(state, shot)
+                self._check_room(shot, request.asker)
+                stream = self._open(state, shot, request.asker)
         except RendererError as error:
             raise RefusedError(str(error)) from None
         stream.stay()
@@ -267,22 +275,40 @@ class _Renderer:
         own = stream is not None and not stream.shot.requested and wanted == ViewRequest(of=wanted.of)
         return stream if own else None
 
-    def _check_room(self, shot: Shot) -> None:
+    def _check_room(self, shot: Shot, asker: str) -> None:
+        """Whether one more may be drawn; a view counts for who asked for it first, as long as it is there.
+
+        Raises:
+            NoRoomError: If there is no place for it, whoever asks.
+            QuotaError: If this asker has its share.
+        """
         settings = self._settings
-        others = [stream.shot for stream in self._streams.values() if stream.shot.requested]
+        asked_for = [stream for stream in self._streams.values() if stream.shot.requested]
+        others = [stream.shot for stream in asked_for]
         if len(others) >= settings.most_views:
             raise NoRoomError(
                 f"{len(others)} views were asked for already, and {settings.most_views} are possible "
                 "(most_views of the site file's [renderer]): ask again when some of them end"
             )
         own = standing("", size=settings.size, fps=settings.fps).pixels_per_s
-        most = max(settings.most_views * _FULL_VIEWS, 1.0) * max(own, _FULL_PIXELS_PER_S)
+        full = max(own, _FULL_PIXELS_PER_S)
+        most = max(settings.most_views * _FULL_VIEWS, 1.0) * full
         left = most - sum(other.pixels_per_s for other in others)
         if shot.pixels_per_s > left:
             raise NoRoomError(
                 f"{shot.size[0]} x {shot.size[1]} at {shot.fps:g} a second is {shot.pixels_per_s / 1e6:.1f} "
                 f"million pixels a second: {max(left, 0.0) / 1e6:.1f} of {most / 1e6:.1f} million are left "
                 "for views that are asked for; ask for a smaller or slower one"
+            )
+        quota = settings.quotas.views
+        had = [stream.shot for stream in asked_for if stream.asker == asker]
+        share = max(most * quota / settings.most_views, full)
+        if len(had) >= quota or sum(each.pixels_per_s for each in had) + shot.pixels_per_s > share:
+            raise QuotaError(
+                f"{NoRoomError.SIGN}{asker} has {len(had)} views already: quota views = {quota} a name, and "
+                f"{share / 1e6:.1f} million pixels a second (the site file's [quotas]); ask again "
+                f"{_COMES_BACK_WITHIN_S:g} s after one of them is left, or for a smaller or slower one",
+                again_s=_COMES_BACK_WITHIN_S,
             )
 
     # -------------------------------------------------------------- painting

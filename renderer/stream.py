@@ -54,11 +54,14 @@ class Stream:
         name: Of the robot and the view.
         quiet_since: When the last watcher left, or somebody asked for it [s]; None: it is watched.
         awaited: Nobody has watched since it was asked for.
+        asker: In whose name it was asked for first; empty: it is the renderer's own.
     """
 
-    def __init__(self, session: Session, state: RobotState, shot: Shot, workshop: Workshop) -> None:
+    def __init__(
+        self, session: Session, state: RobotState, shot: Shot, workshop: Workshop, *, asker: str = ""
+    ) -> None:
         """Declare the view's topics."""
-        self.state, self.shot = state, shot
+        self.state, self.shot, self.asker = state, shot, asker
         self.name = f"{state.name}/{shot.name}"
         self.quiet_since: float | None = time.monotonic()
         self.awaited = True

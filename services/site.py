@@ -37,6 +37,7 @@ from services.site_console import beside as console_beside
 from services.site_fixtures import Clearance, Fixture, fixture_problem, name_problem
 from services.site_legacy import LegacyClients, Quiet
 from services.site_pictures import ALWAYS_RENDERED, Recorder, Renderer
+from services.site_quotas import Quotas
 from services.site_router import RoutedSite, beside
 from services.site_sentences import sentence
 
@@ -160,6 +161,7 @@ class Site(RoutedSite):
     define: Define = Define()
     audit: Audit = Audit()
     watch: Watch = Watch()
+    quotas: Quotas = Quotas()
 
     @field_validator("robot")
     @classmethod

@@ -67,4 +67,4 @@ class Renderer(BaseModel):
     # Of the machine's EGL devices, where it has several GPUs.
     device: Annotated[int, Field(ge=0, le=63)] | None = None
     # That may be asked for beside these, of all robots together.
-    most_views: Annotated[int, Field(ge=0, le=256)] = 16
+    most_views: Annotated[int, Field(ge=0, le=256)] = 32

@@ -20,7 +20,9 @@ from services.site_legacy import Quiet
 # A site's robots are at #/<site>/<robot>: one of these names would hide them behind a page.
 _PAGES = ("define", "events", "program", "recordings", "settings", "wall")
 # What else a site file may hold; `services/site.py` says what.
-OF_OTHERS = frozenset({"robot", "fixture", "recorder", "renderer", "console", "define", "audit", "watch"})
+OF_OTHERS = frozenset(
+    {"robot", "fixture", "recorder", "renderer", "console", "define", "audit", "watch", "quotas"}
+)
 # `beijing` or `beijing=tls/10.1.0.1:7447`: a site that let us in, and where it is if not where it said.
 _SITE_LINK = re.compile(r"([a-z0-9][a-z0-9_-]*)(?:=(\S+))?")
 
@@ -42,6 +44,8 @@ class Router(BaseModel):
         connect: Other routers: an endpoint, or a site that let us in (`robomesh keys accept`).
         access: Who may do what; that of the site's keys unless given.
         border: `slow` lets out to other sites only what a slow line carries.
+        line_mbit: What the narrowest line to another site carries [Mbit/s], so that video waits here and not
+            in front of joint states; None: nobody knows.
     """
 
     model_config = Quiet
@@ -51,6 +55,7 @@ class Router(BaseModel):
     tls: TlsFiles | None = None
     access: Path | None = None
     border: Border = "open"
+    line_mbit: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
     insecure: StrictBool = False
 
     @field_validator("connect")

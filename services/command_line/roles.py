@@ -100,7 +100,7 @@ def kinematics(path: Path | None, connect: str, started: str, metrics: str = "")
     )
     service.run(
         role.serve,
-        role.Settings(site=site.site, robots=robots),
+        role.Settings(site=site.site, robots=robots, quotas=site.quotas.settings),
         service="kinematics",
         session_settings=_session(site, connect, "kinematics"),
         present_for=_each_robot(site),
@@ -121,6 +121,7 @@ def recorder(path: Path | None, connect: str, metrics: str = "") -> None:
         flight=role.flight_of(site.recorder.flight.model_dump()),
         split=role.Split(**site.recorder.split.model_dump()),
         marks=role.marks_of(site.recorder.free.model_dump()),
+        quotas=site.quotas.settings,
         site_file="" if path is None else role.without_secrets(path.read_text(encoding="utf-8")),
     )
     service.run(
@@ -162,6 +163,7 @@ def renderer(path: Path | None, connect: str, metrics: str = "") -> None:
         shading=site.renderer.shading,
         device=site.renderer.device,
         most_views=site.renderer.most_views,
+        quotas=site.quotas.settings,
     )
     service.run(
         role.serve,

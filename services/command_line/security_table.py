@@ -18,7 +18,7 @@ ROBOTS = (NOBODYS_ROBOT, f"{REPLAY}{NOBODYS_ROBOT}", VAGUE)
 def names(row: Topic | Request, who: Principal) -> list[str]:
     """A row's names as somebody might use them: in the own name, in another's, in a request's."""
     if isinstance(row, Request) and row.in_name:
-        stem = row.name.rpartition("/")[0]
+        stem = row.name.rpartition("/")[0].replace("*", NOBODYS_ROBOT)
         called = [each.name for each in REQUESTS.values() if each.wildcard]
         return [f"{stem}/{each}" for each in (who.name, f"nobody.{who.site}x", *called)]
     if row.name == "events/*":

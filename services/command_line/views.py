@@ -40,23 +40,26 @@ async def view_of(
     try:
         if width or height or fps:
             request = ViewRequest(of=name, width=width, height=height, fps=fps)
-            answer = await session.ask(robot_key(*robot, "views"), request, timeout_s=_TIMEOUT_S)
+            answer = await session.ask(_views(session, robot), request, timeout_s=_TIMEOUT_S)
             assert isinstance(answer, ViewAnswer)
             return View(robot_key(*robot, answer.topic), robot_key(*robot, answer.image), answer.fps)
         view = View(robot_key(*robot, f"video/{name}"), robot_key(*robot, f"image/{name}"))
         # Who draws no such view says which there are.
-        await session.ask(f"{view.video}/keyframe", KeyFrameRequest(), timeout_s=_TIMEOUT_S)
+        key = f"{view.video}/keyframe/{session.own_name}"
+        await session.ask(key, KeyFrameRequest(), timeout_s=_TIMEOUT_S)
         return view._replace(fps=await _rate(session, robot, name))
     except NoAnswerError:
         raise NoRendererError(f"nobody draws {robot}: is the renderer of {robot.site} running?") from None
 
 
+def _views(session: Session, robot: find.Robot) -> str:
+    return robot_key(*robot, f"views/{session.own_name}")
+
+
 async def _rate(session: Session, robot: find.Robot, name: str) -> float:
     """A view's highest rate [1/s]; 0: no renderer has it, it is a recording's."""
     with contextlib.suppress(BusError):
-        answer = await session.ask(
-            robot_key(*robot, "views"), ViewRequest(of=name), timeout_s=_RATE_TIMEOUT_S
-        )
+        answer = await session.ask(_views(session, robot), ViewRequest(of=name), timeout_s=_RATE_TIMEOUT_S)
         assert isinstance(answer, ViewAnswer)
         return answer.fps
     return 0.0

@@ -14,7 +14,7 @@ from typing import Any
 from google.protobuf.message import DecodeError
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from bus import topics
+from bus import keys, topics
 from bus.errors import BusError, BusyError, NoAnswerError, RefusedError
 from bus.schemas.robomesh_pb2 import FromPage, KeyFrameRequest, ToPage, ViewAnswer, ViewRequest
 from bus.session import Session
@@ -73,6 +73,8 @@ class Browser:
     ) -> None:
         self.operator = OperatorPresence(session)
         self.who, self.own_name = who, own_name
+        # Who is nobody asks as this connection, as its page does.
+        self._asker = own_name or self.operator.id
         self._greet, self._site = greet, site
         self._session = session
         self._feeds = feeds
@@ -160,6 +162,7 @@ class Browser:
                 expression,
                 self._feeds,
                 self._views,
+                asker=self._asker,
                 on_frame=self._wake.set,
                 on_starved=self._want_key_frame,
             )
@@ -241,7 +244,7 @@ class Browser:
 
         async def ask() -> None:
             try:
-                await self._session.ask(f"{key}/keyframe", KeyFrameRequest())
+                await self._session.ask(f"{key}/keyframe/{self._asker}", KeyFrameRequest())
             except BusError as error:
                 log.debug("no key frame on %s: %s", key, error)
 
@@ -287,10 +290,10 @@ class Browser:
 
     def _learn_view(self, ask: FromPage.Ask, payload: bytes) -> None:
         """What a page was given as a view of its own can be reduced like any other."""
-        robot_key, _, name = ask.key.rpartition("/")
-        if name == "views":
+        site, robot, name = keys.parse_key(ask.key)
+        if topics.request(name).request is ViewRequest:
             request, answer = ViewRequest.FromString(ask.payload), ViewAnswer.FromString(payload)
-            self._views.learn(robot_key, request, answer)
+            self._views.learn(f"{keys.ROOT}/{site}/{robot}", request, answer)
 
     def _keep(self, work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.create_task(work)

@@ -136,7 +136,7 @@ class Hub:
         self.meshes = MeshCache()
         self.feeds = Feeds(session)
         self.views = Views(session)
-        self.pictures = Pictures(self.feeds, self.views)
+        self.pictures = Pictures(self.feeds, self.views, self.asker)
         self._alive: set[PresenceKey] = set()
         self._browsers: set[Browser] = set()
         self._before = Counter[str]()  # of browsers that have gone
@@ -209,6 +209,10 @@ class Hub:
             events.put(event)
 
         return Desk(accounts, self.settings.site, tell)
+
+    def asker(self, scope: Scope) -> str:
+        """In whose name something is asked for over HTTP."""
+        return self._own_name(scope.get("signed_in")) or self.session.own_name
 
     def _own_name(self, who: SignedIn | None) -> str:
         """The one operator that a page asks as; empty: any, where no certificate says who is who.
@@ -283,7 +287,7 @@ def application(hub: Hub) -> ASGIApp:
         WebSocketRoute("/mesh", hub.browse),
         Route("/mesh/{site}/{robot}/{name}", mesh, methods=["GET"]),
         *hub.pictures.routes(),
-        *Recordings(hub.session).routes(),
+        *Recordings(hub.session, hub.asker).routes(),
         *([] if hub.define is None else [hub.define.routes()]),
         Mount("/", PageFiles(directory=hub.settings.page, html=True)),
     ]

@@ -14,7 +14,7 @@ import contextlib
 import logging
 import time
 from collections import Counter
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -26,9 +26,10 @@ from starlette.datastructures import QueryParams
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
+from starlette.types import Scope
 
 from bus import keys
-from bus.errors import BusError, KeyNameError, NoAnswerError, RefusedError
+from bus.errors import BusError, KeyNameError, NoAnswerError, QuotaError, RefusedError
 from bus.schemas.robomesh_pb2 import VideoFrames, ViewRequest
 from bus.subscription import Sample
 from renderer.errors import Mp4Error, NoRoomError
@@ -75,10 +76,15 @@ class _Size(NamedTuple):
 
 @dataclass
 class Pictures:
-    """The routes, and how many use them now."""
+    """The routes, and how many use them now.
+
+    Attributes:
+        asker: In whose name something is asked for over HTTP.
+    """
 
     feeds: Feeds
     views: Views
+    asker: Callable[[Scope], str]
     streams: Counter[str] = field(default_factory=Counter)  # by address
     stills: int = 0
 
@@ -147,13 +153,15 @@ class Pictures:
             raise PictureError(404, str(error)) from None
         wanted = ViewRequest(of=view, width=size.width, height=size.height, fps=size.fps)
         try:
-            answer = await self.views.ask(robot, wanted)
+            answer = await self.views.ask(robot, wanted, self.asker(request.scope))
         except NoAnswerError as error:
             raise PictureError(
                 503,
                 f"no renderer draws {path['site']}/{path['robot']}: is there such a robot, and does its "
                 f"renderer run? ({error})",
             ) from None
+        except QuotaError as error:
+            raise PictureError(429, str(error)) from None
         except RefusedError as error:
             if str(error).startswith(NoRoomError.SIGN):
                 raise PictureError(503, str(error)) from None
@@ -161,7 +169,7 @@ class Pictures:
             status = 404
             if any(size):
                 with contextlib.suppress(BusError):
-                    await self.views.ask(robot, ViewRequest(of=view))
+                    await self.views.ask(robot, ViewRequest(of=view), self.asker(request.scope))
                     status = 400
             raise PictureError(status, str(error)) from None
         return _View(f"{robot}/{answer.topic}", f"{robot}/{answer.image}", max(answer.fps, 1.0))

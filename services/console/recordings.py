@@ -12,8 +12,8 @@ import csv
 import io
 import logging
 import re
-from collections.abc import AsyncIterator
-from typing import TypeVar
+from collections.abc import AsyncIterator, Callable
+from typing import NamedTuple, TypeVar
 from urllib.parse import quote
 
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
@@ -21,8 +21,9 @@ from google.protobuf.message import DecodeError, Message
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
+from starlette.types import Scope
 
-from bus.errors import BusError, KeyNameError, NoAnswerError, RefusedError
+from bus.errors import BusError, KeyNameError, NoAnswerError, QuotaError, RefusedError
 from bus.keys import WHOLE_SITE, robot_key
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
@@ -42,11 +43,22 @@ _ROWS = 2000
 _RANGE = re.compile(r"bytes=(\d{0,19})-(\d{0,19})")
 
 
-class Recordings:
-    """The routes, and how many use them now."""
+class _Where(NamedTuple):
+    """Whose recorder is asked, and in whose name."""
 
-    def __init__(self, session: Session) -> None:
-        self._session = session
+    site: str
+    asker: str
+
+
+class Recordings:
+    """The routes, and how many use them now.
+
+    Args:
+        asker: In whose name something is asked for over HTTP.
+    """
+
+    def __init__(self, session: Session, asker: Callable[[Scope], str]) -> None:
+        self._session, self._asker = session, asker
         self._downloads = 0
 
     def routes(self) -> list[Route]:
@@ -59,9 +71,9 @@ class Recordings:
 
     async def file(self, request: Request) -> Response:
         """The file, or a range of it."""
-        site, name = request.path_params["site"], request.path_params["file"]
+        where, name = self._where(request), request.path_params["file"]
         try:
-            first = await self._piece(site, schema.PieceRequest(file=name, length=1))
+            first = await self._piece(where, schema.PieceRequest(file=name, length=1))
         except BusError as error:
             return _refused(error)
         total, tag = first.total, f'"{first.version}"'
@@ -90,14 +102,14 @@ class Recordings:
         headers["Content-Length"] = str(end - begin)
         if request.method == "HEAD":
             return Response(status_code=status, headers=headers)
-        return self._streamed(self._bytes(site, name, first.version, begin, end), headers, status)
+        return self._streamed(self._bytes(where, name, first.version, begin, end), headers, status)
 
     async def thumbnail(self, request: Request) -> Response:
         """A picture of what was recorded."""
-        site, name = request.path_params["site"], request.path_params["file"]
+        where, name = self._where(request), request.path_params["file"]
         asked = schema.PieceRequest(file=name, attachment="thumbnail.jpg", length=4 << 20)
         try:
-            piece = await self._piece(site, asked)
+            piece = await self._piece(where, asked)
         except BusError as error:
             return _refused(error)
         # A part of an open file's name may be written again, so it is asked for again, and seldom sent.
@@ -108,9 +120,9 @@ class Recordings:
 
     async def values(self, request: Request) -> Response:
         """Joints and tool, a row a state."""
-        site, name = request.path_params["site"], request.path_params["file"]
+        where, name = self._where(request), request.path_params["file"]
         try:
-            info = await self._ask(site, "info", schema.RecordingQuery(file=name))
+            info = await self._ask(where, "info", schema.RecordingQuery(file=name))
             assert isinstance(info, schema.Recording)
             topics = {each.topic.split("/", 3)[-1]: each.topic for each in info.topics if each.messages}
             if "joints" not in topics:
@@ -123,7 +135,7 @@ class Recordings:
             "Content-Type": "text/csv; charset=utf-8",
             "Content-Disposition": f"attachment; filename*=UTF-8''{saved}",
         }
-        return self._streamed(self._lines(site, info, topics), headers, 200)
+        return self._streamed(self._lines(where, info, topics), headers, 200)
 
     def _streamed(self, content: AsyncIterator[bytes], headers: dict[str, str], status: int) -> Response:
         if self._downloads >= _MOST_DOWNLOADS:
@@ -136,28 +148,32 @@ class Recordings:
 
         return Streamed(content, headers, status=status, within_s=_READS_WITHIN_S, on_end=end)
 
-    async def _bytes(self, site: str, name: str, version: str, begin: int, end: int) -> AsyncIterator[bytes]:
+    async def _bytes(
+        self, where: _Where, name: str, version: str, begin: int, end: int
+    ) -> AsyncIterator[bytes]:
         while begin < end:
             asked = schema.PieceRequest(file=name, offset=begin, length=min(_PIECE, end - begin))
-            piece = await self._piece(site, asked)
+            piece = await self._piece(where, asked)
             if piece.version != version or not piece.data:
                 # The answer has begun: only breaking it off tells.
                 raise RecordingChangedError(f"{name} was written again while it was sent")
             begin += len(piece.data)
             yield piece.data
 
-    async def _lines(self, site: str, info: schema.Recording, topics: dict[str, str]) -> AsyncIterator[bytes]:
+    async def _lines(
+        self, where: _Where, info: schema.Recording, topics: dict[str, str]
+    ) -> AsyncIterator[bytes]:
         description: schema.Description | None = None
         if "description" in topics:
-            async for _, data in self._messages(site, info.file, topics["description"]):
+            async for _, data in self._messages(where, info.file, topics["description"]):
                 description = _decoded(schema.Description, data) or description
-        tools = self._messages(site, info.file, topics["kinematics"]) if "kinematics" in topics else None
+        tools = self._messages(where, info.file, topics["kinematics"]) if "kinematics" in topics else None
         tool = None if tools is None else await anext(tools, None)
         table: Table | None = None
         before: list[str] = []
         text = io.StringIO()
         writer = csv.writer(text)
-        async for time_ns, data in self._messages(site, info.file, topics["joints"]):
+        async for time_ns, data in self._messages(where, info.file, topics["joints"]):
             state = _decoded(JointStates, data)
             if state is None:
                 continue
@@ -179,11 +195,11 @@ class Recordings:
                 text.truncate()
         yield text.getvalue().encode()
 
-    async def _messages(self, site: str, name: str, topic: str) -> AsyncIterator[tuple[int, bytes]]:
+    async def _messages(self, where: _Where, name: str, topic: str) -> AsyncIterator[tuple[int, bytes]]:
         """All of a topic; as many as there may be of one time."""
         asked = schema.RangeRequest(file=name, topic=topic, most=_ROWS)
         while True:
-            answer = await self._ask(site, "range", asked)
+            answer = await self._ask(where, f"range/{where.asker}", asked)
             assert isinstance(answer, schema.RecordedMessages)
             times = [message.received.ToNanoseconds() for message in answer.messages]
             for time_ns, message in zip(times, answer.messages, strict=True):
@@ -195,15 +211,18 @@ class Recordings:
             asked.skip = times.count(last) + (asked.skip if still else 0)
             asked.start.FromNanoseconds(last)
 
-    async def _piece(self, site: str, asked: schema.PieceRequest) -> schema.Piece:
-        piece = await self._ask(site, "piece", asked)
+    def _where(self, request: Request) -> _Where:
+        return _Where(request.path_params["site"], self._asker(request.scope))
+
+    async def _piece(self, where: _Where, asked: schema.PieceRequest) -> schema.Piece:
+        piece = await self._ask(where, f"piece/{where.asker}", asked)
         assert isinstance(piece, schema.Piece)
         return piece
 
-    async def _ask(self, site: str, what: str, asked: Message) -> Message:
-        key = robot_key(site, WHOLE_SITE, f"recordings/{what}")
+    async def _ask(self, where: _Where, what: str, asked: Message) -> Message:
+        key = robot_key(where.site, WHOLE_SITE, f"recordings/{what}")
         for timeout_s in _TIMEOUTS_S[:-1]:
-            with contextlib.suppress(NoAnswerError):
+            with contextlib.suppress(NoAnswerError, QuotaError):
                 return await self._session.ask(key, asked, timeout_s=timeout_s)
         return await self._session.ask(key, asked, timeout_s=_TIMEOUTS_S[-1])
 
@@ -225,5 +244,5 @@ def _decoded(kind: type[AnyMessage], data: bytes) -> AnyMessage | None:
 
 
 def _refused(error: BusError) -> Response:
-    status = 400 if isinstance(error, KeyNameError) else 504 if isinstance(error, NoAnswerError) else 404
-    return PlainTextResponse(str(error), status_code=status)
+    statuses = {KeyNameError: 400, NoAnswerError: 504, QuotaError: 429}
+    return PlainTextResponse(str(error), status_code=statuses.get(type(error), 404))

@@ -33,6 +33,9 @@ _TOO_MUCH_WITHIN_S = 8.0
 class SteppedVideo:
     """A browser's watch of one view.
 
+    Args:
+        asker: In whose name less of it is asked for.
+
     Attributes:
         key: As the browser named it, and as its samples are named whatever is watched for it.
         step: How far it is reduced; 0: not at all.
@@ -44,11 +47,12 @@ class SteppedVideo:
         feeds: Feeds,
         views: Views,
         *,
+        asker: str,
         on_frame: Callable[[], None],
         on_starved: Callable[[str], None],
     ) -> None:
         self.key, self.step = key, 0
-        self._feeds, self._views = feeds, views
+        self._feeds, self._views, self._asker = feeds, views, asker
         self._on_frame, self._on_starved = on_frame, on_starved
         self._lane = VideoLane()
         self._source: str | None = None
@@ -109,7 +113,7 @@ class SteppedVideo:
 
     async def _change(self, step: int) -> None:
         try:
-            source = await self._views.reduced(self.key, step)
+            source = await self._views.reduced(self.key, step, self._asker)
         except BusError as error:
             # There is no less of it: frames are left out, and it goes on at key frames.
             log.debug("%s is not reduced: %s", self.key, error)

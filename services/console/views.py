@@ -24,14 +24,14 @@ class Views:
         self._session = session
         self._known: OrderedDict[str, tuple[ViewRequest, ViewAnswer]] = OrderedDict()
 
-    async def ask(self, robot_key: str, request: ViewRequest) -> ViewAnswer:
-        """The topics of a view of one's own.
+    async def ask(self, robot_key: str, request: ViewRequest, asker: str) -> ViewAnswer:
+        """The topics of a view of one's own, asked for in somebody's name.
 
         Raises:
             RefusedError: With the renderer's reason.
             NoAnswerError: If no renderer answers.
         """
-        answer = await self._session.ask(f"{robot_key}/views", request, timeout_s=TIMEOUT_S)
+        answer = await self._session.ask(f"{robot_key}/views/{asker}", request, timeout_s=TIMEOUT_S)
         if not isinstance(answer, ViewAnswer) or not answer.topic:
             raise RefusedError(f"{robot_key}/views was answered with no view")
         self.learn(robot_key, request, answer)
@@ -45,8 +45,10 @@ class Views:
         while len(self._known) > _MOST_KNOWN:
             self._known.popitem(last=False)
 
-    async def reduced(self, key: str, step: int) -> str:
+    async def reduced(self, key: str, step: int, asker: str) -> str:
         """The key of a view's video, reduced by so many steps; all slow browsers share it.
+
+        It is asked for in the name of the one that needs it; whoever was first has it counted.
 
         Raises:
             RefusedError: If there is no less of it: it is a recording's.
@@ -58,8 +60,8 @@ class Views:
         known = self._known.get(key)
         if known is None:
             request = ViewRequest(of=view)
-            known = request, await self.ask(robot_key, request)
-        answer = await self.ask(robot_key, less(*known, step))
+            known = request, await self.ask(robot_key, request, asker)
+        answer = await self.ask(robot_key, less(*known, step), asker)
         return f"{robot_key}/{answer.topic}"
 
 

@@ -106,7 +106,7 @@ class Lane:
 
     async def _ask_for_key_frame(self) -> None:
         try:
-            await self._session.ask(f"{self._keys[0]}/keyframe", KeyFrameRequest())
+            await self._session.ask(f"{self._keys[0]}/keyframe/{self._session.own_name}", KeyFrameRequest())
         except BusError as error:
             log.debug("no key frame on %s: %s", self._keys[0], error)
 

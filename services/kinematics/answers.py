@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bus.errors import RefusedError
+from bus.quotas import Quota
 from bus.requests import Request
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
@@ -43,12 +44,14 @@ def answer_about(
     meshes: Mapping[str, bytes],
     place: Place,
     workers: Workers,
+    checks: Quota,
 ) -> None:
     """Answer what is asked about an arm from now on.
 
     Args:
         meshes: GLB bytes by the last part of their key.
         place: Of its cell.
+        checks: Each asker's, of all arms together: one process answers them.
     """
 
     async def answer_mesh(request: Request) -> bytes:
@@ -78,12 +81,13 @@ def answer_about(
             raise RefusedError(f"start: nobody knows where {robot} is now; give it")
         others, _ = place.others(robot)
         question = CheckQuestion(robot, asked.SerializeToString(), start, others)
-        return schema.CheckAnswer.FromString(await _asked(workers.check, question, _CHECK_S))
+        with checks.one(request.asker):
+            return schema.CheckAnswer.FromString(await _asked(workers.check, question, _CHECK_S))
 
     session.answer(site, robot, "mesh/*", answer_mesh)
     session.answer(site, robot, "kinematics/forward", answer_forward)
     session.answer(site, robot, "kinematics/inverse", answer_inverse)
-    session.answer(site, robot, "kinematics/check", answer_check)
+    session.answer(site, robot, "kinematics/check/*", answer_check)
 
 
 def _positions(model: RobotModel, field: str, given: Sequence[float], robot: str) -> FloatArray:

@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Sequence
 
+from bus.quotas import Quota
 from bus.session import Session
 from bus.worker import Worker
 from robots.cells import CellDescription
@@ -36,18 +37,25 @@ async def serve(session: Session, settings: Settings) -> None:
     """
     cells = tuple({id(robot.place): robot.place for robot in settings.robots}.values())
     workers = Workers(Worker(_WORKER, cells, nice=_NICE), Worker(_WORKER, cells, nice=_NICE))
+    quotas = settings.quotas
+    checks = Quota("checks", at_once=quotas.checks, a_minute=quotas.checks_a_minute)
     try:
         async with asyncio.TaskGroup() as group:
             for cell in cells:
                 robots = [robot for robot in settings.robots if robot.place is cell]
-                group.create_task(_serve_cell(session, settings.site, cell, robots, workers))
+                group.create_task(_serve_cell(session, settings.site, cell, robots, workers, checks))
     finally:
         gc.unfreeze()
         await workers.close()
 
 
 async def _serve_cell(
-    session: Session, site: str, cell: CellDescription, robots: Sequence[RobotSettings], workers: Workers
+    session: Session,
+    site: str,
+    cell: CellDescription,
+    robots: Sequence[RobotSettings],
+    workers: Workers,
+    checks: Quota,
 ) -> None:
     place = Place({robot.name: robot.stale_after_s for robot in robots}, time.monotonic)
     fixtures = await asyncio.to_thread(fixture_meshes, cell)
@@ -55,7 +63,7 @@ async def _serve_cell(
         # Hulls take their time: what a robot is, and where, does not wait for them.
         built = group.create_task(asyncio.to_thread(build_cell, cell))
         for robot in robots:
-            group.create_task(_serve_robot(session, site, robot, place, built, fixtures, workers))
+            group.create_task(_serve_robot(session, site, robot, place, built, fixtures, workers, checks))
         await built
         # What lives as long as the service is no garbage to search: a fifth of a second, now and then.
         gc.freeze()
@@ -69,6 +77,7 @@ async def _serve_robot(
     built: asyncio.Task[Cell],
     fixtures: Sequence[FixtureMesh],
     workers: Workers,
+    checks: Quota,
 ) -> None:
     (robot,) = (each for each in settings.place.robots if each.name == settings.name)
     description = load(robot.model, confined=robot.confined)
@@ -82,6 +91,7 @@ async def _serve_robot(
         meshes=meshes | {each.name: each.glb for each in fixtures},
         place=place,
         workers=workers,
+        checks=checks,
     )
     message = describe(
         description,

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from bus.quotas import DEFAULT_QUOTAS, Quotas
 from robots.cells import CellDescription
 
 
@@ -24,7 +25,8 @@ class RobotSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """The robots of a site."""
+    """The robots of a site, and what each asker may have of their kinematics."""
 
     site: str
     robots: tuple[RobotSettings, ...]
+    quotas: Quotas = DEFAULT_QUOTAS

@@ -201,6 +201,7 @@ class _Recorder:
             settings.folder,
             open_now=self._open_now,
             flight=self._flight_runs,
+            quotas=settings.quotas,
         )
         self._owned: int | None = None
         # Captures that the disk ended, by file: what the files themselves cannot tell.

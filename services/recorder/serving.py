@@ -7,12 +7,14 @@ from google.protobuf.message import Message
 
 from bus.errors import RefusedError
 from bus.keys import WHOLE_SITE
+from bus.quotas import DEFAULT_QUOTAS, Quota, Quotas
 from bus.requests import Request
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
 from bus.worker import Worker, WorkerError
 from mcap_files.errors import RecordingError
 from services.recorder.answers import Question
+from services.recorder.settings import MIB
 
 _MODULE = "services.recorder.reader"
 _NICE = 5
@@ -29,6 +31,7 @@ class Serving:
     Args:
         open_now: The captures that are being written, by their files' names.
         flight: Whether the flight recorder keeps what comes.
+        quotas: Of each asker.
     """
 
     def __init__(
@@ -39,13 +42,15 @@ class Serving:
         *,
         open_now: Callable[[], dict[str, schema.Recording]],
         flight: Callable[[], bool],
+        quotas: Quotas = DEFAULT_QUOTAS,
     ) -> None:
         self._open_now, self._flight = open_now, flight
         self._quick, self._long = (Worker(_MODULE, folder, nice=_NICE) for _ in range(2))
-        answers = {"list": self._list, "info": self._info}
-        for name in ("list", "info", "range", "series", "piece"):
-            handler = answers.get(name) or self._handler(name)
-            session.answer(site, WHOLE_SITE, f"recordings/{name}", handler)
+        self._mebibytes = Quota("recordings_mib", a_minute=quotas.recordings_mib_a_minute)
+        session.answer(site, WHOLE_SITE, "recordings/list", self._list)
+        session.answer(site, WHOLE_SITE, "recordings/info", self._info)
+        for name in ("range", "series", "piece"):
+            session.answer(site, WHOLE_SITE, f"recordings/{name}/*", self._handler(name))
 
     async def close(self) -> None:
         """End the processes."""
@@ -61,7 +66,10 @@ class Serving:
 
         async def answer(request: Request) -> Message:
             assert request.message is not None
-            return schemas[name].FromString(await self._ask(name, request.message))
+            self._mebibytes.check(request.asker)
+            answer = await self._ask(name, request.message)
+            self._mebibytes.count(request.asker, len(answer) / MIB)
+            return schemas[name].FromString(answer)
 
         return answer
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from bus.quotas import DEFAULT_QUOTAS, Quotas
 from bus.schemas.robomesh_pb2 import Event
 
 MIB = 1 << 20
@@ -73,6 +74,7 @@ class Settings:
         robots: Those that can be recorded from the start; others of the site once their gateway is there.
         views: Those whose video a capture holds, unless its request names others.
         flight: None: no flight recorder.
+        quotas: Of each asker of recordings.
         site_file: The site file's text, which goes into each recording; empty: there is none.
     """
 
@@ -83,4 +85,5 @@ class Settings:
     flight: Flight | None = None
     split: Split = Split()
     marks: Marks = Marks()
+    quotas: Quotas = DEFAULT_QUOTAS
     site_file: str = ""

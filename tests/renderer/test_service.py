@@ -68,7 +68,7 @@ def test_key_frames_are_forced_at_most_once_a_second(mesh, tmp_path):
     async def main():
         async with hall(mesh, tmp_path) as (robot, monitor), moving(robot):
             await frames(monitor.subscribe("robomesh/hall/arm/video/front", newest=100, history=False), 3)
-            key = "robomesh/hall/arm/video/front/keyframe"
+            key = "robomesh/hall/arm/video/front/keyframe/li"
             forced = False
             while not forced:
                 asked_s = time.monotonic()

@@ -8,8 +8,16 @@ import numpy as np
 import pytest
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from bus.errors import RefusedError
-from bus.schemas.robomesh_pb2 import Description, Vector3, View, ViewAnswer, ViewRequest
+from bus.errors import QuotaError, RefusedError
+from bus.quotas import Quotas
+from bus.schemas.robomesh_pb2 import (
+    Description,
+    KeyFrameRequest,
+    Vector3,
+    View,
+    ViewAnswer,
+    ViewRequest,
+)
 from bus.session import open_session
 from renderer import service
 from renderer.mp4 import FragmentedMp4
@@ -22,8 +30,8 @@ BESIDE = View(
 )
 
 
-async def ask(monitor, **fields):
-    answer = await monitor.ask(f"{ARM}/views", ViewRequest(**fields), timeout_s=5.0)
+async def ask(monitor, asker="li", **fields):
+    answer = await monitor.ask(f"{ARM}/views/{asker}", ViewRequest(**fields), timeout_s=5.0)
     assert isinstance(answer, ViewAnswer)
     return answer
 
@@ -89,7 +97,9 @@ def test_a_view_of_one_s_own_is_drawn_shared_and_ends_when_nobody_watches(mesh, 
 
 def test_a_request_that_is_not_possible_is_refused_and_harms_nobody(mesh, tmp_path):
     async def main():
-        async with hall(mesh, tmp_path, most_views=4) as (robot, monitor), moving(robot):
+        quotas = Quotas(views=1, key_frames_a_minute=1.0)
+        hall_of_quotas = hall(mesh, tmp_path, most_views=4, quotas=quotas)
+        async with hall_of_quotas as (robot, monitor), moving(robot):
             await picture(monitor)
             video = monitor.subscribe(f"{ARM}/video/front", newest=100, history=False)
             await frames(video, 3)
@@ -104,6 +114,18 @@ def test_a_request_that_is_not_possible_is_refused_and_harms_nobody(mesh, tmp_pa
                 with pytest.raises(RefusedError) as caught:
                     await ask(monitor, **fields)
                 assert says in str(caught.value)
+            # What one has had is nothing to another.
+            mine = await ask(monitor, of="top", width=240, height=200)
+            assert await ask(monitor, of="top", width=240, height=200) == mine
+            with pytest.raises(QuotaError, match="no room: li has 1 views already: quota views = 1 a name"):
+                await ask(monitor, of="left", width=240, height=200)
+            await ask(monitor, "wang", of="left", width=240, height=200)
+            key = f"{ARM}/video/front/keyframe"
+            while not (await monitor.ask(f"{key}/li", KeyFrameRequest())).forced:
+                await asyncio.sleep(0.05)
+            with pytest.raises(QuotaError, match="key_frames_a_minute = 1 a name"):
+                await monitor.ask(f"{key}/li", KeyFrameRequest())
+            await monitor.ask(f"{key}/wang", KeyFrameRequest())
             await frames(video, 3)
 
     run(main())

@@ -132,6 +132,8 @@ def test_a_monitor_sees_everything_and_asks_for_nothing_but_a_stop_in_its_own_na
                     assert not answer.ok
                     assert "zhao is a monitor" in answer.error
                     assert "needs an operator" in answer.error
+                answer = await browser.ask(8, "robomesh/s/r/views/li.s", b"")
+                assert answer.error == "zhao asks in the name zhao.s only, not as li.s"
                 forged = schema.StopRequest(by="li", reason="the page").SerializeToString()
                 assert (await browser.ask(9, "robomesh/s/r/stop", forged)).ok
                 assert [(what, message.by) for what, _, message in asked] == [("stop", "zhao.s")]

@@ -64,7 +64,7 @@ async def rendered(mesh, page):  # noqa: F811
                 raise RefusedError(str(NoRoomError("1 views were asked for already")))
             return ViewAnswer(topic="video/free-1", image="image/free-1", width=160, height=90, fps=20)
 
-        other.answer("s", "r", "views", views)
+        other.answer("s", "r", "views/*", views)
         images = [other.declare_publisher("s", "r", f"image/{name}") for name in ("front", "free-1")]
         videos = [other.declare_publisher("s", "r", f"video/{name}") for name in ("front", "free-1")]
 

@@ -73,7 +73,7 @@ class Steps:
     def __init__(self, refused=False):
         self.refused = refused
 
-    async def reduced(self, key, step):
+    async def reduced(self, key, step, asker):
         if self.refused:
             raise RefusedError("a recording's video is as it is")
         return key if step == 0 else f"{key}-{step}"
@@ -87,7 +87,9 @@ class Clock:
 
 
 def watch(feeds, views=None):
-    return SteppedVideo(KEY, feeds, views or Steps(), on_frame=lambda: None, on_starved=lambda key: None)
+    return SteppedVideo(
+        KEY, feeds, views or Steps(), asker="li", on_frame=lambda: None, on_starved=lambda key: None
+    )
 
 
 async def settled():
@@ -206,16 +208,16 @@ def test_a_renderer_is_asked_for_less_of_what_everybody_watches_and_of_what_a_pa
             )
 
         async with open_session(mesh) as own, open_session(mesh) as other:
-            other.answer("s", "r", "views", answer)
+            other.answer("s", "r", "views/*", answer)
             views = Views(own)
-            assert await views.reduced(KEY, 1) == "robomesh/s/r/video/free-2"
+            assert await views.reduced(KEY, 1, "li") == "robomesh/s/r/video/free-2"
             assert (asked[-1].of, asked[-1].width, asked[-1].height, asked[-1].fps) == ("top", 640, 360, 15)
             page_asked = ViewRequest(of="front", width=320, height=180, fps=10)
             views.learn(
                 "robomesh/s/r", page_asked, ViewAnswer(topic="video/free-9", width=320, height=180, fps=10)
             )
-            await views.reduced("robomesh/s/r/video/free-9", 1)
+            await views.reduced("robomesh/s/r/video/free-9", 1, "li")
             assert (asked[-1].of, asked[-1].width, asked[-1].fps) == ("front", 160, 5)
-            assert await views.reduced(KEY, 0) == KEY
+            assert await views.reduced(KEY, 0, "li") == KEY
 
     run(main())

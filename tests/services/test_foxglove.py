@@ -162,7 +162,7 @@ def test_video_decodes_and_nobody_draws_before_somebody_watches_or_after(mesh):
 
         async with hall(mesh) as robot, bridge(mesh) as address, attached(address) as client:
             robot.declare_publisher("hall", "arm", "description").put(description())
-            robot.answer("hall", "arm", "video/*/keyframe", key_frame)
+            robot.answer("hall", "arm", "video/*/keyframe/*", key_frame)
             video = robot.declare_publisher("hall", "arm", "video/front")
             for number in range(3):
                 frame(number, key_frame=number == 0)

@@ -201,21 +201,27 @@ def test_inverse_and_check_are_answered_by_processes_that_end_with_the_service(m
             answer = await monitor.ask(f"{key}/inverse", request, timeout_s=20.0)
             assert answer.solutions[0].joint_positions == pytest.approx(HOME.tolist(), abs=1e-6)
             request = schema.CheckRequest(program="move_joints 30 90 -90 0 0\nhome\n")
-            answer = await monitor.ask(f"{key}/check", request, timeout_s=20.0)
+            answer = await monitor.ask(f"{key}/check/li", request, timeout_s=20.0)
             assert answer.ok, answer
             assert answer.duration_s > 1.0
             assert "right is left out: nobody knows where it is now" in answer.notes
+            # Two at once are one's own; the others are asked for again.
+            many = [monitor.ask(f"{key}/check/li", request, timeout_s=20.0) for _ in range(8)]
+            assert all(each.ok for each in await asyncio.gather(*many))
+            assert gateway.tally().over_quota["kinematics/check/*"] > 0
             with pytest.raises(RefusedError, match="start: 2 given, left has 5 joints"):
-                await monitor.ask(f"{key}/check", schema.CheckRequest(program="home", start=[0.0, 0.0]))
+                await monitor.ask(f"{key}/check/li", schema.CheckRequest(program="home", start=[0.0, 0.0]))
             with pytest.raises(RefusedError, match="start: nobody knows where right is now; give it"):
-                await monitor.ask("robomesh/hall/right/kinematics/check", schema.CheckRequest(program="home"))
+                await monitor.ask(
+                    "robomesh/hall/right/kinematics/check/li", schema.CheckRequest(program="home")
+                )
             with pytest.raises(RefusedError, match="the pose has 3 numbers"):
                 await monitor.ask(f"{key}/inverse", schema.InverseRequest(pose=[1.0] * 3, task=1))
             children = [each.pid for each in workers]
             assert all(alive(pid) for pid in children)
             monkeypatch.setattr(answers, "_CHECK_S", 1e-6)
             with pytest.raises(RefusedError, match="given up: no answer within 1e-06 s"):
-                await monitor.ask(f"{key}/check", schema.CheckRequest(program="home"))
+                await monitor.ask(f"{key}/check/li", schema.CheckRequest(program="home"))
             return children
 
     monkeypatch.setattr(kinematics.kinematics, "Worker", keep)

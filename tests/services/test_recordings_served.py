@@ -12,7 +12,8 @@ import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from starlette.applications import Starlette
 
-from bus.errors import RefusedError
+from bus.errors import QuotaError, RefusedError
+from bus.quotas import DEFAULT_QUOTAS, Quotas
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import open_session
 from mcap_files.errors import RecordingError
@@ -34,10 +35,10 @@ def folder(tmp_path):
 
 
 @asynccontextmanager
-async def served(mesh, folder, **open_now):
+async def served(mesh, folder, quotas=DEFAULT_QUOTAS, **open_now):
     """A recorder's answers, and somebody who asks."""
     async with open_session(mesh) as own, open_session(mesh) as asker:
-        serving = Serving(own, "site", folder, open_now=lambda: open_now, flight=lambda: True)
+        serving = Serving(own, "site", folder, open_now=lambda: open_now, flight=lambda: True, quotas=quotas)
         try:
             yield asker
         finally:
@@ -49,17 +50,20 @@ def test_recordings_are_listed_ranged_and_refused_over_the_mesh(mesh, folder):
 
     async def main():
         writing = schema.Recording(file="zz.mcap", open=True)
-        async with served(mesh, folder, **{"zz.mcap": writing}) as session:
+        quotas = Quotas(recordings_mib_a_minute=1e-4)
+        async with served(mesh, folder, quotas, **{"zz.mcap": writing}) as session:
             listed = await session.ask(f"{BASE}/list", timeout_s=20.0)
             info = await session.ask(f"{BASE}/info", schema.RecordingQuery(file="trial.mcap"))
             asked = schema.RangeRequest(file="trial.mcap", topic=JOINTS, most=10)
             asked.start.FromNanoseconds(START_NS + 1_000_000_000)
-            messages = await session.ask(f"{BASE}/range", asked)
+            messages = await session.ask(f"{BASE}/range/li", asked)
+            with pytest.raises(QuotaError, match=r"recordings_mib_a_minute = 0\.0001 a name .* ask again in"):
+                await session.ask(f"{BASE}/range/li", asked)
             with pytest.raises(RefusedError, match=r"no recording 'gone\.mcap' here"):
                 await session.ask(f"{BASE}/info", schema.RecordingQuery(file="gone.mcap"))
             asked.start.FromNanoseconds(START_NS + 60_000_000_000)
             with pytest.raises(RefusedError, match=r"nothing from .* it goes from 2023-11-14"):
-                await session.ask(f"{BASE}/range", asked)
+                await session.ask(f"{BASE}/range/wang", asked)
             return listed, info, messages
 
     listed, info, messages = run(main())

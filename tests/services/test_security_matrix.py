@@ -25,9 +25,19 @@ VAGUE = ("*", "ar$*")
 DEADLINE_S = 20.0
 # Who sees and answers everything: the site's second router.
 WITNESS = "router-2.here"
-IN_NAME = ("lease/request/*", "command/*", "alarms/request/*")
+IN_NAME = (
+    "lease/request/*",
+    "command/*",
+    "alarms/request/*",
+    "kinematics/check/*",
+    "views/*",
+    "video/*/keyframe/*",
+    "recordings/range/*",
+    "recordings/series/*",
+    "recordings/piece/*",
+)
 # As an operator's name: what is allowed on the request's key must not hold it.
-REQUESTS_OF_ONE_WORD = ("stop", "views")
+REQUESTS_OF_ONE_WORD = ("stop",)
 
 
 @dataclass
@@ -318,6 +328,7 @@ def test_another_sites_router_speaks_for_its_own_site_and_its_own_people_only(me
     arrived = Arrived()
     subscriber = witness.session.declare_subscriber("robomesh/**", arrived)
     names = ["command/li.here", "command/li.there", "command/li.third", "lease/request/li.there", "stop"]
+    names += ["views/li.here", "views/li.there", "views/li.third"]
     answers = answering(witness, [key(OWN_ROBOT, each) for each in names])
     witness.settle()
     for site, topic in product(sites, ("joints", "events", "audit", "video/x")):
@@ -329,8 +340,11 @@ def test_another_sites_router_speaks_for_its_own_site_and_its_own_people_only(me
     assert arrived.once_there(wanted) == wanted
     by = asked(guest, [key(OWN_ROBOT, each) for each in names])
     assert {each for each, answered in by.items() if answered} == {
-        key(OWN_ROBOT, each) for each in ("command/li.there", "lease/request/li.there", "stop")
+        key(OWN_ROBOT, each)
+        for each in ("command/li.there", "lease/request/li.there", "views/li.there", "stop")
     }
+    by = asked(guests[HUB], [key(OWN_ROBOT, each) for each in names])  # of everybody, but of us
+    assert {each for each in names if not by[key(OWN_ROBOT, each)]} == {"command/li.here", "views/li.here"}
     for each in (subscriber, *answers):
         each.undeclare()
     queryables = answering(guest, [key(OWN_ROBOT, "command/x", site) for site in sites])

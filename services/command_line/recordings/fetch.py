@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from bus.errors import NoAnswerError
+from bus.errors import NoAnswerError, QuotaError
 from bus.keys import WHOLE_SITE, robot_key
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
@@ -66,7 +66,7 @@ async def _fetch(what: str, out: Path, router: str, *, into: bool) -> _Fetched:
         site, recording = await found(session, what)
         name = recording.file
         out = out / name if into else out
-        key = robot_key(site, WHOLE_SITE, "recordings/piece")
+        key = robot_key(site, WHOLE_SITE, f"recordings/piece/{session.own_name}")
         first = await _piece(session, key, schema.PieceRequest(file=name, length=1))
         # Its version in the name: what belongs to another is never gone on with.
         version = hashlib.sha256(first.version.encode()).hexdigest()[:12]
@@ -88,7 +88,7 @@ async def _fetch(what: str, out: Path, router: str, *, into: bool) -> _Fetched:
 
 async def _piece(session: Session, key: str, asked: schema.PieceRequest) -> schema.Piece:
     for _ in range(_TRIES):
-        with contextlib.suppress(NoAnswerError):
+        with contextlib.suppress(NoAnswerError, QuotaError):
             return await _once(session, key, asked)
     return await _once(session, key, asked)
 

@@ -53,13 +53,11 @@ def check_right(row: topics.Request, key: str, who: SignedIn, site: str) -> None
     """
     if who.ended:
         raise RefusedError("nobody is signed in here any more")
-    if Role.MONITOR in row.askers:
-        return
-    account = who.account
-    if not account.may_command:
+    account, everybody = who.account, Role.MONITOR in row.askers
+    if not everybody and not account.may_command:
         raise RefusedError(lacks_right(account, row.name.removesuffix("/*")))
     check_own_name(row, key, operator_name(account.name, site), who=account.name)
-    if who.resting:
+    if not everybody and who.resting:
         raise RefusedError(PASSWORD_AGAIN)
 
 

@@ -114,6 +114,11 @@ export function watch(expression: string, listener: Listener): () => void {
   };
 }
 
+/** A request's key in this page's name: its account's or console's, else its connection's own. */
+export function inOwnName(key: string): string {
+  return `${key}/${hello.value?.operator || hello.value?.session || "page"}`;
+}
+
 /** Asks a request of the mesh.
  *
  * @throws AskError with the reason in words. */

@@ -2,7 +2,7 @@
 
 import type { View } from "./gen/robomesh_pb";
 import { ViewAnswerSchema, ViewRequestSchema } from "./gen/robomesh_pb";
-import { ask } from "./mesh";
+import { ask, inOwnName } from "./mesh";
 
 /** What is wanted to be seen; a width of 0: as the renderer has it for everybody. */
 export interface Wanted {
@@ -59,7 +59,8 @@ export function withView(
     const { of, view, width, height, fps } = wanted;
     const request = view ? { view, width, height, fps } : { of, width, height, fps };
     try {
-      const answer = await ask(`${robotKey}/views`, ViewRequestSchema, request, ViewAnswerSchema, ASK_S);
+      const key = inOwnName(`${robotKey}/views`);
+      const answer = await ask(key, ViewRequestSchema, request, ViewAnswerSchema, ASK_S);
       take(answer.topic, answer.image);
     } catch (error) {
       if (ended) return;

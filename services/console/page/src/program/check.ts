@@ -4,7 +4,7 @@ import { effect, signal } from "@preact/signals";
 import { CheckAnswerSchema, CheckRequestSchema } from "../gen/robomesh_pb";
 import type { CheckAnswer, CheckAnswer_Violation } from "../gen/robomesh_pb";
 import { reasonOf } from "../control";
-import { ask } from "../mesh";
+import { ask, inOwnName } from "../mesh";
 import { draft } from "./draft";
 
 const TYPING_ENDS_MS = 800;
@@ -59,7 +59,7 @@ async function askNext(): Promise<void> {
     const asked: { robotKey: string; text: string } = wanted;
     const at = Date.now();
     try {
-      const key = `${asked.robotKey}/kinematics/check`;
+      const key = inOwnName(`${asked.robotKey}/kinematics/check`);
       const request = { program: asked.text, path: true };
       const answer = await ask(key, CheckRequestSchema, request, CheckAnswerSchema, WITHIN_S);
       if (wanted === asked) {

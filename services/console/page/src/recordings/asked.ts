@@ -16,7 +16,7 @@ import {
   SeriesRequestSchema,
 } from "../gen/robomesh_pb";
 import type { AuditEntry, Event, Recording, SeriesAnswer, SeriesAnswer_Series } from "../gen/robomesh_pb";
-import { AskError, ask, lostAt } from "../mesh";
+import { AskError, ask, inOwnName, lostAt } from "../mesh";
 import type { RecordingName } from "../route";
 import { startMs, topicOf } from "./facts";
 import { r } from "./texts";
@@ -74,7 +74,7 @@ export function useHappened(name: RecordingName | null, info: Recording | null):
           const channels = info.topics.map(({ topic }) => topic).filter((topic) => /^(events(\/.*)?|audit)$/.test(topicOf(topic)));
           const answers = await Promise.all(
             channels.map((topic) =>
-              ask(keyOf(name, "range"), RangeRequestSchema, { file: name.file, topic, most: MOST_EVENTS }, RecordedMessagesSchema, WITHIN_S),
+              ask(inOwnName(keyOf(name, "range")), RangeRequestSchema, { file: name.file, topic, most: MOST_EVENTS }, RecordedMessagesSchema, WITHIN_S),
             ),
           );
           const list = answers
@@ -112,7 +112,7 @@ export function useFirst(name: RecordingName | null, info: Recording | null): nu
             const topic = info.topics.find((each) => topicOf(each.topic) === "frames")?.topic;
             if (!topic) return 0;
             const request = { file: name.file, topic, most: 1 };
-            const { messages } = await ask(keyOf(name, "range"), RangeRequestSchema, request, RecordedMessagesSchema, WITHIN_S);
+            const { messages } = await ask(inOwnName(keyOf(name, "range")), RangeRequestSchema, request, RecordedMessagesSchema, WITHIN_S);
             const received = messages[0]?.received;
             return received ? (timestampMs(received) - startMs(info)) / 1000 : 0;
           }
@@ -155,7 +155,7 @@ export function useSeries(
 }
 
 function askSeries(name: RecordingName, request: object): Promise<SeriesAnswer> {
-  return ask(keyOf(name, "series"), SeriesRequestSchema, { file: name.file, ...request }, SeriesAnswerSchema, WITHIN_S);
+  return ask(inOwnName(keyOf(name, "series")), SeriesRequestSchema, { file: name.file, ...request }, SeriesAnswerSchema, WITHIN_S);
 }
 
 function keyOf({ site }: RecordingName, what: string): string {
