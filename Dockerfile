@@ -5,6 +5,7 @@
 
 FROM debian:12 AS base
 ENV DEBIAN_FRONTEND=noninteractive PYTHONUNBUFFERED=1
+# ca-certificates brings openssl, with which deploy/three-sites/make-keys makes the pages' certificates.
 RUN apt-get update -qq \
  && apt-get install -y -qq --no-install-recommends python3 python3-pip ca-certificates libgomp1 \
  && rm -rf /var/lib/apt/lists/*
