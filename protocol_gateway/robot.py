@@ -375,6 +375,7 @@ class Robot:
                 legacy_clients=None if self._legacy is None else self._legacy.counts,
                 policy=self._checks.policy,
                 unchecked=self._checks.problem,
+                check_starting=self._checks.starting,
                 now=now,
             )
         )

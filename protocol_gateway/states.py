@@ -79,6 +79,7 @@ def controller_state(
     speed_percent: float | None,
     policy: Policy,
     unchecked: str,
+    check_starting: bool,
     now: Now,
 ) -> schema.ControllerState:
     """All that is known of the controller; what it does not tell is "unknown"."""
@@ -99,6 +100,7 @@ def controller_state(
         speed_percent=speed_percent,
         check=_CHECKS[policy],
         check_text=unchecked,
+        check_starting=check_starting,
         counters=schema.LinkCounters(
             units_received=counters.units_received,
             units_malformed=counters.units_malformed,

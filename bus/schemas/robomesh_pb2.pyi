@@ -12,7 +12,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class ControllerState(_message.Message):
-    __slots__ = ("timestamp", "link", "mode", "activity", "homed", "trace", "fault", "last_unit_age_s", "controller_time_s", "counters", "read_only", "stop", "link_text", "rate_hz", "health", "audit_head", "legacy_clients", "speed_percent", "check", "check_text")
+    __slots__ = ("timestamp", "link", "mode", "activity", "homed", "trace", "fault", "last_unit_age_s", "controller_time_s", "counters", "read_only", "stop", "link_text", "rate_hz", "health", "audit_head", "legacy_clients", "speed_percent", "check", "check_text", "check_starting")
     class Link(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         LINK_UNSPECIFIED: _ClassVar[ControllerState.Link]
@@ -91,6 +91,7 @@ class ControllerState(_message.Message):
     SPEED_PERCENT_FIELD_NUMBER: _ClassVar[int]
     CHECK_FIELD_NUMBER: _ClassVar[int]
     CHECK_TEXT_FIELD_NUMBER: _ClassVar[int]
+    CHECK_STARTING_FIELD_NUMBER: _ClassVar[int]
     timestamp: _timestamp_pb2.Timestamp
     link: ControllerState.Link
     mode: ControllerState.Mode
@@ -111,7 +112,8 @@ class ControllerState(_message.Message):
     speed_percent: float
     check: ControllerState.Check
     check_text: str
-    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., link: _Optional[_Union[ControllerState.Link, str]] = ..., mode: _Optional[_Union[ControllerState.Mode, str]] = ..., activity: _Optional[_Union[ControllerState.Activity, str]] = ..., homed: _Optional[_Union[ControllerState.Known, str]] = ..., trace: _Optional[_Union[ControllerState.Known, str]] = ..., fault: _Optional[str] = ..., last_unit_age_s: _Optional[float] = ..., controller_time_s: _Optional[float] = ..., counters: _Optional[_Union[LinkCounters, _Mapping]] = ..., read_only: _Optional[bool] = ..., stop: _Optional[_Union[StopState, _Mapping]] = ..., link_text: _Optional[str] = ..., rate_hz: _Optional[float] = ..., health: _Optional[_Union[LinkHealth, _Mapping]] = ..., audit_head: _Optional[_Union[AuditHead, _Mapping]] = ..., legacy_clients: _Optional[_Union[LegacyClients, _Mapping]] = ..., speed_percent: _Optional[float] = ..., check: _Optional[_Union[ControllerState.Check, str]] = ..., check_text: _Optional[str] = ...) -> None: ...
+    check_starting: bool
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., link: _Optional[_Union[ControllerState.Link, str]] = ..., mode: _Optional[_Union[ControllerState.Mode, str]] = ..., activity: _Optional[_Union[ControllerState.Activity, str]] = ..., homed: _Optional[_Union[ControllerState.Known, str]] = ..., trace: _Optional[_Union[ControllerState.Known, str]] = ..., fault: _Optional[str] = ..., last_unit_age_s: _Optional[float] = ..., controller_time_s: _Optional[float] = ..., counters: _Optional[_Union[LinkCounters, _Mapping]] = ..., read_only: _Optional[bool] = ..., stop: _Optional[_Union[StopState, _Mapping]] = ..., link_text: _Optional[str] = ..., rate_hz: _Optional[float] = ..., health: _Optional[_Union[LinkHealth, _Mapping]] = ..., audit_head: _Optional[_Union[AuditHead, _Mapping]] = ..., legacy_clients: _Optional[_Union[LegacyClients, _Mapping]] = ..., speed_percent: _Optional[float] = ..., check: _Optional[_Union[ControllerState.Check, str]] = ..., check_text: _Optional[str] = ..., check_starting: _Optional[bool] = ...) -> None: ...
 
 class LinkHealth(_message.Message):
     __slots__ = ("jitter_s", "network_round_trip_s", "answer_s", "flooding")

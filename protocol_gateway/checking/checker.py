@@ -57,13 +57,18 @@ class Checker:
         """Why motions of a robot cannot be checked now; empty: they can."""
         return self._problems[robot]
 
+    def starting(self, robot: str) -> bool:
+        """Whether that is so only because the check is getting ready; a failure is more."""
+        return self._problems[robot] == _STARTING
+
     async def run(self) -> None:
         """Keep the process running and every robot's cell ready, until cancelled."""
         await self._wanted.wait()
         try:
             while True:
                 if self._worker.pid is None or self._worker.pid != self._process:
-                    self._problems = dict.fromkeys(self._robots, _STARTING)
+                    if not self._failed:
+                        self._problems = dict.fromkeys(self._robots, _STARTING)
                     self._process = await self._started()
                 await asyncio.sleep(0.1 if self._process is not None else _AGAIN_S)
         finally:

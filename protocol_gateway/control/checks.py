@@ -84,6 +84,11 @@ class Checks:
         """Why motions cannot be checked now; empty: they can, or need not."""
         return "" if self.policy is Policy.OFF else self._checker.problem(self._name)
 
+    @property
+    def starting(self) -> bool:
+        """Whether motions cannot be checked only because the check is getting ready."""
+        return self.policy is not Policy.OFF and self._checker.starting(self._name)
+
     def turn(self, requests: Sequence[CommandRequest]) -> AbstractAsyncContextManager[None]:
         """The cell, for commands that move the robot: nobody else's motion begins meanwhile."""
         moves = any(each.command in MOTION_COMMANDS for each in requests)

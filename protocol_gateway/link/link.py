@@ -241,7 +241,7 @@ class ControllerLink:
             quiet_s = now_s - max(last_s, connected_s)
             mute_s = quiet_s if self._unusable is None else now_s - self._unusable[0]
             if mute_s >= limit_s:
-                return f"{self._where} sent nothing for {limit_s:g} s; connecting again"
+                return f"{self._where} sends nothing; connecting again"
             if quiet_s >= patience_s and self._status.state is LinkState.UP:
                 self._fall_silent()
             wait_s = patience_s - quiet_s if quiet_s < patience_s else limit_s - mute_s
@@ -310,8 +310,7 @@ class ControllerLink:
     def _fall_silent(self) -> None:
         if self._unusable is None:
             self._handing.flood = Flood()
-            text = f"{self._where} has sent nothing for {self._settings.stale_after_s:g} s"
-            self._tell(LinkState.SILENT, text)
+            self._tell(LinkState.SILENT, f"{self._where} sends nothing")
         else:
             _, text, code = self._unusable
             self._tell(LinkState.SILENT, text, code)

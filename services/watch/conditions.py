@@ -5,6 +5,7 @@ A condition begins when it has been so for a while, and goes when it is so no mo
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 from bus.keys import WHOLE_SITE
 from bus.schemas.robomesh_pb2 import ControllerState
@@ -25,6 +26,7 @@ class Condition:
         told: Somebody else has published an event of it.
         latching: To acknowledge it is to know it: it may stay so for good.
         after_s: So long it must be so to begin.
+        steady: Its words are those that it began with: they say what is so, and why changes while it is.
     """
 
     robot: str = WHOLE_SITE
@@ -38,6 +40,7 @@ class Condition:
     told: bool = False
     latching: bool = False
     after_s: float = 0.0
+    steady: bool = False
 
     @property
     def id(self) -> str:
@@ -74,6 +77,8 @@ class Judge:
                 if now - self._since[name] < condition.after_s:
                     continue
                 began.append(condition)
+            elif condition.steady:
+                continue
             elif (before.text, before.code) != (condition.text, condition.code):
                 changed.append(condition)
             self.begun[name] = condition
@@ -90,10 +95,8 @@ def robot_conditions(robot: str, state: ControllerState, age_s: float) -> Iterat
         age_s: Of what it told; a gateway that is gone says nothing of it being over.
     """
 
-    def held(code: str, text: str, *, what: str = "", after_s: float = 0.0) -> Condition:
-        return Condition(
-            robot=robot, source="gateway", code=code, text=text, what=what, told=True, after_s=after_s
-        )
+    def held(code: str, text: str, **more: Any) -> Condition:
+        return Condition(robot=robot, source="gateway", code=code, text=text, told=True, **more)
 
     if age_s > _SILENT_AFTER_S:
         text = f"the gateway of {robot} has said nothing for more than {_SILENT_AFTER_S:g} s"
@@ -101,7 +104,8 @@ def robot_conditions(robot: str, state: ControllerState, age_s: float) -> Iterat
         yield Condition(robot=robot, code="gateway.silent", text=text, over=over)
     if state.link in _LINK:
         text = f"link to the controller: {state.link_text or 'not up'}"
-        yield held(_LINK[state.link], text, what="link", after_s=_LINK_AFTER_S)
+        # One that is frozen is silent, given up and connected to, again and again: that is one alarm.
+        yield held(_LINK[state.link], text, what="link", after_s=_LINK_AFTER_S, steady=True)
     if state.fault or state.activity == ControllerState.FAULT:
         yield held(
             "controller.fault", f"the controller has a fault: {state.fault or 'it does not say which'}"
@@ -115,5 +119,5 @@ def robot_conditions(robot: str, state: ControllerState, age_s: float) -> Iterat
         )
     if state.health.flooding:
         yield held("link.flooding", "the controller sends far too much: only the newest is published")
-    if state.check_text:
+    if state.check_text and not state.check_starting:
         yield held("check.missing", f"motions are not checked: {state.check_text}", after_s=_CHECK_AFTER_S)

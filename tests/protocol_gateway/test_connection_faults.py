@@ -30,10 +30,10 @@ def test_of_a_frozen_controller_old_states_are_silent_within_a_second_then_it_is
             await until(lambda: plant.controller.link == STATE.SILENT)
             # 1 s after the last unit, and what a busy machine adds.
             assert time.monotonic() - begin_s < 1.0 + 1.5
-            assert "has sent nothing for 0.95 s" in (await plant.event("link.silent", -1)).text
+            assert "sends nothing" in (await plant.event("link.silent", -1)).text
             joints = len(plant.seen["joints"])
             await until(lambda: plant.controller.link == STATE.DOWN)
-            assert "sent nothing for 4 s; connecting again" in (await plant.event("link.down", -1)).text
+            assert "sends nothing; connecting again" in (await plant.event("link.down", -1)).text
             assert len(plant.seen["joints"]) == joints
             await fault("freeze", off=True)
             await until(lambda: plant.controller.link == STATE.UP, timeout_s=40.0)

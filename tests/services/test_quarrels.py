@@ -3,10 +3,10 @@
 import pytest
 
 from bus.keys import PresenceKey
-from bus.schemas.robomesh_pb2 import ServiceHealth
+from bus.schemas.robomesh_pb2 import ControllerState, ServiceHealth
 from services import site as site_file
 from services.errors import SiteFileError
-from services.watch.conditions import Condition, Judge
+from services.watch.conditions import Condition, Judge, robot_conditions
 from services.watch.mesh import Mesh
 from services.watch.quarrels import Expected, mesh_conditions
 
@@ -128,3 +128,25 @@ def test_a_router_that_is_to_link_to_itself_is_refused(tmp_path):
     )
     with pytest.raises(SiteFileError, match="localhost:7447 is given twice, to the router and to another"):
         site_file.load(path)
+
+
+def test_a_check_that_is_getting_ready_is_no_alarm_and_one_that_fails_is():
+    starting = ControllerState(link=ControllerState.UP, check_text="getting ready", check_starting=True)
+    failed = ControllerState(link=ControllerState.UP, check_text="the check does not work: no memory")
+    assert [each.code for each in robot_conditions("arm", starting, 0.0)] == []
+    assert [each.code for each in robot_conditions("arm", failed, 0.0)] == ["check.missing"]
+
+
+def test_a_frozen_controller_that_is_connected_to_again_and_again_is_one_alarm_in_the_same_words():
+    judge, state = Judge(), ControllerState(link=ControllerState.SILENT, link_text="10.0.0.7 sends nothing")
+
+    def judged(now_s: float) -> tuple[list[str], list[Condition], list[str]]:
+        began, changed, over = judge.judge(robot_conditions("arm", state, 0.0), now_s)
+        return [each.text for each in began], changed, [each.code for each in over]
+
+    assert judged(0.0) == ([], [], [])
+    assert judged(1.0) == (["link to the controller: 10.0.0.7 sends nothing"], [], [])
+    state.link, state.link_text = ControllerState.DOWN, "10.0.0.7 sends nothing; connecting again"
+    assert judged(4.0) == ([], [], [])
+    state.link = ControllerState.UP
+    assert judged(5.0) == ([], [], ["link.silent"])
