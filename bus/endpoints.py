@@ -19,6 +19,11 @@ _LINKS = ("1-4", "5-7")
 ON_THE_SECOND_LINK = (Priority.DATA, Priority.DATA_LOW, Priority.BACKGROUND)
 _NOBODYS_KEY = "robomesh/-/-/-"
 _SETTLE_S = 0.25
+# Of bulk, a connection over a line whose rate is told holds what the line carries in this long [s]: enough
+# to fill it over 80 ms there and back, and so little that what is urgent never waits for much.
+_HELD_S = 0.065
+# Linux counts each packet's own bookkeeping too.
+_LEAST_HELD_BYTES = 16_384
 # When a machine goes without a word, closing its connections holds the thread that does it for up to 10 s
 # (Zenoh sets SO_LINGER), and by default a process receives with two: a cut line silenced a site's own
 # services for as long. So there are more than can be held at once; a client has four connections.
@@ -87,16 +92,18 @@ def router_config(
     connect: tuple[str | Link, ...] = (),
     tls: Tls | None = None,
     access: Mapping[str, Any] = MappingProxyType({}),
+    line_bps: float | None = None,
 ) -> zenoh.Config:
     """The configuration of a router that listens, and links to other sites' routers.
 
     Args:
         access: Sections of Zenoh's configuration that say who may do what (`bus/access.py`).
+        line_bps: What the lines to the others carry [bit/s]; None: nobody knows.
 
     Raises:
         SessionError: If an endpoint is not one of Zenoh's.
     """
-    return _config(router_values(listen, connect, tls, access))
+    return _config(router_values(listen, connect, tls, access, line_bps))
 
 
 def router_values(
@@ -104,13 +111,17 @@ def router_values(
     connect: tuple[str | Link, ...] = (),
     tls: Tls | None = None,
     access: Mapping[str, Any] = MappingProxyType({}),
+    line_bps: float | None = None,
 ) -> dict[str, Any]:
     """As `router_config`, as keys of Zenoh's configuration and their values."""
+    held_bytes = None if line_bps is None else max(round(line_bps / 8 * _HELD_S), _LEAST_HELD_BYTES)
     return {
         "mode": "router",
         "listen/endpoints": list(listen),
         "connect/endpoints": [
-            _two_links(each) if isinstance(each, str) else _two_links(each.endpoint, each.tls)
+            _two_links(each, held_bytes=held_bytes)
+            if isinstance(each, str)
+            else _two_links(each.endpoint, each.tls, held_bytes=held_bytes)
             for each in connect
         ],
         # Nobody is scouted for; the default waits half a second for nobody.
@@ -142,8 +153,12 @@ def settle(session: zenoh.Session, priority: Priority) -> None:
             pass
 
 
-def _two_links(endpoint: str, tls: Tls | None = None) -> dict[str, Any]:
-    """Both links to a router; certificates that are for it alone stand in the endpoint itself."""
+def _two_links(endpoint: str, tls: Tls | None = None, held_bytes: int | None = None) -> dict[str, Any]:
+    """Both links to a router; certificates that are for it alone stand in the endpoint itself.
+
+    Args:
+        held_bytes: How much the second one's buffers hold, either way; None: what the system likes.
+    """
     address, _, own = endpoint.partition("#")
     separator = "&" if "?" in address else "?"
     options = [own] if own else []
@@ -153,8 +168,13 @@ def _two_links(endpoint: str, tls: Tls | None = None) -> dict[str, Any]:
             f"connect_certificate_file={tls.certificate}",
             f"connect_private_key_file={tls.key}",
         ]
-    tail = "#" + ";".join(options) if options else ""
-    return {"strategy": "allOf", "locators": [f"{address}{separator}prio={p}{tail}" for p in _LINKS]}
+    # Its own sending, and by the window that it offers the other end's.
+    short = [] if held_bytes is None else [f"so_sndbuf={held_bytes}", f"so_rcvbuf={held_bytes}"]
+    locators = []
+    for priorities, more in zip(_LINKS, ([], short), strict=True):
+        tail = "#" + ";".join(options + more) if options + more else ""
+        locators.append(f"{address}{separator}prio={priorities}{tail}")
+    return {"strategy": "allOf", "locators": locators}
 
 
 def _shared(tls: Tls | None) -> dict[str, Any]:

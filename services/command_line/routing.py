@@ -47,6 +47,7 @@ def _settings(site: RoutedSite, metrics: tuple[str, int] | None) -> role.Setting
         insecure=site.router.insecure,
         metrics=metrics,
     )
+        line_bps=None if site.router.line_mbit is None else site.router.line_mbit * 1e6,
 
 
 def metrics_address(site: RoutedSite, text: str) -> tuple[str, int] | None:

@@ -43,6 +43,7 @@ class Settings:
         metrics: Host and port at which Prometheus may ask; None: nowhere.
     """
 
+        line_bps: What the lines to other routers carry [bit/s]; None: nobody knows.
     site: str = ""
     listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)
     connect: tuple[str | Link, ...] = ()
@@ -52,6 +53,7 @@ class Settings:
     metrics: tuple[str, int] | None = None
 
 
+    line_bps: float | None = None
 class AccessError(ServiceError):
     """Rules for a router that cannot be read, or that Zenoh does not take."""
 
@@ -107,7 +109,7 @@ async def serve(settings: Settings, *, ready: Callable[[str], None] | None = Non
             seen = stamps
             try:
                 wanted = read_access(settings.access)
-                router_config(settings.listen, settings.connect, settings.tls, wanted)
+                router_config(settings.listen, settings.connect, settings.tls, wanted, settings.line_bps)
             except (AccessError, BusError) as error:
                 told.say(Event.ERROR, "rules", f"{error}; the router goes on with the rules that it has")
                 continue
@@ -171,7 +173,13 @@ def write_config(settings: Settings, out: Path) -> str:
     Raises:
         AccessError: If the rules cannot be read, or the file not written.
     """
-    values = router_values(settings.listen, settings.connect, settings.tls, read_access(settings.access))
+    values = router_values(
+        settings.listen, settings.connect, settings.tls, read_access(settings.access), settings.line_bps
+    )
+    # Refuses what Zenoh would not take, and says with how many threads a router runs: zenohd takes them from
+    # its environment, like ours.
+    router_config(settings.listen, settings.connect, settings.tls)
+    threads = shlex.quote(os.environ["ZENOH_RUNTIME"])
     tree: dict[str, Any] = {}
     for key, value in values.items():
         *parents, last = key.split("/")
@@ -222,7 +230,7 @@ def check_listen(settings: Settings) -> None:
 
 
 async def _open(settings: Settings, rules: Mapping[str, Any]) -> zenoh.Session:
-    config = router_config(settings.listen, settings.connect, settings.tls, rules)
+    config = router_config(settings.listen, settings.connect, settings.tls, rules, settings.line_bps)
     try:
         return await asyncio.to_thread(zenoh.open, config)
     except zenoh.ZError as error:
