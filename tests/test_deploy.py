@@ -31,15 +31,18 @@ CONTAINERS = [
 
 
 def check_words(words):
-    command, *rest = words
-    assert command in COMMANDS, f"robomesh {command} is no command"
-    known = {option for each in COMMANDS[command].params for option in (*each.opts, *each.secondary_opts)}
+    name, *rest = words
+    assert name in COMMANDS, f"robomesh {name} is no command"
+    command = COMMANDS[name]
+    while getattr(command, "commands", None):
+        command = command.commands[rest.pop(0)]
+    known = {option for each in command.params for option in (*each.opts, *each.secondary_opts)}
     # Where there is --connect, there is --keys.
     known |= {"--keys"} if "--connect" in known else set()
     for word in rest:
         if word.startswith("--"):
-            assert word in known, f"robomesh {command} has no {word}"
-    return command
+            assert word in known, f"robomesh {name} has no {word}"
+    return name
 
 
 @pytest.mark.parametrize(("file", "service"), CONTAINERS)
