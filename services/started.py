@@ -11,7 +11,9 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from robots.description import DESCRIPTION_FILE
+from bus.errors import KeyNameError
+from bus.keys import check_name
+from robots.description import DESCRIPTION_FILE, library_names
 from services.errors import SiteFileError
 from services.site import Robot, Site
 
@@ -57,6 +59,26 @@ def read_started(site: Site) -> tuple[Robot, ...]:
         else robot
         for robot in added.robot
     )
+
+
+def may_start(site: Site) -> tuple[str, ...]:
+    """Names of the robots that the page may start: started, saved, or the library's; none of the site file's.
+
+    Raises:
+        SiteFileError: If the file of those that were started is wrong.
+    """
+    started = {robot.name for robot in read_started(site)}
+    saved = {file.parent.name for file in site.define.folder.glob(f"[!.]*/{DESCRIPTION_FILE}")}
+    names = started | saved.union(library_names()) - {robot.name for robot in site.robot}
+    return tuple(sorted(filter(_is_name, names)))
+
+
+def _is_name(text: str) -> bool:
+    try:
+        check_name(text, "robot")
+    except KeyNameError:
+        return False
+    return True
 
 
 def robot_to_start(site: Site, name: str) -> Robot:

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from bus.topic_rows import Role
+from services.command_line.keys_folder import KeysFolder, keys_folder
 from services.command_line.options import Json
 
 keys_app = typer.Typer(
@@ -16,8 +17,6 @@ keys_app = typer.Typer(
     rich_markup_mode=None,
 )
 
-_Folder = Annotated[Path, typer.Option("--folder", metavar="DIR", help="Where the site's keys lie.")]
-_FOLDER = Path("keys")
 _Days = Annotated[float, typer.Option(metavar="N", min=0.0001, max=365, help="How long it is good for.")]
 _SECTION = '\n[keys]\nfolder = "keys"\n'
 
@@ -33,7 +32,7 @@ def init(
     from services import site as site_file
     from services.keys import Folder, deeds
     from services.site_router import public
-    from services.started import read_started
+    from services.started import may_start
 
     read = site_file.load(site)
     if read.keys.folder is None:
@@ -50,7 +49,7 @@ def init(
         robots=[robot.name for robot in read.robot],
         border=read.router.border,
         routers=public(read.router, read.keys),
-        started=[robot.name for robot in read_started(read)],
+        started=may_start(read),
     )
     print(f"{folder.path}: {len(made)} new certificates" + (f": {', '.join(made)}" if made else ""))
     print(
@@ -71,13 +70,14 @@ def issue(
         str, typer.Option(metavar="A,B", help="A guest's: for whom it speaks; '*': all but ours (a hub).")
     ] = "",
     days: _Days = 30.0,
-    folder: _Folder = _FOLDER,
+    folder: KeysFolder = None,
     as_json: Json = False,
 ) -> None:
     """Issue a certificate, as one file with its key, to hand over."""
-    from services.keys import Folder, deeds
+    from services.keys import deeds
 
-    where, lives = Folder(folder), timedelta(days=days)
+    where, lives = keys_folder(folder, quiet=as_json), timedelta(days=days)
+    before, rules = deeds.principals_of(where), where.access.read_bytes() if where.access.is_file() else b""
     if guest:
         _only(not name and not role and not robots, "--guest goes alone, with --sites where it is a hub")
         entry = deeds.issue_guest(where, guest, sites=_listed(sites), lives=lives)
@@ -92,9 +92,19 @@ def issue(
         _print(_record(entry) | {"file": file})
         return
     print(f"{file}: {entry.name}, {entry.role.value}, until {entry.expires:%Y-%m-%d %H:%M} UTC")
+    had = before.find(entry.name)
+    if had is not None and had.revoked is None and had.expires is not None and had.expires > deeds.now():
+        print(
+            f"{entry.name} had a certificate already, good until {had.expires:%Y-%m-%d %H:%M}: now both are. "
+            f"robomesh keys renew {entry.name} makes one for as long as before; keys revoke ends all."
+        )
     use = f"robomesh keys accept {Path(file).name}, at {guest}," if guest else f"robomesh list --keys {file}"
-    print(f"Hand it over as a secret; {use} uses it. The routers follow at once: whoever moves a robot now")
-    print("by a lease sees it stop, unless the site has two routers.")
+    print(f"Hand it over as a secret; {use} uses it.")
+    if where.access.read_bytes() != rules:
+        print(
+            "The routers follow at once: whoever moves a robot now by a lease sees it stop, unless the site "
+            "has two routers."
+        )
 
 
 @keys_app.command()
@@ -103,15 +113,15 @@ def accept(
     sites: Annotated[
         str, typer.Option(metavar="A,B", help="For whom its router speaks; '*': all but ours (a hub).")
     ] = "",
-    folder: _Folder = _FOLDER,
+    folder: KeysFolder = None,
 ) -> None:
     """Take what lets our routers in at another site."""
-    from services.keys import Folder, deeds
+    from services.keys import deeds
     from services.keys.errors import KeysError
     from services.keys.folder import read
 
     try:
-        site = deeds.accept(Folder(folder), read(file), sites=_listed(sites))
+        site = deeds.accept(keys_folder(folder), read(file), sites=_listed(sites))
     except KeysError as error:
         raise KeysError(f"{file}: {error}" if str(file) not in str(error) else str(error)) from None
     print(f'site {site} lets us in: connect = ["{site}"] under [router] in the site file links to it')
@@ -123,14 +133,13 @@ def renew(
     all_: Annotated[
         bool, typer.Option("--all", help="People's and guests' too, and whenever it expires.")
     ] = False,
-    folder: _Folder = _FOLDER,
+    folder: KeysFolder = None,
     as_json: Json = False,
 ) -> None:
     """Issue anew, for as long as before: the services' that expire within ten days, those named, or all."""
-    from services.keys import Folder, deeds
+    from services.keys.renewals import renew as renew_
 
-    where = Folder(folder)
-    renewed = deeds.renew(where, names or (), all_=all_)
+    renewed = renew_(keys_folder(folder, quiet=as_json), names or (), all_=all_)
     if as_json:
         for entry in renewed:
             _print(_record(entry))
@@ -145,14 +154,14 @@ def renew(
 
 
 @keys_app.command()
-def revoke(name: str, folder: _Folder = _FOLDER) -> None:
+def revoke(name: str, folder: KeysFolder = None) -> None:
     """Take somebody off the routers' list: whoever is on the mesh in that name is cut off.
 
     Nobody gets the name again while a certificate of it is good.
     """
-    from services.keys import Folder, deeds
+    from services.keys import deeds
 
-    entry = deeds.revoke(Folder(folder), name)
+    entry = deeds.revoke(keys_folder(folder), name)
     print(
         f"{entry.name} has no rights any more: the site's router drops it now; where there are two, each does"
     )
@@ -160,11 +169,12 @@ def revoke(name: str, folder: _Folder = _FOLDER) -> None:
 
 
 @keys_app.command("list")
-def list_(folder: _Folder = _FOLDER, as_json: Json = False) -> None:
+def list_(folder: KeysFolder = None, as_json: Json = False) -> None:
     """Who has a certificate, as what, until when."""
-    from services.keys import Folder, deeds
+    from services.keys import deeds
+    from services.keys.renewals import RENEW_WITHIN
 
-    principals = deeds.principals_of(Folder(folder))
+    principals = deeds.principals_of(keys_folder(folder, quiet=as_json))
     for entry in principals.entries:
         if as_json:
             _print(_record(entry))
@@ -175,7 +185,7 @@ def list_(folder: _Folder = _FOLDER, as_json: Json = False) -> None:
             until = f"revoked {entry.revoked:%Y-%m-%d %H:%M}"
         elif entry.expires is not None and entry.expires <= now:
             until = f"EXPIRED {entry.expires:%Y-%m-%d %H:%M}"
-        elif entry.expires is not None and entry.expires <= now + deeds.RENEW_WITHIN:
+        elif entry.expires is not None and entry.expires <= now + RENEW_WITHIN:
             until += ", to be renewed"
         what = f"{entry.role.value:<11}{until}"
         for_ = ", ".join(entry.sites or entry.robots or ())

@@ -20,6 +20,7 @@ from services.command_line.attaching import offer_keys
 from services.command_line.descriptions import mesh_app, robot_app
 from services.command_line.kept import audit_app, recordings_app
 from services.command_line.keys import keys_app
+from services.command_line.keys_folder import KeysFolder, keys_folder
 from services.command_line.options import Connect, Height, Json, Robot, Width
 from services.command_line.programs import program_app
 
@@ -186,7 +187,7 @@ def doctor(
     security: Annotated[
         bool, typer.Option("--security", help="Try every role against every key, on the live mesh.")
     ] = False,
-    folder: Annotated[Path, typer.Option(metavar="DIR", help="Where the site's keys lie.")] = Path("keys"),
+    folder: KeysFolder = None,
     routers: Annotated[
         str, typer.Option("--connect", metavar="tls/HOST:PORT", help="A router; the list's unless given.")
     ] = "",
@@ -197,7 +198,7 @@ def doctor(
         from services.command_line import security as check
         from services.command_line.attaching import addresses
 
-        return check.run(folder, addresses(routers), as_json)
+        return check.run(keys_folder(folder, quiet=as_json), addresses(routers), as_json)
     from services.command_line import doctor as command
 
     command.run()

@@ -54,13 +54,12 @@ class Person:
     heard: set[str] = field(default_factory=set)
 
 
-def run(folder: Path, connect: tuple[str, ...], as_json: bool) -> int:
+def run(keys: Folder, connect: tuple[str, ...], as_json: bool) -> int:
     """Print the matrix; 1: something differs from the table.
 
     Raises:
         KeysError: If there are no keys, or no router takes them.
     """
-    keys = Folder(folder)
     principals = deeds.principals_of(keys)
     routers = connect or principals.routers
     if not routers:

@@ -23,7 +23,7 @@ from services.keys import Folder
 from services.keys.errors import KeysError
 from services.listen import reachable, split_address
 from services.site import Robot, Site
-from services.started import read_started
+from services.started import may_start, read_started
 from services.supervisor import Program, supervise
 
 _CONSOLE_POLL_S = 0.1
@@ -141,7 +141,11 @@ class _Started:
         }
 
     def _entitle(self, names: list[str]) -> None:
-        """Tell the routers for whom their gateways may speak, before they do."""
+        """Tell the routers for whom their gateways may speak, before they do.
+
+        Those that may be started are named ahead, because routers open anew for new rules, which stops
+        motions: only the first start of one that was saved since then does that.
+        """
         if names == self._entitled or self._site.keys.folder is None:
             return
         from services.keys import deeds  # only what changes keys needs the package that makes them
@@ -149,7 +153,9 @@ class _Started:
         folder = Folder(self._site.keys.folder)
         # Where only bundles were brought, nobody was started from the page.
         if names or folder.principals.is_file():
-            deeds.entitle(folder, names)
+            there, ahead = deeds.entitled(folder), {*names, *may_start(self._site)}
+            if not there.issuperset(names if self._entitled is not None else ahead):
+                deeds.entitle(folder, [*ahead])
         self._entitled = names
 
 

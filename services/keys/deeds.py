@@ -1,11 +1,11 @@
-"""What is done with a site's keys: made, issued, renewed, revoked, taken from another site.
+"""What is done with a site's keys: made, issued, revoked, taken from another site.
 
 Whatever changes the list writes the routers' rules anew; a router that runs follows them. Deeds of several
 processes come one after the other.
 """
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime, timedelta
 from functools import wraps
 from itertools import count
@@ -25,8 +25,7 @@ _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
 LIVES = timedelta(days=30)
-RENEW_WITHIN = timedelta(days=10)
-# The gateways of robots that were started from the page. Which those are only the routers' rules say: they
+# The gateways of robots that are started from the page. Which those may be only the routers' rules say: they
 # follow the page, and no key is there to sign.
 STARTED = "started"
 _EVERY_SERVICE = (
@@ -35,7 +34,7 @@ _EVERY_SERVICE = (
 )
 
 
-def _alone(deed: "Callable[Concatenate[Folder, _P], _R]") -> "Callable[Concatenate[Folder, _P], _R]":
+def alone(deed: "Callable[Concatenate[Folder, _P], _R]") -> "Callable[Concatenate[Folder, _P], _R]":
     """A deed that reads the list and writes it anew while nobody else does."""
 
     @wraps(deed)
@@ -79,7 +78,7 @@ def prepare(
     Args:
         robots: The site file's, which the site's gateway speaks for.
         routers: Where the site's routers are.
-        started: The robots that were started from the page.
+        started: The robots that may be started from the page.
 
     Returns:
         The names that certificates were issued to.
@@ -113,15 +112,25 @@ def _prepared(
         entry = principals.find(name) or Entry(name=f"{name}.{site}", role=role)
         wanted = entry.model_copy(update={"robots": robots}) if name == Role.GATEWAY.value else entry
         if entry.revoked is None and (wanted != entry or not folder.service(name).is_file()):
-            principals = _issued(folder, principals, wanted)
+            principals = issued(folder, principals, wanted)
             made.append(wanted.name)
-    _save(folder, principals)
+    save(folder, principals)
     return tuple(made)
 
 
-@_alone
+def entitled(folder: Folder) -> frozenset[str]:
+    """The robots that gateways of robots started from the page may speak for.
+
+    Raises:
+        KeysError: If there is no list, or it is wrong.
+    """
+    entry = principals_of(folder).find(STARTED)
+    return frozenset(entry.robots or () if entry is not None else ())
+
+
+@alone
 def entitle(folder: Folder, started: Sequence[str]) -> None:
-    """Let the gateways of robots that were started from the page speak for those, and for no other.
+    """Let the gateways of robots that are started from the page speak for these, and for no other.
 
     Raises:
         KeysError: If there is no list, or it cannot be written.
@@ -134,10 +143,10 @@ def _entitle(folder: Folder, started: Sequence[str]) -> None:
     entry = principals.find(STARTED)
     robots = tuple(sorted(started))
     if entry is not None and entry.robots != robots:
-        _save(folder, principals.replaced(entry.model_copy(update={"robots": robots})))
+        save(folder, principals.replaced(entry.model_copy(update={"robots": robots})))
 
 
-@_alone
+@alone
 def issue(
     folder: Folder, name: str, role: Role, *, robots: Sequence[str] | None = None, lives: timedelta = LIVES
 ) -> Entry:
@@ -162,14 +171,14 @@ def issue(
     if there is not None:
         _check_free(principals, there)
     entry = _entry(name=full, role=role, robots=None if robots is None else tuple(robots))
-    principals = _issued(folder, principals, entry, lives)
-    _save(folder, principals)
+    principals = issued(folder, principals, entry, lives)
+    save(folder, principals)
     found = principals.find(full)
     assert found is not None
     return found
 
 
-@_alone
+@alone
 def issue_guest(folder: Folder, site: str, *, sites: Sequence[str] = (), lives: timedelta = LIVES) -> Entry:
     """A certificate that lets another site's router in.
 
@@ -184,14 +193,14 @@ def issue_guest(folder: Folder, site: str, *, sites: Sequence[str] = (), lives: 
     if (there := principals.find(f"router.{site}")) is not None:
         _check_free(principals, there)
     entry = _entry(name=f"router.{site}", role=Role.ROUTER, sites=tuple(sites) or (site,))
-    principals = _issued(folder, principals, entry, lives)
-    _save(folder, principals)
+    principals = issued(folder, principals, entry, lives)
+    save(folder, principals)
     found = principals.find(entry.name)
     assert found is not None
     return found
 
 
-@_alone
+@alone
 def accept(folder: Folder, data: bytes, *, sites: Sequence[str] = ()) -> str:
     """Take what lets our routers in at another site; its router gets rights here, as it gives them.
 
@@ -223,54 +232,11 @@ def accept(folder: Folder, data: bytes, *, sites: Sequence[str] = ()) -> str:
             entry = entry.model_copy(update={**kept, "issued": there.issued, "expires": there.expires})
         principals = principals.replaced(entry)
     write(folder.link(shown.authority), data)
-    _save(folder, principals)
+    save(folder, principals)
     return shown.authority
 
 
-@_alone
-def renew(folder: Folder, names: Iterable[str] = (), *, all_: bool = False) -> tuple[Entry, ...]:
-    """New keys and certificates, for as long as those before: of those named, or of what expires soon.
-
-    Without names the site's own services only: a person's file and a guest's are handed over by somebody,
-    and who was let in for a while is not let in for ever.
-
-    Args:
-        all_: Without names: everybody's that has not expired, whenever it does.
-
-    Raises:
-        KeysError: If a name has none, or was revoked.
-    """
-    principals = principals_of(folder)
-    wanted = []
-    for name in names:
-        entry = principals.find(name)
-        if entry is None or not entry.serial:
-            raise KeysError(f"{name} has no certificate of this site: robomesh keys list shows who has")
-        if entry.revoked is not None:
-            raise KeysError(f"{entry.name} was revoked: robomesh keys issue makes a certificate anew")
-        wanted.append(entry)
-    if not wanted:
-        soon = now() + RENEW_WITHIN
-        wanted = [
-            entry
-            for entry in principals.entries
-            if entry.serial and entry.revoked is None and entry.expires is not None
-            if (_of_service(principals, entry) and (all_ or entry.expires <= soon))
-            or (all_ and entry.expires > now())
-        ]
-    for entry in wanted:
-        assert entry.expires is not None
-        assert entry.issued is not None
-        principals = _issued(folder, principals, entry, entry.expires - entry.issued)
-    _save(folder, principals)
-    return tuple(found for entry in wanted if (found := principals.find(entry.name)) is not None)
-
-
-def _of_service(principals: Principals, entry: Entry) -> bool:
-    return entry.role not in PEOPLE and entry.name.rpartition(".")[2] == principals.site
-
-
-@_alone
+@alone
 def revoke(folder: Folder, name: str) -> Entry:
     """Take a name off the routers' list; they drop whoever is there under it.
 
@@ -283,7 +249,7 @@ def revoke(folder: Folder, name: str) -> Entry:
         raise KeysError(f"{name} has no certificate of this site: robomesh keys list shows who has")
     if entry.revoked is None:
         entry = entry.model_copy(update={"revoked": now()})
-    _save(folder, principals.replaced(entry))
+    save(folder, principals.replaced(entry))
     return entry
 
 
@@ -350,7 +316,7 @@ def _another(principals: Principals, entry: Entry) -> str:
     return next(new for n in count(2) if principals.find(new := f"{name}-{n}") is None)
 
 
-def _issued(folder: Folder, principals: Principals, entry: Entry, lives: timedelta = LIVES) -> Principals:
+def issued(folder: Folder, principals: Principals, entry: Entry, lives: timedelta = LIVES) -> Principals:
     """The list with an entry's new certificate, whose bundle is written."""
     if not folder.authority_key.is_file():
         raise KeysError(
@@ -358,7 +324,7 @@ def _issued(folder: Folder, principals: Principals, entry: Entry, lives: timedel
         )
     authority = certificates.read_authority(read(folder.authority_key), read(folder.authority))
     ours = entry.name.rpartition(".")[2] == principals.site
-    issued = certificates.issue(
+    made = certificates.issue(
         authority,
         entry.name,
         entry.role.value,
@@ -369,11 +335,11 @@ def _issued(folder: Folder, principals: Principals, entry: Entry, lives: timedel
     identity = Identity(
         name=entry.name,
         role=entry.role,
-        expires=issued.expires,
+        expires=made.expires,
         robots=None if entry.name == f"{STARTED}.{principals.site}" else entry.own_robots,
         routers=principals.routers,
     )
-    data = header(identity).encode() + issued.key + issued.certificate + read(folder.authority)
+    data = header(identity).encode() + made.key + made.certificate + read(folder.authority)
     name, _, of = entry.name.rpartition(".")
     path = (
         folder.guest(of)
@@ -386,16 +352,17 @@ def _issued(folder: Folder, principals: Principals, entry: Entry, lives: timedel
     before = principals.find(entry.name)
     told = {
         "earlier": None if before is None else before.good_until,
-        "serial": issued.serial,
-        "fingerprint": issued.fingerprint,
-        "issued": issued.issued,
-        "expires": issued.expires,
+        "serial": made.serial,
+        "fingerprint": made.fingerprint,
+        "issued": made.issued,
+        "expires": made.expires,
         "revoked": None,
     }
     return principals.replaced(entry.model_copy(update=told))
 
 
-def _save(folder: Folder, principals: Principals) -> None:
+def save(folder: Folder, principals: Principals) -> None:
+    """Write the list, and the routers' rules where they have changed."""
     write(folder.principals, write_principals(principals).encode())
     rules = rules_of(principals).encode()
     # A router reloads when it changes: renewed certificates alone are no reason.

@@ -12,6 +12,7 @@ import zenoh
 from bus.endpoints import router_config
 from bus.identity import read_identity
 from bus.topics import Role
+from robots.description import library_names
 from services.command_line import main, up
 from services.keys import Folder, deeds
 from services.keys.errors import KeysError
@@ -86,7 +87,8 @@ def test_a_robot_that_the_site_file_gains_is_the_gateways_after_the_next_init(si
     keys("list", "--json")
     listed = records(capsys)
     assert listed["gateway.hall"]["robots"] == ["arm", "arm-2"]
-    assert listed["started.hall"]["robots"] == []
+    # Whatever the page may start is named ahead, and no other robot of the site is.
+    assert set(listed["started.hall"]["robots"]) == set(library_names())
 
 
 def test_whoever_was_started_from_the_page_is_named_in_the_rules_without_the_authoritys_key(site, tmp_path):
@@ -105,14 +107,35 @@ def test_whoever_was_started_from_the_page_is_named_in_the_rules_without_the_aut
         answered = (rule["key_exprs"] for rule in rules if "declare_queryable" in rule["messages"])
         return {each for each in chain(*answered) if each.endswith("/stop")}
 
-    always = {"robomesh/hall/-/stop", "robomesh/hall/matrix-probe/stop"}
-    assert rights() == always
+    def stops(*names):
+        return {f"robomesh/hall/{name}/stop" for name in ("-", "matrix-probe", *library_names(), *names)}
+
+    assert rights() == stops()
     file.write_text('site = "hall"' + ONE_ARM.replace('"arm"', '"mine"'))
-    assert rights() == always | {"robomesh/hall/mine/stop"}
+    assert rights() == stops("mine")
     assert keys("init", str(site)) == 0
-    assert rights() == always | {"robomesh/hall/mine/stop"}
+    assert rights() == stops("mine")
+    # What it may speak for once it may until the next init: no routers open anew for a robot that ends.
     file.unlink()
-    assert rights() == always
+    assert rights() == stops("mine")
+    assert keys("init", str(site)) == 0
+    assert rights() == stops()
+
+
+def test_no_router_opens_anew_for_the_first_start_of_a_robot_that_was_there_before(site, tmp_path):
+    keys("init", str(site))
+    saved = tmp_path / "robots" / "mine" / "robot.toml"
+    saved.parent.mkdir(parents=True)
+    saved.write_text("")
+    following = up._Started(load(site), site, load(site).listened[0])
+    following.wanted()
+    rules = Folder(tmp_path / "keys").access.stat()
+    for name in ("mine", library_names()[0]):
+        (tmp_path / "robots" / "started.toml").write_text(
+            'site = "hall"' + ONE_ARM.replace('"arm"', f'"{name}"')
+        )
+        assert [key[0] for key in following.wanted()] == [name]
+    assert Folder(tmp_path / "keys").access.stat() == rules
 
 
 def test_a_bundle_knows_where_the_routers_are(site):
@@ -161,6 +184,45 @@ def test_issue_renew_revoke_and_list_tell_what_they_did(site, capsys):
     assert "mo.hall" not in rules
     assert keys("list") == 0
     assert "mo.hall                     monitor    revoked 20" in capsys.readouterr().out
+
+
+def test_a_name_that_has_a_certificate_is_told_so_and_nobodys_motion_is_spoken_of(site, capsys):
+    keys("init", str(site))
+    capsys.readouterr()
+    keys("issue", "li", "--role", "operator")
+    first = capsys.readouterr().out
+    assert "sees it stop" in first
+    assert "already" not in first
+    keys("issue", "li", "--role", "operator")
+    again = capsys.readouterr().out
+    assert "li.hall had a certificate already, good until" in again
+    assert "robomesh keys renew li.hall" in again
+    assert "sees it stop" not in again
+
+
+def test_keys_are_found_where_a_site_file_says_or_beside_or_around_ones_own_and_named(
+    tmp_path, monkeypatch, capsys
+):
+    for name in ("keys", "other", "third"):
+        deeds.prepare(Folder(tmp_path / name), name, robots=[], border="open", routers=[])
+    work = tmp_path / "work"
+    work.mkdir()
+    monkeypatch.chdir(work)
+    monkeypatch.delenv("ROBOMESH_KEYS", raising=False)
+    assert keys("list") == 2
+    assert "no keys are found" in capsys.readouterr().err
+    monkeypatch.setenv("ROBOMESH_KEYS", str(tmp_path / "third" / "people" / "li.pem"))
+    assert keys("list") == 0
+    assert f"keys in {tmp_path / 'third'}\n" in capsys.readouterr().out
+    (work / "keys").symlink_to(tmp_path / "keys")
+    assert keys("list") == 0
+    assert "keys in keys\n" in capsys.readouterr().out
+    (work / "hall.toml").write_text('site = "hall"\n[keys]\nfolder = "../other"\n')
+    assert keys("list") == 0
+    assert "keys in ../other\n" in capsys.readouterr().out
+    (work / "b.toml").write_text('site = "b"\n[keys]\nfolder = "../third"\n')
+    assert keys("revoke", "recorder") == 2
+    assert "site files here name ../third and ../other: --folder says" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
