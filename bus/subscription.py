@@ -279,7 +279,7 @@ class Subscription:
         self._received += 1
         late_s = 0.0
         if asked_at is None:
-            late_s = 0.0 if keys.is_replay(key) else seen.lateness.of(header, now)
+            late_s = 0.0 if keys.is_replay(key) else seen.lateness.of(header, now, time.time_ns())
             seen.live_at = now - late_s
         elif self.topic.heartbeat_s is not None:
             seen.live_at = now - self.topic.heartbeat_s

@@ -11,6 +11,8 @@ const least = new Map<string, Least>();
 // The least lag may grow as fast as clocks part while one is being set, but not over a silence.
 const DRIFT = 1e-3;
 const MOST_GROWN_MS = 1000;
+// Clocks that are set by NTP differ by less.
+const AHEAD_MS = 1000;
 
 /** How much longer [ms] a sample was on its way than its publisher's quickest; `arrived` on any monotonic clock. */
 export function lateness(key: string, publisher: bigint, sourceTime: number, arrived: number): number {
@@ -18,10 +20,15 @@ export function lateness(key: string, publisher: bigint, sourceTime: number, arr
   if (sourceTime === 0 || key.includes("/replay-")) return 0;
   const lag = arrived - sourceTime;
   const before = least.get(key);
-  const known = before?.publisher === publisher ? before : { lag, last: lag, at: arrived };
-  const grown = Math.min(Math.max(arrived - known.at, 0), MOST_GROWN_MS) * DRIFT;
+  if (before?.publisher !== publisher) {
+    // The first alone is believed, for the second may have waited; but not one that our own clock has still to come to.
+    const ahead = sourceTime > Date.now() + AHEAD_MS;
+    least.set(key, { publisher, lag: ahead ? Infinity : lag, last: lag, at: arrived });
+    return 0;
+  }
+  const grown = Math.min(Math.max(arrived - before.at, 0), MOST_GROWN_MS) * DRIFT;
   // A single sample dated ahead makes no other late.
-  const now = { publisher, lag: Math.min(known.lag + grown, Math.max(lag, known.last)), last: lag, at: arrived };
+  const now = { publisher, lag: Math.min(before.lag + grown, Math.max(lag, before.last)), last: lag, at: arrived };
   least.set(key, now);
   return Math.max(lag - now.lag, 0);
 }
