@@ -15,7 +15,8 @@ logger = logging.getLogger(__name__)
 def run(path: Path | None, config_out: Path | None = None, metrics: str = "") -> None:
     """Run the router of the site."""
     service.log_to_stderr()
-    site = _read(path)
+    # zenohd may be started in another folder.
+    site = _read(path if path is None or config_out is None else path.absolute())
     settings = _settings(site, metrics_address(site, metrics))
     if config_out is not None:
         print(role.write_config(settings, config_out))
@@ -46,8 +47,8 @@ def _settings(site: RoutedSite, metrics: tuple[str, int] | None) -> role.Setting
         access=access,
         insecure=site.router.insecure,
         metrics=metrics,
-    )
         line_bps=None if site.router.line_mbit is None else site.router.line_mbit * 1e6,
+    )
 
 
 def metrics_address(site: RoutedSite, text: str) -> tuple[str, int] | None:

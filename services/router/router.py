@@ -7,6 +7,8 @@ by themselves; whoever was revoked comes back to nothing.
 import asyncio
 import json
 import logging
+import os
+import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -41,9 +43,9 @@ class Settings:
         site: Whose router it is, which its health is told for; empty: it tells nobody.
         access: Sections of Zenoh's configuration that `robomesh keys` wrote; None: everybody may everything.
         metrics: Host and port at which Prometheus may ask; None: nowhere.
+        line_bps: What the lines to other routers carry [bit/s]; None: nobody knows.
     """
 
-        line_bps: What the lines to other routers carry [bit/s]; None: nobody knows.
     site: str = ""
     listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)
     connect: tuple[str | Link, ...] = ()
@@ -51,9 +53,9 @@ class Settings:
     access: Path | None = None
     insecure: bool = False
     metrics: tuple[str, int] | None = None
-
-
     line_bps: float | None = None
+
+
 class AccessError(ServiceError):
     """Rules for a router that cannot be read, or that Zenoh does not take."""
 
@@ -172,6 +174,7 @@ def write_config(settings: Settings, out: Path) -> str:
 
     Raises:
         AccessError: If the rules cannot be read, or the file not written.
+        SessionError: If an endpoint is not one of Zenoh's.
     """
     values = router_values(
         settings.listen, settings.connect, settings.tls, read_access(settings.access), settings.line_bps
@@ -187,14 +190,17 @@ def write_config(settings: Settings, out: Path) -> str:
         for parent in parents:
             node = node.setdefault(parent, {})
         node[last] = value
-    tree["adminspace"] = {"enabled": False}
+    # zenohd enables its admin space whatever is said here; nobody may read what is in it.
+    tree["adminspace"] = {"enabled": False, "permissions": {"read": False, "write": False}}
     try:
         out.write_text(json.dumps(tree, indent=1) + "\n", encoding="utf-8")
     except OSError as error:
         raise AccessError(f"{out}: cannot be written: {error.strerror}") from None
     return (
-        f"{out}: zenohd --config {out} routes as robomesh router does, but reads its rules and certificates "
-        "at its start only: write this file anew and restart it after robomesh keys issue, renew or revoke"
+        f"{out}: ZENOH_RUNTIME={threads} zenohd --config {out} routes as robomesh router does, "
+        "but reads its rules and certificates at its start only: write this file anew and restart it after "
+        "robomesh keys issue, renew or revoke. It tells nobody that it is there, and does not look at what "
+        "certificates other sites' routers show"
     )
 
 
