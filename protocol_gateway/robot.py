@@ -338,7 +338,8 @@ class Robot:
     def _on_written(self, entry: Entry) -> None:
         self._audit_topic.put(audit_entry(entry), source_time_ns=entry.time_ns)
         if entry.request == ROTATE:
-            self._journal.say(_S.INFO, "audit.rotated", f"audit log {self._audit.path.name}: {entry.text}")
+            name = self._audit.path.name
+            self._journal.say(_S.INFO, "audit.rotated", f"audit log {name}: {entry.text}", file=name)
 
     def _observe(self) -> None:
         if self._link.status.state is not LinkState.UP:

@@ -145,8 +145,9 @@ class Programs:
             await asyncio.gather(self._task, return_exceptions=True)
 
     async def _run(self, run: _Run) -> None:
+        said = f"{run.operator} runs program {run.name}"
+        self._guarded.journal.say(_S.INFO, "program.started", said, operator=run.operator, program=run.name)
         text = "the gateway failed at it: its log says why"
-        self._guarded.journal.say(_S.INFO, "program.started", f"{run.operator} runs program {run.name}")
         try:
             text = await self._all_steps(run)
         except asyncio.CancelledError:
@@ -233,7 +234,10 @@ class Programs:
         where = f"line {self.state.line}"
         said = f"program {run.name} ended at {where}: {text}" if text else f"program {run.name} is done"
         self._guarded.journal.say(
-            _S.WARNING if text else _S.INFO, "program.ended" if text else "program.done", said
+            _S.WARNING if text else _S.INFO,
+            "program.ended" if text else "program.done",
+            said,
+            program=run.name,
         )
         self._guarded.ledger.after_later(
             entry_of(

@@ -13,7 +13,15 @@ from services.errors import ServiceError
 
 
 class AccountsError(ServiceError):
-    """An accounts file that says something wrong, or a change of it that cannot be."""
+    """An accounts file that says something wrong, or a change of it that cannot be.
+
+    Attributes:
+        word: Which, for the page, which has words of its own; "refused": its text is all there is.
+    """
+
+    def __init__(self, text: str, word: str = "refused") -> None:
+        super().__init__(text)
+        self.word = word
 
 
 class SignInBusyError(ServiceError):

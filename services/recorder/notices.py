@@ -35,10 +35,10 @@ class Notices:
         if robot not in self._publishers:
             self._publishers[robot] = self._session.declare_publisher(self._site, robot, "events/recorder")
 
-    def say(self, robot: str, severity: schema.Event.Severity, code: str, text: str) -> None:
+    def say(self, robot: str, severity: schema.Event.Severity, code: str, text: str, **values: str) -> None:
         """An event of a robot, or of the whole site (`-`)."""
         log.log(_LEVEL.get(severity, logging.ERROR), "%s: %s", robot, text)
-        event = schema.Event(severity=severity, code=code, text=text, source="recorder")
+        event = schema.Event(severity=severity, code=code, text=text, source="recorder", values=values)
         event.timestamp.GetCurrentTime()
         self.ready(robot)
         self._publishers[robot].put(event)

@@ -109,7 +109,7 @@ class _Robot:
             elif state.trace == _State.YES and before != _State.YES and part is not None:
                 name = part.capture.about["name"]
                 text = f"the controller's trace goes into {name}, which is being recorded already"
-                self.recorder.notices.say(self.name, _S.INFO, "recorder.trace_joined", text)
+                self.recorder.notices.say(self.name, _S.INFO, "recorder.trace_joined", text, recording=name)
             elif state.trace == _State.NO and part and part.capture.about["started_by"] == "trace":
                 await self.close()
         except RefusedError as error:
@@ -294,7 +294,7 @@ class _Recorder:
         def done(problem: str | None) -> None:
             if problem is None:
                 text = f"{path.name} had not been closed; it is whole now"
-                self.notices.say(path.parent.name, _S.INFO, "recorder.recovered", text)
+                self.notices.say(path.parent.name, _S.INFO, "recorder.recovered", text, file=path.name)
             else:
                 text = f"{path.name} had not been closed, and stays as it is: {problem}"
                 self.notices.say(path.parent.name, _S.WARNING, "recorder.not_recovered", text)

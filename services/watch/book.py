@@ -118,6 +118,7 @@ class Book:
             AlarmError: Why not.
         """
         alarms = self.alarms
+        values = {"by": by}
         texts = {each: alarms.held[each].text for each in asked.ids if each in alarms.held}
         match asked.action:
             case _Request.ACKNOWLEDGE:
@@ -129,11 +130,12 @@ class Book:
                     "alarm.shelved",
                     f"shelved for {asked.shelve_s / 60:.0f} min ({asked.reason.strip()})",
                 )
+                values |= {"minutes": f"{asked.shelve_s / 60:.0f}", "reason": asked.reason.strip()}
             case _:
                 alarms.unshelve(asked.ids, by, now)
                 code, did = "alarm.unshelved", "put back"
         for identity, text in texts.items():
-            self._say(_S.INFO, code, f"{by} {did}: {text}", {"id": identity, "by": by})
+            self._say(_S.INFO, code, f"{by} {did}: {text}", values | {"id": identity})
         await self._save()
 
     # ------------------------------------------------------------ what is told

@@ -1,13 +1,54 @@
-"""The page's Chinese words for alarms keep up with the watch's table."""
+"""The page's Chinese words for alarms, events and refusals keep up with who tells them."""
 
 import re
 from pathlib import Path
 
+import pytest
+
+from services.console.accounts.passwords import check_password
+from services.console.errors import AccountsError
 from services.watch.rules import RULES
 
-WORDS = Path(__file__).resolve().parents[2] / "services/console/page/src/events/alarm-words.ts"
+HOUSE = Path(__file__).resolve().parents[2]
+PAGE = HOUSE / "services/console/page/src"
+
+
+def table(name: str) -> set[str]:
+    """The keys of a table of words."""
+    return set(re.findall(r'^  "([a-z_.]+)":', (PAGE / name).read_text(encoding="utf-8"), re.MULTILINE))
 
 
 def test_every_alarm_that_the_watch_can_raise_has_chinese_words_on_the_page():
-    known = set(re.findall(r'^  "([a-z_.]+)": \[', WORDS.read_text(encoding="utf-8"), re.MULTILINE))
-    assert {code for code, rule in RULES.items() if rule.priority is not None} - known == set()
+    wanted = {code for code, rule in RULES.items() if rule.priority is not None}
+    assert wanted - table("events/alarm-words.ts") == set()
+
+
+def test_every_event_that_asks_nobody_to_act_has_chinese_words_on_the_page():
+    told = set()
+    for folder in ("protocol_gateway", "renderer", "services"):
+        for source in (HOUSE / folder).rglob("*.py"):
+            # A severity and the code behind it, as in: say(_S.INFO, "joints.back", ...)
+            text = source.read_text(encoding="utf-8")
+            told |= set(re.findall(r'\bINFO\b[^"()]{0,40}"([a-z_]+\.[a-z_]+)"', text))
+    assert len(told) > 15
+    # The page has words of its own for stops, in both languages.
+    known = table("events/event-words.ts") | table("events/alarm-words.ts") | {"stop.reset"}
+    assert told - known == set()
+
+
+@pytest.mark.parametrize(
+    ("word", "password"),
+    [
+        ("short", "few"),
+        ("long", "a few words are good " * 20),
+        ("control", "a few words\a"),
+        ("repeats", "abababababab"),
+        ("run", "qwertyuiopas"),
+        ("common", "Passw0rd2026!"),
+    ],
+)
+def test_why_a_password_is_refused_has_words_in_both_languages_on_the_page(word, password):
+    with pytest.raises(AccountsError) as caught:
+        check_password(password, name="li")
+    assert caught.value.word == word
+    assert f"refused_{word}: [" in (PAGE / "account/texts.ts").read_text(encoding="utf-8")

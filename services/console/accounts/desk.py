@@ -251,12 +251,13 @@ def change_account(
         account = accounts.get(name)
         if action == "add":
             if account is not None:
-                raise AccountsError(f"there is an account {name} already")
+                raise AccountsError(f"there is an account {name} already", "taken")
             role = role or AccountRole.MONITOR
             accounts[name] = Account(name=name, role=role, hash=hashed, created=_now())
             return
         if account is None:
-            raise AccountsError(f"there is no account {name!r}: there are {', '.join(accounts) or 'none'}")
+            there_are = ", ".join(accounts) or "none"
+            raise AccountsError(f"there is no account {name!r}: there are {there_are}", "no_account")
         changes: dict[str, object]
         match action:
             case "role" if role is not None:
@@ -276,7 +277,8 @@ def change_account(
             accounts[name] = Account(**{**vars(account), **changes})
         admins = [each for each in accounts.values() if each.role is AccountRole.ADMIN and not each.disabled]
         if by_page and not admins:
-            raise AccountsError(f"{name} is the last administrator who can sign in: make another one first")
+            text = f"{name} is the last administrator who can sign in: make another one first"
+            raise AccountsError(text, "last_admin")
 
 
 def _now() -> datetime:

@@ -72,9 +72,9 @@ def check_account_name(name: str) -> str:
     try:
         keys.check_name(name, "account")
     except KeyNameError as error:
-        raise AccountsError(str(error)) from None
+        raise AccountsError(str(error), "name") from None
     if len(name) > _LONGEST_NAME:
-        raise AccountsError(f"account {name!r}: {_LONGEST_NAME} characters at most")
+        raise AccountsError(f"account {name!r}: {_LONGEST_NAME} characters at most", "name")
     return name
 
 

@@ -45,23 +45,24 @@ def check_password(password: str, *, name: str, site: str = "") -> str:
     """
     if len(password) < SHORTEST:
         raise AccountsError(
-            f"the password is too short: {SHORTEST} characters at least, a few words are good"
+            f"the password is too short: {SHORTEST} characters at least, a few words are good", "short"
         )
     if len(password.encode(errors="surrogatepass")) > _LONGEST:
-        raise AccountsError(f"the password is too long: {_LONGEST} bytes at most")
+        raise AccountsError(f"the password is too long: {_LONGEST} bytes at most", "long")
     if any(ord(each) < 32 or 0xD800 <= ord(each) < 0xE000 for each in password):
-        raise AccountsError("the password holds a control character: leave it out")
+        raise AccountsError("the password holds a control character: leave it out", "control")
     folded = password.casefold()
     if len(set(folded)) < _FEWEST_DIFFERENT:
-        raise AccountsError("the password repeats a few characters: a few words are good")
+        raise AccountsError("the password repeats a few characters: a few words are good", "repeats")
     if any(folded in run or folded in run[::-1] for run in _RUNS):
-        raise AccountsError("the password is a run of neighbours: a few words are good")
+        raise AccountsError("the password is a run of neighbours: a few words are good", "run")
     ending = re.sub(r"[\W\d_]+$", "", folded)
     cores = {_core(folded), _core(folded.translate(_DISGUISED)), _core(ending.translate(_DISGUISED))}
     if cores & (_COMMON | {name.casefold(), site.casefold()}) or not _core(folded):
         raise AccountsError(
             "the password is one that is tried first: a common word or a name, and digits; "
-            "a few words are good"
+            "a few words are good",
+            "common",
         )
     return password
 

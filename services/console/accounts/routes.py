@@ -6,11 +6,10 @@ JSON both ways. What is refused says so in one word for the page (`error`) and i
 import json
 import math
 import time
-from collections.abc import Awaitable, Callable, Mapping
-from functools import wraps
+from collections.abc import Mapping
 from typing import Any
 
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
@@ -18,6 +17,7 @@ from services.console.accounts.desk import Desk, SignInError
 from services.console.accounts.file import AccountRole, role_of
 from services.console.accounts.rights import operator_name
 from services.console.accounts.sessions import SignedIn
+from services.console.answered import Handler, answered
 from services.console.errors import AccountsError, SignInBusyError
 
 Json = dict[str, Any]
@@ -264,29 +264,22 @@ async def _json(request: Request, *texts: str) -> Json:
     return asked
 
 
-def _answered(
-    handler: Callable[[Request], Awaitable[Response]],
-) -> Callable[[Request], Awaitable[Response]]:
-    """A handler whose refusals are answered in words."""
+def _answered(handler: Handler) -> Handler:
+    return answered(handler, _refused)
 
-    @wraps(handler)
-    async def answered(request: Request) -> Response:
-        try:
-            response = await handler(request)
-        except RefusedError as error:
-            response = JSONResponse(error.answer, status_code=error.status)
-        except SignInError as error:
-            response = _refused_sign_in(error)
-        except SignInBusyError as error:
-            response = _refusal(503, "busy", str(error), {"Retry-After": "1"})
-        except AccountsError as error:
-            response = _refusal(422, "refused", str(error))
-        except ClientDisconnect:
-            response = Response(status_code=499)
-        response.headers.setdefault("Cache-Control", "no-store")
-        return response
 
-    return answered
+def _refused(error: Exception) -> Response | None:
+    match error:
+        case RefusedError():
+            return JSONResponse(error.answer, status_code=error.status)
+        case SignInError():
+            return _refused_sign_in(error)
+        case SignInBusyError():
+            return _refusal(503, "busy", str(error), {"Retry-After": "1"})
+        case AccountsError():
+            return _refusal(422, error.word, str(error))
+        case _:
+            return None
 
 
 def _refused_sign_in(error: SignInError) -> Response:

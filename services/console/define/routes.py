@@ -8,18 +8,18 @@ import json
 import logging
 import sys
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable
-from functools import partial, wraps
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import Mount, Route
 
 from robots.description import library_names
 from robots.errors import RobotError, RobotExistsError
 from robots.save import read_robot, refused_path, revision_of, write_description, zip_description
+from services.console.answered import Handler, answered
 from services.console.define import saved, store
 from services.console.define.errors import RefusedRequest
 from services.console.define.settings import DefineSettings
@@ -306,32 +306,23 @@ def _remember(kept: OrderedDict[Key, Value], key: Key, value: Value) -> None:
         kept.popitem(last=False)
 
 
-def _answered(
-    handler: Callable[[Request], Awaitable[Response]],
-) -> Callable[[Request], Awaitable[Response]]:
-    """A handler whose refusals are answered in words."""
+def _answered(handler: Handler) -> Handler:
+    return answered(handler, _refused)
 
-    @wraps(handler)
-    async def answered(request: Request) -> Response:
-        try:
-            response = await handler(request)
-        except RefusedRequest as error:
-            response = PlainTextResponse(error.text, status_code=error.status)
-        except RobotError as error:
-            response = PlainTextResponse(str(error), status_code=422)
-        except UnicodeError:
-            response = PlainTextResponse("the request holds half a character", status_code=422)
-        except RecursionError:
-            response = PlainTextResponse("the request is nested too deeply", status_code=422)
-        except ClientDisconnect:
-            response = PlainTextResponse("gone", status_code=499)
-        except OSError as error:
+
+def _refused(error: Exception) -> Response:
+    match error:
+        case RefusedRequest():
+            return PlainTextResponse(error.text, status_code=error.status)
+        case RobotError():
+            return PlainTextResponse(str(error), status_code=422)
+        case UnicodeError():
+            return PlainTextResponse("the request holds half a character", status_code=422)
+        case RecursionError():
+            return PlainTextResponse("the request is nested too deeply", status_code=422)
+        case OSError():
             log.error("define: %s", error)
-            response = PlainTextResponse(f"the console's disk: {error.strerror}", status_code=507)
-        except Exception as error:
-            log.exception("define: a fault of robomesh itself")
-            response = PlainTextResponse(f"a fault of robomesh itself: {error!r}"[:300], status_code=500)
-        response.headers.setdefault("Cache-Control", "no-store")
-        return response
-
-    return answered
+            return PlainTextResponse(f"the console's disk: {error.strerror}", status_code=507)
+        case _:
+            log.error("define: a fault of robomesh itself", exc_info=error)
+            return PlainTextResponse(f"a fault of robomesh itself: {error!r}"[:300], status_code=500)

@@ -4,6 +4,7 @@ import { useState } from "preact/hooks";
 import { count, stampFull, stampTime } from "./format";
 import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "./gen/robomesh_pb";
 import type { AuditEntry, ControllerState, Event } from "./gen/robomesh_pb";
+import { eventInChinese } from "./events/event-words";
 import { LinkFacts } from "./link-facts";
 import { Choice, Panel } from "./parts";
 import { t } from "./texts";
@@ -73,19 +74,21 @@ export function Mark({ word, level }: { word: TextName; level: string }) {
 
 function EventLine(event: Event) {
   const [word, level] = SEVERITIES[event.severity] ?? ["severity_info", "normal"];
+  const text = eventText(event);
   return (
     <li title={`${stampFull(event.timestamp)} · ${event.source} · ${event.code}`}>
       <time>{stampTime(event.timestamp)}</time>
       <span class="event-text">
         {level !== "normal" && <Mark word={word} level={level} />}
-        <span lang="en">{eventText(event)}</span>
+        <span lang={text === event.text ? "en" : undefined}>{text}</span>
       </span>
     </li>
   );
 }
 
-/** The page's own words for what people meet most; the gateway's for the rest. */
-export function eventText({ code, text, values }: Event): string {
+/** The page's own words for what people meet most; the event's for the rest. */
+export function eventText(event: Event): string {
+  const { code, values } = event;
   const by = values["by"] ?? "";
   const reason = values["reason"];
   switch (code) {
@@ -98,7 +101,7 @@ export function eventText({ code, text, values }: Event): string {
     case "stop.reset":
       return t("event_stop_reset");
     default:
-      return text;
+      return eventInChinese(event) ?? event.text;
   }
 }
 

@@ -1,5 +1,6 @@
 // Asks for a reason before something is done. It is no modal dialog: STOP stays within reach.
 
+import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "./texts";
 
@@ -8,6 +9,8 @@ export function Reason(props: {
   text: string;
   does: string;
   required?: boolean;
+  /** What else is chosen, between the text and the reason. */
+  children?: ComponentChildren;
   close: () => void;
   done: (reason: string) => void;
 }) {
@@ -32,6 +35,7 @@ export function Reason(props: {
       }}
     >
       <p>{props.text}</p>
+      {props.children}
       <label>
         <span class="dim">{t(props.required ? "reason_required" : "reason_optional")}</span>
         <input

@@ -4,7 +4,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { AccountError, me, post } from "./account";
 import type { Me } from "./account";
 import { PasswordField } from "./password-field";
-import { a } from "./texts";
+import { a, refusedText } from "./texts";
 
 export function ChangePassword({ close }: { close: () => void }) {
   const [old, setOld] = useState("");
@@ -63,5 +63,5 @@ export function refusalText(error: unknown): string {
   const { word, seconds } = error;
   if (word === "wait") return a("wait", { seconds });
   if (word === "wrong" || word === "busy" || word === "unreachable") return a(word);
-  return error.message;
+  return refusedText(word) || error.message;
 }

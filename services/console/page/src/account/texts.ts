@@ -63,6 +63,30 @@ const TEXTS = {
   cancel: ["Cancel", "取消"],
   close: ["Close", "关闭"],
 
+  refused_short: ["The password is too short: 10 characters at least, a few words are good.", "密码太短：至少 10 个字符，几个词语即可。"],
+  refused_long: ["The password is too long: 256 bytes at most.", "密码太长：最多 256 字节。"],
+  refused_control: ["The password holds a control character: leave it out.", "密码含有控制字符，请去掉。"],
+  refused_repeats: ["The password repeats a few characters: a few words are good.", "密码只重复少数几个字符：请用几个词语。"],
+  refused_run: ["The password is a run of neighbours: a few words are good.", "密码是连续或相邻的字符：请用几个词语。"],
+  refused_common: [
+    "The password is one that is tried first: a common word or a name, and digits. A few words are good.",
+    "密码最容易被猜到（常用词或名称加数字）：请用几个词语。",
+  ],
+  refused_name: [
+    "That cannot be an account’s name: small letters, digits, _ and -, beginning with a letter or digit, 32 at most.",
+    "账户名不可用：请用小写字母、数字、_ 和 -，以字母或数字开头，最多 32 个字符。",
+  ],
+  refused_taken: ["There is an account of that name already.", "已有同名账户。"],
+  refused_no_account: ["There is no such account any more.", "该账户已不存在。"],
+  refused_last_admin: [
+    "That is the last administrator who can sign in: make another one first.",
+    "这是最后一个可登录的管理员：请先添加另一个。",
+  ],
+  refused_not_admin: ["Only an administrator may do that.", "只有管理员可以这样做。"],
+  refused_resting: ["Give your password again first.", "请先再次输入密码。"],
+  refused_sign_in: ["Sign in first.", "请先登录。"],
+  refused_no_session: ["That session is over already.", "该会话已结束。"],
+
   monitor_only: [
     "{account} is a monitor’s account: it watches, and asks for no control. A stop request works all the same.",
     "{account} 是监视账户：只能监视，不能请求控制权，但可请求停止。",
@@ -83,6 +107,11 @@ export function a(name: AccountText, values: Record<string, string | number> = {
 /** Why a session ended, by the server's word for it. */
 export function endText(word: string): string {
   return `out_${word}` in TEXTS ? a(`out_${word}` as AccountText) : a("out_signed_out");
+}
+
+/** Why something was refused, by the server's word for it; empty: there are no words for it here. */
+export function refusedText(word: string): string {
+  return `refused_${word}` in TEXTS ? a(`refused_${word}` as AccountText) : "";
 }
 
 export function roleText(role: string): string {

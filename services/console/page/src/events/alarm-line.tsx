@@ -3,7 +3,7 @@
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import { stampFull, stampTime, timeOfDay, fullTime } from "../format";
 import { robotLink } from "../route";
-import { State, isUnacknowledged } from "./alarms";
+import { State, isUnacknowledged, nameOf } from "./alarms";
 import type { Alarm } from "./alarms";
 import { alarmAdvice, alarmTitle } from "./alarm-words";
 import { PriorityMark } from "./priority";
@@ -32,7 +32,7 @@ export function AlarmLine(props: {
   const [title, advice] = [alarmTitle(alarm.code), alarmAdvice(alarm.code, alarm.advice)];
   const when = alarm.last ?? alarm.since;
   return (
-    <li class={`alarm-line ${open ? "open" : ""} ${state === State.RETURNED ? "over" : ""}`} data-alarm={alarm.id}>
+    <li class={`alarm-line ${open ? "open" : ""} ${state === State.RETURNED ? "over" : ""}`} data-alarm={nameOf(alarm)}>
       <label class="alarm-select">
         <input
           type="checkbox"
@@ -65,7 +65,7 @@ export function AlarmLine(props: {
           </span>
         )}
         <span class="dim alarm-more">
-          {more(alarm).join(" · ")} · <code title={e("id_hint")}>{alarm.id}</code>
+          {more(alarm).join(" · ")} · <code title={e("id_hint")}>{nameOf(alarm)}</code>
         </span>
       </div>
       <span class="alarm-actions">

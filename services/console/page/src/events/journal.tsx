@@ -209,6 +209,11 @@ function Details({ entry, close }: { entry: Entry; close: () => void }) {
   return (
     <div class="entry-details" role="region" aria-label={wordsOf(entry)}>
       <p>{"event" in entry ? <EventWords entry={entry} /> : <AuditWords entry={entry} />}</p>
+      {event && eventText(event) !== event.text && (
+        <p class="dim">
+          {e("in_its_words")} <span lang="en">{event.text}</span>
+        </p>
+      )}
       <dl>
         {facts.map(([name, value]) => (
           <div key={name}>

@@ -1,8 +1,8 @@
-// Puts alarms aside for a while, with a reason. It is no modal dialog: STOP stays within reach.
+// Puts alarms aside for a while, with a reason.
 
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useState } from "preact/hooks";
 import { Choice } from "../parts";
-import { t } from "../texts";
+import { Reason } from "../reason";
 import type { Alarm } from "./alarms";
 import { e } from "./texts";
 
@@ -14,32 +14,17 @@ export function Shelve(props: {
   close: () => void;
   done: (reason: string, shelveS: number) => void;
 }) {
-  const [reason, setReason] = useState("");
   const [time, setTime] = useState<Time>("hour");
-  const input = useRef<HTMLInputElement>(null);
-  const opener = useRef(document.activeElement);
-  useEffect(() => {
-    input.current?.focus();
-    return () => opener.current instanceof HTMLElement && opener.current.focus();
-  }, []);
   const [first, ...others] = props.alarms;
   return (
-    <form
-      class="reason shelve"
-      aria-label={e("shelve_do")}
-      onKeyDown={(event) => event.key === "Escape" && props.close()}
-      onSubmit={(event) => {
-        event.preventDefault();
-        if (!reason.trim()) return;
-        props.close();
-        props.done(reason.trim(), TIMES[time]);
-      }}
+    <Reason
+      required
+      title={e("shelve_do")}
+      text={others.length ? e("shelve_count", { count: props.alarms.length }) : e("shelve_one", { text: first?.text ?? "" })}
+      does={e("shelve_do")}
+      close={props.close}
+      done={(reason) => props.done(reason, TIMES[time])}
     >
-      <p>
-        {others.length
-          ? e("shelve_count", { count: props.alarms.length })
-          : e("shelve_one", { text: first?.text ?? "" })}
-      </p>
       <Choice
         label={e("shelve_for")}
         values={Object.keys(TIMES) as Time[]}
@@ -47,25 +32,6 @@ export function Shelve(props: {
         text={e}
         choose={setTime}
       />
-      <label>
-        <span class="dim">{e("reason")}</span>
-        <input
-          ref={input}
-          type="text"
-          autocomplete="off"
-          maxLength={120}
-          value={reason}
-          onInput={(event) => setReason(event.currentTarget.value)}
-        />
-      </label>
-      <div class="reason-row">
-        <button type="button" class="action" onClick={props.close}>
-          {t("cancel")}
-        </button>
-        <button type="submit" class="action primary" disabled={!reason.trim()}>
-          {e("shelve_do")}
-        </button>
-      </div>
-    </form>
+    </Reason>
   );
 }

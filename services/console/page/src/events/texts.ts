@@ -59,7 +59,6 @@ export const EVENTS_TEXTS = {
   unshelve: ["Unshelve", "取消搁置"],
   unshelve_of: ["Unshelve: {text}", "取消搁置：{text}"],
   select: ["Select: {text}", "选择：{text}"],
-  reason: ["Reason (everybody sees it)", "理由（所有人可见）"],
   acting: ["Telling the watch…", "正在通知监视服务…"],
   acknowledged: ["Acknowledged: {count}", "已确认：{count}"],
   shelved: ["Shelved: {count}", "已搁置：{count}"],

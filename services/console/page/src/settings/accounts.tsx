@@ -2,7 +2,7 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { me, post } from "../account/account";
-import { reasonOf } from "../control";
+import { refusalText } from "../account/change-password";
 import type { Notice } from "../control";
 import { fullTime } from "../format";
 import { Select } from "../events/select";
@@ -35,7 +35,7 @@ export function Accounts() {
       setAccounts((await post<{ accounts: Account[] }>("accounts", { action, name, ...values })).accounts);
       setNotice({ kind: "done", text: s("done") });
     } catch (error) {
-      setNotice({ kind: "refused", text: s("not_done", { text: reasonOf(error) }) });
+      setNotice({ kind: "refused", text: s("not_done", { text: refusalText(error) }) });
       throw error;
     }
   };

@@ -2,7 +2,7 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { post } from "../account/account";
-import { reasonOf } from "../control";
+import { refusalText } from "../account/change-password";
 import { fullTime } from "../format";
 import { NoticeLine, Panel } from "../parts";
 import type { Notice } from "../control";
@@ -39,7 +39,7 @@ export function Sessions() {
       await look();
       setNotice({ kind: "done", text: s("done") });
     } catch (error) {
-      setNotice({ kind: "refused", text: s("not_done", { text: reasonOf(error) }) });
+      setNotice({ kind: "refused", text: s("not_done", { text: refusalText(error) }) });
     }
   };
   return (
