@@ -21,6 +21,7 @@ import zenoh
 
 from bus.endpoints import first_line
 from bus.errors import NoAnswerError
+from bus.messages import TEXT
 
 # Two of them fit into one of Zenoh's batches.
 PIECE_BYTES = 30_000
@@ -30,10 +31,11 @@ _OF_WHOLE = struct.Struct("<8sQ")
 # What an owner keeps for those who are still taking it: this much, for so long after it was last asked for.
 _KEPT_BYTES = 64 << 20
 _KEPT_S = 60.0
-# At once: twice as many after each round that came whole, half as many after one that did not.
+# At once, as TCP does it: twice as many a round until something is lost; then half, and one more a round.
 _MOST_AT_ONCE = 16
-# What has not come by then counts as lost; longer after a round of which nothing came.
+# What has not come by then counts as lost, while nobody knows how long a round takes.
 _LOST_AFTER_S = 2.0
+_SLACK_S = 0.5
 # Zenoh says at once that there is no owner.
 _AGAIN_S = 0.05
 # No answer of the mesh is longer; whoever says so must not fill the asker's memory.
@@ -81,7 +83,7 @@ class LongAnswers:
                 self._kept[token] = time.monotonic(), answer
         with query:
             if not answer or not offset.isascii() or not offset.isdigit() or int(offset) >= len(answer):
-                query.reply_err(f"{asked} is no piece of an answer here: ask anew".encode())
+                query.reply_err(f"{asked} is no piece of an answer here: ask anew".encode(), encoding=TEXT)
             else:
                 begin = int(offset)
                 query.reply(str(query.key_expr), answer[begin : begin + PIECE_BYTES])
@@ -120,9 +122,11 @@ async def whole(
     """Take the rest of a long answer; None: its owner has it no more, or no piece came for `timeout_s`."""
     missing = list(range(PIECE_BYTES, first.length, PIECE_BYTES))
     taken = {0: first.data}
-    at_once, patience_s, came = 1, _LOST_AFTER_S, time.monotonic()
+    at_once, patience_s, lossless = 1, _LOST_AFTER_S, True
+    came = time.monotonic()
     while missing:
-        left_s = came + timeout_s - time.monotonic()
+        began = time.monotonic()
+        left_s = came + timeout_s - began
         if left_s <= 0:
             return None
         now, later = missing[:at_once], missing[at_once:]
@@ -136,11 +140,14 @@ async def whole(
                 return None  # refused, or another's nonsense
             else:
                 taken[offset], came = piece, time.monotonic()
-        at_once = max(at_once // 2, 1) if lost else min(2 * at_once, _MOST_AT_ONCE)
-        patience_s = 2 * patience_s if len(lost) == len(now) else _LOST_AFTER_S
         missing = lost + later
         if lost:
+            lossless, at_once = False, max(at_once // 2, 1)
+            patience_s = max(patience_s, _LOST_AFTER_S) * (2 if len(lost) == len(now) else 1)
             await asyncio.sleep(_AGAIN_S)
+        else:
+            at_once = min(2 * at_once if lossless else at_once + 1, _MOST_AT_ONCE)
+            patience_s = 2 * (time.monotonic() - began) + _SLACK_S
     return b"".join(taken[offset] for offset in sorted(taken))
 
 
@@ -153,7 +160,11 @@ async def _ask(
     answers: list[bytes] = []
 
     def on_reply(reply: zenoh.Reply) -> None:
-        answers.append(b"" if reply.ok is None else reply.ok.payload.to_bytes())
+        if reply.ok is not None:
+            answers.append(reply.ok.payload.to_bytes())
+        # Zenoh's own, that the time is over, has another encoding.
+        elif reply.err is not None and str(reply.err.encoding) == TEXT:
+            answers.append(b"")
 
     def finish() -> None:
         if not done.done():

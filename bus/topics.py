@@ -295,7 +295,7 @@ _REQUESTS = (
         name="mesh/*",
         request=None,
         answer=None,
-        priority=Priority.BACKGROUND,
+        priority=Priority.DATA,
         owners=_KINEMATICS_OR_REPLAY,
         askers=EVERYONE,
     ),

@@ -5,6 +5,7 @@ function below and its arguments; each is answered with one line of JSON.
 """
 
 import asyncio
+import hashlib
 import json
 import random
 import sys
@@ -21,6 +22,7 @@ from bus import messages
 from bus.endpoints import bundle
 from bus.errors import BusError
 from bus.messages import PROTOBUF
+from bus.requests import Request
 from bus.session import Session, SessionSettings, open_session
 from bus.subscription import Subscription
 from bus.topics import request
@@ -105,6 +107,25 @@ class Probe:
 
         self._readers.append(asyncio.create_task(put()))
         return True
+
+    async def hold_mesh(self, site: str, robot: str, size: int) -> str:
+        """Answer for meshes, all the same and of that many bytes; its SHA-256."""
+        mesh = random.randbytes(size)
+
+        async def answer(_: Request) -> bytes:
+            return mesh
+
+        self._session.answer(site, robot, "mesh/*", answer)
+        return hashlib.sha256(mesh).hexdigest()
+
+    async def mesh(self, key: str, timeout_s: float) -> dict[str, Any]:
+        """A mesh's SHA-256, or why there is none; and how long it took."""
+        began = time.monotonic()
+        try:
+            sha256 = hashlib.sha256(await self._session.ask_bytes(key, timeout_s=timeout_s)).hexdigest()
+        except BusError as error:
+            return {"error": str(error), "took_s": time.monotonic() - began}
+        return {"sha256": sha256, "took_s": time.monotonic() - began}
 
     async def stop_over_one_link(self, key: str) -> dict[str, float]:
         """A stop asked as any other request is, to compare."""
