@@ -65,6 +65,7 @@ def test_codes_are_numbers(tmp_path):
             'site = "hall"\n[[robot]]\nname = "replay-1"\nmodel = "pt600"',
             "replay-... is what recordings are played back as",
         ),
+        ('site = "hall"\n[quotas]\nviews = 0', "quotas.views = 0: should be greater than or equal to 1"),
         (
             'site = "hall"\n[recorder]\nviews = ["side"]',
             "views = 'side': the renderer has no such view; it has front, top, left, free, close, far",
