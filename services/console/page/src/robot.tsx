@@ -184,7 +184,9 @@ function Headline(props: {
       {message?.checkText && (
         <span class="trouble warning">
           <span class="shape warning" aria-hidden="true" />
-          {t(message.check === Check.REQUIRE ? "check_refuses" : "check_cannot", { text: message.checkText })}
+          {t(message.check === Check.REQUIRE ? "check_refuses" : "check_cannot", {
+            text: message.checkStarting ? t("check_starting") : message.checkText,
+          })}
         </span>
       )}
       {/* In the place of what matters less, so that nothing below moves. */}

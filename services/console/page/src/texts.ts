@@ -69,6 +69,7 @@ const TEXTS = {
   check_warn: ["motions are checked: warned", "运动检查：警告"],
   check_require: ["motions are checked: required", "运动检查：必须通过"],
   check_cannot: ["Motions are not checked now: {text}", "目前无法检查运动：{text}"],
+  check_starting: ["the check is still getting ready.", "检查正在准备中。"],
   check_refuses: ["Motions are refused, for none can be checked now: {text}", "目前无法检查运动，一律拒绝：{text}"],
   program_runs: ["{name}: step {step} of {steps}, {at}; {operator}; {time}", "{name}：第 {step}/{steps} 步，{at}；{operator}；{time}"],
   program_at: ["line {line}: {statement}", "第 {line} 行：{statement}"],
