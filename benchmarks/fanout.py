@@ -8,12 +8,13 @@ without our bus), `page` (our console, clients that speak the page's protocol), 
 `foxglove` (foxglove-sdk's server); `-plain` behind a name: without TLS, which all others have (pyzmq: CURVE).
 The peers need a Python with pyzmq, nats-py and foxglove-sdk, and a nats-server. Each arm has the same
 publisher, at most four processes of monitors, and notes only the age of what came; the arms take turns,
-so that a busy machine is busy for all. `--stopped`: beside each, the same with one more monitor, stopped.
+so that a busy machine is busy for all. A page is told the newest: what it was not sent because a newer state
+of the same robot was counts as overtaken. `--stopped`: beside each, the same with one more monitor, stopped.
 A peer that is not there is left out, what does not come up within a minute is told and passed over, and
 after `--minutes` nothing more is begun.
 
-Reach: all delivered; p99 at 64 at most 1.3 times the bare router's, and below NATS and foxglove-sdk;
-a stopped monitor changes the others' p99 by less than a fifth.
+Reach: all delivered, or to a page overtaken; p99 at 64 at most 1.3 times the bare router's, and below NATS
+and foxglove-sdk; a stopped monitor changes the others' p99 by less than a fifth.
 """
 
 import argparse
@@ -178,8 +179,10 @@ class Cell:
             for what in ("joints", "pictures")
         }
         percentiles = np.percentile(ages["joints"], (50, 99)) / 1e6 if ages["joints"].size else (np.nan,) * 2
+        overtaken = sum(int(file.read_text()) for file in folder.glob("overtaken.*"))
         return {
             "delivered": ages["joints"].size / max(1, sent["joints"] * self.count),
+            "overtaken": overtaken / max(1, sent["joints"] * self.count),
             "pictures": ages["pictures"].size / max(1, sent["pictures"] * self.count),
             "p50_ms": float(percentiles[0]),
             "p99_ms": float(percentiles[1]),
@@ -314,7 +317,7 @@ def summed(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     for (count, arm, stopped), same in sorted(kinds.items(), key=lambda item: item[0][0]):
         values = {
             name: statistics.median(row[name] for row in same)
-            for name in ("delivered", "pictures", "p50_ms", "p99_ms")
+            for name in ("delivered", "overtaken", "pictures", "p50_ms", "p99_ms")
         }
         cores = {group: statistics.median(row["cores"][group] for row in same) for group in same[0]["cores"]}
         late = [row["p99_ms"] for row in same]
@@ -325,10 +328,11 @@ def summed(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def words(row: dict[str, Any]) -> str:
     spread = "{:.1f}..{:.1f}".format(*row["p99_spread_ms"]) if "p99_spread_ms" in row else ""
+    overtaken = f"(and {row['overtaken']:.3%} overtaken)" if row["overtaken"] else ""
     cores = ", ".join(f"{name} {value:.2f}" for name, value in row["cores"].items())
     return (
         f"{row['monitors']:3} {row['arm'] + (' +stopped' if row['stopped'] else ''):<24} "
-        f"joints {row['delivered']:8.3%}  pictures {row['pictures']:8.3%}  "
+        f"joints {row['delivered']:8.3%} {overtaken}  pictures {row['pictures']:8.3%}  "
         f"p50 {row['p50_ms']:7.2f} ms  p99 {row['p99_ms']:8.2f} ms {spread:>14}  cores: {cores}"
     )
 

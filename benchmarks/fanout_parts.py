@@ -76,6 +76,8 @@ class Ages:
         # Empty until begun: what comes before is no part of the figures.
         self.window = Window(0, 0)
         self.joints, self.pictures = array("q"), array("q")
+        # States that did not come because a newer one of the same robot did.
+        self.overtaken = 0
 
     def note(self, sent_ns: int, picture: bool) -> None:
         """Takes one."""
@@ -84,6 +86,7 @@ class Ages:
 
     def write(self, folder: Path) -> None:
         """Leaves them for the parent."""
+        (folder / f"overtaken.{os.getpid()}").write_text(str(self.overtaken))
         for name in ("joints", "pictures"):
             with (folder / f"{name}.{os.getpid()}").open("wb") as file:
                 getattr(self, name).tofile(file)
@@ -160,11 +163,21 @@ Take = Callable[[WebSocketReader, int, bytes], None]
 async def watch_console(address: str, tls: bool, watches: list[str], count: int, folder: Path) -> None:
     """So many pages' WebSockets, which watch the same; `watches` are messages of the page's protocol."""
     ages = Ages()
+    # Of each page and robot the newest number.
+    newest: dict[tuple[WebSocketReader, int], int] = {}
 
-    def take(_: WebSocketReader, opcode: int, message: bytes) -> None:
+    def take(reader: WebSocketReader, opcode: int, message: bytes) -> None:
         at = message.find(b"\x12\x18", 0, 120)  # the sample's attachment: field 2, 24 bytes
-        if at > 0:
-            ages.note(HEADER.unpack_from(message, at + 2)[2], b"/video/" in message[:at])
+        if at < 0:
+            return
+        publisher, number, sent_ns = HEADER.unpack_from(message, at + 2)
+        picture = b"/video/" in message[:at]
+        ages.note(sent_ns, picture)
+        if not picture:
+            before = newest.get((reader, publisher), number)
+            newest[reader, publisher] = number
+            if ages.window.begin_ns <= sent_ns < ages.window.end_ns:
+                ages.overtaken += number - before - 1 if number > before else 0
 
     for _ in range(count):
         reader = await connected(address, "/mesh", tls, take)

@@ -124,6 +124,15 @@ class Subscription:
                 raise StopAsyncIteration
             await self._ready.wait()
 
+    async def all_that_came(self) -> list[Sample]:
+        """Waits for the next sample; it, and all that came after it. None: it was closed."""
+        async for sample in self:
+            with self._lock:
+                samples = [sample, *self._ring]
+                self._ring.clear()
+            return samples
+        return []
+
     def age_s(self, key: str) -> float | None:
         """Time since a new sample of the key came, and how late it was [s]; None: none came as we listened.
 
@@ -279,7 +288,7 @@ class Subscription:
         self._received += 1
         late_s = 0.0
         if asked_at is None:
-            late_s = 0.0 if keys.is_replay(key) else seen.lateness.of(header, now, time.time_ns())
+            late_s = 0.0 if keys.is_replay(key) else seen.lateness.of(header, now)
             seen.live_at = now - late_s
         elif self.topic.heartbeat_s is not None:
             seen.live_at = now - self.topic.heartbeat_s

@@ -9,6 +9,7 @@ import logging
 import time
 from collections import deque
 from collections.abc import Callable, Coroutine
+from functools import partial
 from typing import Any
 
 from google.protobuf.message import DecodeError
@@ -18,18 +19,17 @@ from bus import keys, topics
 from bus.errors import BusError, BusyError, NoAnswerError, RefusedError
 from bus.schemas.robomesh_pb2 import FromPage, KeyFrameRequest, ToPage, ViewAnswer, ViewRequest
 from bus.session import Session
-from bus.subscription import Sample
 from bus.topics import History
 from services.console.accounts.rights import check_ask, check_own_name, check_right, in_own_name
 from services.console.accounts.sessions import SignedIn
 from services.console.errors import WatchError
 from services.console.feeds import Feeds, check_expression
 from services.console.lanes import Lane, lane_for
-from services.console.line import send_together
+from services.console.line import Line, line_of
 from services.console.operating import OperatorPresence
 from services.console.stepped import SteppedVideo
 from services.console.views import Views
-from services.console.wire import state_bytes, video_bytes
+from services.console.wire import MOST_BEHIND, MOST_TOGETHER, Moment, frame, state_frame, video_frame
 
 log = logging.getLogger(__name__)
 
@@ -42,8 +42,6 @@ _MOST_UNREAD = 4 << 20
 _CLOSED_WITHIN_S = 1.0
 _LONGEST_ASK_S = 30.0  # a check of a program's motion
 _KEY_FRAME_EACH_S = 1.0
-# What is given to the line at once: on a slow one newer state must still be able to replace the rest.
-_MOST_TOGETHER = 4096
 _POLICY_VIOLATION = 1008
 
 
@@ -80,16 +78,22 @@ class Browser:
         self._feeds = feeds
         self._views = views
         self._watches: set[str] = set()
+        # State: what keeps step is sent as it came; once the line takes no more, it waits in lanes, until
+        # they are empty.
+        self._moments: deque[Moment] = deque()
+        self._behind = False
         self._lanes: dict[str, Lane] = {}
-        # Those that have something to send.
-        self._waiting: dict[str, Lane] = {}
         self._video: dict[str, SteppedVideo] = {}
+        # The lanes and views that have something to send; each in turn sends one sample.
+        self._waiting: dict[str, Lane | SteppedVideo] = {}
         self._key_frame_asked: dict[str, float] = {}
         self._messages: deque[bytes] = deque()
         self._unread = 0
         self._cut_off = False
         self._asks: set[asyncio.Task[None]] = set()
-        self._wake = asyncio.Event()
+        self._websocket: WebSocket | None = None
+        self._line: Line | None = None
+        self._soon: asyncio.Handle | None = None
         # Samples that came for it, and that were sent; the others were overtaken by newer ones.
         self.offered = self.sent = 0
         self.greet()
@@ -115,11 +119,14 @@ class Browser:
         if not self._cut_off:
             self._messages.append(message.SerializeToString())
             self._unread += len(self._messages[-1])
-            self._wake.set()
+            self._serve_soon()
 
     async def run(self, websocket: WebSocket) -> None:
         """Serves it until it goes."""
-        sending = asyncio.create_task(self._send(websocket))
+        line = line_of(websocket)
+        self._websocket, self._line = websocket, line
+        line.on_ready = self._serve_soon
+        self._serve_soon()
         try:
             await self._receive(websocket)
         except WebSocketDisconnect:
@@ -133,9 +140,10 @@ class Browser:
             self.operator.close()
             for expression in tuple(self._watches):
                 self._unwatch(expression)
-            for task in (sending, *self._asks):
+            line.on_ready = self._line = None
+            for task in self._asks:
                 task.cancel()
-            await asyncio.gather(sending, *self._asks, return_exceptions=True)
+            await asyncio.gather(*self._asks, return_exceptions=True)
 
     async def _receive(self, websocket: WebSocket) -> None:
         while True:
@@ -163,9 +171,10 @@ class Browser:
                 self._feeds,
                 self._views,
                 asker=self._asker,
-                on_frame=self._wake.set,
+                on_frame=partial(self._frame_came, expression),
                 on_starved=self._want_key_frame,
             )
+            self._frame_came(expression)
         else:
             self._feeds.join(expression, self._offer)
         self._watches.add(expression)
@@ -181,60 +190,83 @@ class Browser:
         else:
             self._feeds.leave(expression, self._offer)
             self._lanes.pop(expression, None)
-            self._waiting.pop(expression, None)
+        self._waiting.pop(expression, None)
 
-    def _offer(self, sample: Sample) -> None:
-        lane = self._lanes.get(sample.key)
-        if lane is None:
-            lane = self._lanes[sample.key] = lane_for(topics.topic(sample.parsed.topic))
-        lane.push(sample)
-        self._waiting[sample.key] = lane
-        self.offered += 1
-        self._wake.set()
+    def _offer(self, moment: Moment) -> None:
+        self.offered += len(moment.samples)
+        if self._behind:
+            self._wait(moment)
+        else:
+            self._moments.append(moment)
+        self._feeds.turns.due(self._serve)
 
-    async def _send(self, websocket: WebSocket) -> None:
-        while True:
-            await self._wake.wait()
-            self._wake.clear()
-            while await self._send_round(websocket):
-                pass
+    def _frame_came(self, expression: str) -> None:
+        video = self._video.get(expression)
+        if video is not None:  # it is given what is held before it is kept here
+            self._waiting[expression] = video
+            self._feeds.turns.due(self._serve)
 
-    async def _send_round(self, websocket: WebSocket) -> bool:
-        """Sends all messages, then one sample of each key, state before video; whether there was any."""
-        await self._send_messages(websocket)
-        sent = bool(self._waiting)
-        waiting, self._waiting = self._waiting, {}
-        together: list[bytes] = []
+    def _wait(self, moment: Moment) -> None:
+        """What the line does not take waits in lanes, where newer replaces older."""
+        self._behind = True
+        for sample in moment.samples:
+            lane = self._lanes.get(sample.key)
+            if lane is None:
+                lane = self._lanes[sample.key] = lane_for(topics.topic(sample.parsed.topic))
+            lane.push(sample)
+            self._waiting[sample.key] = lane
+
+    def _serve_soon(self) -> None:
+        if self._soon is None:
+            self._soon = asyncio.get_running_loop().call_soon(self._serve)
+
+    def _serve(self) -> None:
+        """Sends as much as the line takes."""
+        self._soon = None
+        line = self._line
+        if line is None:
+            return
+        while line.ready and (frames := self._frames()):
+            line.write(frames)
+        while self._moments:
+            self._wait(self._moments.popleft())
+        if self._cut_off and not self._messages and self._websocket is not None:  # it has missed something
+            self._keep(self._websocket.close(_POLICY_VIOLATION, "read too slowly"))
+            self._websocket = None
+
+    def _frames(self) -> bytes:
+        """What is given to the line at once; nothing: nothing waits."""
+        frames: list[bytes] = []
         size = 0
-        for key, lane in waiting.items():
+        most = MOST_BEHIND if self._behind else MOST_TOGETHER
+        while size < most and (each := self._next()):
+            frames.append(each)
+            size += len(each)
+        return b"".join(frames)
+
+    def _next(self) -> bytes:
+        """The next to send: messages before any sample, state that keeps step before what waits."""
+        if self._messages:
+            message = self._messages.popleft()
+            self._unread -= len(message)
+            return frame(message)
+        if self._moments:
+            moment = self._moments.popleft()
+            self.sent += len(moment.samples)
+            return moment.frames()
+        while self._waiting:
+            key = next(iter(self._waiting))
+            lane = self._waiting.pop(key)
             sample = lane.pop()
             if sample is None:
                 continue
-            if lane.held():
-                self._waiting[key] = lane
-            together.append(state_bytes(sample))
-            size += len(together[-1])
-            if size > _MOST_TOGETHER:
-                await send_together(websocket, together)
-                together, size = [], 0
-                await self._send_messages(websocket)
-        if together:
-            await send_together(websocket, together)
-        for video in tuple(self._video.values()):
-            await self._send_messages(websocket)
-            sample = video.pop()
-            if sample is not None:
-                await websocket.send_bytes(video_bytes(sample, key=video.key, step=video.step))
-                sent = True
-        return sent
-
-    async def _send_messages(self, websocket: WebSocket) -> None:
-        while self._messages:
-            message = self._messages.popleft()
-            self._unread -= len(message)
-            await websocket.send_bytes(message)
-        if self._cut_off:  # it has missed something
-            await websocket.close(_POLICY_VIOLATION, "read too slowly")
+            self._waiting[key] = lane  # behind all others
+            if isinstance(lane, SteppedVideo):
+                return video_frame(sample, key=key, step=lane.step)
+            self.sent += 1
+            return state_frame(sample)
+        self._behind = False
+        return b""
 
     def _want_key_frame(self, key: str) -> None:
         now = time.monotonic()

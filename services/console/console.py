@@ -1,12 +1,12 @@
 """The console's server: the built page, the WebSocket behind it, the meshes it draws."""
 
 import asyncio
+import functools
 import logging
 import ssl
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -147,7 +147,9 @@ class Hub:
         self.define = None if settings.define is None else Define(settings.define)
         session.measure("browsers", "Pages that are open", lambda: len(self._browsers))
         for name, text in (("offered", "that came for pages"), ("sent", "that were sent to pages")):
-            session.measure(f"page_samples_{name}_total", f"Samples {text}", partial(self._count, name))
+            session.measure(
+                f"page_samples_{name}_total", f"Samples {text}", functools.partial(self._count, name)
+            )
 
     async def __aenter__(self) -> "Hub":
         work = self._watch_presence(), self._watch_router(), asyncio.to_thread(stills.prepare)
@@ -317,6 +319,7 @@ def _presence(who: PresenceKey, *, alive: bool) -> ToPage:
     return ToPage(presence=ToPage.Presence(key=key, alive=alive))
 
 
+@functools.cache  # it reads the package's metadata, and every page is told
 def _version() -> str:
     try:
         return version("robomesh")

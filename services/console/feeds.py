@@ -10,7 +10,9 @@ from bus.session import Session
 from bus.subscription import Sample
 from bus.topics import History
 from services.console.errors import WatchError
-from services.console.lanes import Lane, lane_for
+from services.console.lanes import Lane, lane_for, thinned
+from services.console.turns import Turns
+from services.console.wire import Moment, moments
 
 log = logging.getLogger(__name__)
 
@@ -19,13 +21,14 @@ _NEWEST = {History.KEY_FRAME: 75, History.LAST_100: 400}
 _NEWEST_STATE = 1024
 _ASK_AGAIN_S = 3.0
 
-Sink = Callable[[Sample], None]
+Sink = Callable[[Moment], None]
 
 
 class Feed:
     """A subscription, what it holds for those still to come, and who takes its samples."""
 
-    def __init__(self, session: Session, expression: str) -> None:
+    def __init__(self, session: Session, expression: str, turns: Turns) -> None:
+        self._turns = turns
         self.topic = check_expression(expression)
         newest = _NEWEST.get(self.topic.history, _NEWEST_STATE)
         self._subscription = session.subscribe(expression, newest=newest)
@@ -37,9 +40,8 @@ class Feed:
 
     def join(self, sink: Sink) -> None:
         """Gives what is held, then everything new, to a sink that must return at once."""
-        for lane in self._held.values():
-            for sample in lane.held():
-                sink(sample)
+        for moment in moments(sample for lane in self._held.values() for sample in lane.held()):
+            sink(moment)
         self._sinks.add(sink)
 
     def leave(self, sink: Sink) -> bool:
@@ -67,22 +69,40 @@ class Feed:
                 return
 
     async def _run(self) -> None:
-        async for sample in self._subscription:
-            try:
-                lane = self._held.get(sample.key)
-                if lane is None:
-                    lane = self._held[sample.key] = lane_for(self.topic, hold=True)
-                lane.push(sample)
+        while samples := await self._subscription.all_that_came():
+            for moment in moments(thinned(self.topic, [each for each in samples if self._hold(each)])):
                 for sink in tuple(self._sinks):
-                    sink(sample)
-            except Exception:  # one publisher's nonsense must not end the feed of all others
-                log.exception("a sample on %s could not be passed on", sample.key)
+                    self._give(sink, moment)
+            await self._turns.over()
+
+    def _hold(self, sample: Sample) -> bool:
+        """Keeps a sample for those still to come; whether it can be passed on."""
+        try:
+            lane = self._held.get(sample.key)
+            if lane is None:
+                lane = self._held[sample.key] = lane_for(self.topic, hold=True)
+            lane.push(sample)
+        except Exception:  # one publisher's nonsense must not end the feed of all others
+            log.exception("a sample on %s could not be passed on", sample.key)
+            return False
+        return True
+
+    def _give(self, sink: Sink, moment: Moment) -> None:
+        try:
+            sink(moment)
+        except Exception:  # nor that of one page's
+            log.exception("what came on %s could not be passed on", self._subscription.key_expr)
 
 
 class Feeds:
-    """The feeds that somebody watches now."""
+    """The feeds that somebody watches now.
+
+    Attributes:
+        turns: When the pages are served.
+    """
 
     def __init__(self, session: Session) -> None:
+        self.turns = Turns()
         self._session = session
         self._feeds: dict[str, Feed] = {}
 
@@ -94,7 +114,7 @@ class Feeds:
         """
         feed = self._feeds.get(expression)
         if feed is None:
-            feed = self._feeds[expression] = Feed(self._session, expression)
+            feed = self._feeds[expression] = Feed(self._session, expression, self.turns)
         feed.join(sink)
 
     def leave(self, expression: str, sink: Sink) -> None:

@@ -4,8 +4,10 @@ State: the newest value, and what came just before it. Lists (events, audit): th
 Video: the frames since a key frame; who falls behind goes on at the next key frame.
 """
 
+import functools
 import time
 from collections import deque
+from collections.abc import Sequence
 from typing import Protocol
 
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
@@ -21,6 +23,8 @@ _SKIP_FROM = 6
 
 # A stall of the machine, not a slow line: at 100 Hz five states.
 _RECENT_S, _MOST_RECENT = 0.05, 8
+# How far behind a page may draw.
+_SHOWN_S = 0.1
 
 _NAL_IDR, _NAL_SPS = 5, 7
 
@@ -170,6 +174,16 @@ def lane_for(topic: Topic, *, hold: bool = False) -> Lane:
             return NewestLane() if hold else RecentLane()
 
 
+def thinned(topic: Topic, samples: Sequence[Sample]) -> Sequence[Sample]:
+    """What came together, without the state that is old for a display and has a newer."""
+    since = time.monotonic() - _SHOWN_S
+    if topic.history is not History.LAST or not samples or samples[0].received > since:
+        return samples
+    newest = {sample.key: sample for sample in samples}
+    return [each for each in samples if each.received > since or newest[each.key] is each]
+
+
+@functools.lru_cache(64)  # every page that watches a picture asks
 def begins_video(sample: Sample) -> bool:
     """Whether a decoder can begin with this sample: a key frame, or the frames since one."""
     return not sample.live or is_key_frame(CompressedVideo.FromString(sample.payload).data)

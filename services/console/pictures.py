@@ -40,6 +40,7 @@ from services.console.lanes import Lane, NewestLane, VideoLane
 from services.console.stills import png
 from services.console.streamed import Streamed
 from services.console.views import Views, robot_key
+from services.console.wire import Moment
 
 log = logging.getLogger(__name__)
 
@@ -236,8 +237,9 @@ class _Watch:
                     await self._ready.wait()
         return None
 
-    def _push(self, sample: Sample) -> None:
-        self._lane.push(sample)
+    def _push(self, moment: Moment) -> None:
+        for sample in moment.samples:
+            self._lane.push(sample)
         self._ready.set()
 
 

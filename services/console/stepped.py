@@ -17,6 +17,7 @@ from bus.subscription import Sample
 from services.console.feeds import Feeds
 from services.console.lanes import VideoLane, begins_video
 from services.console.views import LOWEST_STEP, Views
+from services.console.wire import Moment
 
 log = logging.getLogger(__name__)
 
@@ -75,11 +76,12 @@ class SteppedVideo:
         """The next frame to send."""
         return self._lane.pop()
 
-    def _push(self, sample: Sample) -> None:
+    def _push(self, moment: Moment) -> None:
         self._pushed_at = time.monotonic()
-        self._lane.push(sample)
-        if self._lane.starved:
-            self._on_starved(sample.key)
+        for sample in moment.samples:
+            self._lane.push(sample)
+            if self._lane.starved:
+                self._on_starved(sample.key)
         if self._lane.waited_s() > _LATE_S:
             self._late()
         self._on_frame()
@@ -133,8 +135,8 @@ class SteppedVideo:
         came = asyncio.Event()
         held = True
 
-        def look(sample: Sample) -> None:
-            if not held and sample.live and begins_video(sample):
+        def look(moment: Moment) -> None:
+            if not held and any(each.live and begins_video(each) for each in moment.samples):
                 came.set()
 
         self._feeds.join(source, look)

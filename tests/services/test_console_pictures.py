@@ -19,6 +19,7 @@ from renderer.errors import NoRoomError
 from services.console import pictures
 from services.console.lanes import NewestLane
 from services.console.streamed import Streamed
+from services.console.wire import Moment
 from tests.conftest import run
 from tests.services.test_console import console, get, page  # noqa: F401
 
@@ -282,7 +283,8 @@ def test_what_a_slow_reader_is_given_next_is_the_newest():
         feeds = Feeds()
         watch = pictures._Watch(feeds, "robomesh/s/r/image/front", NewestLane())
         for number in range(100):
-            feeds.sink(Sample("robomesh/s/r/image/front", b"", Header(1, number, 0), True, 0.0))
+            sample = Sample("robomesh/s/r/image/front", b"", Header(1, number, 0), True, 0.0)
+            feeds.sink(Moment([sample]))
         assert (await watch.next(1.0)).header.sequence == 99
         assert await watch.next(0.01) is None
 

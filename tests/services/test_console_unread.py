@@ -15,22 +15,27 @@ __all__ = ["page"]  # a fixture
 LONG = "robomesh/s/r/" + "x" * 900_000
 
 
+class Full:
+    """A line that took one write."""
+
+    ready = True
+
+    def write(self, frames):
+        self.ready = False
+
+
 @dataclass
 class Deaf:
     """A WebSocket whose other end asks again and again, and takes nothing."""
 
     asked: int = 0
-    sent: list = field(default_factory=list)
+    scope: dict = field(default_factory=lambda: {"extensions": {"robomesh.line": {"line": Full()}}})
 
     async def receive(self):
         await asyncio.sleep(0)
         self.asked += 1
         ask = FromPage.Ask(id=self.asked, key="robomesh/s/r/no-such-request")
         return {"type": "websocket.receive", "bytes": FromPage(ask=ask).SerializeToString()}
-
-    async def send_bytes(self, data):
-        self.sent.append(data)
-        await asyncio.Event().wait()
 
     async def close(self, code, reason):
         await asyncio.Event().wait()

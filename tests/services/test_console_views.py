@@ -14,6 +14,7 @@ from bus.subscription import Sample
 from services.console import lanes, stepped
 from services.console.stepped import SteppedVideo
 from services.console.views import LOWEST_STEP, Views, less
+from services.console.wire import Moment
 from tests.conftest import run
 
 KEY = "robomesh/s/r/video/top"
@@ -60,7 +61,7 @@ class Feeds:
 
     def give(self, key, sample):
         for sink in tuple(self.joined[key]):
-            sink(sample)
+            sink(Moment([sample]))
 
     def give_all(self, sample):
         for key in tuple(self.joined):

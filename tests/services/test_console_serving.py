@@ -1,0 +1,163 @@
+"""What pages are sent, and when: together, the same bytes; the newest to who was slow."""
+
+import asyncio
+import time
+from types import SimpleNamespace
+
+from bus.header import Header
+from bus.schemas.robomesh_pb2 import FromPage, ToPage
+from bus.subscription import Sample
+from services.console.browser import Browser
+from services.console.turns import Turns
+from services.console.wire import Moment, frame, moments, state_frame
+from tests.conftest import run
+
+KEY = "robomesh/s/r/joints"
+
+
+def sample(number, *, key=KEY, payload=b"state", received=None):
+    received = time.monotonic() if received is None else received
+    return Sample(key, payload, Header(1, number, 0), True, received)
+
+
+def numbers(frames):
+    """The numbers of the samples in WebSocket frames of 126 bytes to 64 KiB, or less than 126."""
+    found = []
+    while frames:
+        assert frames[0] == 0x82  # binary, whole
+        length, at = frames[1], 2
+        if length == 126:
+            length, at = int.from_bytes(frames[2:4], "big"), 4
+        message = ToPage.FromString(frames[at : at + length])
+        if message.WhichOneof("message") == "sample":
+            found.append(int.from_bytes(message.sample.attachment[8:16], "little"))
+        frames = frames[at + length :]
+    return found
+
+
+class Feeds:
+    """One feed."""
+
+    def __init__(self):
+        self.turns, self.sinks = Turns(), []
+
+    def join(self, _, sink):
+        self.sinks.append(sink)
+
+    def leave(self, _, sink):
+        self.sinks.remove(sink)
+
+    async def give(self, *samples):
+        for moment in moments(samples):
+            for sink in self.sinks:
+                sink(moment)
+        await self.turns.over()
+
+
+class Line:
+    """A line that may take nothing."""
+
+    def __init__(self):
+        self.ready, self.written, self.on_ready = True, [], None
+
+    def write(self, frames):
+        self.written.append(frames)
+
+    def came(self):
+        came, self.written = b"".join(self.written), []
+        return numbers(came)
+
+
+class Socket:
+    """A WebSocket whose page watches one key, and then only reads."""
+
+    def __init__(self, line):
+        self.scope = {"extensions": {"robomesh.line": {"line": line}}}
+        self.watched = False
+
+    async def receive(self):
+        if self.watched:
+            await asyncio.Event().wait()
+        self.watched = True
+        watch = FromPage(watch=FromPage.Watch(key=KEY))
+        return {"type": "websocket.receive", "bytes": watch.SerializeToString()}
+
+
+def test_who_keeps_step_gets_all_in_one_write_and_who_does_not_the_newest_until_it_does(monkeypatch):
+    monkeypatch.setattr("services.console.wire._SAME_AGE_S", 60.0)  # a busy machine's turn may be long
+
+    async def main():
+        feeds, lines = Feeds(), [Line(), Line(), Line()]
+        browsers = [
+            Browser(None, feeds, None, greet=lambda _: ToPage(hello=ToPage.Hello()), site="s") for _ in lines
+        ]
+        serving = [
+            asyncio.create_task(each.run(Socket(line))) for each, line in zip(browsers, lines, strict=True)
+        ]
+        while len(feeds.sinks) < len(lines) or not all(line.written for line in lines):
+            await asyncio.sleep(0)
+        quick, other, slow = lines
+        assert [line.came() for line in lines] == [[], [], []]  # greeted
+        slow.ready = False
+        long_ago = time.monotonic() - 1.0
+        await feeds.give(*(sample(number, received=long_ago) for number in range(1, 4)))
+        assert len(quick.written) == 1
+        assert quick.written[0] is other.written[0]
+        assert quick.came() == [1, 2, 3]
+        await feeds.give(*(sample(number, received=long_ago) for number in range(4, 10)))
+        await feeds.give(sample(10))
+        slow.ready = True
+        slow.on_ready()
+        await feeds.give(sample(11))
+        assert slow.came() == [10, 11]
+        await feeds.give(sample(12), sample(13))
+        assert slow.came() == [12, 13]
+        assert [browser.offered for browser in browsers] == [13, 13, 13]
+        assert [browser.sent for browser in browsers] == [13, 13, 4]
+        for task in serving:
+            task.cancel()
+        await asyncio.gather(*serving, return_exceptions=True)
+        assert not feeds.sinks
+
+    run(main())
+
+
+def test_the_same_bytes_are_sent_to_all_for_a_moment_then_the_age_is_told_anew(monkeypatch):
+    moment = Moment([sample(1, received=time.monotonic() - 2.0)])
+    first = moment.frames()
+    assert moment.frames() is first or time.monotonic() - moment._at > 0.005
+    later = time.monotonic() + 1.0
+    monkeypatch.setattr("services.console.wire.time", SimpleNamespace(monotonic=lambda: later))
+    ages = [ToPage.FromString(each[2:]).sample.age_s for each in (first, moment.frames())]
+    assert ages[0] >= 2.0
+    assert 0.9 < ages[1] - ages[0] < 31.0
+
+
+def test_what_is_given_to_a_line_at_once_is_little_and_in_order():
+    samples = [sample(number, payload=bytes(1000)) for number in range(20)]
+    pieces = list(moments(samples))
+    assert [each for piece in pieces for each in piece.samples] == samples
+    assert max(len(piece.frames()) for piece in pieces) < 5000
+    assert len(pieces) == 5
+    assert list(moments([])) == []
+
+
+def test_a_page_that_cannot_be_served_takes_nobody_elses_turn(caplog):
+    async def main():
+        turns, served = Turns(), []
+        turns.due(lambda: 1 / 0)
+        turns.due(lambda: served.append(1))
+        await turns.over()
+        assert served == [1]
+        await turns.over()
+
+    run(main())
+    assert "could not be served" in caplog.text
+
+
+def test_a_message_of_any_length_is_one_frame():
+    for length in (0, 125, 126, 65535, 65536):
+        message = bytes(length)
+        assert frame(message).endswith(message)
+        assert len(frame(message)) - length == (2 if length < 126 else 4 if length < 65536 else 10)
+    assert numbers(state_frame(sample(5)) + state_frame(sample(6))) == [5, 6]
