@@ -10,7 +10,8 @@ delay      80 ms there and back, with and without 1 % of the packets lost each w
            the joints; how soon a stop is on the controller's socket after it was asked for over both
            links, as stops are, and over one, as other requests are
 narrow     100, 20 and 2 Mbit/s, 40 ms each way, beside publications like 8 Mbit/s of video: how late the
-           joints are and how many come, and how much of the video comes
+           joints are and how many come, and how much of the video comes; then 2 Mbit/s of which the plant's
+           router was told (`line_mbit`), and meshes of 3 MB fetched over it, with and without that video
 cut        the link cut for 5 and 60 s: how soon the room sees it, how soon all is live again, and whether
            what was lost is what was counted
 kills      the plant's router killed with -9, 20 times: how soon the room has live joints and the last state
@@ -53,6 +54,9 @@ ONE_WAY_MS = 40.0
 # As much as a few views of 1280 x 720; and what a line's own router queues, 0.26 s at 2 Mbit/s.
 VIDEO_MBIT = 8.0
 QUEUE_BYTES = 64_000
+NARROW_MBIT = 2
+MESH = "robomesh/plant/arm/mesh/base"
+MESH_BYTES = 3_000_000
 
 
 @dataclass
@@ -75,8 +79,12 @@ class Stage:
 
 
 @contextlib.contextmanager
-def stage(**link: Any) -> Iterator[Stage]:
-    """Everything up, and joints live in the room."""
+def stage(*, told_mbit: float | None = None, **link: Any) -> Iterator[Stage]:
+    """Everything up, and joints live in the room.
+
+    Args:
+        told_mbit: What the plant's router is told that its line carries [Mbit/s]; None: nothing.
+    """
     with tempfile.TemporaryDirectory() as folder, Network() as network:
         hosts = {name: network.host(name) for name in ("plant", "hub", "room")}
         far = network.link(hosts["plant"], hosts["hub"])
@@ -84,6 +92,7 @@ def stage(**link: Any) -> Iterator[Stage]:
         hub = Site(hosts["hub"], "hub", Path(folder))
         hub.start("router")
         plant = Site(hosts["plant"], "plant", Path(folder), links=(f"tcp/{far.far}:{PORT}",), more=ARM)
+        plant.router = "" if told_mbit is None else f"line_mbit = {told_mbit}"
         beside = plant.with_arm()
         room = Probe(hosts["room"], f"tcp/{near.far}:{PORT}")
         made = Stage(network, plant, hub, far, near, beside, room)
@@ -164,29 +173,59 @@ def stops_asked(made: Stage, number: int, order: tuple[Any, ...]) -> dict[str, A
 # ------------------------------------------------------------------------- narrow
 
 
-def narrow(seconds: float) -> dict[str, Any]:
-    """Joints beside video on a narrow link."""
+def narrow(seconds: float, meshes: int) -> dict[str, Any]:
+    """Joints beside video on a narrow link, and meshes over it."""
     rows: dict[str, Any] = {}
     with stage(delay_ms=ONE_WAY_MS) as made:
-        made.beside.do("pour", "plant", "arm", "free", VIDEO_MBIT, 30.0)
-        made.room.do("watch", VIDEO)
-        for mbit in (100, 20, 2):
-            made.far.change(rate_bps=mbit * 1e6, queue_bytes=QUEUE_BYTES)
-            time.sleep(5.0)
-            made.room.do("samples", VIDEO)
-            before = made.far.counters()["forth"]
-            lags = [lag for _, lag in joints_for(made, seconds)]
-            after = made.far.counters()["forth"]
-            pictures = [each for each in made.room.do("samples", VIDEO) if each[2]]
-            rows[f"{mbit} Mbit/s"] = {
-                "joints_ms": quantiles(lags),
-                "joints_share": round(len(lags) / (100 * seconds), 4),
-                "pictures_per_s": round(len(pictures) / seconds, 1),
-                "pictures_ms": quantiles([each[1] for each in pictures]),
-                "mbit_per_s": round((after["bytes"] - before["bytes"]) * 8e-6 / seconds, 2),
-                "overflowed": after["overflowed"] - before["overflowed"],
-            }
+        pour_video(made)
+        for mbit in (100, 20, NARROW_MBIT):
+            rows[f"{mbit} Mbit/s"] = beside_video(made, mbit, seconds)
+    for video in (True, False):
+        with stage(told_mbit=NARROW_MBIT, delay_ms=ONE_WAY_MS) as made:
+            if video:
+                pour_video(made)
+                rows[f"{NARROW_MBIT} Mbit/s, told"] = beside_video(made, NARROW_MBIT, seconds)
+            made.far.change(rate_bps=NARROW_MBIT * 1e6, queue_bytes=QUEUE_BYTES)
+            rows["meshes beside video" if video else "meshes alone"] = fetch_meshes(made, meshes)
     return rows
+
+
+def pour_video(made: Stage) -> None:
+    """Publish what is like video at the plant, and watch it in the room."""
+    made.beside.do("pour", "plant", "arm", "free", VIDEO_MBIT, 30.0)
+    made.room.do("watch", VIDEO)
+
+
+def beside_video(made: Stage, mbit: float, seconds: float) -> dict[str, Any]:
+    """Joints and video over a line of that rate."""
+    made.far.change(rate_bps=mbit * 1e6, queue_bytes=QUEUE_BYTES)
+    time.sleep(5.0)
+    made.room.do("samples", VIDEO)
+    before = made.far.counters()["forth"]
+    lags = [lag for _, lag in joints_for(made, seconds)]
+    after = made.far.counters()["forth"]
+    pictures = [each for each in made.room.do("samples", VIDEO) if each[2]]
+    return {
+        "joints_ms": quantiles(lags),
+        "joints_share": round(len(lags) / (100 * seconds), 4),
+        "pictures_per_s": round(len(pictures) / seconds, 1),
+        "pictures_ms": quantiles([each[1] for each in pictures]),
+        "mbit_per_s": round((after["bytes"] - before["bytes"]) * 8e-6 / seconds, 2),
+        "overflowed": after["overflowed"] - before["overflowed"],
+    }
+
+
+def fetch_meshes(made: Stage, times: int) -> dict[str, Any]:
+    """How many of them came whole, how long each took, and the joints meanwhile."""
+    sha256 = made.beside.do("hold_mesh", "plant", "arm", MESH_BYTES)
+    made.room.do("samples", JOINTS)
+    answers = [made.room.do("mesh", MESH, 10.0) for _ in range(times)]
+    lags = [lag for _, lag, live, *_ in made.room.do("samples", JOINTS) if live]
+    return {
+        "whole": f"{sum(each.get('sha256') == sha256 for each in answers)} of {times}",
+        "took_ms": quantiles([each["took_s"] for each in answers]),
+        "joints_ms": quantiles(lags),
+    }
 
 
 # ---------------------------------------------------------------------------- cut
@@ -300,6 +339,7 @@ def main() -> None:
     parser.add_argument("--only", default="delay,narrow,cut,kills,failover,frozen,bytes,border")
     parser.add_argument("--seconds", type=float, default=20.0, help="of joints, for each figure")
     parser.add_argument("--stops", type=int, default=300)
+    parser.add_argument("--meshes", type=int, default=3, help="of 3 MB, fetched over 2 Mbit/s")
     parser.add_argument("--cuts", default="5,60")
     parser.add_argument("--kills", type=int, default=20)
     parser.add_argument("--json", action="store_true")
@@ -310,7 +350,7 @@ def main() -> None:
     lengths = tuple(float(each) for each in arguments.cuts.split(","))
     wanted = {
         "delay": lambda: delay(arguments.seconds, arguments.stops),
-        "narrow": lambda: narrow(arguments.seconds),
+        "narrow": lambda: narrow(arguments.seconds, arguments.meshes),
         "cut": lambda: cut(lengths),
         "kills": lambda: kills(arguments.kills),
         "failover": lambda: failover(5),

@@ -2,7 +2,7 @@
 
 It holds no robot state and is on no data path: killed, it takes its processes with it; a killed
 process comes back, and the others do not notice. What is added while it runs comes and goes beside
-the rest, in groups.
+the rest, in groups. Of what nobody can do without, another waits, loaded, to take its place.
 """
 
 import asyncio
@@ -29,6 +29,9 @@ _READ_BYTES = 1 << 16
 _LONGEST_LINE = 2000
 _PR_SET_PDEATHSIG = 1
 _FOLLOW_EACH_S = 0.4
+# A spare is loaded when what it stands by for has run this long: not while everything starts.
+_SPARE_AFTER_S = 5.0
+_SPARE = "ROBOMESH_SPARE"
 
 # Groups of programs that are to run beside the others, now: a key that is new starts its own, one that
 # is gone has them ended.
@@ -41,11 +44,14 @@ class Program:
 
     Attributes:
         needed: The site cannot do without it: when it cannot start at all, nothing starts.
+        spare: Another process of it stands by (`wait_for_turn`): on a busy machine loading a service takes
+            seconds, and starting one that is loaded does not.
     """
 
     name: str
     arguments: tuple[str, ...]
     needed: bool = True
+    spare: bool = False
 
 
 class CouldNotStartError(ServiceError):
@@ -91,6 +97,17 @@ async def supervise(
         await _end([*running.values()])
 
 
+def wait_for_turn() -> None:
+    """As a spare, wait until the process that it stands by for has ended; as any other, not at all."""
+    if not os.environ.pop(_SPARE, ""):
+        return
+    if not os.read(0, 1):
+        sys.exit(0)  # the supervisor has ended
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
+
+
 def _prefixed(write: Callable[[str], None], prefix: str) -> Callable[[str], None]:
     return lambda line: write(prefix + line)
 
@@ -127,12 +144,13 @@ async def _keep(
     ran_well = False
     while True:
         started = time.monotonic()
-        process = await _start(program)
+        process = await _next(program, running)
         running[program.name] = process
         assert process.stdout is not None
-        async for line in _lines(process.stdout):
-            write(line)
-        status = await process.wait()
+        async with _standing_by(program, running):
+            async for line in _lines(process.stdout):
+                write(line)
+            status = await process.wait()
         ran_s = time.monotonic() - started
         if status == _COULD_NOT and not ran_well and ran_s < _WELL_AFTER_S:
             if program.needed:
@@ -140,10 +158,10 @@ async def _keep(
             write("could not start; everything else runs without it")
             return
         if ran_s > _WELL_AFTER_S:
-            ran_well, wait_s = True, _SHORTEST_WAIT_S
-        write(f"ended ({_status(status)}); again in {wait_s:.1f} s")
+            ran_well, wait_s = True, 0.0
+        write(f"ended ({_status(status)}); again {f'in {wait_s:.1f} s' if wait_s else 'at once'}")
         await asyncio.sleep(wait_s * random.uniform(0.8, 1.2))
-        wait_s = min(2 * wait_s, _LONGEST_WAIT_S)
+        wait_s = min(max(2 * wait_s, _SHORTEST_WAIT_S), _LONGEST_WAIT_S)
 
 
 async def _lines(stream: asyncio.StreamReader) -> AsyncIterator[str]:
@@ -158,7 +176,43 @@ async def _lines(stream: asyncio.StreamReader) -> AsyncIterator[str]:
         yield rest.decode(errors="replace").rstrip()
 
 
-async def _start(program: Program) -> asyncio.subprocess.Process:
+async def _next(
+    program: Program, running: dict[str, asyncio.subprocess.Process]
+) -> asyncio.subprocess.Process:
+    """The spare, told that it is its turn, or a new process."""
+    spare = running.pop(_spare(program), None)
+    if spare is None or spare.returncode is not None:
+        return await _start(program)
+    assert spare.stdin is not None
+    spare.stdin.write(b"\n")
+    return spare
+
+
+@contextlib.asynccontextmanager
+async def _standing_by(
+    program: Program, running: dict[str, asyncio.subprocess.Process]
+) -> AsyncIterator[None]:
+    """See to it that a spare is there, where there is to be one."""
+
+    async def keep() -> None:
+        while True:
+            await asyncio.sleep(_SPARE_AFTER_S)
+            running[_spare(program)] = spare = await _start(program, spare=True)
+            await spare.wait()
+
+    task = asyncio.create_task(keep()) if program.spare else None
+    try:
+        yield
+    finally:
+        if task is not None:
+            task.cancel()
+
+
+def _spare(program: Program) -> str:
+    return f"{program.name}, spare"
+
+
+async def _start(program: Program, *, spare: bool = False) -> asyncio.subprocess.Process:
     supervisor = os.getpid()
 
     def die_with_the_supervisor() -> None:
@@ -171,13 +225,13 @@ async def _start(program: Program) -> asyncio.subprocess.Process:
         "-m",
         "services.command_line.main",
         *program.arguments,
-        stdin=asyncio.subprocess.DEVNULL,
+        stdin=asyncio.subprocess.PIPE if spare else asyncio.subprocess.DEVNULL,
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.STDOUT,
         # A terminal's Ctrl-C is for the supervisor, which ends the others in order.
         start_new_session=True,
         preexec_fn=die_with_the_supervisor,
-        env={**_environment(), "PYTHONUNBUFFERED": "1"},
+        env={**_environment(), "PYTHONUNBUFFERED": "1", **({_SPARE: "1"} if spare else {})},
     )
 
 

@@ -37,7 +37,9 @@ class RunningSite:
         found = {}
         for line in _output("ps", "-o", "pid=,args=", "--ppid", str(self.process.pid)).splitlines():
             pid, _, arguments = line.strip().partition(" ")
-            if "services.command_line.main " in arguments:
+            # A spare waits at its standard input, a pipe.
+            spare = "pipe:" in str(Path(f"/proc/{pid}/fd/0").readlink())
+            if "services.command_line.main " in arguments and not spare:
                 name = arguments.split("services.command_line.main ", 1)[1].split()[0]
                 found[name] = int(pid)
         return found

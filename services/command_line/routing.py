@@ -8,6 +8,7 @@ from services import router as role
 from services.keys import Folder
 from services.listen import check_reach, split_address
 from services.site_router import RoutedSite, read_routed
+from services.supervisor import wait_for_turn
 
 logger = logging.getLogger(__name__)
 
@@ -15,6 +16,7 @@ logger = logging.getLogger(__name__)
 def run(path: Path | None, config_out: Path | None = None, metrics: str = "") -> None:
     """Run the router of the site."""
     service.log_to_stderr()
+    wait_for_turn()
     # zenohd may be started in another folder.
     site = _read(path if path is None or config_out is None else path.absolute())
     settings = _settings(site, metrics_address(site, metrics))

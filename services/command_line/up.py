@@ -71,7 +71,7 @@ def programs(site: Site, path: Path | None, endpoint: str) -> tuple[Program, ...
         Program(name="kinematics", arguments=("kinematics", *of_site, *attach)),
     )
     return (
-        Program(name="router", arguments=("router", *of_site)),
+        Program(name="router", arguments=("router", *of_site), spare=True),
         *simulators,
         *(of_robots if site.robot else ()),
         Program(name="console", arguments=("console", *of_site, *attach, "--supervised")),

@@ -1,13 +1,17 @@
 """The supervisor's small parts; a whole site is tried in test_whole_site."""
 
 import asyncio
+import os
+import signal
 import subprocess
 import sys
 
+import psutil
 import pytest
 
+from services import supervisor
 from services.supervisor import CouldNotStartError, Program, _lines, supervise
-from tests.conftest import run
+from tests.conftest import free_port, run
 
 
 def test_lines_of_any_length_and_any_bytes_end_nobody():
@@ -109,3 +113,33 @@ def test_a_held_terminal_holds_no_service():
     finally:
         process.kill()
         process.communicate()
+
+
+def test_a_spare_takes_the_place_of_what_was_killed(tmp_path, monkeypatch):
+    monkeypatch.setattr(supervisor, "_SPARE_AFTER_S", 0.1)
+    site = tmp_path / "site.toml"
+    site.write_text(f'site = "hall"\n[router]\nlisten = ["tcp/127.0.0.1:{free_port()}"]\n')
+    router = Program(name="router", arguments=("router", "--site", str(site)), spare=True)
+    log = []
+
+    def pids():
+        return [each.pid for each in sorted(psutil.Process().children(), key=lambda each: each.pid)]
+
+    async def until(condition):
+        while not condition():
+            await asyncio.sleep(0.02)
+
+    async def main():
+        task = asyncio.create_task(supervise([router], ready=asyncio.Event().wait, write=log.append))
+        await until(lambda: sum("routing on" in line for line in log) == 1)
+        await until(lambda: len(pids()) == 2)
+        serving, spare = pids()
+        os.kill(serving, signal.SIGKILL)
+        await until(lambda: sum("routing on" in line for line in log) == 2)
+        await until(lambda: serving not in pids() and len(pids()) == 2)
+        assert spare in pids()
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+    run(main(), timeout_s=60.0)
+    assert not pids()
