@@ -4,10 +4,9 @@ A line that is cut for a moment, or full, gives old samples out together afterwa
 machines cannot be compared, but the lags of one publisher's samples can, each with the least of them:
 whatever lies between the clocks is the same in all of them. Nobody is believed alone: a least lag is what
 two samples, one after the other, do not exceed, so that a single one dated ahead makes no other late. The
-first is, because the second may have waited; but not where our own clock says that it is dated ahead.
+first is, because the second may have waited, but not for longer than anything can.
 """
 
-import math
 from dataclasses import dataclass
 
 from bus.header import Header
@@ -16,8 +15,9 @@ from bus.header import Header
 # that, but not over a silence: what comes first after it may have waited.
 _DRIFT = 1e-3
 _MOST_GROWN_S = 1.0
-# Clocks that are set by NTP differ by less.
-_AHEAD_NS = 10**9
+# A connection that carries nothing for 2 s is given up, with what waited there. A second sample that is
+# later than this tells that the first was dated ahead.
+_MOST_WAITED_S = 10.0
 
 
 @dataclass(slots=True)
@@ -28,23 +28,24 @@ class Lateness:
     least_lag_s: float = 0.0
     last_lag_s: float = 0.0
     taken_s: float = 0.0
+    alone: bool = True
 
-    def of(self, header: Header, now_s: float, wall_ns: int) -> float:
+    def of(self, header: Header, now_s: float) -> float:
         """How much longer a sample was on its way than the quickest before it [s].
 
         Args:
             now_s: On the receiver's monotonic clock, any origin.
-            wall_ns: On its clock of the day, ns since the Unix epoch: only a publisher's first is held to it.
         """
         if not header.source_time_ns:
             return 0.0  # its publisher does not tell
         lag_s = now_s - header.source_time_ns * 1e-9
         if header.publisher != self.publisher:
-            ahead = header.source_time_ns > wall_ns + _AHEAD_NS
-            self.publisher, self.least_lag_s = header.publisher, math.inf if ahead else lag_s
+            self.publisher, self.least_lag_s, self.alone = header.publisher, lag_s, True
             self.last_lag_s, self.taken_s = lag_s, now_s
             return 0.0
         grown_s = min(max(now_s - self.taken_s, 0.0), _MOST_GROWN_S) * _DRIFT
-        self.least_lag_s = min(self.least_lag_s + grown_s, max(lag_s, self.last_lag_s))
-        self.last_lag_s, self.taken_s = lag_s, now_s
+        least_s, of_two_s = self.least_lag_s + grown_s, max(lag_s, self.last_lag_s)
+        dated_ahead = self.alone and lag_s - least_s > _MOST_WAITED_S
+        self.least_lag_s = of_two_s if dated_ahead else min(least_s, of_two_s)
+        self.last_lag_s, self.taken_s, self.alone = lag_s, now_s, False
         return max(lag_s - self.least_lag_s, 0.0)

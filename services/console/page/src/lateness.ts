@@ -5,14 +5,15 @@ interface Least {
   lag: number;
   last: number;
   at: number;
+  alone: boolean;
 }
 const least = new Map<string, Least>();
 
 // The least lag may grow as fast as clocks part while one is being set, but not over a silence.
 const DRIFT = 1e-3;
 const MOST_GROWN_MS = 1000;
-// Clocks that are set by NTP differ by less.
-const AHEAD_MS = 1000;
+// Nothing waits longer on its way: a second sample that is later tells that the first was dated ahead.
+const MOST_WAITED_MS = 10_000;
 
 /** How much longer [ms] a sample was on its way than its publisher's quickest; `arrived` on any monotonic clock. */
 export function lateness(key: string, publisher: bigint, sourceTime: number, arrived: number): number {
@@ -21,14 +22,15 @@ export function lateness(key: string, publisher: bigint, sourceTime: number, arr
   const lag = arrived - sourceTime;
   const before = least.get(key);
   if (before?.publisher !== publisher) {
-    // The first alone is believed, for the second may have waited; but not one that our own clock has still to come to.
-    const ahead = sourceTime > Date.now() + AHEAD_MS;
-    least.set(key, { publisher, lag: ahead ? Infinity : lag, last: lag, at: arrived });
+    least.set(key, { publisher, lag, last: lag, at: arrived, alone: true });
     return 0;
   }
   const grown = Math.min(Math.max(arrived - before.at, 0), MOST_GROWN_MS) * DRIFT;
+  const leastOfAll = before.lag + grown;
   // A single sample dated ahead makes no other late.
-  const now = { publisher, lag: Math.min(before.lag + grown, Math.max(lag, before.last)), last: lag, at: arrived };
+  const ofTwo = Math.max(lag, before.last);
+  const datedAhead = before.alone && lag - leastOfAll > MOST_WAITED_MS;
+  const now = { publisher, lag: datedAhead ? ofTwo : Math.min(leastOfAll, ofTwo), last: lag, at: arrived, alone: false };
   least.set(key, now);
   return Math.max(lag - now.lag, 0);
 }
