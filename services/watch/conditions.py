@@ -14,6 +14,8 @@ from bus.schemas.robomesh_pb2 import ControllerState
 _LINK_AFTER_S = 1.0
 _CHECK_AFTER_S = 20.0
 _SILENT_AFTER_S = 6.0
+# Longer than it takes to give up a frozen controller and connect to it anew.
+_WORDS_AFTER_S = 10.0
 _LINK = {ControllerState.DOWN: "link.down", ControllerState.SILENT: "link.silent"}
 
 
@@ -26,7 +28,7 @@ class Condition:
         told: Somebody else has published an event of it.
         latching: To acknowledge it is to know it: it may stay so for good.
         after_s: So long it must be so to begin.
-        steady: Its words are those that it began with: they say what is so, and why changes while it is.
+        words_after_s: So long other words must be so to be told: why it is so may change again and again.
     """
 
     robot: str = WHOLE_SITE
@@ -40,7 +42,7 @@ class Condition:
     told: bool = False
     latching: bool = False
     after_s: float = 0.0
-    steady: bool = False
+    words_after_s: float = 0.0
 
     @property
     def id(self) -> str:
@@ -63,6 +65,8 @@ class Judge:
 
     begun: dict[str, Condition] = field(default_factory=dict)
     _since: dict[str, float] = field(default_factory=dict)
+    # Other words than those told, and since when.
+    _words: dict[str, tuple[str, float]] = field(default_factory=dict)
 
     def judge(
         self, conditions: Iterable[Condition], now: float
@@ -77,15 +81,23 @@ class Judge:
                 if now - self._since[name] < condition.after_s:
                     continue
                 began.append(condition)
-            elif condition.steady:
-                continue
             elif (before.text, before.code) != (condition.text, condition.code):
+                if now - self._words_since(name, condition, now) < condition.words_after_s:
+                    continue
                 changed.append(condition)
             self.begun[name] = condition
         over = [condition for name, condition in self.begun.items() if name not in there]
         for condition in over:
             del self.begun[condition.id]
+            self._words.pop(condition.id, None)
         return began, changed, over
+
+    def _words_since(self, name: str, condition: Condition, now: float) -> float:
+        text, since = self._words.get(name, ("", now))
+        if text != condition.text:
+            since = now
+        self._words[name] = condition.text, since
+        return since
 
 
 def robot_conditions(robot: str, state: ControllerState, age_s: float) -> Iterator[Condition]:
@@ -105,7 +117,7 @@ def robot_conditions(robot: str, state: ControllerState, age_s: float) -> Iterat
     if state.link in _LINK:
         text = f"link to the controller: {state.link_text or 'not up'}"
         # One that is frozen is silent, given up and connected to, again and again: that is one alarm.
-        yield held(_LINK[state.link], text, what="link", after_s=_LINK_AFTER_S, steady=True)
+        yield held(_LINK[state.link], text, what="link", after_s=_LINK_AFTER_S, words_after_s=_WORDS_AFTER_S)
     if state.fault or state.activity == ControllerState.FAULT:
         yield held(
             "controller.fault", f"the controller has a fault: {state.fault or 'it does not say which'}"

@@ -150,3 +150,16 @@ def test_a_frozen_controller_that_is_connected_to_again_and_again_is_one_alarm_i
     assert judged(4.0) == ([], [], [])
     state.link = ControllerState.UP
     assert judged(5.0) == ([], [], ["link.silent"])
+
+
+def test_a_link_that_stays_down_for_another_reason_is_told_with_that_reason():
+    judge, state = Judge(), ControllerState(link=ControllerState.DOWN, link_text="connecting to 10.0.0.7")
+
+    def changed(now_s: float) -> list[str]:
+        return [each.text for each in judge.judge(robot_conditions("arm", state, 0.0), now_s)[1]]
+
+    assert [changed(now_s) for now_s in (0.0, 1.0)] == [[], []]
+    state.link_text = "cannot connect to 10.0.0.7: Connection refused"
+    assert changed(2.0) == []
+    assert changed(13.0) == ["link to the controller: cannot connect to 10.0.0.7: Connection refused"]
+    assert changed(14.0) == []
