@@ -24,6 +24,9 @@ _SETTLE_S = 0.25
 _HELD_S = 0.065
 # Linux counts each packet's own bookkeeping too.
 _LEAST_HELD_BYTES = 16_384
+# What Linux grants by default (net.core.wmem_max): a line too quick to be kept busy by so little has the
+# buffers that the system sizes by itself.
+_MOST_HELD_BYTES = 212_992
 # When a machine goes without a word, closing its connections holds the thread that does it for up to 10 s
 # (Zenoh sets SO_LINGER), and by default a process receives with two: a cut line silenced a site's own
 # services for as long. So there are more than can be held at once; a client has four connections.
@@ -115,6 +118,8 @@ def router_values(
 ) -> dict[str, Any]:
     """As `router_config`, as keys of Zenoh's configuration and their values."""
     held_bytes = None if line_bps is None else max(round(line_bps / 8 * _HELD_S), _LEAST_HELD_BYTES)
+    if held_bytes is not None and held_bytes > _MOST_HELD_BYTES:
+        held_bytes = None
     return {
         "mode": "router",
         "listen/endpoints": list(listen),

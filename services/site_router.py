@@ -55,7 +55,7 @@ class Router(BaseModel):
     tls: TlsFiles | None = None
     access: Path | None = None
     border: Border = "open"
-    line_mbit: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
+    line_mbit: Annotated[float, Field(gt=0, le=100_000)] | None = None
     insecure: StrictBool = False
 
     @field_validator("connect")
