@@ -193,7 +193,7 @@ class Browser:
         self._waiting.pop(expression, None)
 
     def _offer(self, moment: Moment) -> None:
-        self.offered += len(moment.samples)
+        self.offered += len(moment.samples) + moment.overtaken
         if self._behind:
             self._wait(moment)
         else:

@@ -70,7 +70,9 @@ class Feed:
 
     async def _run(self) -> None:
         while samples := await self._subscription.all_that_came():
-            for moment in moments(thinned(self.topic, [each for each in samples if self._hold(each)])):
+            came = [each for each in samples if self._hold(each)]
+            newest = thinned(self.topic, came)
+            for moment in moments(newest, len(came) - len(newest)):
                 for sink in tuple(self._sinks):
                     self._give(sink, moment)
             await self._turns.over()

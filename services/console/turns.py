@@ -2,7 +2,7 @@
 
 A write to a page costs much the same with one state in it as with ten (TLS, the system's call, the page's
 own work). So with one page every state goes out as it comes, and the more pages there are, the more goes
-out at once; the console never spends more than its share on it.
+out at once: a quarter of a processor is spent on it, until a display would show that pages wait.
 """
 
 import asyncio

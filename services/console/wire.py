@@ -28,10 +28,11 @@ class Moment:
 
     Attributes:
         samples: In the order in which they came.
+        overtaken: How many more came, of which these are newer.
     """
 
-    def __init__(self, samples: list[Sample]) -> None:
-        self.samples = samples
+    def __init__(self, samples: list[Sample], overtaken: int = 0) -> None:
+        self.samples, self.overtaken = samples, overtaken
         self._aged = bytearray()
         # Where an age belongs, and since when it is counted.
         self._ages: list[tuple[int, float]] = []
@@ -55,18 +56,18 @@ class Moment:
                 self._ages.append((len(self._aged) - _AGED.size, sample.received - sample.late_s))
 
 
-def moments(samples: Iterable[Sample]) -> Iterator[Moment]:
-    """Samples in pieces that may be given to a line at once."""
+def moments(samples: Iterable[Sample], overtaken: int = 0) -> Iterator[Moment]:
+    """Samples in pieces that may be given to a line at once; the first is told how many were overtaken."""
     together: list[Sample] = []
     size = 0
     for sample in samples:
         if together and size + len(sample.payload) > MOST_BEHIND:
-            yield Moment(together)
-            together, size = [], 0
+            yield Moment(together, overtaken)
+            together, size, overtaken = [], 0, 0
         together.append(sample)
         size += len(sample.payload)
     if together:
-        yield Moment(together)
+        yield Moment(together, overtaken)
 
 
 def frame(message: bytes) -> bytes:

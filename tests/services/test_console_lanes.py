@@ -8,7 +8,7 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from bus import topics
 from bus.header import Header
 from bus.subscription import Sample
-from services.console.lanes import is_key_frame, lane_for
+from services.console.lanes import is_key_frame, lane_for, thinned
 
 KEY = b"\0\0\0\1\x67\x42\xc0\x1f\0\0\0\1\x68\xce\0\0\0\1\x65\x88"
 DELTA = b"\0\0\0\1\x41\x9a\x01"
@@ -46,6 +46,17 @@ def test_of_state_that_came_in_one_burst_all_is_passed_on():
     for number in range(1000):
         lane.push(replace(sample(number), received=now))
     assert len(lane.held()) < 10
+
+
+def test_of_what_a_stall_held_back_the_last_moment_and_the_newest_of_each_key_are_passed_on():
+    row, now = topics.topic("joints"), time.monotonic() + 3600.0
+    old = [sample(number) for number in range(5)]
+    other = replace(sample(5), key="robomesh/s/other/joints")
+    new = [replace(sample(number), received=now) for number in range(6, 9)]
+    assert thinned(row, [*old, other, *new]) == [other, *new]
+    assert thinned(row, [*old, other]) == [old[-1], other]
+    assert thinned(row, new) == new
+    assert thinned(topics.topic("events"), old) == old
 
 
 def test_events_keep_their_order_and_are_bounded():
