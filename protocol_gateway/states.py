@@ -144,7 +144,9 @@ def _health(health: LinkHealth, *, flooding: bool) -> schema.LinkHealth:
 
 def _link_text(controller: Controller) -> str:
     read_only = controller.read_only and f"read-only: {controller.read_only}"
-    return "; ".join(filter(None, (controller.link.text, controller.positions_gone, read_only)))
+    # Of a link that is not up nothing comes: that says it all.
+    gone = controller.positions_gone if controller.link.state is LinkState.UP else ""
+    return "; ".join(filter(None, (controller.link.text, gone, read_only)))
 
 
 def lease_state(authority: Authority, now: Now) -> schema.Lease:
