@@ -10,6 +10,7 @@ BusError
 │   ├── QuotaError          more than one name may ask for; it may be asked again later
 │   └── NoRightError        what this end's certificate may not do: it was not even asked
 └── NoAnswerError           a request that nobody answered in time
+    └── BrokenAnswerError   a long answer that began, and whose rest did not come
 """
 
 
@@ -62,3 +63,7 @@ class NoRightError(RefusedError):
 
 class NoAnswerError(BusError):
     """Nobody answered a request in time: no owner, no route, or too slow."""
+
+
+class BrokenAnswerError(NoAnswerError):
+    """A long answer that began, and whose rest did not come; the text says how much did."""

@@ -13,24 +13,27 @@ import asyncio
 import secrets
 import struct
 import time
-from collections import OrderedDict
 from dataclasses import dataclass
 from threading import Lock
 
 import zenoh
 
 from bus.endpoints import first_line
-from bus.errors import NoAnswerError
+from bus.errors import BrokenAnswerError, NoAnswerError
 from bus.messages import TEXT
 
 # Two of them fit into one of Zenoh's batches.
 PIECE_BYTES = 30_000
 _ASKING = "pieces"
 _PIECE = "piece"
-_OF_WHOLE = struct.Struct("<8sQ")
+_TOKEN_BYTES = 8
+_OF_WHOLE = struct.Struct(f"<{_TOKEN_BYTES}sQ")
 # What an owner keeps for those who are still taking it: this much, for so long after it was last asked for.
 _KEPT_BYTES = 64 << 20
 _KEPT_S = 60.0
+# Each asking gives out so many times the answer's pieces: some are lost, but nobody takes them without end.
+_TIMES = 4
+_OFFSET_DIGITS = 12
 # At once, as TCP does it: twice as many a round until something is lost; then half, and one more a round.
 _MOST_AT_ONCE = 16
 # What has not come by then counts as lost, while nobody knows how long a round takes.
@@ -52,23 +55,42 @@ class First:
     length: int
 
 
+@dataclass(slots=True)
+class _Kept:
+    """An answer that is being taken.
+
+    Attributes:
+        due: Pieces that those who asked have yet to take; below zero: so many were given out beyond that.
+        used: When it was last asked for [s].
+    """
+
+    answer: bytes
+    due: int = 0
+    used: float = 0.0
+
+    @property
+    def pieces(self) -> int:
+        """How many there are behind the first."""
+        return (len(self.answer) - 1) // PIECE_BYTES
+
+
 class LongAnswers:
     """An owner's answers that somebody is taking in pieces."""
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[str, tuple[float, bytes]] = OrderedDict()
+        self._kept: dict[str, _Kept] = {}
         self._lock = Lock()  # pieces are answered on Zenoh's thread
+        self._timer: asyncio.TimerHandle | None = None
 
     def reply(self, query: zenoh.Query, key: str, answer: bytes, encoding: str) -> None:
-        """Answer a request, by a first piece where the whole is long and who asks takes pieces."""
+        """Answer a request, by a first piece where the whole is long and who asks takes pieces.
+
+        Called on the event loop.
+        """
         if len(answer) <= PIECE_BYTES or _ASKING not in _names(query):
             query.reply(key, answer, encoding=encoding)
             return
-        token = secrets.token_bytes(8)
-        with self._lock:
-            self._kept[token.hex()] = time.monotonic(), answer
-            self._forget()
-        whole = _OF_WHOLE.pack(token, len(answer))
+        whole = _OF_WHOLE.pack(bytes.fromhex(self._keep(answer)), len(answer))
         query.reply(key, answer[:PIECE_BYTES], encoding=encoding, attachment=whole)
 
     def reply_piece(self, query: zenoh.Query) -> bool:
@@ -77,26 +99,56 @@ class LongAnswers:
         if asked is None:
             return False
         token, _, offset = asked.partition(":")
-        with self._lock:
-            _, answer = self._kept.pop(token, (0.0, b""))
-            if answer:
-                self._kept[token] = time.monotonic(), answer
+        readable = offset.isascii() and offset.isdigit() and len(offset) <= _OFFSET_DIGITS
+        piece = self._piece(token, int(offset)) if readable else b""
         with query:
-            if not answer or not offset.isascii() or not offset.isdigit() or int(offset) >= len(answer):
-                query.reply_err(f"{asked} is no piece of an answer here: ask anew".encode(), encoding=TEXT)
+            if piece:
+                query.reply(str(query.key_expr), piece)
             else:
-                begin = int(offset)
-                query.reply(str(query.key_expr), answer[begin : begin + PIECE_BYTES])
+                query.reply_err(b"no such piece of an answer is here: ask anew", encoding=TEXT)
         return True
 
-    def _forget(self) -> None:
-        """The oldest, but for the newest of all."""
-        kept, now = sum(len(answer) for _, answer in self._kept.values()), time.monotonic()
-        for token, (used, answer) in list(self._kept.items())[:-1]:
-            if kept <= _KEPT_BYTES and now - used < _KEPT_S:
-                return
-            del self._kept[token]
-            kept -= len(answer)
+    def _keep(self, answer: bytes) -> str:
+        """Keep an answer for one who asked; its token."""
+        with self._lock:
+            # A mesh that many take is kept once.
+            same = (token for token, kept in self._kept.items() if kept.answer == answer)
+            token = next(same, None) or secrets.token_hex(_TOKEN_BYTES)
+            kept = self._kept.setdefault(token, _Kept(answer))
+            kept.due, kept.used = max(kept.due, 0) + kept.pieces, time.monotonic()
+            self._forget(token)
+        if self._timer is None:
+            self._forget_later()
+        return token
+
+    def _piece(self, token: str, offset: int) -> bytes:
+        with self._lock:
+            kept = self._kept.get(token)
+            if kept is None or offset >= len(kept.answer):
+                return b""
+            kept.due, kept.used = kept.due - 1, time.monotonic()
+            if kept.due <= -(_TIMES - 1) * kept.pieces:
+                del self._kept[token]
+            return kept.answer[offset : offset + PIECE_BYTES]
+
+    def _forget(self, asked_now: str = "") -> None:
+        """What is unused; and where it is too much, first what was taken, then what waits longest."""
+        now, length = time.monotonic(), sum(len(each.answer) for each in self._kept.values())
+        # Whoever took all of it may have lost a piece, but who is still taking has lost all without it.
+        order = sorted(self._kept, key=lambda each: (self._kept[each].due > 0, self._kept[each].used))
+        for token in order:
+            kept = self._kept[token]
+            if token != asked_now and (length > _KEPT_BYTES or now - kept.used >= _KEPT_S):
+                del self._kept[token]
+                length -= len(kept.answer)
+
+    def _forget_later(self) -> None:
+        """An owner that nobody asks any more keeps nothing."""
+        with self._lock:
+            self._forget()
+            waits = bool(self._kept)
+        loop = asyncio.get_running_loop()
+        self._timer = loop.call_later(_KEPT_S, self._forget_later) if waits else None
 
 
 def selector(key: str) -> str:
@@ -116,10 +168,15 @@ def first_of(sample: zenoh.Sample) -> First | None:
     return First(str(sample.key_expr), data, token.hex(), length)
 
 
-async def whole(
-    session: zenoh.Session, first: First, priority: zenoh.Priority, *, timeout_s: float
-) -> bytes | None:
-    """Take the rest of a long answer; None: its owner has it no more, or no piece came for `timeout_s`."""
+async def whole(session: zenoh.Session, first: First, priority: zenoh.Priority, *, timeout_s: float) -> bytes:
+    """Take the rest of a long answer, however long that takes, as long as pieces come.
+
+    Args:
+        timeout_s: How long none may come [s].
+
+    Raises:
+        BrokenAnswerError: If its owner has it no more, or no piece came for so long.
+    """
     missing = list(range(PIECE_BYTES, first.length, PIECE_BYTES))
     taken = {0: first.data}
     at_once, patience_s, lossless = 1, _LOST_AFTER_S, True
@@ -128,7 +185,7 @@ async def whole(
         began = time.monotonic()
         left_s = came + timeout_s - began
         if left_s <= 0:
-            return None
+            raise _broken(first, taken, f"then none for {timeout_s:g} s")
         now, later = missing[:at_once], missing[at_once:]
         selectors = [f"{first.key}?{_PIECE}={first.token}:{offset}" for offset in now]
         asked = [_ask(session, each, priority, min(patience_s, left_s)) for each in selectors]
@@ -137,7 +194,8 @@ async def whole(
             if piece is None:
                 lost.append(offset)
             elif len(piece) != min(PIECE_BYTES, first.length - offset):
-                return None  # refused, or another's nonsense
+                # Refused, or another's nonsense.
+                raise _broken(first, taken, "then its owner had it no more: ask again")
             else:
                 taken[offset], came = piece, time.monotonic()
         missing = lost + later
@@ -149,6 +207,11 @@ async def whole(
             at_once = min(2 * at_once if lossless else at_once + 1, _MOST_AT_ONCE)
             patience_s = 2 * (time.monotonic() - began) + _SLACK_S
     return b"".join(taken[offset] for offset in sorted(taken))
+
+
+def _broken(first: First, taken: dict[int, bytes], why: str) -> BrokenAnswerError:
+    came = sum(map(len, taken.values()))
+    return BrokenAnswerError(f"{first.key}: {came} of {first.length} bytes came, {why}")
 
 
 async def _ask(

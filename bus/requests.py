@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import math
 import secrets
 import time
 from collections import Counter
@@ -14,7 +15,14 @@ from google.protobuf.message import Message
 
 from bus import keys, pieces, topics
 from bus.endpoints import ON_THE_SECOND_LINK, first_line, settle
-from bus.errors import BusyError, MessageError, NoAnswerError, QuotaError, RefusedError
+from bus.errors import (
+    BrokenAnswerError,
+    BusyError,
+    MessageError,
+    NoAnswerError,
+    QuotaError,
+    RefusedError,
+)
 from bus.latencies import Latencies
 from bus.messages import JSON, PROTOBUF, TEXT, decode, decode_request, encode, is_json
 
@@ -102,7 +110,7 @@ class Answerer:
         self._tasks: set[asyncio.Task[None]] = set()
         self._begun: dict[bytes, asyncio.Future[Message | bytes]] = {}
         self._long = pieces.LongAnswers()
-        # By the key that was asked, so by asker where the row has a place for one.
+        # By the last chunk that was asked, so by asker where the row has a place for one.
         self._unanswered = Counter[str]()
         self._most_of_one = _MOST_OF_ONE if "*" in name else _MOST
         self._counting = Lock()  # Zenoh's thread counts up, the loop's down
@@ -135,31 +143,31 @@ class Answerer:
         if self._long.reply_piece(query):
             return
         received_ns = time.time_ns()
-        asked = str(query.key_expr)
+        asker = _last_chunk(str(query.key_expr))
         with self._counting:
-            busy = self._unanswered.total() >= _MOST or self._unanswered[asked] >= self._most_of_one
+            busy = self._unanswered.total() >= _MOST or self._unanswered[asker] >= self._most_of_one
             if not busy or self._row.unread:  # a stop is a stop
-                self._unanswered[asked] += 1
+                self._unanswered[asker] += 1
             else:
                 self.turned_away += 1
         if busy and not self._row.unread:
             with query:
                 query.reply_err(_BUSY.encode(), encoding=_BUSY_TEXT)
         elif not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._start, query, asked, received_ns)
+            self._loop.call_soon_threadsafe(self._start, query, asker, received_ns)
 
-    def _start(self, query: zenoh.Query, asked: str, received_ns: int) -> None:
+    def _start(self, query: zenoh.Query, asker: str, received_ns: int) -> None:
         task = self._loop.create_task(self._answer(query, received_ns))
         self._tasks.add(task)
-        task.add_done_callback(lambda task: self._done(task, asked, received_ns))
+        task.add_done_callback(lambda task: self._done(task, asker, received_ns))
 
-    def _done(self, task: asyncio.Task[None], asked: str, received_ns: int) -> None:
+    def _done(self, task: asyncio.Task[None], asker: str, received_ns: int) -> None:
         self._tasks.discard(task)
         self.latencies.add((time.time_ns() - received_ns) * 1e-9)
         with self._counting:
-            self._unanswered[asked] -= 1
-            if not self._unanswered[asked]:
-                del self._unanswered[asked]
+            self._unanswered[asker] -= 1
+            if not self._unanswered[asker]:
+                del self._unanswered[asker]
 
     async def _answer(self, query: zenoh.Query, received_ns: int) -> None:
         asked = str(query.key_expr)
@@ -236,6 +244,11 @@ class Answerer:
         return self._own if not self._row.wildcard or asked.rsplit("/", 1)[-1] == last else None
 
 
+def _last_chunk(asked: str) -> str:
+    """Whose place a request takes; all wildcards share one, however they are spelt."""
+    return "*" if keys.has_wildcard(asked) else asked.rpartition("/")[2]
+
+
 def _chunk(row: str, name: str) -> str:
     for pattern, chunk in zip(row.split("/"), name.split("/"), strict=True):
         if pattern == "*":
@@ -244,9 +257,19 @@ def _chunk(row: str, name: str) -> str:
 
 
 async def ask_all(
-    session: zenoh.Session, key: str, payload: bytes, *, timeout_s: float
-) -> list[tuple[str, bytes | None, RefusedError | None]]:
-    """Every owner's (key, answer bytes, error); exactly one of the two is there."""
+    session: zenoh.Session,
+    key: str,
+    payload: bytes,
+    *,
+    timeout_s: float,
+    silent_s: float | None = None,
+) -> list[tuple[str, bytes | None, RefusedError | BrokenAnswerError | None]]:
+    """Every owner's (key, answer bytes, error); exactly one of the two is there.
+
+    Args:
+        timeout_s: How long owners may take to answer [s].
+        silent_s: How long nothing more of a long answer may come [s]; None: as long.
+    """
     loop = asyncio.get_running_loop()
     row = topics.request(keys.parse_key(key).topic)
     if row.priority in ON_THE_SECOND_LINK:
@@ -265,12 +288,17 @@ async def ask_all(
         answers = max(answers, await done, key=len)
         if answers:
             break
-    found: list[tuple[str, bytes | None, RefusedError | None]] = []
+    silent_s = timeout_s if silent_s is None else silent_s
+    found: list[tuple[str, bytes | None, RefusedError | BrokenAnswerError | None]] = []
     for owner, answer, refused in answers:
-        if isinstance(answer, pieces.First):
-            answer = await pieces.whole(session, answer, _zenoh(row.priority), timeout_s=timeout_s)
-        if answer is not None or refused is not None:
+        if not isinstance(answer, pieces.First):
             found.append((owner, answer, refused))
+            continue
+        try:
+            whole = await pieces.whole(session, answer, _zenoh(row.priority), timeout_s=silent_s)
+            found.append((owner, whole, None))
+        except BrokenAnswerError as error:
+            found.append((owner, None, error))
     return found
 
 
@@ -334,41 +362,45 @@ def _refused(text: str, encoding: str) -> RefusedError:
         return BusyError(text)
     if encoding.startswith(_QUOTA_TEXT):
         try:
-            return QuotaError(text, again_s=max(float(encoding.removeprefix(_QUOTA_TEXT)), _AGAIN_S))
+            again_s = float(encoding.removeprefix(_QUOTA_TEXT))
         except ValueError:
-            pass  # another's nonsense: a refusal all the same
+            again_s = math.nan
+        if math.isfinite(again_s):  # else another's nonsense: a refusal all the same
+            return QuotaError(text, again_s=max(again_s, _AGAIN_S))
     return RefusedError(text)
 
 
 async def ask_bytes(session: zenoh.Session, key: str, payload: bytes, *, timeout_s: float) -> bytes:
     """The one answer to a request, as bytes.
 
-    An owner who is busy or starting is asked again, and so is one whose quota gives something in time.
+    An owner who is busy or starting, or has forgotten a long answer before it was taken, is asked again, and
+    so is one whose quota gives something in time. A long answer that has begun may take longer.
 
     Raises:
         RefusedError: With the owner's words.
         BusyError: If the owner had no place for it, until the end.
         QuotaError: If the quota gives nothing before the end.
         NoAnswerError: If nobody answered in time.
+        BrokenAnswerError: If nothing more of a long answer came for the whole of that time.
     """
     loop = asyncio.get_running_loop()
     deadline = loop.time() + timeout_s
-    busy: BusyError | QuotaError | None = None
+    again: BusyError | QuotaError | BrokenAnswerError | None = None
     while (left_s := deadline - loop.time()) > 0:
         # Zenoh answers at once that there is no owner.
-        busy, again_s = None, _AGAIN_S
-        for _, answer, error in await ask_all(session, key, payload, timeout_s=left_s):
-            if isinstance(error, BusyError):
-                busy = error
+        again, again_s = None, _AGAIN_S
+        for _, answer, error in await ask_all(session, key, payload, timeout_s=left_s, silent_s=timeout_s):
+            if isinstance(error, BusyError | BrokenAnswerError):
+                again = error
             elif isinstance(error, QuotaError) and error.again_s < deadline - loop.time():
-                busy, again_s = error, error.again_s
+                again, again_s = error, error.again_s
             elif error is not None:
                 raise error
             elif answer is not None:
                 return answer
         await asyncio.sleep(min(again_s, left_s))
-    if busy is not None:
-        raise busy
+    if again is not None:
+        raise again
     raise NoAnswerError(f"nobody answered {key} within {timeout_s:g} s: is its service running?")
 
 

@@ -14,7 +14,7 @@ from google.protobuf.message import Message
 
 from bus import access, keys, presence, refused, requests, topics
 from bus.endpoints import DEFAULT_ROUTER, Tls, client_config, first_line
-from bus.errors import NoAnswerError, NoRightError, SessionError
+from bus.errors import BrokenAnswerError, NoAnswerError, NoRightError, SessionError
 from bus.publisher import OnGet, Publisher
 from bus.subscription import Subscription
 from bus.tally import Measure, Tally
@@ -114,7 +114,7 @@ class Session:
         try:
             return await requests.ask_bytes(self.zenoh_session, key, payload, timeout_s=timeout_s)
         except NoAnswerError as error:
-            if self.principal is None:
+            if self.principal is None or isinstance(error, BrokenAnswerError):
                 raise
             # A router refuses in silence.
             raise NoAnswerError(f"{error} Or was the certificate of {self.principal.name} revoked?") from None
