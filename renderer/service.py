@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
-from bus.errors import QuotaError, RefusedError
+from bus.errors import RefusedError
 from bus.keys import WHOLE_SITE
 from bus.quotas import DEFAULT_QUOTAS, Quota, Quotas
 from bus.requests import Answerer, Request
@@ -19,11 +19,12 @@ from bus.schemas.robomesh_pb2 import Event, KeyFrameAnswer, ViewAnswer, ViewRequ
 from bus.session import Session
 from renderer.cache import cache_folder
 from renderer.composing import Composition
-from renderer.errors import NoRoomError, RendererError, UnknownViewError
+from renderer.errors import RendererError, UnknownViewError
 from renderer.finishing import Finished, Finishing, Order
 from renderer.pace import Pace, next_of
 from renderer.requested import FAR, Shot, far, requested, standing
 from renderer.robots import Robots
+from renderer.room import Room
 from renderer.state import Ages, RobotState
 from renderer.stream import Stream
 from renderer.studio import Drawn, Studio, open_thread
@@ -37,9 +38,6 @@ T = TypeVar("T")
 _TIDY_EACH_S = 1.0
 # A view of one's own: so long for the first watcher to come, and for another after the last one.
 _COMES_WITHIN_S, _COMES_BACK_WITHIN_S = 10.0, 5.0
-# Of as many views as may be asked for, so many may be as large and fast as the renderer's own, or as this.
-_FULL_VIEWS = 0.125
-_FULL_PIXELS_PER_S = 1280 * 720 * 30.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,6 +133,12 @@ class _Renderer:
         self._wake = asyncio.Event()
         self._pace = Pace()
         self._key_frames = Quota("key_frames", a_minute=settings.quotas.key_frames_a_minute)
+        self._room = Room(
+            most_views=settings.most_views,
+            quota=settings.quotas.views,
+            own_pixels_per_s=standing("", size=settings.size, fps=settings.fps).pixels_per_s,
+            again_s=_COMES_BACK_WITHIN_S,
+        )
         self._pictures = 0
         self._events = session.declare_publisher(settings.site, WHOLE_SITE, "events/renderer")
         session.measure("views", "Views that can be watched", lambda: len(self._streams))
@@ -217,8 +221,8 @@ class _Renderer:
     async def finish(self, drawn: Drawn, order: Order) -> Finished:
         return await _in(self._encoding, self._finishing.finish, drawn.picture, drawn.camera, order)
 
-    def _open(self, state: RobotState, shot: Shot, asker: str = "") -> Stream:
-        stream = self._streams[state.name, shot.name] = Stream(self._session, state, shot, self, asker=asker)
+    def _open(self, state: RobotState, shot: Shot) -> Stream:
+        stream = self._streams[state.name, shot.name] = Stream(self._session, state, shot, self)
         return stream
 
     def _close(self, key: tuple[str, str]) -> None:
@@ -258,11 +262,12 @@ class _Renderer:
                 )
                 stream = self._streams.get((state.name, shot.name))
             if stream is None:
-                self._check_room(shot, request.asker)
-                stream = self._open(state, shot, request.asker)
+                asked_for = [each for each in self._streams.values() if each.shot.requested]
+                self._room.check(asked_for, shot, request.asker)
+                stream = self._open(state, shot)
         except RendererError as error:
             raise RefusedError(str(error)) from None
-        stream.stay()
+        stream.stay(request.asker)
         shot = stream.shot
         width, height = shot.size
         return ViewAnswer(
@@ -274,42 +279,6 @@ class _Renderer:
         stream = self._streams.get((state.name, wanted.of))
         own = stream is not None and not stream.shot.requested and wanted == ViewRequest(of=wanted.of)
         return stream if own else None
-
-    def _check_room(self, shot: Shot, asker: str) -> None:
-        """Whether one more may be drawn; a view counts for who asked for it first, as long as it is there.
-
-        Raises:
-            NoRoomError: If there is no place for it, whoever asks.
-            QuotaError: If this asker has its share.
-        """
-        settings = self._settings
-        asked_for = [stream for stream in self._streams.values() if stream.shot.requested]
-        others = [stream.shot for stream in asked_for]
-        if len(others) >= settings.most_views:
-            raise NoRoomError(
-                f"{len(others)} views were asked for already, and {settings.most_views} are possible "
-                "(most_views of the site file's [renderer]): ask again when some of them end"
-            )
-        own = standing("", size=settings.size, fps=settings.fps).pixels_per_s
-        full = max(own, _FULL_PIXELS_PER_S)
-        most = max(settings.most_views * _FULL_VIEWS, 1.0) * full
-        left = most - sum(other.pixels_per_s for other in others)
-        if shot.pixels_per_s > left:
-            raise NoRoomError(
-                f"{shot.size[0]} x {shot.size[1]} at {shot.fps:g} a second is {shot.pixels_per_s / 1e6:.1f} "
-                f"million pixels a second: {max(left, 0.0) / 1e6:.1f} of {most / 1e6:.1f} million are left "
-                "for views that are asked for; ask for a smaller or slower one"
-            )
-        quota = settings.quotas.views
-        had = [stream.shot for stream in asked_for if stream.asker == asker]
-        share = max(most * quota / settings.most_views, full)
-        if len(had) >= quota or sum(each.pixels_per_s for each in had) + shot.pixels_per_s > share:
-            raise QuotaError(
-                f"{NoRoomError.SIGN}{asker} has {len(had)} views already: quota views = {quota} a name, and "
-                f"{share / 1e6:.1f} million pixels a second (the site file's [quotas]); ask again "
-                f"{_COMES_BACK_WITHIN_S:g} s after one of them is left, or for a smaller or slower one",
-                again_s=_COMES_BACK_WITHIN_S,
-            )
 
     # -------------------------------------------------------------- painting
 

@@ -26,6 +26,7 @@ log = logging.getLogger(__name__)
 # A picture in which nothing moves still tells that it is alive, and its age.
 _IDLE_HZ = 2.0
 _TRY_AGAIN_S = 5.0
+_MOST_ASKERS = 64
 
 
 class Workshop(Protocol):
@@ -54,14 +55,13 @@ class Stream:
         name: Of the robot and the view.
         quiet_since: When the last watcher left, or somebody asked for it [s]; None: it is watched.
         awaited: Nobody has watched since it was asked for.
-        asker: In whose name it was asked for first; empty: it is the renderer's own.
+        askers: In whose names it was asked for; it counts for the first one.
     """
 
-    def __init__(
-        self, session: Session, state: RobotState, shot: Shot, workshop: Workshop, *, asker: str = ""
-    ) -> None:
+    def __init__(self, session: Session, state: RobotState, shot: Shot, workshop: Workshop) -> None:
         """Declare the view's topics."""
-        self.state, self.shot, self.asker = state, shot, asker
+        self.state, self.shot = state, shot
+        self.askers: list[str] = []
         self.name = f"{state.name}/{shot.name}"
         self.quiet_since: float | None = time.monotonic()
         self.awaited = True
@@ -120,8 +120,14 @@ class Stream:
         """Make the next picture a key frame; False: the last one is younger than a second."""
         return self._key_frames.ask(time.monotonic())
 
-    def stay(self) -> None:
-        """Somebody asked for it: who is about to watch has as long as who comes first."""
+    def stay(self, asker: str = "") -> None:
+        """Somebody asked for it: who is about to watch has as long as who comes first.
+
+        Args:
+            asker: In whose name; empty: nobody's, a picture alone was asked for.
+        """
+        if asker and asker not in self.askers and len(self.askers) < _MOST_ASKERS:
+            self.askers.append(asker)
         if self.quiet_since is not None:
             self.quiet_since, self.awaited = time.monotonic(), True
 
