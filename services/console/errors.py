@@ -45,8 +45,9 @@ class PictureError(ServiceError):
 
     Attributes:
         status: HTTP's.
+        again_s: When to ask again [s]; None: nobody knows.
     """
 
-    def __init__(self, status: int, text: str) -> None:
+    def __init__(self, status: int, text: str, *, again_s: float | None = None) -> None:
         super().__init__(text)
-        self.status = status
+        self.status, self.again_s = status, again_s

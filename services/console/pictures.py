@@ -12,6 +12,7 @@ more, is watched for no more.
 import asyncio
 import contextlib
 import logging
+import math
 import time
 from collections import Counter
 from collections.abc import AsyncGenerator, Callable
@@ -29,7 +30,7 @@ from starlette.routing import Route
 from starlette.types import Scope
 
 from bus import keys
-from bus.errors import BusError, KeyNameError, NoAnswerError, QuotaError, RefusedError
+from bus.errors import BusError, BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError
 from bus.schemas.robomesh_pb2 import VideoFrames, ViewRequest
 from bus.subscription import Sample
 from renderer.errors import Mp4Error, NoRoomError
@@ -55,6 +56,7 @@ _STALE_AFTER_S, _SILENT_S = 1.0, 10.0
 _STALE_AFTER = 2.0  # and in pictures that did not come
 _READS_WITHIN_S = 10.0
 _NO_STORE = {"Cache-Control": "no-store"}
+_BUSY_AGAIN_S = 1.0
 # An <img> would show the last picture for ever: this one says that it is old.
 _STALE = (Path(__file__).parent / "stale.jpg").read_bytes()
 
@@ -162,7 +164,9 @@ class Pictures:
                 f"renderer run? ({error})",
             ) from None
         except QuotaError as error:
-            raise PictureError(429, str(error)) from None
+            raise PictureError(429, str(error), again_s=error.again_s) from None
+        except BusyError as error:
+            raise PictureError(503, str(error), again_s=_BUSY_AGAIN_S) from None
         except RefusedError as error:
             if str(error).startswith(NoRoomError.SIGN):
                 raise PictureError(503, str(error)) from None
@@ -324,4 +328,5 @@ def _endless(media_type: str) -> Response:
 
 
 def _refused(error: PictureError) -> Response:
-    return PlainTextResponse(str(error), status_code=error.status, headers=_NO_STORE)
+    again = {} if error.again_s is None else {"Retry-After": str(math.ceil(error.again_s))}
+    return PlainTextResponse(str(error), status_code=error.status, headers=_NO_STORE | again)

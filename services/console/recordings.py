@@ -11,6 +11,7 @@ import contextlib
 import csv
 import io
 import logging
+import math
 import re
 from collections.abc import AsyncIterator, Callable
 from typing import NamedTuple, TypeVar
@@ -23,7 +24,7 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
 from starlette.types import Scope
 
-from bus.errors import BusError, KeyNameError, NoAnswerError, QuotaError, RefusedError
+from bus.errors import BusError, BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError
 from bus.keys import WHOLE_SITE, robot_key
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
@@ -244,5 +245,14 @@ def _decoded(kind: type[AnyMessage], data: bytes) -> AnyMessage | None:
 
 
 def _refused(error: BusError) -> Response:
-    statuses = {KeyNameError: 400, NoAnswerError: 504, QuotaError: 429}
-    return PlainTextResponse(str(error), status_code=statuses.get(type(error), 404))
+    status, headers = 404, {}
+    match error:
+        case KeyNameError():
+            status = 400
+        case QuotaError():
+            status, headers = 429, {"Retry-After": str(math.ceil(error.again_s))}
+        case BusyError():
+            status, headers = 503, {"Retry-After": "1"}
+        case NoAnswerError():
+            status = 504
+    return PlainTextResponse(str(error), status_code=status, headers=headers)

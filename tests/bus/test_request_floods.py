@@ -21,6 +21,7 @@ class Owner:
     def __init__(self, session):
         self.begun, self.go_on = [], asyncio.Event()
         session.answer("site", "arm", "command/*", self._wait)
+        session.answer("site", "arm", "video/*/keyframe/*", self._key_frame)
         session.answer("site", "arm", "stop", self._stop)
 
     async def _wait(self, request: Request):
@@ -28,6 +29,11 @@ class Owner:
             self.begun.append(request.chunk)
             await self.go_on.wait()
         return schema.CommandAnswer(accepted=True)
+
+    async def _key_frame(self, request: Request):
+        self.begun.append(request.asker)
+        await self.go_on.wait()
+        return schema.KeyFrameAnswer()
 
     async def _stop(self, request: Request):
         return schema.StopAnswer(stop_id=1, sent=True)
@@ -42,9 +48,10 @@ async def site(mesh):
         yield owner, eve, li
 
 
-def once(session, name):
+def once(session, name, what="command"):
     """Asked as a flooder asks, who is answered and does not wait."""
-    key, payload = f"robomesh/site/arm/command/{name}", HOME.SerializeToString()
+    key = f"robomesh/site/arm/{what}/{name}"
+    payload = HOME.SerializeToString() if what == "command" else b""
     return asyncio.create_task(ask_all(session.zenoh_session, key, payload, timeout_s=20.0))
 
 
@@ -78,6 +85,20 @@ def test_a_flooder_of_many_names_is_bounded_too(mesh):
             owner.go_on.set()
             await asyncio.gather(*asked)
             assert len(owner.begun) == 256
+
+    run(main())
+
+
+def test_a_flooder_with_one_name_has_one_share_whatever_views_it_names(mesh):
+    async def main():
+        async with site(mesh) as (owner, eve, li):
+            asked = [once(eve, "eve", f"video/view-{number}/keyframe") for number in range(40)]
+            await until(lambda: sum(map(is_busy, asked)) == 40 - 16)
+            other = once(li, "li", "video/view-1/keyframe")
+            await until(lambda: "li" in owner.begun)
+            owner.go_on.set()
+            await asyncio.gather(*asked, other)
+            assert len(owner.begun) == 17
 
     run(main())
 

@@ -1,7 +1,9 @@
 """`robomesh recordings fetch`: a recording from its site's recorder, over the mesh, with resume."""
 
+import asyncio
 import contextlib
 import hashlib
+import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,6 +20,8 @@ from services.command_line.recordings.output import progress
 
 _PIECE = 1 << 20
 _TIMEOUT_S, _TRIES = 10.0, 2
+# A quota is a minute's worth: by then it has given something back.
+_MOST_WAIT_S = 60.0
 
 
 def run(what: str, out: Path, router: str, as_json: bool) -> None:
@@ -87,13 +91,17 @@ async def _fetch(what: str, out: Path, router: str, *, into: bool) -> _Fetched:
 
 
 async def _piece(session: Session, key: str, asked: schema.PieceRequest) -> schema.Piece:
-    for _ in range(_TRIES):
-        with contextlib.suppress(NoAnswerError, QuotaError):
-            return await _once(session, key, asked)
-    return await _once(session, key, asked)
-
-
-async def _once(session: Session, key: str, asked: schema.PieceRequest) -> schema.Piece:
-    piece = await session.ask(key, asked, timeout_s=_TIMEOUT_S)
-    assert isinstance(piece, schema.Piece)
-    return piece
+    tries = _TRIES
+    while True:
+        try:
+            piece = await session.ask(key, asked, timeout_s=_TIMEOUT_S)
+            assert isinstance(piece, schema.Piece)
+            return piece
+        except QuotaError as error:
+            # Above the progress, where there is one.
+            print(f"{asked.file} waits: {error}", file=sys.stderr)
+            await asyncio.sleep(min(error.again_s, _MOST_WAIT_S))
+        except NoAnswerError:
+            if not tries:
+                raise
+            tries -= 1
