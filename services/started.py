@@ -11,8 +11,6 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from bus.errors import KeyNameError
-from bus.keys import check_name
 from robots.description import DESCRIPTION_FILE, library_names
 from services.errors import SiteFileError
 from services.site import Robot, Site
@@ -75,8 +73,8 @@ def may_start(site: Site) -> tuple[str, ...]:
 
 def _is_name(text: str) -> bool:
     try:
-        check_name(text, "robot")
-    except KeyNameError:
+        Robot(name=text, model=text)
+    except ValidationError:
         return False
     return True
 

@@ -154,8 +154,13 @@ class _Started:
         # Where only bundles were brought, nobody was started from the page.
         if names or folder.principals.is_file():
             there, ahead = deeds.entitled(folder), {*names, *may_start(self._site)}
-            if not there.issuperset(names if self._entitled is not None else ahead):
-                deeds.entitle(folder, [*ahead])
+            try:
+                if not there.issuperset(names if self._entitled is not None else ahead):
+                    deeds.entitle(folder, [*ahead])
+            except KeysError as error:
+                if not there.issuperset(names):
+                    raise
+                _write(f"{error}; the robots that were started run, others are named when they are started")
         self._entitled = names
 
 

@@ -9,6 +9,7 @@ from itertools import chain
 import pytest
 import zenoh
 
+from bus.access import NOBODYS_ROBOT
 from bus.endpoints import router_config
 from bus.identity import read_identity
 from bus.topics import Role
@@ -18,6 +19,7 @@ from services.keys import Folder, deeds
 from services.keys.errors import KeysError
 from services.router.router import read_access
 from services.site import load
+from services.started import may_start
 from tests.conftest import free_port
 from tests.site import ONE_ARM, robomesh, running_site, site_file
 
@@ -127,6 +129,11 @@ def test_no_router_opens_anew_for_the_first_start_of_a_robot_that_was_there_befo
     saved = tmp_path / "robots" / "mine" / "robot.toml"
     saved.parent.mkdir(parents=True)
     saved.write_text("")
+    # What a robot of the site file may not be called, one that is started may not either.
+    for other in ("replay-x", NOBODYS_ROBOT, "No"):
+        (saved.parent.parent / other).mkdir()
+        (saved.parent.parent / other / "robot.toml").write_text("")
+    assert may_start(load(site)) == tuple(sorted(("mine", *library_names())))
     following = up._Started(load(site), site, load(site).listened[0])
     following.wanted()
     rules = Folder(tmp_path / "keys").access.stat()
@@ -136,6 +143,29 @@ def test_no_router_opens_anew_for_the_first_start_of_a_robot_that_was_there_befo
         )
         assert [key[0] for key in following.wanted()] == [name]
     assert Folder(tmp_path / "keys").access.stat() == rules
+
+
+def test_where_no_names_can_be_written_ahead_the_robots_that_were_started_run_on(
+    site, tmp_path, monkeypatch, capsys
+):
+    keys("init", str(site))
+    folder = Folder(tmp_path / "keys")
+    started = tmp_path / "robots" / "started.toml"
+    started.parent.mkdir()
+    started.write_text('site = "hall"' + ONE_ARM.replace('"arm"', '"mine"'))
+    deeds.entitle(folder, ["mine"])
+
+    def full(*_):
+        raise KeysError(f"{folder.principals}: cannot be written: no space left on device")
+
+    monkeypatch.setattr(deeds, "save", full)
+    following = up._Started(load(site), site, load(site).listened[0])
+    assert [key[0] for key in following.wanted()] == ["mine"]
+    assert "no space left on device; the robots that were started run" in capsys.readouterr().err
+    # Nobody would let in a gateway of this one.
+    started.write_text(started.read_text() + ONE_ARM.replace('"arm"', '"new"'))
+    assert [key[0] for key in following.wanted()] == ["mine"]
+    assert "no space left on device; the robots that were started before stay" in capsys.readouterr().err
 
 
 def test_a_bundle_knows_where_the_routers_are(site):
