@@ -206,13 +206,28 @@ def test_inverse_and_check_are_answered_by_processes_that_end_with_the_service(m
             assert answer.ok, answer
             assert answer.duration_s > 1.0
             assert "right is left out: nobody knows where it is now" in answer.notes
-            # Two at once are one's own.
+            # Two at once are one's own; these wait until a third was refused.
             monkeypatch.setattr(quotas, "_AGAIN_S", 60.0)
-            many = [monitor.ask(f"{key}/check/li", request, timeout_s=20.0) for _ in range(8)]
-            found = await asyncio.gather(*many, return_exceptions=True)
-            refused = [each for each in found if isinstance(each, QuotaError)]
-            assert "quota checks = 2 a name" in str(refused[0])
-            assert len(found) - len(refused) == sum(getattr(each, "ok", False) for each in found) >= 2
+            under_way, let_go = asyncio.Semaphore(0), asyncio.Event()
+            asked = Worker.ask
+
+            async def held(*args, **kwargs):
+                under_way.release()
+                await let_go.wait()
+                return await asked(*args, **kwargs)
+
+            with monkeypatch.context() as patch:
+                patch.setattr(Worker, "ask", held)
+                two = [
+                    asyncio.create_task(monitor.ask(f"{key}/check/li", request, timeout_s=30.0))
+                    for _ in range(2)
+                ]
+                for _ in two:
+                    await under_way.acquire()
+                with pytest.raises(QuotaError, match="quota checks = 2 a name"):
+                    await monitor.ask(f"{key}/check/li", request, timeout_s=20.0)
+                let_go.set()
+                assert all(answer.ok for answer in await asyncio.gather(*two))
             with pytest.raises(RefusedError, match="start: 2 given, left has 5 joints"):
                 await monitor.ask(f"{key}/check/li", schema.CheckRequest(program="home", start=[0.0, 0.0]))
             with pytest.raises(RefusedError, match="start: nobody knows where right is now; give it"):
