@@ -213,13 +213,14 @@ class Hub:
         return Desk(accounts, self.settings.site, tell)
 
     def asker(self, scope: Scope) -> str:
-        """In whose name something is asked for over HTTP."""
+        """In whose name something is asked for over HTTP: the account's, else that of the whole console."""
         return self._own_name(scope.get("signed_in")) or self.session.own_name
 
     def _own_name(self, who: SignedIn | None) -> str:
         """The one operator that a page asks as; empty: any, where no certificate says who is who.
 
-        The router lets a console ask in every name of its site, for its accounts: it must know whose.
+        The router lets a console ask in every name of its site, for its accounts: it must know whose. So
+        without accounts all its pages ask in its own, and share that name's quotas.
         """
         if who is not None:
             return operator_name(who.account.name, self.settings.site)
