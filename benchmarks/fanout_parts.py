@@ -177,7 +177,8 @@ async def watch_console(address: str, tls: bool, watches: list[str], count: int,
             before = newest.get((reader, publisher), number)
             newest[reader, publisher] = number
             if ages.window.begin_ns <= sent_ns < ages.window.end_ns:
-                ages.overtaken += number - before - 1 if number > before else 0
+                since_begin = (sent_ns - ages.window.begin_ns) * RATE_HZ // 10**9
+                ages.overtaken += max(min(number - before - 1, since_begin), 0)
 
     for _ in range(count):
         reader = await connected(address, "/mesh", tls, take)
