@@ -11,7 +11,7 @@ import pytest
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from bus.errors import RefusedError
+from bus.errors import QuotaError, RefusedError
 from bus.header import Header
 from bus.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
 from bus.subscription import Sample
@@ -57,6 +57,8 @@ async def rendered(mesh, page):  # noqa: F811
         async def views(request):
             if request.message.of != "front":
                 raise RefusedError(f"no view {request.message.of!r}; there are front")
+            if request.message.width == 640:
+                raise QuotaError("li has had its views", again_s=30.5)
             if request.message.width > 1920:
                 raise RefusedError("a view of 2000 pixels: up to 1920 are possible")
             if request.message == ViewRequest(of="front"):
@@ -227,6 +229,7 @@ def test_a_still_is_the_newest_picture_as_jpeg_or_png(mesh, page):  # noqa: F811
         ("image/s/r/front.jpg?width=2000&height=1000", 400, "up to 1920 are possible"),
         ("image/s/r/front.jpg?width=wide", 400, "width='wide' is no number of pixels"),
         ("image/s/r/front.jpg?width=1920", 503, "no room: 1 views were asked for already"),
+        ("image/s/r/front.jpg?width=640", 429, "li has had its views"),
         ("video/s/r/front.mp4?fps=fast", 400, "fps='fast' is no number"),
         ("video/s/r/front.mp4?quality=5", 400, "width, height and fps"),
         ("image/S!/r/front.jpg", 404, "S!"),
@@ -235,8 +238,9 @@ def test_a_still_is_the_newest_picture_as_jpeg_or_png(mesh, page):  # noqa: F811
 def test_what_cannot_be_shown_is_said_in_words(mesh, page, path, status, words):  # noqa: F811
     async def main():
         async with rendered(mesh, page) as (address, *_):
-            answered, _, body = await get(address, f"/{path}")
+            answered, headers, body = await get(address, f"/{path}")
             assert answered == status
+            assert headers.get("retry-after") == ("31" if status == 429 else None)
             assert words in body.decode()
 
     run(main())

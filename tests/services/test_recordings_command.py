@@ -10,6 +10,7 @@ import av
 import numpy as np
 import pytest
 
+from bus.errors import QuotaError
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import open_session
 from mcap_files.capture import Capture
@@ -205,7 +206,14 @@ def test_a_file_that_is_being_recorded_is_not_recovered_away(tmp_path, capsys):
         capture.finish({})
 
 
-def test_a_recording_of_a_site_has_one_name_for_every_command(mesh, router, tmp_path, capsys):
+def test_a_recording_of_a_site_has_one_name_for_every_command(mesh, router, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("services.command_line.recordings.fetch._MOST_WAIT_S", 0.1)
+    refusals = [None, QuotaError("more than one name may have: ask again in 30.0 s", again_s=30.0)]
+
+    def check(asker):
+        if refusals and (error := refusals.pop(0)):
+            raise error
+
     folder = tmp_path / "recordings"
     (folder / "arm").mkdir(parents=True)
     source = write_recording(folder / "arm" / "2026_trial.mcap", seconds=0.5)
@@ -213,6 +221,7 @@ def test_a_recording_of_a_site_has_one_name_for_every_command(mesh, router, tmp_
     async def main():
         async with open_session(mesh) as own:
             serving = Serving(own, "site", folder, open_now=dict, flight=lambda: False)
+            monkeypatch.setattr(serving._mebibytes, "check", check)
             own.declare_presence("site", "-", "recorder")
             try:
                 for what, command in (
@@ -235,6 +244,7 @@ def test_a_recording_of_a_site_has_one_name_for_every_command(mesh, router, tmp_
     header, row, _ = told.out.splitlines()[-3:]
     assert header.split() == ["recorded", "length", "size", "robot", "name"]
     assert row.split()[-3:] == ["MB", "site/arm", "2026_trial"]
+    assert "2026_trial.mcap waits: more than one name may have: ask again in 30.0 s" in told.err
     assert "no recording 'no', neither a file here nor in robomesh recordings list" in told.err
     assert (tmp_path / "2026_trial.mcap").read_bytes() == source.read_bytes()
     assert len((tmp_path / "out.csv").read_text().splitlines()) == 51

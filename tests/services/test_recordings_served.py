@@ -12,7 +12,7 @@ import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from starlette.applications import Starlette
 
-from bus.errors import QuotaError, RefusedError
+from bus.errors import BrokenAnswerError, BusyError, QuotaError, RefusedError
 from bus.quotas import DEFAULT_QUOTAS, Quotas
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import open_session
@@ -217,6 +217,23 @@ def test_what_is_not_there_is_refused_in_words_over_http(http):
     none = http.get("/recordings/site/trial.mcap/thumbnail.jpg")
     assert (none.status_code, "no attachment 'thumbnail.jpg'" in none.text) == (404, True)
     assert http.get("/recordings/site/..%2Ftrial.mcap").status_code == 404
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "again"),
+    [
+        (QuotaError("li has had its minute's worth", again_s=30.2), 429, "31"),
+        (BusyError("too many requests wait"), 503, "1"),
+        (BrokenAnswerError("30000 of 90000 bytes came"), 504, None),
+    ],
+)
+def test_over_http_it_is_told_when_to_ask_again(folder, error, status, again):
+    async def refuse(*_, **__):
+        raise error
+
+    app = Starlette(routes=Recordings(SimpleNamespace(ask=refuse), lambda _: "li").routes())
+    answer = _Http(app).get("/recordings/site/trial.mcap")
+    assert (answer.status_code, answer.headers.get("retry-after"), answer.text) == (status, again, str(error))
 
 
 def test_values_as_csv_equal_the_files_numbers(http, folder, monkeypatch):
