@@ -31,7 +31,7 @@ _OF_WHOLE = struct.Struct(f"<{_TOKEN_BYTES}sQ")
 # What an owner keeps for those who are still taking it: this much, for so long after it was last asked for.
 _KEPT_BYTES = 64 << 20
 _KEPT_S = 60.0
-# Each asking gives out so many times the answer's pieces: some are lost, but nobody takes them without end.
+# An answer of one name's gives out its pieces so many times: some are lost, but its quota counts it once.
 _TIMES = 4
 _OFFSET_DIGITS = 12
 # At once, as TCP does it: twice as many a round until something is lost; then half, and one more a round.
@@ -75,9 +75,15 @@ class _Kept:
 
 
 class LongAnswers:
-    """An owner's answers that somebody is taking in pieces."""
+    """An owner's answers that somebody is taking in pieces.
 
-    def __init__(self) -> None:
+    Args:
+        in_name: They are asked for in a name: each belongs to whoever asked, and is given out a few times.
+            Otherwise the same answer is kept once for all who ask.
+    """
+
+    def __init__(self, *, in_name: bool) -> None:
+        self._in_name = in_name
         self._kept: dict[str, _Kept] = {}
         self._lock = Lock()  # pieces are answered on Zenoh's thread
         self._timer: asyncio.TimerHandle | None = None
@@ -111,9 +117,7 @@ class LongAnswers:
     def _keep(self, answer: bytes) -> str:
         """Keep an answer for one who asked; its token."""
         with self._lock:
-            # A mesh that many take is kept once.
-            same = (token for token, kept in self._kept.items() if kept.answer == answer)
-            token = next(same, None) or secrets.token_hex(_TOKEN_BYTES)
+            token = self._token_of(answer)
             kept = self._kept.setdefault(token, _Kept(answer))
             kept.due, kept.used = max(kept.due, 0) + kept.pieces, time.monotonic()
             self._forget(token)
@@ -121,13 +125,20 @@ class LongAnswers:
             self._forget_later()
         return token
 
+    def _token_of(self, answer: bytes) -> str:
+        if not self._in_name:
+            for token, kept in self._kept.items():
+                if kept.answer == answer:
+                    return token
+        return secrets.token_hex(_TOKEN_BYTES)
+
     def _piece(self, token: str, offset: int) -> bytes:
         with self._lock:
             kept = self._kept.get(token)
             if kept is None or offset >= len(kept.answer):
                 return b""
             kept.due, kept.used = kept.due - 1, time.monotonic()
-            if kept.due <= -(_TIMES - 1) * kept.pieces:
+            if self._in_name and kept.due <= -(_TIMES - 1) * kept.pieces:
                 del self._kept[token]
             return kept.answer[offset : offset + PIECE_BYTES]
 

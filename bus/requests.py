@@ -109,7 +109,7 @@ class Answerer:
         self._loop = asyncio.get_running_loop()
         self._tasks: set[asyncio.Task[None]] = set()
         self._begun: dict[bytes, asyncio.Future[Message | bytes]] = {}
-        self._long = pieces.LongAnswers()
+        self._long = pieces.LongAnswers(in_name=self._row.in_name)
         # By the last chunk that was asked, so by asker where the row has a place for one.
         self._unanswered = Counter[str]()
         self._most_of_one = _MOST_OF_ONE if "*" in name else _MOST

@@ -12,6 +12,7 @@ from tests.conftest import run
 from tests.protocol_gateway.hall import until
 
 KEY = "robomesh/hall/arm/mesh/{}"
+NAMED = "robomesh/hall/arm/kinematics/check/{}"
 PIECES = 6
 LENGTH = (PIECES - 1) * pieces.PIECE_BYTES + 7
 
@@ -22,7 +23,7 @@ def mesh_of(name):
 
 @asynccontextmanager
 async def hall(mesh):
-    """An asker, the names that were asked for, and what their owner keeps."""
+    """An asker, the meshes that were asked for, and what their owner keeps; of NAMED the same."""
     async with open_session(mesh) as owner, open_session(mesh) as asker:
         asked = []
 
@@ -32,9 +33,12 @@ async def hall(mesh):
 
         answerer = owner.answer("hall", "arm", "mesh/*", answer)
         await asker.ask_bytes(KEY.format("ready"), timeout_s=20.0)
-        asked.clear()
         answerer._long._kept.clear()
-        yield asker, asked, answerer._long
+        named = owner.answer("hall", "arm", "kinematics/check/*", answer)
+        await asker.ask_bytes(NAMED.format("ready"), timeout_s=20.0)
+        named._long._kept.clear()
+        asked.clear()
+        yield asker, asked, answerer._long, named._long
 
 
 async def get(asker, selector):
@@ -44,15 +48,15 @@ async def get(asker, selector):
     return replies[0]
 
 
-async def token_of(asker, name):
-    first = pieces.first_of((await get(asker, pieces.selector(KEY.format(name)))).ok)
+async def token_of(asker, name, key=KEY):
+    first = pieces.first_of((await get(asker, pieces.selector(key.format(name)))).ok)
     assert first.length == LENGTH
     return first.token
 
 
-async def piece(asker, name, token, offset):
+async def piece(asker, name, token, offset, key=KEY):
     """Its bytes; None: refused."""
-    reply = await get(asker, f"{KEY.format(name)}?piece={token}:{offset}")
+    reply = await get(asker, f"{key.format(name)}?piece={token}:{offset}")
     return None if reply.ok is None else reply.ok.payload.to_bytes()
 
 
@@ -74,7 +78,7 @@ def between(monkeypatch, act):
 
 def test_lost_pieces_are_asked_for_again_and_the_owner_is_not(mesh, monkeypatch):
     async def main():
-        async with hall(mesh) as (asker, asked, _):
+        async with hall(mesh) as (asker, asked, *_):
             between(monkeypatch, lambda answers, number: number % 3 == 0)
             assert await asker.ask_bytes(KEY.format("base"), timeout_s=20.0) == mesh_of("base")
             assert asked == ["base"]
@@ -84,7 +88,7 @@ def test_lost_pieces_are_asked_for_again_and_the_owner_is_not(mesh, monkeypatch)
 
 def test_what_its_owner_forgot_while_it_was_taken_is_asked_anew(mesh, monkeypatch):
     async def main():
-        async with hall(mesh) as (asker, asked, _):
+        async with hall(mesh) as (asker, asked, *_):
             between(monkeypatch, lambda answers, number: number == 3 and answers._kept.clear())
             assert await asker.ask_bytes(KEY.format("base"), timeout_s=20.0) == mesh_of("base")
             assert asked == ["base", "base"]
@@ -94,7 +98,7 @@ def test_what_its_owner_forgot_while_it_was_taken_is_asked_anew(mesh, monkeypatc
 
 def test_an_answer_that_breaks_off_is_told_as_such(mesh, monkeypatch):
     async def main():
-        async with hall(mesh) as (asker, _, _):
+        async with hall(mesh) as (asker, *_):
             between(monkeypatch, lambda answers, number: number > 1)
             told = rf"mesh/base: [36]0000 of {LENGTH} bytes came, then none for 2 s"
             with pytest.raises(BrokenAnswerError, match=told):
@@ -106,7 +110,7 @@ def test_an_answer_that_breaks_off_is_told_as_such(mesh, monkeypatch):
 def test_of_too_much_what_was_taken_goes_first_and_the_same_is_kept_once(mesh, monkeypatch):
     async def main():
         monkeypatch.setattr(pieces, "_KEPT_BYTES", 2 * LENGTH)
-        async with hall(mesh) as (asker, _, answers):
+        async with hall(mesh) as (asker, _, answers, _):
             taking, taken = await token_of(asker, "a"), await token_of(asker, "b")
             for number in range(1, PIECES):
                 assert await piece(asker, "b", taken, number * pieces.PIECE_BYTES)
@@ -119,17 +123,18 @@ def test_of_too_much_what_was_taken_goes_first_and_the_same_is_kept_once(mesh, m
     run(main())
 
 
-def test_one_asking_gives_out_its_pieces_a_few_times_and_no_longer(mesh):
+def test_what_is_asked_in_a_name_is_given_out_a_few_times_and_no_longer(mesh):
     async def main():
-        async with hall(mesh) as (asker, _, answers):
-            token = await token_of(asker, "a")
+        async with hall(mesh) as (asker, _, _, answers):
+            another, token = await token_of(asker, "li", NAMED), await token_of(asker, "li", NAMED)
+            assert another != token
             for offset in (LENGTH, "9" * 5000, "-1", "x", ""):
-                assert await piece(asker, "a", token, offset) is None
+                assert await piece(asker, "li", token, offset, NAMED) is None
             given = 0
-            while await piece(asker, "a", token, 0) is not None:
+            while await piece(asker, "li", token, 0, NAMED) is not None:
                 given += 1
             assert given == pieces._TIMES * (PIECES - 1)
-            assert not answers._kept
+            assert list(answers._kept) == [another]
 
     run(main())
 
@@ -137,7 +142,7 @@ def test_one_asking_gives_out_its_pieces_a_few_times_and_no_longer(mesh):
 def test_an_idle_owner_keeps_nothing(mesh, monkeypatch):
     async def main():
         monkeypatch.setattr(pieces, "_KEPT_S", 0.1)
-        async with hall(mesh) as (asker, _, answers):
+        async with hall(mesh) as (asker, _, answers, _):
             await token_of(asker, "a")
             await until(lambda: not answers._kept)
 
