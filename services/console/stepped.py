@@ -27,6 +27,8 @@ _SETTLED_AFTER_S = 0.6
 _MIND_EACH_S = 1.0
 _SILENT_S = 4.0  # a reduced view that ended (its renderer began anew) is left
 _KEY_FRAME_WITHIN_S = 3.0
+# Where there is no less of it, or nobody answers: frames that are late come 30 times a second.
+_ASK_AGAIN_AFTER_S = 5.0
 _TRY_MORE_AFTER_S = (10.0, 160.0)
 _TOO_MUCH_WITHIN_S = 8.0
 
@@ -61,7 +63,7 @@ class SteppedVideo:
         self._minding: asyncio.Task[None] | None = None
         self._pushed_at = self._late_at = time.monotonic()
         self._joined_at = self._pushed_at
-        self._raised_at = -math.inf
+        self._raised_at = self._refused_at = -math.inf
         self._try_more_after_s = _TRY_MORE_AFTER_S[0]
         self._join(key)
 
@@ -94,6 +96,8 @@ class SteppedVideo:
         self._lane.skip()
         if self._changing is not None or self.step == LOWEST_STEP:
             return
+        if now - self._refused_at < _ASK_AGAIN_AFTER_S:
+            return
         if now - self._raised_at < _TOO_MUCH_WITHIN_S:
             self._try_more_after_s = min(2 * self._try_more_after_s, _TRY_MORE_AFTER_S[1])
         self._changing = asyncio.create_task(self._change(self.step + 1))
@@ -119,6 +123,7 @@ class SteppedVideo:
         except BusError as error:
             # There is no less of it: frames are left out, and it goes on at key frames.
             log.debug("%s is not reduced: %s", self.key, error)
+            self._refused_at = time.monotonic()
         else:
             async with self._beginning(source) if step < self.step else contextlib.nullcontext():
                 self._leave()

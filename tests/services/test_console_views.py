@@ -72,9 +72,10 @@ class Steps:
     """A renderer's lower views; `refused`: it has none."""
 
     def __init__(self, refused=False):
-        self.refused = refused
+        self.refused, self.asked = refused, 0
 
     async def reduced(self, key, step, asker):
+        self.asked += 1
         if self.refused:
             raise RefusedError("a recording's video is as it is")
         return key if step == 0 else f"{key}-{step}"
@@ -150,6 +151,20 @@ def test_a_view_that_cannot_be_reduced_goes_on_at_key_frames(monkeypatch):
         assert video.pop() is None
         feeds.give(KEY, sample(13, KEY_FRAME))
         assert video.pop().header.sequence == 13
+        video.close()
+
+    run(main())
+
+
+def test_who_cannot_be_given_less_is_not_asked_about_with_every_picture(monkeypatch):
+    async def main():
+        clock, feeds, steps = Clock(monkeypatch), Feeds(), Steps(refused=True)
+        video = watch(feeds, steps)
+        for number in range(300):
+            clock.now += 0.033
+            feeds.give(KEY, sample(number, DELTA if number % 10 else KEY_FRAME))
+            await settled()
+        assert 1 <= steps.asked <= 2  # in ten seconds
         video.close()
 
     run(main())
