@@ -14,7 +14,7 @@ from bus.keys import robot_key
 from bus.session import SessionSettings, open_session
 from bus.topics import Role
 from services import router as service
-from services.keys import Folder, certificates, deeds
+from services.keys import Folder, certificates, deeds, renewals
 from services.router.router import AccessError, read_access
 from tests.conftest import free_port, run
 
@@ -189,7 +189,7 @@ def test_a_link_ends_with_its_certificate_and_comes_back_with_the_renewed_one(tm
                     return mo.connected
 
                 await until(away)
-                deeds.renew(folder, ["mo"])
+                renewals.renew(folder, ["mo"])
                 await until(back)
 
         run(main(), timeout_s=60.0)
