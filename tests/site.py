@@ -7,7 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -34,15 +34,19 @@ class RunningSite:
 
     def children(self) -> dict[str, int]:
         """Process ids of its services, by name."""
-        found = {}
-        for line in _output("ps", "-o", "pid=,args=", "--ppid", str(self.process.pid)).splitlines():
-            pid, _, arguments = line.strip().partition(" ")
-            # A spare waits at its standard input, a pipe.
-            spare = "pipe:" in str(Path(f"/proc/{pid}/fd/0").readlink())
-            if "services.command_line.main " in arguments and not spare:
-                name = arguments.split("services.command_line.main ", 1)[1].split()[0]
-                found[name] = int(pid)
-        return found
+        return {words[0]: pid for pid, words in self.services()}
+
+    def services(self) -> Iterator[tuple[int, list[str]]]:
+        """Each process that does something now, and its command's words.
+
+        No spare, which waits at its standard input, a pipe; nor one that is just going, or not there yet.
+        """
+        for line in _output("ps", "-ww", "-o", "pid=,args=", "--ppid", str(self.process.pid)).splitlines():
+            pid, *words = line.split()
+            with suppress(FileNotFoundError):
+                spare = "pipe:" in str(Path(f"/proc/{pid}/fd/0").readlink())
+                if "services.command_line.main" in words and not spare:
+                    yield int(pid), words[words.index("services.command_line.main") + 1 :]
 
     def command(self, *arguments: str, timeout_s: float = 40.0) -> subprocess.CompletedProcess[str]:
         """Run `robomesh` towards its router."""

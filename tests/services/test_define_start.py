@@ -16,19 +16,12 @@ pytestmark = pytest.mark.processes
 
 def processes(site) -> dict[str, int]:
     """Process ids of all that `up` runs, by service and robot: "gateway mine"."""
-    found = subprocess.run(
-        ["ps", "-ww", "--ppid", str(site.process.pid), "-o", "pid=,args="], capture_output=True, text=True
-    ).stdout
     named = {}
-    for line in found.splitlines():
-        pid, *words = line.split()
-        if "services.command_line.main" not in words:
-            continue  # one that is just going, or not there yet
-        service = words[words.index("services.command_line.main") + 1]
+    for pid, (service, *words) in site.services():
         robot = words[words.index("--started") + 1] if "--started" in words else ""
-        if service == "simulate" and "mine" in line:
+        if service == "simulate" and any("mine" in word for word in words):
             robot = "mine"
-        named[f"{service} {robot}".strip()] = int(pid)
+        named[f"{service} {robot}".strip()] = pid
     return named
 
 
