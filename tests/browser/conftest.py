@@ -26,7 +26,14 @@ from tests.cells import arm_alone
 from tests.conftest import free_port
 
 CHROMIUM = Path("/usr/bin/chromium")
-ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+ARGUMENTS = [
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    # What an address bar offers is drawn for each page by two processes more, half of what a page costs. The
+    # last such list counts: the others are Playwright's that could matter here.
+    "--disable-features=WebUIOmniboxPopup,WebUIOmniboxAimPopup,HttpsUpgrades,PaintHolding,OptimizationHints",
+]
 STARTED_S = 60.0
 NO_WEBGL = """
 const getContext = HTMLCanvasElement.prototype.getContext;
