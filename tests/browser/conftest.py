@@ -76,10 +76,7 @@ class Plant:
     def start_controller(self, name, port=0, **settings):
         async def start():
             said = self.loop.create_future()
-            # A quarter of what controllers send is as lively to a person, and leaves time for the browser.
-            settings_ = simulator.Settings(
-                robot="pt600", listen=f"127.0.0.1:{port}", **{"rate_hz": 25.0, **settings}
-            )
+            settings_ = simulator.Settings(robot="pt600", listen=f"127.0.0.1:{port}", **settings)
             task = self.loop.create_task(simulator.serve(settings_, ready=said.set_result))
             await asyncio.wait([said, task], return_when=asyncio.FIRST_COMPLETED)
             self.controllers[name] = (task, int((await said).rpartition(":")[2]))
