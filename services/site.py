@@ -35,7 +35,8 @@ from services.listen import cannot_both_listen, check_page_reach, check_reach, s
 from services.site_console import Console
 from services.site_console import beside as console_beside
 from services.site_fixtures import Clearance, Fixture, fixture_problem, name_problem
-from services.site_legacy import LegacyClients, Quiet
+from services.site_legacy import LegacyClients
+from services.site_part import Quiet
 from services.site_pictures import ALWAYS_RENDERED, Recorder, Renderer
 from services.site_quotas import Quotas
 from services.site_router import RoutedSite, beside

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, StrictBool
 
-from services.site_legacy import Quiet
+from services.site_part import Quiet
 
 
 class ConsoleTls(BaseModel):

@@ -21,7 +21,7 @@ from robots.meshes.solids import ball, box, turned
 from robots.poses import pose_matrix
 from robots.schema import Pose, Positive, Units, nearest
 from robots.tree import Shape, rgb
-from services.site_legacy import Quiet
+from services.site_part import Quiet
 
 _ROUND = 48
 _MILLIMETRE = 1e-3

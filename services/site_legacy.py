@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, field_validator, model_validator
+from pydantic import BaseModel, Field, StrictBool, field_validator, model_validator
 
 from bus import keys
 from bus.errors import KeyNameError
@@ -10,8 +10,7 @@ from protocol_gateway.legacy.settings import LegacySettings, plain_address
 from protocol_gateway.texts import LONGEST
 from services.errors import ListenError
 from services.listen import check_reach, is_loopback, split_address
-
-Quiet = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+from services.site_part import Quiet
 
 
 class Commander(BaseModel):

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field
 
-from services.site_legacy import Quiet
+from services.site_part import Quiet
 
 Pixels = Annotated[int, Field(ge=64, le=4096, multiple_of=2)]
 

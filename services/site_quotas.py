@@ -6,7 +6,7 @@ from pydantic import BaseModel, Field
 
 from bus.quotas import DEFAULT_QUOTAS as DEFAULT
 from bus.quotas import Quotas as QuotaSettings
-from services.site_legacy import Quiet
+from services.site_part import Quiet
 
 
 class Quotas(BaseModel):

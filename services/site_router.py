@@ -15,7 +15,7 @@ from bus.keys import check_name
 from services.keys import Folder
 from services.keys.errors import KeysError
 from services.listen import reachable
-from services.site_legacy import Quiet
+from services.site_part import Quiet
 
 # A site's robots are at #/<site>/<robot>: one of these names would hide them behind a page.
 _PAGES = ("define", "events", "program", "recordings", "settings", "wall")
