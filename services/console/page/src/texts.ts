@@ -114,7 +114,7 @@ const TEXTS = {
   video_inset: ["Inset", "画中画"],
   video_large: ["Large", "大图"],
   video_place: ["Where the video stands", "视频位置"],
-  reduced: ["reduced: slow link", "已降低：链路慢"],
+  reduced: ["reduced: slow here", "已降低：此处较慢"],
   reduced_hint: ["This browser, or the line to it, does not take the whole video: it is given a smaller one, and tried with more later.", "此浏览器或其链路无法承载完整视频：已改用较小的视频，稍后再尝试恢复。"],
   save_still: ["Save still", "保存图像"],
   record_video: ["Save MP4", "保存 MP4"],
