@@ -43,6 +43,7 @@ SITE = "soak"
 ROBOMESH = (sys.executable, "-m", "services.command_line.main")
 LOOK_EACH_S = 60.0
 CAPTURE_S = 30.0
+ENDED_WITHIN_S = 20.0
 KILLED = ("gateway", "kinematics", "console", "recorder", "renderer", "player", "watch")
 # A page shows fewer states than there are when a machine stalls: it counts apart.
 WATCHED = f"robomesh/{SITE}/*/joints"
@@ -183,6 +184,7 @@ async def soak(
     events: Counter[str] = Counter()
     stops: set[str] = set()
     kills: Counter[str] = Counter()
+    unended: list[str] = []
     grown = Grown(site.pid)
     async with open_session(SessionSettings(connect=(ports.router,), wait_s=20.0)) as session:
         tasks = [
@@ -191,7 +193,7 @@ async def soak(
                 watch_joints(session, joints),
                 watch_stops(session, stops),
                 watch_events(session, events),
-                record(folder, ports, arguments.robots),
+                record(folder, ports, arguments.robots, unended),
                 *([kill(site.pid, arguments.kills, kills)] if arguments.kills else []),
             )
         ]
@@ -206,6 +208,7 @@ async def soak(
                 "events": dict(events),
                 "stops": sorted(stops),
                 "kills": dict(kills),
+                "captures_not_ended": unended,
                 "disk_mib": round(sum(f.stat().st_size for f in folder.rglob("*") if f.is_file()) / 2**20, 1),
             }
 
@@ -260,7 +263,7 @@ async def watch_page(address: str, seen: Seen) -> None:
         await asyncio.sleep(1.0)
 
 
-async def record(folder: Path, ports: Ports, robots: int) -> None:
+async def record(folder: Path, ports: Ports, robots: int, unended: list[str]) -> None:
     """A capture of one robot after another, each deleted when it is whole: the disk stays as it is."""
     number = 0
     while True:
@@ -274,7 +277,10 @@ async def record(folder: Path, ports: Ports, robots: int) -> None:
         try:
             await asyncio.sleep(CAPTURE_S)
             process.send_signal(signal.SIGINT)
-            await asyncio.wait_for(process.wait(), 20.0)
+            await asyncio.wait_for(process.wait(), ENDED_WITHIN_S)
+        except TimeoutError:
+            # One that is late says something of the machine, and an hour is not thrown away for it.
+            unended.append(f"soak-{number}")
         finally:
             if process.returncode is None:
                 process.kill()
