@@ -17,10 +17,10 @@ import zenoh
 from latency import free_port
 from prometheus_client import CollectorRegistry, generate_latest
 
+from bus.answering import Request
 from bus.endpoints import router_config
 from bus.health import Served, health_of
 from bus.metrics import SessionMetrics
-from bus.requests import Request
 from bus.schemas.robomesh_pb2 import LeaseAnswer
 from bus.session import Session, SessionSettings, open_session
 

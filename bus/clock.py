@@ -16,11 +16,11 @@ from dataclasses import dataclass, field
 
 import zenoh
 
+from bus.answering import Answerer, Request
 from bus.endpoints import first_line
 from bus.errors import MessageError, NoAnswerError
 from bus.keys import WHOLE_SITE, robot_key
 from bus.messages import PROTOBUF, decode
-from bus.requests import Answerer, Request
 from bus.schemas.robomesh_pb2 import ClockAnswer, ClockRequest
 from bus.session import Session
 

@@ -7,11 +7,13 @@ enums are refused by name.
 import json
 import math
 from collections.abc import Iterator
-from typing import TypeVar
+from functools import cache
+from typing import Any, TypeVar
 
 from google.protobuf import json_format
-from google.protobuf.descriptor import FieldDescriptor
+from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from google.protobuf.message import DecodeError, Message
+from google.protobuf.timestamp_pb2 import Timestamp
 
 from bus.errors import MessageError
 
@@ -20,6 +22,10 @@ JSON = "application/json"
 TEXT = "text/plain"
 
 _FLOATS = (FieldDescriptor.TYPE_DOUBLE, FieldDescriptor.TYPE_FLOAT)
+_OWN = "robomesh"
+_TIME = Timestamp.DESCRIPTOR.full_name
+# Years 1 to 9999, as its proto has it: to make a number of any other raises ValueError.
+_FIRST_S, _LAST_S = -62_135_596_800, 253_402_300_799
 
 AnyMessage = TypeVar("AnyMessage", bound=Message)
 
@@ -48,12 +54,14 @@ def decode(schema: type[AnyMessage], payload: bytes) -> AnyMessage:
     """A message from protobuf bytes.
 
     Raises:
-        MessageError: If the bytes are not that message.
+        MessageError: If the bytes are not that message, or hold a time that is none.
     """
     try:
-        return schema.FromString(payload)
+        message = schema.FromString(payload)
     except DecodeError as error:
         raise MessageError(f"{len(payload)} bytes are not a {schema.DESCRIPTOR.full_name}: {error}") from None
+    _check_times(message, _dated(schema.DESCRIPTOR))
+    return message
 
 
 def decode_request(schema: type[AnyMessage], payload: bytes, encoding: str) -> AnyMessage:
@@ -125,3 +133,32 @@ def _problems(message: Message, path: str = "") -> Iterator[str]:
 
 def _is_map(field: FieldDescriptor) -> bool:
     return field.message_type is not None and field.message_type.GetOptions().map_entry
+
+
+# Of each field that is a time or holds some: its name, whether it is repeated, and its own such fields; None:
+# it is a time itself.
+_Dated = tuple[tuple[str, bool, "_Dated | None"], ...]
+
+
+def _check_times(message: Message, dated: _Dated) -> None:
+    for name, repeated, within in dated:
+        value: Any = getattr(message, name)
+        for each in value if repeated else (value,):
+            if within is not None:
+                _check_times(each, within)
+            elif not (_FIRST_S <= each.seconds <= _LAST_S and 0 <= each.nanos < 1_000_000_000):
+                raise MessageError(f"{name}: {each.seconds} s and {each.nanos} ns are no time")
+
+
+@cache
+def _dated(schema: Descriptor) -> _Dated:
+    if schema.file.package != _OWN:  # Foxglove's come by the thousand, and nobody reckons with their times
+        return ()
+    found: list[tuple[str, bool, _Dated | None]] = []
+    for field in schema.fields:
+        if field.message_type is None or _is_map(field):
+            continue
+        within = None if field.message_type.full_name == _TIME else _dated(field.message_type)
+        if within != ():
+            found.append((field.name, bool(field.is_repeated), within))
+    return tuple(found)

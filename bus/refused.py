@@ -1,4 +1,4 @@
-"""Why a router does not let us in, where that can be found out.
+"""Why a router does not let us in, where that can be found out; and how long our certificate lasts.
 
 Zenoh says only that it could not connect. So, once that has happened, the same handshake is tried again
 by Python's own TLS, which says what the other end has against it.
@@ -7,6 +7,7 @@ by Python's own TLS, which says what the other end has against it.
 import socket
 import ssl
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 from bus.endpoints import Tls
 from bus.errors import SessionError
@@ -37,6 +38,20 @@ def own_certificate(tls: Tls | None, now: datetime | None = None) -> tuple[Ident
     if left <= timedelta(0):
         raise SessionError(f"{tls.certificate}: the certificate of {identity.name} expired on {when}: {mend}")
     return identity, f"the certificate of {identity.name} expires on {when}: {mend}" if left < _SOON else None
+
+
+def left_s(file: Path, at_first: datetime) -> float:
+    """Until a file's certificate expires [s]: it may have been renewed, and the next link is opened with it.
+
+    Args:
+        at_first: When the one expires that was there at first; it counts where the file cannot be read now.
+    """
+    try:
+        identity = read_identity(file)
+    except SessionError:
+        identity = None
+    expires = at_first if identity is None or identity.expires is None else identity.expires
+    return (expires - datetime.now(UTC)).total_seconds()
 
 
 def why(endpoint: str, tls: Tls | None) -> str | None:
@@ -70,7 +85,7 @@ def why(endpoint: str, tls: Tls | None) -> str | None:
         return f"{endpoint} shows a certificate that {tls.ca} does not vouch for: {error.verify_message}"
     except ssl.SSLError as error:
         return None if plain else _verdict(endpoint, tls, error)
-    except OSError:
+    except (OSError, OverflowError, UnicodeError):  # no such port, no such name
         pass
     return None
 

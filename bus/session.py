@@ -4,15 +4,15 @@ import asyncio
 import logging
 import secrets
 import threading
-import time
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
+from functools import partial
 
 import zenoh
 from google.protobuf.message import Message
 
-from bus import access, keys, presence, refused, requests, topics
+from bus import access, answering, asking, keys, presence, refused, topics
 from bus.endpoints import DEFAULT_ROUTER, Tls, client_config, first_line
 from bus.errors import BrokenAnswerError, NoAnswerError, NoRightError, SessionError
 from bus.publisher import OnGet, Publisher
@@ -25,7 +25,7 @@ _RETRY_S = 0.25
 # A measure of whoever has one [s].
 CERTIFICATE = "certificate_seconds"
 
-_Declared = Publisher | Subscription | requests.Answerer | presence.PresenceWatch
+_Declared = Publisher | Subscription | answering.Answerer | presence.PresenceWatch
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,13 +106,13 @@ class Session:
             NoAnswerError: If nobody answered in time.
         """
         payload = b"" if request is None else request.SerializeToString()
-        return requests.decode_answer(key, await self.ask_bytes(key, payload, timeout_s=timeout_s))
+        return asking.decode_answer(key, await self.ask_bytes(key, payload, timeout_s=timeout_s))
 
     async def ask_bytes(self, key: str, payload: bytes = b"", *, timeout_s: float = 2.0) -> bytes:
         """As `ask`, with bytes both ways."""
         self._check("query", key)
         try:
-            return await requests.ask_bytes(self.zenoh_session, key, payload, timeout_s=timeout_s)
+            return await asking.ask_bytes(self.zenoh_session, key, payload, timeout_s=timeout_s)
         except NoAnswerError as error:
             if self.principal is None or isinstance(error, BrokenAnswerError):
                 raise
@@ -121,19 +121,12 @@ class Session:
 
     async def ask_all(
         self, key: str, request: Message | None = None, *, timeout_s: float = 2.0
-    ) -> list[requests.Answer]:
+    ) -> list[asking.Answer]:
         """Every owner's answer to a request on a key with a wildcard."""
         self._check("query", key)
         payload = b"" if request is None else request.SerializeToString()
-        answers = await requests.ask_all(self.zenoh_session, key, payload, timeout_s=timeout_s)
-        return [
-            requests.Answer(
-                owner,
-                None if answer is None else requests.decode_answer(owner, answer),
-                None if error is None else str(error),
-            )
-            for owner, answer, error in answers
-        ]
+        answers = await asking.ask_all(self.zenoh_session, key, payload, timeout_s=timeout_s)
+        return [asking.answer_of(*each) for each in answers]
 
     async def last(self, key: str, *, timeout_s: float = 2.0) -> Message | None:
         """The last value of a topic (its history message where it has one); None: nobody has one."""
@@ -155,10 +148,10 @@ class Session:
         site: str,
         robot: str,
         name: str,
-        handler: requests.Handler,
+        handler: answering.Handler,
         *,
-        on_refused: requests.OnRefused = lambda chunk, text: None,
-    ) -> requests.Answerer:
+        on_refused: answering.OnRefused = lambda chunk, text: None,
+    ) -> answering.Answerer:
         """Answer a request of the table: `stop`, `command/*`; `on_refused` is told of what cannot be read.
 
         Raises:
@@ -167,7 +160,7 @@ class Session:
         """
         self._check("declare_queryable", keys.robot_key(site, robot, name))
         over = self._link_apart() if topics.request(name).own_link else self.zenoh_session
-        answerer = requests.Answerer(over, site, robot, name, handler, on_refused=on_refused)
+        answerer = answering.Answerer(over, site, robot, name, handler, on_refused=on_refused)
         self._keep(answerer)
         return answerer
 
@@ -288,10 +281,9 @@ async def open_session(settings: SessionSettings) -> AsyncIterator[Session]:
             await asyncio.sleep(_RETRY_S)
     if told:
         log.info("router found at %s", routers)
-    if identity is not None and (expires := identity.expires) is not None:
-        session.measure(
-            CERTIFICATE, "Until the own certificate expires", lambda: expires.timestamp() - time.time()
-        )
+    if settings.tls is not None and identity is not None and identity.expires is not None:
+        left_s = partial(refused.left_s, settings.tls.certificate, identity.expires)
+        session.measure(CERTIFICATE, "Until the own certificate expires", left_s)
     try:
         yield session
     finally:

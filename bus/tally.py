@@ -8,9 +8,9 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from bus.answering import Answerer
 from bus.latencies import Latencies
 from bus.publisher import Publisher
-from bus.requests import Answerer
 from bus.subscription import Subscription
 
 

@@ -7,6 +7,7 @@ another.
 
 import asyncio
 import contextlib
+import ctypes
 import os
 import pickle
 import resource
@@ -21,6 +22,7 @@ from bus.errors import BusError
 _START_S = 60.0
 _LENGTH = struct.Struct("<Q")
 _MEMORY_BYTES = 6 * 1024**3
+_PR_SET_PDEATHSIG = 1
 
 
 class WorkerError(BusError):
@@ -89,15 +91,18 @@ class Worker:
     async def _started(self) -> asyncio.subprocess.Process:
         if self._process is not None and self._process.returncode is None:
             return self._process
-        self._process = process = await asyncio.create_subprocess_exec(
-            sys.executable,
-            "-m",
-            self._module,
-            str(self._nice),
-            stdin=asyncio.subprocess.PIPE,
-            stdout=asyncio.subprocess.PIPE,
-            start_new_session=True,  # Ctrl-C is for its owner, who ends it
-        )
+        try:
+            self._process = process = await asyncio.create_subprocess_exec(
+                sys.executable,
+                "-m",
+                self._module,
+                str(self._nice),
+                stdin=asyncio.subprocess.PIPE,
+                stdout=asyncio.subprocess.PIPE,
+                start_new_session=True,  # Ctrl-C is for its owner, who ends it
+            )
+        except OSError as error:
+            raise WorkerError(f"{self._module} could not be started: {error.strerror}") from None
         try:
             async with asyncio.timeout(_START_S):
                 await self._answer(process, self._settings)
@@ -133,11 +138,13 @@ class Worker:
 
 
 def answer_all(begin: Callable[[Any], Callable[[Any], Any]]) -> None:
-    """The worker's end: answer each question until nobody asks any more.
+    """The worker's end: answer each question until nobody asks any more, or its owner is killed.
 
     Args:
         begin: Gets the settings, gives what answers a question; exceptions of both go to who asks.
     """
+    # In the middle of a question too: it holds its owner's log open, which tells that its owner has ended.
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     os.nice(int(sys.argv[1]))
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, _MEMORY_BYTES))
     questions, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")

@@ -9,10 +9,10 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from bus.answering import Answerer, Handler, Request
 from bus.errors import KeyNameError, RefusedError
 from bus.keys import presence_key
 from bus.publisher import LIST_LENGTH, Publisher
-from bus.requests import Answerer, Handler, Request
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
 from bus.topics import Role, check_operator

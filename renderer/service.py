@@ -11,10 +11,10 @@ from functools import partial
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
+from bus.answering import Answerer, Request
 from bus.errors import RefusedError
 from bus.keys import WHOLE_SITE
 from bus.quotas import DEFAULT_QUOTAS, Quota, Quotas
-from bus.requests import Answerer, Request
 from bus.schemas.robomesh_pb2 import Event, KeyFrameAnswer, ViewAnswer, ViewRequest
 from bus.session import Session
 from renderer.cache import cache_folder

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from bus.answering import Request
 from bus.errors import RefusedError
-from bus.requests import Request
 from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.entry import Entry, Outcome, audit_entry, parse_line
 from protocol_gateway.audit.files import lines_of, open_files

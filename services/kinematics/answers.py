@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bus.answering import Request
 from bus.errors import RefusedError
 from bus.quotas import Quota
-from bus.requests import Request
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
 from bus.worker import Worker, WorkerError

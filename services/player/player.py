@@ -9,10 +9,10 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
+from bus.answering import Request
 from bus.errors import RefusedError
 from bus.keys import WHOLE_SITE
 from bus.presence import OPERATOR
-from bus.requests import Request
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
 from mcap_files.errors import RecordingsError

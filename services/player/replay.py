@@ -8,10 +8,10 @@ from collections import deque
 from dataclasses import dataclass
 
 from bus import topics
+from bus.answering import Answerer, Handler, Request
 from bus.errors import BusError, RefusedError
 from bus.keys import robot_key
 from bus.publisher import Publisher
-from bus.requests import Answerer, Handler, Request
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
 from bus.topics import History

@@ -9,9 +9,9 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
+from bus.answering import Request
 from bus.errors import MessageError, RefusedError
 from bus.keys import WHOLE_SITE, robot_key
-from bus.requests import Request
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
 from mcap_files.capture import Capture

@@ -5,10 +5,10 @@ from pathlib import Path
 
 from google.protobuf.message import Message
 
+from bus.answering import Request
 from bus.errors import RefusedError
 from bus.keys import WHOLE_SITE
 from bus.quotas import DEFAULT_QUOTAS, Quota, Quotas
-from bus.requests import Request
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
 from bus.worker import Worker, WorkerError

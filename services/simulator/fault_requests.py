@@ -4,9 +4,9 @@ import asyncio
 import time
 from dataclasses import dataclass
 
+from bus.answering import Request
 from bus.errors import RefusedError
 from bus.health import Served, present
-from bus.requests import Request
 from bus.schemas.robomesh_pb2 import FaultAnswer, FaultRequest
 from bus.session import SessionSettings, open_session
 from bus.topics import Role

@@ -8,10 +8,10 @@ from collections.abc import Coroutine
 from dataclasses import dataclass
 from pathlib import Path
 
+from bus.answering import Request
 from bus.clock import read_clock
 from bus.errors import MessageError, NoAnswerError, RefusedError
 from bus.keys import REPLAY, ROOT, WHOLE_SITE, check_name
-from bus.requests import Request
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
 from bus.subscription import Subscription

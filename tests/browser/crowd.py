@@ -19,7 +19,7 @@ if __name__ == "__main__":
 import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from bus.requests import Request
+from bus.answering import Request
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session, SessionSettings, open_session
 from robots.description import load

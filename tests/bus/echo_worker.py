@@ -1,6 +1,7 @@
 """A worker for the tests: echoes, fails, dies, takes its time."""
 
 import os
+import sys
 import time
 
 from bus.worker import answer_all
@@ -23,6 +24,9 @@ def begin(settings):
                 raise OfTwoArgumentsError(text, text)
             case "die":
                 os._exit(3)
+            case ("say and sleep", seconds):
+                print("asleep", file=sys.stderr, flush=True)
+                time.sleep(seconds)
             case ("sleep", seconds):
                 time.sleep(seconds)
             case "print":

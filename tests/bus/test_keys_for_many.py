@@ -4,10 +4,10 @@ import asyncio
 
 import zenoh
 
+from bus.answering import Request
 from bus.endpoints import client_config
 from bus.header import Header, pack
 from bus.last_values import last_values
-from bus.requests import Request
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import open_session
 from tests.bus.test_session import joints, until

@@ -5,8 +5,9 @@ import contextlib
 
 import pytest
 
+from bus.answering import Request
+from bus.asking import ask_all
 from bus.errors import BusyError
-from bus.requests import Request, ask_all
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import open_session
 from tests.conftest import run

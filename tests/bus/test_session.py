@@ -7,9 +7,9 @@ import pytest
 import zenoh
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
+from bus.answering import Request
 from bus.endpoints import client_config, router_config
 from bus.errors import NoAnswerError, RefusedError, SessionError
-from bus.requests import Request
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import SessionSettings, open_session
 from tests.conftest import free_port, run
@@ -390,6 +390,9 @@ def test_no_router_is_one_line_that_says_what_to_do():
                 pass
         with pytest.raises(SessionError, match="'nonsense' is no endpoint: tcp/"):
             async with open_session(SessionSettings(connect=("nonsense",), wait_s=0.0)):
+                pass
+        with pytest.raises(SessionError, match="no router at tcp/"):
+            async with open_session(SessionSettings(connect=("tcp/no..name:7447",), wait_s=0.0)):
                 pass
 
     run(main())

@@ -1,8 +1,12 @@
 import asyncio
 import contextlib
 import os
+import subprocess
+import sys
 from contextlib import asynccontextmanager
+from subprocess import PIPE
 
+import psutil
 import pytest
 
 from bus.worker import Worker, WorkerError
@@ -107,3 +111,26 @@ def test_questions_wait_for_each_other_and_waiting_counts():
             assert (await first)[2] == ("sleep", 1.5)
 
     run(main())
+
+
+def test_a_worker_ends_with_its_owner_in_the_middle_of_a_question_too():
+    owner = (
+        "import asyncio\n"
+        "from bus.worker import Worker\n"
+        "async def main():\n"
+        f"    worker = Worker({CHILD!r}, 'settings')\n"
+        "    await worker.start()\n"
+        "    print(worker.pid, flush=True)\n"
+        "    await worker.ask(('say and sleep', 300), timeout_s=300)\n"
+        "asyncio.run(main())\n"
+    )
+    # The worker says what it has to say where its owner does: whoever reads that waits for both to end.
+    with subprocess.Popen([sys.executable, "-c", owner], stdout=PIPE, stderr=PIPE, text=True) as process:
+        worker = psutil.Process(int(process.stdout.readline()))
+        assert process.stderr.readline() == "asleep\n"
+        process.kill()
+        try:
+            process.communicate(timeout=40.0)
+        finally:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                worker.kill()

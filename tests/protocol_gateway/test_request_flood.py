@@ -2,7 +2,7 @@
 
 import asyncio
 
-from bus.requests import ask_all
+from bus.asking import ask_all
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import open_session
 from protocol_gateway.audit.log import read_entries

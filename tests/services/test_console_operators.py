@@ -2,8 +2,8 @@
 
 import asyncio
 
+from bus.asking import ask_all
 from bus.errors import RefusedError
-from bus.requests import ask_all
 from bus.schemas.robomesh_pb2 import LeaseAnswer, LeaseRequest
 from tests.conftest import run
 from tests.services.test_console import browse, console, page

@@ -3,9 +3,9 @@
 import asyncio
 import signal
 
+from bus.asking import ask_all
 from bus.errors import RefusedError
 from bus.lease import control
-from bus.requests import ask_all
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import open_session
 from services.command_line import find, send

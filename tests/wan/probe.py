@@ -19,10 +19,10 @@ import zenoh
 from google.protobuf import json_format
 
 from bus import messages
+from bus.answering import Request
 from bus.endpoints import bundle
 from bus.errors import BusError
 from bus.messages import PROTOBUF
-from bus.requests import Request
 from bus.session import Session, SessionSettings, open_session
 from bus.subscription import Subscription
 from bus.topics import request
