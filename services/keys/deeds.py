@@ -109,9 +109,12 @@ def _prepared(
     principals = Principals(site=site, border=border, routers=routers, entries=principals.entries)
     made = []
     for name, role in _EVERY_SERVICE:
-        entry = principals.find(name) or Entry(name=f"{name}.{site}", role=role)
-        wanted = entry.model_copy(update={"robots": robots}) if name == Role.GATEWAY.value else entry
-        if entry.revoked is None and (wanted != entry or not folder.service(name).is_file()):
+        there = principals.find(name)
+        wanted = there or Entry(name=f"{name}.{site}", role=role)
+        if name == Role.GATEWAY.value:
+            wanted = wanted.model_copy(update={"robots": robots})
+        # A bundle without an entry is what was killed here before it wrote the list.
+        if wanted.revoked is None and (wanted != there or not folder.service(name).is_file()):
             principals = issued(folder, principals, wanted)
             made.append(wanted.name)
     save(folder, principals)
@@ -153,11 +156,16 @@ def issue(
     """A certificate for a person, a service, or another router or gateway of the site.
 
     Raises:
-        KeysError: If the name cannot be, is taken by somebody else, or was revoked and its certificate
-            has not expired.
+        KeysError: If the name cannot be, or not for that role, is taken by somebody else, or was revoked and
+            its certificate has not expired.
     """
     principals = principals_of(folder)
-    full = f"{name.removesuffix('.' + principals.site)}.{principals.site}"
+    name = name.removesuffix("." + principals.site)
+    full = f"{name}.{principals.site}"
+    if folder.service(name) == folder.authority:
+        raise KeysError(f"{full} is the authority itself, and its file the authority's: take another name")
+    if role is Role.ROUTER and name.partition("-")[0] != Role.ROUTER.value:
+        raise KeysError(f"{full}: other sites know a router by its name: router-2 and router-3 are right")
     there = principals.find(full)
     if there is not None and there.role is not role and there.revoked is None:
         raise KeysError(

@@ -3,10 +3,10 @@
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError
 
 from bus.access import Border, Principal
 from bus.topics import Role
@@ -37,10 +37,11 @@ class Entry(BaseModel):
     sites: tuple[Site, ...] = ()
     serial: str = ""
     fingerprint: str = ""
-    issued: datetime | None = None
-    expires: datetime | None = None
-    earlier: datetime | None = None
-    revoked: datetime | None = None
+    # With its zone: people may edit the file.
+    issued: AwareDatetime | None = None
+    expires: AwareDatetime | None = None
+    earlier: AwareDatetime | None = None
+    revoked: AwareDatetime | None = None
 
     @property
     def good_until(self) -> datetime | None:
@@ -144,7 +145,7 @@ def write_principals(principals: Principals) -> str:
                 lines.append(f'{key} = "{text}"')
         for key in ("issued", "expires", "earlier", "revoked"):
             if (time := getattr(entry, key)) is not None:
-                lines.append(f"{key} = {time:%Y-%m-%dT%H:%M:%SZ}")
+                lines.append(f"{key} = {time.astimezone(UTC):%Y-%m-%dT%H:%M:%SZ}")
     return "\n".join([*lines, ""])
 
 

@@ -1,6 +1,7 @@
 """`robomesh keys` as people use it, and a whole site that runs by its keys."""
 
 import json
+import re
 import stat
 from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, timedelta
@@ -272,6 +273,8 @@ def test_keys_are_found_where_a_site_file_says_or_beside_or_around_ones_own_and_
         (("accept", "site.toml"), "site.toml: no bundle of a private key"),
         (("accept", "not-there.pem"), "not-there.pem: cannot be read"),
         (("accept", "keys/router.pem"), "hall is this site"),
+        (("issue", "authority", "--role", "watch"), "authority.hall is the authority itself"),
+        (("issue", "spare", "--role", "router"), "spare.hall: other sites know a router by its name"),
         (("list", "--folder", "elsewhere"), "elsewhere/principals.toml is not there"),
     ],
 )
@@ -302,6 +305,28 @@ def test_a_list_that_somebody_spoiled_is_told_with_its_file_and_key(site, capsys
     assert keys("list") == 2
     assert "principals.toml: principal." in (error := capsys.readouterr().err)
     assert "'king'" in error
+
+
+def test_a_time_without_its_zone_is_told_too(site, capsys):
+    keys("init", str(site))
+    listed = Folder(site.parent / "keys").principals
+    listed.write_text(re.sub(r"(expires = \S+)Z", r"\1", listed.read_text(), count=1))
+    capsys.readouterr()
+    assert keys("list") == 2
+    assert re.search(r"principals\.toml: principal\.0\.expires = .*timezone", capsys.readouterr().err)
+
+
+def test_an_init_that_was_killed_before_it_wrote_the_list_is_made_good_by_the_next(site):
+    keys("init", str(site))
+    folder = Folder(site.parent / "keys")
+    whole = deeds.principals_of(folder)
+    folder.principals.unlink()
+    folder.access.unlink()
+    assert keys("init", str(site)) == 0
+    again = deeds.principals_of(folder)
+    assert [each.name for each in again.entries] == [each.name for each in whole.entries]
+    known = json.dumps(read_access(folder.access)["access_control"]["subjects"])
+    assert all(each.name in known and each.serial for each in again.entries)
 
 
 def test_a_revoked_name_is_given_to_nobody_while_a_certificate_of_it_is_good(made, monkeypatch, capsys):
