@@ -9,6 +9,7 @@ import json
 import logging
 import os
 import shlex
+import ssl
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -33,6 +34,7 @@ log = logging.getLogger(__name__)
 _LOOK_S = 0.5
 _AGAIN_S = 0.2
 _REVOKED = "its certificate was revoked, or the rules do not name it"
+_GOES_ON = "the router goes on with the rules and keys that it has"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,20 +108,25 @@ async def serve(settings: Settings, *, ready: Callable[[str], None] | None = Non
                 settings = replace(settings, connect=own)
                 await asyncio.to_thread(router.close)
                 router, rules = await _open_again(settings, rules, rules)
-            if (stamps := _stamps(settings)) == seen:
+            # After a cut there are fewer files: that is no change.
+            if (stamps := _stamps(settings)).items() <= seen.items():
                 continue
             seen = stamps
             try:
                 wanted = read_access(settings.access)
+                _check_keys(settings.tls)
                 router_config(settings.listen, settings.connect, settings.tls, wanted, settings.line_bps)
             except (AccessError, BusError) as error:
-                told.say(Event.ERROR, "rules", f"{error}; the router goes on with the rules that it has")
+                told.say(Event.ERROR, "rules", f"{error}; {_GOES_ON}")
                 continue
             others = await asyncio.to_thread(neighbours, router, settings.tls)
             await our_turn(router, settings.tls, others)
             await asyncio.to_thread(router.close)
             router, rules = await _open_again(settings, wanted, rules)
-            told.say(Event.INFO, "rules", "the router follows the new rules and keys")
+            if rules is wanted:
+                told.say(Event.INFO, "rules", "the router follows the new rules and keys")
+            else:
+                told.say(Event.ERROR, "rules", f"{settings.access}: Zenoh does not take it; {_GOES_ON}")
     finally:
         for task in tasks:
             task.cancel()
@@ -251,21 +258,37 @@ async def _open_again(
 ) -> tuple[zenoh.Session, Mapping[str, Any]]:
     """With the new rules; with those before where Zenoh takes no new ones, until it opens."""
     while True:
-        for rules in (wanted, before):
+        for rules in (wanted, wanted, before):  # twice: the first time an address may still be taken
             try:
                 return await _open(settings, rules), rules
             except ListenError as error:
                 log.error("%s", error)
-        await asyncio.sleep(_AGAIN_S)
+            await asyncio.sleep(_AGAIN_S)
 
 
-def _stamps(settings: Settings) -> list[tuple[int, int]]:
+def _check_keys(tls: Tls | None) -> None:
+    """Whether a router could listen with its certificate as it is now.
+
+    Raises:
+        AccessError: If not: it is not there, is half copied, or has another's key.
+    """
+    if tls is None:
+        return
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    try:
+        context.load_verify_locations(tls.ca)
+        context.load_cert_chain(tls.certificate, tls.key, password="")  # it asks nobody for one
+    except OSError as error:  # OpenSSL's own among them
+        raise AccessError(f"{tls.certificate} cannot be taken: {error}") from None
+
+
+def _stamps(settings: Settings) -> dict[Path, tuple[int, int]]:
     """When the files that the router was opened with were written."""
     files = [settings.access] if settings.access is not None else []
     for tls in (settings.tls, *(link.tls for link in settings.connect if isinstance(link, Link))):
         if tls is not None:
             files += [tls.ca, tls.certificate, tls.key]
-    return [_stamp(file) for file in dict.fromkeys(files)]
+    return {file: _stamp(file) for file in files}
 
 
 def _stamp(file: Path) -> tuple[int, int]:

@@ -11,7 +11,7 @@ import zenoh
 from bus.endpoints import bundle, router_config
 from bus.errors import NoRightError, SessionError
 from bus.keys import robot_key
-from bus.session import SessionSettings, open_session
+from bus.session import CERTIFICATE, SessionSettings, open_session
 from bus.topics import Role
 from services import router as service
 from services.keys import Folder, certificates, deeds, renewals
@@ -105,7 +105,7 @@ def test_broken_rules_are_not_taken_and_the_router_goes_on(tmp_path, caplog):
     good = folder.access.read_text()
 
     async def refused():
-        return "goes on with the rules that it has" in caplog.text
+        return "goes on with the rules and keys that it has" in caplog.text
 
     async def main():
         async with routing(settings_of(folder, endpoint)), attached(endpoint, folder.person("mo")) as mo:
@@ -286,3 +286,82 @@ def test_a_certificate_shows_whose_it_is_and_who_signed_it(tmp_path):
     shown = certificates.show(folder.person("li").read_bytes())
     assert (shown.name, shown.role, shown.authority) == ("li.here", "operator", "here")
     assert entry.expires == shown.expires
+
+
+def test_a_router_outlives_keys_that_are_gone_or_half_copied_and_takes_them_when_they_are_whole(
+    tmp_path, caplog
+):
+    folder, endpoint = prepared(tmp_path)
+    deeds.issue(folder, "mo", Role.MONITOR)
+    bundle_of_router = folder.service("router")
+    good = bundle_of_router.read_bytes()
+    other = deeds.issued(folder, deeds.principals_of(folder), deeds.principals_of(folder).find("router"))
+    assert other.find("router").serial
+    other_key = bundle_of_router.read_bytes()
+    bundle_of_router.write_bytes(good)
+
+    async def main():
+        async with routing(settings_of(folder, endpoint)), attached(endpoint, folder.person("mo")) as mo:
+            identity = await router_of(mo)
+            begin, of_good = other_key.index(b"-----BEGIN CERT"), good.index(b"-----BEGIN CERT")
+            for broken in (None, good[: len(good) // 2], good[:of_good] + other_key[begin:]):
+                caplog.clear()
+                if broken is None:
+                    bundle_of_router.unlink()
+                else:
+                    bundle_of_router.write_bytes(broken)
+                await until(goes_on)
+            assert await router_of(mo) == identity, "it was not even opened anew"
+            bundle_of_router.write_bytes(other_key)
+            while await router_of(mo) == identity:
+                await asyncio.sleep(0.05)
+
+    async def goes_on():
+        return "router.pem cannot be taken: " in caplog.text
+
+    async def router_of(session):
+        while not (routers := session.zenoh_session.info.routers_zid()):
+            await asyncio.sleep(0.05)
+        return str(routers[0])
+
+    run(main(), timeout_s=60.0)
+
+
+def test_rules_that_zenoh_refuses_are_not_said_to_be_followed(tmp_path, caplog):
+    caplog.set_level("INFO")
+    folder, endpoint = prepared(tmp_path)
+    deeds.issue(folder, "mo", Role.MONITOR)
+    rules = json.loads("\n".join(folder.access.read_text().splitlines()[1:]))
+    rules["access_control"]["policies"][0]["rules"] = ["no such rule"]
+
+    async def main():
+        async with routing(settings_of(folder, endpoint)), attached(endpoint, folder.person("mo")) as mo:
+            folder.access.write_text(json.dumps(rules))
+            await until(refused)
+            assert "the router follows" not in caplog.text
+            await until(lambda: present(mo))
+
+    async def refused():
+        return "Zenoh does not take it; the router goes on with the rules and keys that it has" in caplog.text
+
+    async def present(session):
+        return (SITE, "router") in await names(session)
+
+    run(main(), timeout_s=60.0)
+
+
+def test_a_renewed_certificate_is_told_without_a_restart(tmp_path):
+    folder, endpoint = prepared(tmp_path)
+    deeds.issue(folder, "mo", Role.MONITOR, lives=timedelta(hours=1))
+    with zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access))):
+
+        async def main():
+            async with attached(endpoint, folder.person("mo")) as mo:
+                (left,) = (each.read for each in mo.measures if each.name == CERTIFICATE)
+                assert 3500 < left() <= 3600
+                deeds.issue(folder, "mo", Role.MONITOR, lives=timedelta(hours=2))
+                assert 7100 < left() <= 7200
+                folder.person("mo").unlink()
+                assert 3500 < left() <= 3600
+
+        run(main())
