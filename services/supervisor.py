@@ -144,13 +144,19 @@ async def _keep(
     ran_well = False
     while True:
         started = time.monotonic()
-        process = await _next(program, running)
-        running[program.name] = process
-        assert process.stdout is not None
-        async with _standing_by(program, running):
-            async for line in _lines(process.stdout):
-                write(line)
-            status = await process.wait()
+        status: int | None = None
+        try:
+            process = await _next(program, running)
+        except OSError as error:  # no memory, or no process, is left just now: the others need not end too
+            how = f"could not be started: {error.strerror}"
+        else:
+            running[program.name] = process
+            assert process.stdout is not None
+            async with _standing_by(program, running):
+                async for line in _lines(process.stdout):
+                    write(line)
+                status = await process.wait()
+            how = f"ended ({_status(status)})"
         ran_s = time.monotonic() - started
         if status == _COULD_NOT and not ran_well and ran_s < _WELL_AFTER_S:
             if program.needed:
@@ -159,7 +165,7 @@ async def _keep(
             return
         if ran_s > _WELL_AFTER_S:
             ran_well, wait_s = True, 0.0
-        write(f"ended ({_status(status)}); again {f'in {wait_s:.1f} s' if wait_s else 'at once'}")
+        write(f"{how}; again {f'in {wait_s:.1f} s' if wait_s else 'at once'}")
         await asyncio.sleep(wait_s * random.uniform(0.8, 1.2))
         wait_s = min(max(2 * wait_s, _SHORTEST_WAIT_S), _LONGEST_WAIT_S)
 
@@ -197,8 +203,9 @@ async def _standing_by(
     async def keep() -> None:
         while True:
             await asyncio.sleep(_SPARE_AFTER_S)
-            running[_spare(program)] = spare = await _start(program, spare=True)
-            await spare.wait()
+            with contextlib.suppress(OSError):  # the next time
+                running[_spare(program)] = spare = await _start(program, spare=True)
+                await spare.wait()
 
     task = asyncio.create_task(keep()) if program.spare else None
     try:

@@ -1,6 +1,7 @@
 """The supervisor's small parts; a whole site is tried in test_whole_site."""
 
 import asyncio
+import errno
 import os
 import signal
 import subprocess
@@ -143,3 +144,33 @@ def test_a_spare_takes_the_place_of_what_was_killed(tmp_path, monkeypatch):
 
     run(main(), timeout_s=60.0)
     assert not pids()
+
+
+def test_a_machine_that_has_no_process_left_for_a_moment_ends_nobody(monkeypatch):
+    start, failures, log = supervisor._start, [], []
+
+    async def short_of_processes(program, **how):
+        if program.name == "late" and len(failures) < 2:
+            failures.append(program)
+            raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+        return await start(program, **how)
+
+    monkeypatch.setattr(supervisor, "_start", short_of_processes)
+    programs = [
+        Program(name=name, arguments=("simulate", "--listen", "127.0.0.1:0")) for name in ("rest", "late")
+    ]
+
+    def told(name, words):
+        return [line for line in log if line.startswith(name) and words in line]
+
+    async def main():
+        supervising = asyncio.create_task(supervise(programs, ready=asyncio.Event().wait, write=log.append))
+        while not (told("rest", "listening") and told("late", "listening")):
+            assert not supervising.done()
+            await asyncio.sleep(0.02)
+        supervising.cancel()
+        await asyncio.gather(supervising, return_exceptions=True)
+
+    run(main())
+    assert len(told("late", "could not be started: Resource temporarily unavailable; again in")) == 2
+    assert not told("rest", "ended")
