@@ -61,14 +61,17 @@ def record_bytes(record: McapRecord) -> bytes:
 
 
 def message_head(channel: int, sequence: int, log_time: int, publish_time: int, size: int) -> bytes:
-    """What stands before a message's payload of `size` bytes; times in ns since the Unix epoch."""
+    """What stands before a message's payload of `size` bytes; times in ns since the Unix epoch.
+
+    The format has no time before that: a clock that says so is recorded as saying 0.
+    """
     return _WHOLE_MESSAGE.pack(
         Opcode.MESSAGE,
         MESSAGE.size + size,
         channel,
         sequence & 0xFFFFFFFF,  # the format has 32 bits
         log_time,
-        publish_time,
+        max(publish_time, 0),
     )
 
 

@@ -12,7 +12,7 @@ from functools import partial
 from math import inf
 from pathlib import Path
 
-from bus.errors import RefusedError
+from bus.errors import MessageError, RefusedError
 from bus.messages import decode
 from bus.schemas import robomesh_pb2 as schema
 from bus.topics import Topic
@@ -179,7 +179,7 @@ class FlightRecorder:
     def _saw(self, row: Topic, payload: bytes) -> None:
         """A publication; on the intake's thread."""
         if row.schema is schema.Event:
-            with suppress(ValueError):
+            with suppress(MessageError):
                 event = decode(schema.Event, payload)
                 if event.severity >= self._flight.severity and event.source != SOURCE:
                     self._loop.call_soon_threadsafe(self._on_event, event.text)

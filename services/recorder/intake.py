@@ -30,10 +30,12 @@ _SWEEP_EVERY_S = 0.004
 # Of its time: a hundred robots' rings are looked into less often, and more is in them.
 _MOST_BUSY = 0.2
 _LONGEST_S = 0.02
-# Ten seconds of a fast topic, if this thread should not run.
-_RING = 16_384
+# A ring has room for twenty seconds of its topic at its highest rate, if this thread should not run, and
+# for a burst of what has none. In time all of its room is touched, 270 bytes a message: none of it is free.
+_RING_S, _SMALLEST_RING = 20.0, 512
 _MOST_AT_ONCE = 2048
 _MOST_MISSING = 10_000
+_SAY_AGAIN_AFTER_S = 10.0
 # Of a view, from its newest key frame on; what is longer is not kept, for it would begin in its middle.
 _MOST_KEPT_BYTES = 16 << 20
 _ANSWER_S = 2.0
@@ -140,7 +142,7 @@ class _Tap:
             try:
                 for key, header, payload, received_ns in self._read_answer(answer, now_ns):
                     self._give(key, header, payload, received_ns, sinks)
-            except MessageError as error:
+            except (MessageError, ValueError) as error:  # a time that no timestamp can be
                 log.warning("%s: left out of the recording: %s", self.key_expr, error)
         if held:
             return 0
@@ -314,6 +316,7 @@ class Intake:
         # Held by whoever looks into the rings, or changes what is listened to.
         self.lock = threading.RLock()
         self._robots: dict[str, RobotIntake] = {}
+        self._say_at = 0.0
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._run, name="intake", daemon=True)
         self._thread.start()
@@ -336,18 +339,32 @@ class Intake:
             begun = time.monotonic()
             with self.lock:
                 for robot in tuple(self._robots.values()):
-                    robot.sweep()
+                    self._sweep(robot, begun)
             took_s = time.monotonic() - begun
             wait_s = min(max(_SWEEP_EVERY_S, took_s / _MOST_BUSY - took_s), _LONGEST_S)
+
+    def _sweep(self, robot: RobotIntake, now_s: float) -> None:
+        """Robots know nothing of each other: what fails at one message ends no recording."""
+        try:
+            robot.sweep()
+        except Exception:
+            if now_s >= self._say_at:
+                self._say_at = now_s + _SAY_AGAIN_AFTER_S
+                log.exception("something that came is left out of the recording")
 
 
 _Ring = zenoh.Handler[zenoh.Sample]
 
 
+def _ring(row: Topic) -> int:
+    """Messages that a topic's ring has room for."""
+    return max(round((row.rate_hz or 0.0) * _RING_S), _SMALLEST_RING)
+
+
 def _subscribe(
     session: zenoh.Session, key_expr: str, row: Topic
 ) -> zenoh.Subscriber[_Ring] | zenoh.ext.AdvancedSubscriber[_Ring]:
-    ring: zenoh.handlers.RingChannel[zenoh.Sample] = zenoh.handlers.RingChannel(_RING)
+    ring: zenoh.handlers.RingChannel[zenoh.Sample] = zenoh.handlers.RingChannel(_ring(row))
     if row.recovered:
         recovery = zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True)
         return zenoh.ext.declare_advanced_subscriber(session, key_expr, ring, recovery=recovery)

@@ -7,17 +7,18 @@ from types import SimpleNamespace
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
 from bus.header import Header, pack
-from bus.schemas.robomesh_pb2 import Event, EventList
+from bus.schemas.robomesh_pb2 import Event, EventList, RecordingQuery
 from bus.session import open_session
-from bus.topics import topic
+from bus.topics import TOPICS, topic
 from mcap_files.capture import Capture
 from mcap_files.reading import RecordingFile
 from services.recorder import intake
 from services.recorder.disk import Taken
 from services.recorder.part import Part
+from services.recorder.settings import Flight
 from tests.conftest import run
 from tests.recordings import KEY_PICTURE, PICTURE, START_NS
-from tests.services.recording import until
+from tests.services.recording import WITHIN_S, put_states, recording_site, trace_on, until
 
 ARM = "robomesh/site/arm"
 JOINTS, VIDEO, EVENTS = f"{ARM}/joints", f"{ARM}/video/front", f"{ARM}/events"
@@ -73,6 +74,93 @@ def test_who_takes_a_robots_joints_is_given_no_video_and_misses_none_of_it(mesh)
     assert {key for key, _ in all_of_it} == {JOINTS, VIDEO}
     assert lost == [{JOINTS: 7}, {JOINTS: 7, VIDEO: 3}]
     assert afresh == {}
+
+
+def test_what_cannot_be_read_ends_no_recording_of_what_follows(mesh, tmp_path):
+    async def main():
+        async with recording_site(mesh, tmp_path, flight=Flight(minutes=1.0)) as session:
+            joints = session.declare_publisher("site", "arm", "joints")
+            await until(lambda: joints.watched)
+            put = session.zenoh_session.put
+            # No event, and a clock that was before 1970.
+            put(EVENTS, b"\xff\xff", attachment=pack(Header(7, 1, 0)))
+            put(EVENTS, Event(code="early").SerializeToString(), attachment=pack(Header(7, 2, -1)))
+            answer = await trace_on(session, name="trial")
+            await put_states(joints, range(20))
+            while True:
+                told = await session.ask(
+                    "robomesh/site/-/recordings/info",
+                    RecordingQuery(file=answer.file),
+                    timeout_s=WITHIN_S,
+                )
+                if any(each.topic == JOINTS and each.messages >= 20 for each in told.topics):
+                    return
+                await asyncio.sleep(0.05)
+
+    run(main(), timeout_s=60)
+
+
+def test_a_list_with_a_time_that_is_none_is_left_out_and_what_follows_is_taken(mesh):
+    async def main():
+        async with open_session(mesh) as own, open_session(mesh) as other:
+            event = Event(code="bad")
+            event.timestamp.nanos = 2_000_000_000
+            list_of = EventList(events=[event]).SerializeToString()
+
+            def tell(query):
+                query.reply(EVENTS, list_of, attachment=pack(Header(7, 1, 0)))
+
+            queryable = other.zenoh_session.declare_queryable(EVENTS, tell)
+            taking, sink = intake.Intake(own.zenoh_session, "site"), Sink()
+            try:
+                with taking.lock:
+                    taking.robot("arm").attach(sink, frozenset({"events"}))
+                number = 1
+                while not sink.taken:
+                    number += 1
+                    other.zenoh_session.put(EVENTS, b"", attachment=pack(Header(7, number, 0)))
+                    await asyncio.sleep(0.02)
+            finally:
+                taking.close()
+                queryable.undeclare()
+
+    run(main(), timeout_s=60)
+
+
+def test_a_sink_that_fails_at_a_message_ends_no_other_robots_recording(mesh, caplog):
+    class Failing(Sink):
+        def take(self, key, row, header, payload, received_ns):
+            raise RuntimeError("a fault of ours")
+
+    async def main():
+        async with open_session(mesh) as own, open_session(mesh) as other:
+            taking, sink = intake.Intake(own.zenoh_session, "site"), Sink()
+            try:
+                with taking.lock:
+                    taking.robot("bad").attach(Failing(), frozenset({"joints"}))
+                    taking.robot("arm").attach(sink, frozenset({"joints"}))
+                number = 0
+                while not (
+                    "a fault of ours" in caplog.text and sink.taken and number > sink.taken[0][1] + 10
+                ):
+                    number += 1
+                    for key in ("robomesh/site/bad/joints", JOINTS):
+                        other.zenoh_session.put(key, b"", attachment=pack(Header(7, number, number)))
+                    await asyncio.sleep(0.02)
+                await until(lambda: len(sink.taken) > 5)
+            finally:
+                taking.close()
+
+    run(main(), timeout_s=60)
+
+
+def test_no_ring_is_larger_than_its_topic_needs():
+    rings = {row.name: intake._ring(row) for row in TOPICS.values() if row.recorded}
+    assert rings["joints"] == 2000
+    assert rings["audit"] == 512
+    # Of a robot, without video: what a recorder of a hundred robots has room for.
+    states = sum(size for name, size in rings.items() if not name.startswith("video/"))
+    assert states * 100 * 300 < 256 << 20
 
 
 def test_a_long_time_between_key_frames_is_kept_whole_or_not_at_all(monkeypatch):
