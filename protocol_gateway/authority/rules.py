@@ -87,6 +87,7 @@ class Why(Enum):
     LOCAL_MODE = auto()
     STOPPED = auto()
     LIMIT = auto()
+    HELD = auto()
     OTHER = auto()
 
 

@@ -243,10 +243,21 @@ class Control:
         if not rules.holds(self.authority, attempt.entries[0].operator, attempt.requests[0].lease):
             text = "Not sent: control ended while the command was being written down."
             return Answer(False, text, Why.NOT_IN_CONTROL)
-        if refusal := self._refusal(attempt):
+        if refusal := self._held_up(attempt) or self._refusal(attempt):
             return refusal
         changed = "" if self._checks is None else self._checks.changed(finding)
         return Answer(False, f"Not sent: {changed} since the motion was checked.") if changed else None
+
+    def _held_up(self, attempt: _Attempt) -> Answer | None:
+        """That HOLD, which waits for nothing, has overtaken a motion: whoever held the robot expects none."""
+        if not any(each.command in MOTION_COMMANDS for each in attempt.requests):
+            return None
+        lease, program = self.authority.lease, self._guarded.program
+        if attempt.step:
+            held = program is not None and (program.held or program.given_up)
+        else:
+            held = lease is not None and lease.last_id > attempt.requests[-1].id
+        return Answer(False, "Not sent: HOLD came before it could be sent.", Why.HELD) if held else None
 
     def _note(self, entries: Sequence[Entry], outcome: Outcome, text: str) -> None:
         for entry in entries:
@@ -312,8 +323,11 @@ class Control:
             alone=alone,
         )
         program = self._guarded.program
-        if program is not None and request.command in (_C.HOLD, _C.RESUME, _C.RESET):
+        if program is not None and request.command in (_C.HOLD, _C.RESUME):
             self._guarded.program = replace(program, held=request.command == _C.HOLD)
+        if program is not None and request.command == _C.RESET:
+            given_up = program.held or controller.status.activity is Activity.HOLDING
+            self._guarded.program = replace(program, given_up=given_up)
         if request.command == _C.SPEED:
             self.speed_percent = request.speed_percent
         if request.command == _C.RESET:

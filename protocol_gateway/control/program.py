@@ -5,7 +5,8 @@
                   -> wait until the robot stands at the step's target
 
 It ends with its last step, with a stop, with its holder's control, with a refused step, or where the
-robot comes to rest elsewhere. HOLD and RESUME are its holder's, as with any motion.
+robot comes to rest elsewhere. HOLD and RESUME are its holder's, as with any motion, and a RESET that gives
+up what is on hold gives up all of it.
 """
 
 import asyncio
@@ -18,6 +19,7 @@ from bus.errors import RefusedError
 from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.log import Outcome
 from protocol_gateway.authority import rules
+from protocol_gateway.authority.rules import Why
 from protocol_gateway.checking.questions import Checked
 from protocol_gateway.control.checks import Checks
 from protocol_gateway.control.control import PROGRAM, Control
@@ -174,10 +176,13 @@ class Programs:
         begin_s = time.monotonic()
         if step.kind is StepKind.WAIT:
             return await self._until(run, lambda: time.monotonic() - begin_s >= (step.seconds or 0.0))
-        # On hold between two motions, it waits for RESUME like a motion would.
-        if problem := await self._until(run, self._not_held):
-            return problem
-        answer = await self._control.step(_request(step, run.secret), operator=run.operator)
+        while True:
+            # On hold between two motions, it waits for RESUME like a motion would.
+            if problem := await self._until(run, self._not_held):
+                return problem
+            answer = await self._control.step(_request(step, run.secret), operator=run.operator)
+            if answer.accepted or answer.why is not Why.HELD:
+                break
         if not answer.accepted:
             return answer.text.removeprefix("Not sent: ").rstrip(".")
         if step.target is None:
@@ -223,6 +228,8 @@ class Programs:
             return f"stopped by {authority.stop.by}: {authority.stop.reason}"
         if authority.last_stop_id != run.last_stop_id:
             return f"stopped: stop request {authority.last_stop_id}"
+        if self._guarded.program is not None and self._guarded.program.given_up:
+            return "given up with RESET"
         if not rules.holds(authority, run.operator, run.secret):
             return f"control ended: {authority.ended or 'nobody says why'}"
         return ""

@@ -50,12 +50,14 @@ class Running:
         targets: Everywhere that it goes, in order [rad] or [m].
         done: So many of them are told to the controller already.
         held: HOLD was sent, and no RESUME since.
+        given_up: RESET was sent while it was on hold: nothing of it is to come after that.
     """
 
     name: str
     targets: tuple[tuple[float, ...], ...] = ()
     done: int = 0
     held: bool = False
+    given_up: bool = False
 
     @property
     def ahead(self) -> tuple[tuple[float, ...], ...]:

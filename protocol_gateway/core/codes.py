@@ -51,6 +51,11 @@ class CodeTable:
         """Whether its controller knows a command: by name, or, where it knows codes only, by a code."""
         return not self.codes or Meaning(COMMAND) in self.codes or Meaning(COMMAND, word) in self.codes
 
+    def marks(self, word: str) -> tuple[bytes, ...]:
+        """What a unit that says a command holds, one at least: the word, or its code's digits."""
+        code = self.codes.get(Meaning(COMMAND, word))
+        return (word.encode(),) if code is None else (word.encode(), b"%d" % abs(code))
+
 
 def code_table(codes: Mapping[int, str]) -> CodeTable:
     """The table of a site file's `codes`; the default one, written as names, when there are none.

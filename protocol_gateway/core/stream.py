@@ -6,6 +6,7 @@
 What is malformed harms nothing before its first byte or after its "@".
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -65,11 +66,11 @@ class UnitStream:
         self._offset = 0  # of the buffer's first byte
         self._lost = False  # past 64 KiB: skipping to the next "@"
 
-    def receive(self, data: bytes, holding: bytes = b"") -> list[StreamEvent]:
+    def receive(self, data: bytes, holding: Collection[bytes] | None = None) -> list[StreamEvent]:
         """Events of the next bytes; the same however they are cut.
 
         Args:
-            holding: Units without these bytes are passed over unread, which costs next to nothing.
+            holding: Units without any of these are passed over unread, which costs next to nothing.
         """
         *ends, rest = data.split(TERMINATOR)
         events: list[StreamEvent] = []
@@ -80,7 +81,7 @@ class UnitStream:
                 self._buffer.clear()
             if self._lost:
                 self._lost = False
-            elif holding in unit:
+            elif holding is None or any(each in unit for each in holding):
                 events.append(self._unit(unit, self._offset))
             self._offset += len(unit) + 1
         self._buffer += rest

@@ -26,7 +26,6 @@ _READ_BYTES = 1024
 # A host that vanished is noticed in seconds, and not before one that only does not read is given up in words.
 _UNACKNOWLEDGED_MS = 6000
 _LAST_WORD_S = 0.5
-_STOP = b"stop"
 # Who is overheard is read at 200 KiB/s.
 _NEXT_PIECE_S = 0.005
 
@@ -75,6 +74,7 @@ class Client(asyncio.BufferedProtocol):
     def __init__(self, server: Server, table: CodeTable, limits: Limits | None = None) -> None:
         self._server = server
         self._stream = UnitStream(table)
+        self._stop = table.marks("stop")
         self._loop = asyncio.get_running_loop()
         self._budget = None if limits is None else Budget(limits, self._loop.time())
         self._read = bytearray(_READ_BYTES)
@@ -229,7 +229,7 @@ class Client(asyncio.BufferedProtocol):
         self.abort()
 
     def _overhear(self, data: bytes) -> None:
-        events = self._stream.receive(data, holding=_STOP)
+        events = self._stream.receive(data, holding=self._stop)
         if events:
             self._server.overheard(self, events)
         if not self._transport.is_closing():

@@ -103,6 +103,22 @@ def test_a_stop_while_a_unit_is_being_written_down_forbids_all_of_it(tmp_path):
     run(main())
 
 
+def test_a_motion_that_hold_has_overtaken_is_not_sent(tmp_path):
+    async def main():
+        async with place(tmp_path) as it:
+            await it.lease(A.ACQUIRE)
+            motion = asyncio.create_task(it.commands((C.HOME, {})))
+            await asyncio.sleep(0)  # it waits for the disk now
+            hold = asyncio.create_task(it.commands((C.HOLD, {}), first_id=2))
+            with pytest.raises(RefusedError, match="HOLD came before it could be sent"):
+                await motion
+            await hold
+            assert it.socket == [b"1#COMMAND*hold@"]
+            assert it.control.authority.lease.motion is None
+
+    run(main())
+
+
 def test_a_session_that_is_gone_takes_its_own_lease_with_it_and_stops_its_motion(tmp_path):
     async def main():
         async with place(tmp_path) as it:

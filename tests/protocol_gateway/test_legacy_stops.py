@@ -61,6 +61,20 @@ async def test_a_stop_of_one_too_many_is_done(mesh, tmp_path):
             assert second.bytes == b"1#ERROR*1;too many clients@"
 
 
+@in_loop
+async def test_a_stop_by_its_code_is_done_as_well_of_one_too_many(mesh, tmp_path):
+    codes = {2: "ABSOLUTE.DEG", 5: "STATUS", 102: "COMMAND:stop"}
+    simulated, settings = {"codes": codes}, legacy(commanders={}, most=1)
+    async with (
+        hall(mesh, tmp_path, settings, simulated=simulated, codes=codes) as plant,
+        program(settings),
+    ):
+        await until(lambda: plant.controller.legacy_clients.attached == 1)
+        async with program(settings) as second:
+            second.say(b"1#0102@")
+            await until(lambda: plant.events("stop.latched"))
+
+
 @contextlib.asynccontextmanager
 async def program_from(address, settings):
     one = Program(*await asyncio.open_connection(ME, settings.port, local_addr=(address, 0)))

@@ -193,6 +193,26 @@ def test_a_program_on_hold_between_two_motions_waits_there(mesh, tmp_path):
     run(main(), timeout_s=60)
 
 
+def test_a_program_that_is_given_up_on_hold_between_two_motions_goes_on_no_more(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.home()
+            await start(plant, "wait 1\nmove_joints -40 90 -90 0 0\n")
+            await until(lambda: states(plant)[-1].outcome == RUN.RUNNING)
+            await plant.command(C.HOLD)
+            await until(lambda: plant.controller.activity == STATE.HOLDING)
+            where = list(plant.joints)
+            await plant.command(C.RESET)
+            state = await ended(plant, RUN.ENDED)
+            assert state.text == "given up with RESET"
+            await until(lambda: plant.controller.activity == STATE.IDLE)
+            await plant.lease(A.RENEW, ttl_s=5)
+            await asyncio.sleep(1.5)
+            assert list(plant.joints) == pytest.approx(where, abs=1e-3)
+
+    run(main(), timeout_s=60)
+
+
 def test_what_planning_takes_is_no_delay_on_the_way(mesh, tmp_path):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
