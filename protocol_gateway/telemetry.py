@@ -28,6 +28,27 @@ _SLOW_S = 0.1
 _FAULT = 9  # the protocol's ERROR number for a fault
 
 _S = Event.Severity
+# Longer than the journal's limit of a kind: what comes and goes must not leave the last word out.
+_BACK_AFTER_S = 6.0
+
+
+class _Absence:
+    """Whether something is said to be gone; it is back when it has come for a while."""
+
+    def __init__(self) -> None:
+        self._said = False
+        self._back_s: float | None = None
+
+    def news(self, now_s: float, *, gone: bool) -> bool | None:
+        """True: say that it is gone; False: that it is back; None: nothing."""
+        if gone:
+            self._back_s = None
+            news = None if self._said else True
+        else:
+            self._back_s = now_s if self._back_s is None else self._back_s
+            news = False if self._said and now_s - self._back_s >= _BACK_AFTER_S else None
+        self._said = self._said if news is None else news
+        return news
 
 
 class Telemetry:
@@ -72,6 +93,7 @@ class Telemetry:
         self._positions: tuple[tuple[float, ...], float] | None = None  # and when they were so
         self._fault = ""
         self._gone = (False, False)
+        self._no_joints, self._no_status = _Absence(), _Absence()
         self.controller_time_s: float | None = None
         self.watch.forget()
 
@@ -100,21 +122,23 @@ class Telemetry:
     def look(self, now_s: float) -> None:
         """Say when positions or status come no more; to be called now and then while the link is up."""
         before, self._gone = self._gone, (bool(self.positions_gone(now_s)), self._beat.ceased(now_s))
-        if self._gone == before:
-            return
         positions, status = self._gone
         if positions and not before[0]:
             self.watch.forget()
+        news = self._no_joints.news(now_s, gone=positions)
+        if news is True:
             text = f"{self.positions_gone(now_s)}: where the robot is is not known, motion is refused"
             self._journal.say(_S.WARNING, "joints.gone", text)
-        if before[0] and not positions:
+        elif news is False:
             self._journal.say(_S.INFO, "joints.back", "joint positions come again")
-        if status and not before[1]:
+        news = self._no_status.news(now_s, gone=status)
+        if news is True:
             text = f"the controller's status has not come for {STALE_S:g} s: it is not known any more"
             self._journal.say(_S.WARNING, "status.gone", text)
-        if before[1] and not status:
+        elif news is False:
             self._journal.say(_S.INFO, "status.back", "the controller's status comes again")
-        self._on_status()
+        if self._gone != before:
+            self._on_status()
 
     def on_event(self, event: ControllerEvent, received: Received) -> None:
         """Publish an event of the driver's and keep what it tells."""

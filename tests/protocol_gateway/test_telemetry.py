@@ -1,0 +1,59 @@
+"""What a controller tells, and what is said when it tells something no more."""
+
+from types import SimpleNamespace
+
+from protocol_gateway.drivers.driver import JointsReceived
+from protocol_gateway.journal import Journal
+from protocol_gateway.link.link import Received
+from protocol_gateway.telemetry import Telemetry
+from robots.description import load
+from robots.joints import joints_of
+
+
+class Desk:
+    """Hears events; everything else that is published is of no interest."""
+
+    def __init__(self):
+        self.now_s = 100.0
+        self.codes = []
+        nobody = SimpleNamespace(put=lambda message, **_: None)
+        self.telemetry = Telemetry(
+            joints_of(load("pt600")),
+            fast=nobody,
+            slow=nobody,
+            raw=nobody,
+            journal=Journal(self, "arm", monotonic_s=lambda: self.now_s),
+            stale_after_s=1.0,
+            on_status=lambda: None,
+            on_refused=lambda: None,
+        )
+
+    def put(self, event):
+        self.codes.append(event.code)
+
+    def goes_on(self, seconds, *, positions):
+        for _ in range(round(seconds * 10)):
+            self.now_s += 0.1
+            if positions:
+                self.telemetry.on_event(JointsReceived((0.0,) * 5), Received(self.now_s, 0))
+            self.telemetry.look(self.now_s)
+
+
+def test_positions_that_come_and_go_are_one_event_until_they_have_come_for_a_while():
+    desk = Desk()
+    for _ in range(30):
+        desk.goes_on(0.5, positions=True)
+        desk.goes_on(1.5, positions=False)
+    assert desk.codes == ["joints.gone"]
+    desk.goes_on(10.0, positions=True)
+    assert desk.codes == ["joints.gone", "joints.back"]
+    desk.goes_on(10.0, positions=False)
+    assert desk.codes[2:] == ["joints.gone"]
+
+
+def test_the_last_word_of_what_comes_and_goes_is_never_left_out():
+    desk = Desk()
+    for _ in range(30):
+        desk.goes_on(6.2, positions=True)
+        desk.goes_on(1.1, positions=False)
+        assert desk.codes[-1] == "joints.gone"
