@@ -49,6 +49,7 @@ class Alarm:
         came: Its last comings, at most three: what chatters.
         going_at: It has gone, and is taken for gone from then on.
         by: Who acknowledged or shelved it, `at` then.
+        told_by: The process that will say that it is over; empty: none, or it is not known which.
     """
 
     id: str
@@ -74,6 +75,7 @@ class Alarm:
     at: float | None = None
     shelved_until: float | None = None
     reason: str = ""
+    told_by: str = ""
 
     @property
     def state(self) -> State:
@@ -127,9 +129,15 @@ class Alarms:
         self.held[identity] = replace(alarm, going_at=now + _CHATTERS_WITHIN_S if chatters else now)
         self.look(now)
 
+    def orphan(self, identity: str, now: float) -> None:
+        """Who would say that it is over has been replaced: it is over, unless that process says so too."""
+        self.held[identity] = replace(self.held[identity], told_by="")
+        self.go(identity, now)
+
     def look(self, now: float) -> None:
         """What time alone changes; to be called now and then."""
         for alarm in tuple(self.held.values()):
+            alarm = _in_reach(alarm, now)
             if alarm.shelved_until is not None and now >= alarm.shelved_until:
                 alarm = replace(alarm, shelved_until=None, reason="", seen=False)
                 if alarm.stands:
@@ -137,7 +145,7 @@ class Alarms:
             if alarm.stands and alarm.going_at is not None and now >= alarm.going_at:
                 alarm = replace(alarm, stands=False, going_at=None, returned=now)
             self._keep(alarm)
-        self._rings = [at for at in self._rings if now - at < _FLOOD_WITHIN_S]
+        self._rings = [at for at in self._rings if abs(now - at) < _FLOOD_WITHIN_S]
         self.flooding = len(self._rings) >= (_FLOOD_OVER if self.flooding else _FLOOD + 1)
 
     def acknowledge(self, identities: Iterable[str], by: str, now: float) -> None:
@@ -206,3 +214,13 @@ class Alarms:
         """The least urgent go first, should there ever be too many."""
         for alarm in self.sorted()[_MOST:] if len(self.held) > _MOST else ():
             del self.held[alarm.id]
+
+
+def _in_reach(alarm: Alarm, now: float) -> Alarm:
+    """An alarm whose times to come are as near as they were, should the clock have been set back."""
+    if alarm.going_at is not None:
+        longest_s = max(alarm.over_after_s or 0.0, _CHATTERS_WITHIN_S)
+        alarm = replace(alarm, going_at=min(alarm.going_at, now + longest_s))
+    if alarm.shelved_until is not None:
+        alarm = replace(alarm, shelved_until=min(alarm.shelved_until, now + LONGEST_SHELF_S))
+    return alarm

@@ -29,6 +29,7 @@ class Condition:
         latching: To acknowledge it is to know it: it may stay so for good.
         after_s: So long it must be so to begin.
         words_after_s: So long other words must be so to be told: why it is so may change again and again.
+        gist: What of the text must be another to be other words, where a number in it counts on.
     """
 
     robot: str = WHOLE_SITE
@@ -43,11 +44,17 @@ class Condition:
     latching: bool = False
     after_s: float = 0.0
     words_after_s: float = 0.0
+    gist: str = ""
 
     @property
     def id(self) -> str:
         """Of its alarm."""
         return alarm_id(self.robot, self.what or self.code, self.each)
+
+    @property
+    def words(self) -> tuple[str, str]:
+        """What is told anew when it changes."""
+        return self.code, self.gist or self.text
 
 
 def alarm_id(robot: str, what: str, each: str = "") -> str:
@@ -69,20 +76,24 @@ class Judge:
     _words: dict[str, tuple[str, float]] = field(default_factory=dict)
 
     def judge(
-        self, conditions: Iterable[Condition], now: float
+        self, conditions: Iterable[Condition], now_s: float
     ) -> tuple[list[Condition], list[Condition], list[Condition]]:
-        """What has begun, what has other words now, and what is over."""
+        """What has begun, what has other words now, and what is over.
+
+        Args:
+            now_s: On a clock that nobody sets.
+        """
         there = {condition.id: condition for condition in conditions}
-        self._since = {name: self._since.get(name, now) for name in there}
+        self._since = {name: self._since.get(name, now_s) for name in there}
         began, changed = [], []
         for name, condition in there.items():
             before = self.begun.get(name)
             if before is None:
-                if now - self._since[name] < condition.after_s:
+                if now_s - self._since[name] < condition.after_s:
                     continue
                 began.append(condition)
-            elif (before.text, before.code) != (condition.text, condition.code):
-                if now - self._words_since(name, condition, now) < condition.words_after_s:
+            elif before.words != condition.words:
+                if now_s - self._words_since(name, condition, now_s) < condition.words_after_s:
                     continue
                 changed.append(condition)
             self.begun[name] = condition
@@ -92,12 +103,12 @@ class Judge:
             self._words.pop(condition.id, None)
         return began, changed, over
 
-    def _words_since(self, name: str, condition: Condition, now: float) -> float:
-        text, since = self._words.get(name, ("", now))
+    def _words_since(self, name: str, condition: Condition, now_s: float) -> float:
+        text, since_s = self._words.get(name, ("", now_s))
         if text != condition.text:
-            since = now
-        self._words[name] = condition.text, since
-        return since
+            since_s = now_s
+        self._words[name] = condition.text, since_s
+        return since_s
 
 
 def robot_conditions(robot: str, state: ControllerState, age_s: float) -> Iterator[Condition]:

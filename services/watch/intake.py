@@ -29,15 +29,15 @@ class Intake:
     alarms: Alarms
     told_ns: dict[str, int] = field(default_factory=dict)
 
-    def live(self, key: Key, event: Event, now: float) -> None:
-        """An event that has just come."""
-        self.told_ns[_name(key)] = event.timestamp.ToNanoseconds()
-        self._take(key.robot, event, now)
+    def live(self, key: Key, event: Event, now: float, *, told_by: str = "") -> None:
+        """An event that has just come; `told_by`: the process, where it is known."""
+        self.told_ns[_name(key)] = _time_ns(event)
+        self._take(key.robot, event, now, told_by)
 
-    def remembered(self, key: Key, events: Sequence[Event], now: float) -> None:
+    def remembered(self, key: Key, events: Sequence[Event], now: float, *, told_by: str = "") -> None:
         """Events that its publisher tells who comes late, the oldest first."""
         told_ns = self.told_ns.get(_name(key), round((now - _NEWS_S) * 1e9))
-        times_ns = [event.timestamp.ToNanoseconds() for event in events]
+        times_ns = [_time_ns(event) for event in events]
         if told_ns in times_ns:
             # Whatever clocks do: the order holds.
             new = events[len(times_ns) - times_ns[::-1].index(told_ns) :]
@@ -46,9 +46,9 @@ class Intake:
         else:
             new = [event for event, at_ns in zip(events, times_ns, strict=True) if at_ns > told_ns]
         for event in new:
-            self.live(key, event, now)
+            self.live(key, event, now, told_by=told_by)
 
-    def _take(self, robot: str, event: Event, now: float) -> None:
+    def _take(self, robot: str, event: Event, now: float, told_by: str) -> None:
         if event.source == "watch" or event.code in _BY_STATE:
             return
         values = dict(event.values)
@@ -76,6 +76,7 @@ class Intake:
                 values=tuple(values.items()),
                 latching=rule.over_after_s is None and not _is_ended(event.code),
                 over_after_s=rule.over_after_s,
+                told_by=told_by if _is_ended(event.code) else "",
             ),
             now,
         )
@@ -107,6 +108,14 @@ def _is_ended(code: str) -> bool:
 
 def _name(key: Key) -> str:
     return f"{key.robot}/{key.topic}"
+
+
+def _time_ns(event: Event) -> int:
+    """When an event was, by its publisher's clock; 0: it tells no time that there is."""
+    try:
+        return event.timestamp.ToNanoseconds()
+    except ValueError:
+        return 0
 
 
 _OVER_IS_TOLD = (

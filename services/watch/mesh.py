@@ -6,13 +6,15 @@ from dataclasses import dataclass, field
 from statistics import quantiles
 
 from bus.clock import Clock, Reading
-from bus.keys import PresenceKey
+from bus.keys import WHOLE_SITE, PresenceKey
 from bus.presence import SILENT
 from bus.schemas.robomesh_pb2 import MeshState, ServiceHealth
 
 _LOSS_OVER = 30  # health messages: a minute
 _HOPS_KEPT = 200
 _MOST_HOPS = 500
+# Who is heard, and is not present so long after, is not about to come.
+_COMES_WITHIN_S = 5.0
 
 
 @dataclass
@@ -90,6 +92,21 @@ class Mesh:
     def services(self) -> list[PresenceKey]:
         """Tokens of all that are no people."""
         return sorted(who for tokens in self.present.values() for who in tokens if who.service not in SILENT)
+
+    def serving(self, site: str, service: str, robot: str) -> set[str]:
+        """The processes that are a service for a robot of a site, or for all of that."""
+        return {
+            who.id
+            for tokens in self.present.values()
+            for who in tokens
+            if (who.site, who.service) == (site, service) and who.robot in (robot, WHOLE_SITE)
+        }
+
+    def forget_gone(self, now_s: float) -> None:
+        """Whose last words came after it had gone."""
+        for name in [name for name in self.processes if name not in self.present]:
+            if now_s - self.processes[name].at_s > _COMES_WITHIN_S:
+                del self.processes[name]
 
     def forget_losses(self) -> None:
         """Count anew what processes receive and lose."""

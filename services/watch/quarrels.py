@@ -6,6 +6,7 @@ Each names both sides. Pure.
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 
 from bus.keys import REPLAY, WHOLE_SITE, PresenceKey
 from bus.session import CERTIFICATE
@@ -67,6 +68,7 @@ def mesh_conditions(
     here: str,
     expected: Expected,
     begun: frozenset[str],
+    now: float,
     now_s: float,
     settled_s: float = SETTLED_S,
 ) -> Iterator[Condition]:
@@ -75,6 +77,7 @@ def mesh_conditions(
     Args:
         here: This watch's own identity.
         begun: Names of alarms that stand: what is near its threshold stays.
+        now: Since the Unix epoch [s]; `now_s`: on the clock that told when processes were heard.
         settled_s: So long who comes and goes must have come or gone.
     """
     tokens = mesh.services()
@@ -87,7 +90,7 @@ def mesh_conditions(
     yield from _clocks(mesh, here, begun)
     for process in mesh.processes.values():
         if process.site == site:
-            yield from _of_process(process, begun, now_s)
+            yield from _of_process(process, begun, now, now_s)
 
 
 def _twice(mesh: Mesh, tokens: list[PresenceKey]) -> Iterator[Condition]:
@@ -170,6 +173,7 @@ def _clocks(mesh: Mesh, here: str, begun: frozenset[str]) -> Iterator[Condition]
                 over=f"the clocks of {host} and {mine} agree again",
                 each=host,
                 values=(("offset_s", f"{offset_s:.3f}"), ("uncertainty_s", f"{round_trip_s / 2:.3f}")),
+                gist=way,
             )
 
 
@@ -189,7 +193,7 @@ def _versions(mesh: Mesh) -> Iterator[Condition]:
         )
 
 
-def _of_process(process: Process, begun: frozenset[str], now_s: float) -> Iterator[Condition]:
+def _of_process(process: Process, begun: frozenset[str], now: float, now_s: float) -> Iterator[Condition]:
     health = process.health
     if now_s - process.at_s > _SILENT_S:
         yield Condition(
@@ -205,28 +209,31 @@ def _of_process(process: Process, begun: frozenset[str], now_s: float) -> Iterat
     if (lost >= _LOSS_LEAST and share > _LOSS) or (standing and share > _LOSS_OVER):
         yield Condition(
             code="mesh.loss",
-            text=f"{process.name} lost {100 * share:.1f} % of what was sent to it in the last minute",
+            text=f"{process.name} lost {100 * share:.1f} % of what was sent to it within a minute",
             over=f"{process.name} loses nothing worth telling any more",
             each=each,
             values=(("lost", str(lost)), ("received", str(received))),
+            gist="loss",
         )
-    links, wanted = (int(health.values.get(name, 0)) for name in ("links", "links_wanted"))
+    links, wanted = (health.values.get(name, 0.0) for name in ("links", "links_wanted"))
     if links < wanted:
         yield Condition(
             code="router.unlinked",
-            text=f"{process.name} reaches {links} of the {wanted} routers that it is to link to",
+            text=f"{process.name} reaches {links:.0f} of the {wanted:.0f} routers that it is to link to",
             over=f"{process.name} reaches every router that it is to link to",
             each=health.id,
             after_s=_UNLINKED_AFTER_S,
         )
     if CERTIFICATE in health.values and health.values[CERTIFICATE] < _EXPIRES_S:
-        left = health.values[CERTIFICATE]
-        when = f"expires in {left / _DAY_S:.0f} days" if left > 0 else "has expired"
+        left_s = health.values[CERTIFICATE] - (now_s - process.at_s)
+        ends = datetime.fromtimestamp(max(now + left_s, 0.0), UTC)
+        expires = "expires" if left_s > 0 else "expired"
         yield Condition(
             code="certificate.expires",
-            text=f"the certificate of {process.name} {when}",
+            text=f"the certificate of {process.name} {expires} on {ends:%Y-%m-%d at %H:%M} UTC",
             over=f"the certificate of {process.name} is renewed",
             each=each,
+            gist=expires,
         )
 
 

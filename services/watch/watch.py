@@ -70,6 +70,8 @@ class _Watch:
         self._mesh_topic = session.declare_publisher(settings.site, WHOLE_SITE, "mesh")
         self._controllers = session.subscribe(f"{ROOT}/{self._site}/*/controller", newest=1000)
         self._blind_until_s = self._unsettled_until_s = 0.0
+        # Alarms whose teller has been replaced, and since when.
+        self._orphans: dict[str, float] = {}
         self._zenoh_id = str(session.zenoh_session.info.zid())
         session.measure("alarms", "Alarms that are not over and seen", lambda: len(self._book.alarms.held))
         session.measure("processes", "Processes of the mesh", lambda: len(self._mesh.processes))
@@ -121,11 +123,17 @@ class _Watch:
             except MessageError as error:
                 log.warning("%s: %s", sample.key, error)
                 continue
-            now = time.time()
+            now, key, intake = time.time(), sample.parsed, self._book.intake
             if isinstance(message, schema.EventList):
-                self._book.intake.remembered(sample.parsed, message.events, now)
+                told_by = self._teller(key.robot, message.events[-1].source) if message.events else ""
+                intake.remembered(key, message.events, now, told_by=told_by)
             elif isinstance(message, schema.Event):
-                self._book.intake.live(sample.parsed, message, now)
+                intake.live(key, message, now, told_by=self._teller(key.robot, message.source))
+
+    def _teller(self, robot: str, service: str) -> str:
+        """The process that says something as a service; empty: it is none, or one of several."""
+        serving = self._mesh.serving(self._site, service, robot)
+        return serving.pop() if len(serving) == 1 else ""
 
     async def _follow_health(self, subscription: Subscription) -> None:
         async for sample in subscription:
@@ -148,7 +156,8 @@ class _Watch:
 
         async def read(site: str, identity: str) -> None:
             async with turns:
-                with contextlib.suppress(NoAnswerError):  # its health says whether it is there
+                # Its health says whether it is there; a time that is none is no reading.
+                with contextlib.suppress(NoAnswerError, ValueError):
                     self._mesh.read(identity, await read_clock(self._session, site, identity, hops=True))
 
         while True:
@@ -171,6 +180,7 @@ class _Watch:
             if now_s - begun_s > self._settled_s + _KNOWN_AFTER_S:
                 before = {}
             self._forget_robots()
+            self._mesh.forget_gone(now_s)
             if self._sees(now_s):
                 self._weigh(now, now_s, before)
             if self._book.look(now) or looks % _ALARMS_EACH == 0:
@@ -211,19 +221,34 @@ class _Watch:
             here=self._session.identity,
             expected=self._expected,
             begun=frozenset(self._judge.begun),
+            now=now,
             now_s=now_s,
             settled_s=self._settled_s,
         )
         conditions += self._book.conditions_of_its_own()
         there = {condition.id for condition in conditions}
         conditions += [condition for name, condition in before.items() if name not in there]
-        began, changed, over = self._judge.judge(conditions, now)
+        began, changed, over = self._judge.judge(conditions, now_s)
         for condition in began:
             self._book.begin(condition, now)
         for condition in changed:
             self._book.change(condition)
         for condition in over:
             self._book.end(condition, now)
+        self._end_orphans(now, now_s)
+
+    def _end_orphans(self, now: float, now_s: float) -> None:
+        """Who has taken another's place does not know what that one had told, and ends none of it."""
+        alarms, orphans = self._book.alarms, {}
+        for alarm in alarms.held.values():
+            if alarm.stands and alarm.told_by:
+                serving = self._mesh.serving(self._site, alarm.source, alarm.robot)
+                if serving and alarm.told_by not in serving:
+                    orphans[alarm.id] = self._orphans.get(alarm.id, now_s)
+        self._orphans = orphans
+        for name, since_s in orphans.items():
+            if now_s - since_s >= self._settled_s:
+                alarms.orphan(name, now)
 
     def _forget_robots(self) -> None:
         """Whose gateway is gone, once somebody knows: nothing will say what they are in."""

@@ -280,6 +280,32 @@ def test_a_file_of_alarms_with_a_value_that_cannot_be_is_named(tmp_path, name, v
         kept.load(path)
 
 
+def test_a_clock_that_is_set_back_keeps_no_alarm_standing_for_longer():
+    alarms, now = Alarms(), 1_000_000.0
+    alarms.come(alarm("arm:refused", over_after_s=300.0, by_state=False), now)
+    alarms.come(alarm("arm:shelved"), now)
+    alarms.shelve(["arm:shelved"], "li", now, for_s=LONGEST_SHELF_S, reason="service")
+    now -= 500_000.0
+    alarms.look(now)
+    alarms.look(now + 299.0)
+    assert states(alarms)["arm:refused"] == UNACKNOWLEDGED
+    alarms.look(now + 301.0)
+    assert states(alarms)["arm:refused"] == RETURNED
+    alarms.look(now + LONGEST_SHELF_S + 1.0)
+    assert states(alarms)["arm:shelved"] == UNACKNOWLEDGED
+
+
+def test_an_event_whose_time_is_none_is_an_alarm_all_the_same():
+    key, intake = parse_key("robomesh/s/arm/events"), Intake(Alarms())
+    event = Event(severity=Event.ERROR, code="live")
+    event.timestamp.nanos = 2_000_000_000
+    behind = Event(severity=Event.ERROR, code="behind")
+    behind.timestamp.FromSeconds(1001)
+    intake.live(key, event, 1000.0)
+    intake.remembered(key, [event, behind], 1002.0)
+    assert {"arm:live", "arm:behind"} == intake.alarms.held.keys()
+
+
 def test_one_event_of_the_future_silences_nothing_and_none_is_told_twice():
     now, key = 1000.0, parse_key("robomesh/s/arm/events")
     intake = Intake(Alarms())

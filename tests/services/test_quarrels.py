@@ -2,6 +2,7 @@
 
 import pytest
 
+from bus.clock import Reading
 from bus.keys import PresenceKey
 from bus.schemas.robomesh_pb2 import ControllerState, ServiceHealth
 from services import site as site_file
@@ -9,6 +10,9 @@ from services.errors import SiteFileError
 from services.watch.conditions import Condition, Judge, robot_conditions
 from services.watch.mesh import Mesh
 from services.watch.quarrels import Expected, mesh_conditions
+
+# 2026-11-22 12:00 UTC.
+EPOCH = 1795348800.0
 
 
 def mesh_of(*told: ServiceHealth, site: str = "s") -> Mesh:
@@ -20,7 +24,9 @@ def mesh_of(*told: ServiceHealth, site: str = "s") -> Mesh:
 
 
 def found(mesh: Mesh, *, now_s: float = 1.0, begun: frozenset[str] = frozenset()) -> dict[str, str]:
-    conditions = mesh_conditions(mesh, "s", here="me", expected=Expected(), begun=begun, now_s=now_s)
+    conditions = mesh_conditions(
+        mesh, "s", here="me", expected=Expected(), begun=begun, now=EPOCH + now_s, now_s=now_s
+    )
     return {condition.id: condition.text for condition in conditions}
 
 
@@ -52,7 +58,14 @@ def test_losses_are_told_above_a_mark_and_until_another():
     assert name in found(mesh, begun=frozenset({name}))
 
 
-@pytest.mark.parametrize(("left_s", "said"), [(864000 - 60.0, "in 10 days"), (-60.0, "has expired")])
+@pytest.mark.parametrize(
+    ("left_s", "said"),
+    [
+        (864000 - 60.0, "expires on 2026-12-02 at 11:59 UTC"),
+        (-60.0, "expired on 2026-11-22 at 11:59 UTC"),
+        (float("-inf"), "expired on 1970-01-01"),
+    ],
+)
 def test_a_certificate_that_ends_soon_is_told(left_s, said):
     assert found(mesh_of(health(values={"certificate_seconds": 900000.0}))) == {}
     told = found(mesh_of(health(values={"certificate_seconds": left_s})))
@@ -63,6 +76,52 @@ def test_a_router_that_misses_a_link_is_told():
     assert found(mesh_of(health("router", values={"links": 2.0, "links_wanted": 2.0}))) == {}
     told = found(mesh_of(health("router", values={"links": 1.0, "links_wanted": 2.0})))
     assert "reaches 1 of the 2 routers" in told["-:router.unlinked:a1"]
+    assert found(mesh_of(health("router", values={"links": float("nan"), "links_wanted": 2.0}))) == {}
+
+
+def test_an_alarm_keeps_its_words_while_only_a_number_in_them_counts_on():
+    mesh, judge = mesh_of(health(received=1000)), Judge()
+    mesh.read("a1", Reading(offset_s=2.0, round_trip_s=0.01))
+
+    def judged(now_s: float, left_s: float, received: int, lost: int) -> tuple[list[Condition], ...]:
+        told = health(values={"certificate_seconds": left_s}, received=received, lost=lost)
+        mesh.see("s", told, now_s)
+        conditions = mesh_conditions(
+            mesh,
+            "s",
+            here="me",
+            expected=Expected(),
+            begun=frozenset(judge.begun),
+            now=EPOCH + now_s,
+            now_s=now_s,
+        )
+        return judge.judge(conditions, now_s)
+
+    day_s = 86400.0
+    began, _, _ = judged(1.0, 9 * day_s, 2000, 40)
+    assert {each.code for each in began} == {"clock.off", "mesh.loss", "certificate.expires"}
+    mesh.processes["a1"].clock.readings.clear()
+    mesh.read("a1", Reading(offset_s=2.4, round_trip_s=0.01))
+    assert judged(2.0 + day_s, 8 * day_s, 3000, 90) == ([], [], [])
+    _, changed, _ = judged(3.0 + 9 * day_s, -1.0, 4000, 120)
+    assert [each.text.endswith("expired on 2026-12-01 at 12:00 UTC") for each in changed] == [True]
+    mesh.processes["a1"].clock.readings.clear()
+    mesh.read("a1", Reading(offset_s=-2.0, round_trip_s=0.01))
+    _, changed, _ = judged(4.0 + 9 * day_s, -2.0, 5000, 150)
+    assert [each.text for each in changed] == [
+        "the clock of host-a is 2.0 s behind that of the watch (the watch's)"
+    ]
+
+
+def test_whose_last_words_come_after_it_has_gone_does_not_hang():
+    mesh = mesh_of(health())
+    mesh.go(PresenceKey("s", "-", "recorder", "a1"))
+    mesh.see("s", health(), 1.0)
+    mesh.forget_gone(2.0)
+    assert "a1" in mesh.processes, "it may be about to come"
+    mesh.forget_gone(11.0)
+    assert found(mesh, now_s=12.0) == {}
+    assert "a1" not in mesh.processes
 
 
 def test_a_site_that_is_seen_no_more_is_gone_once():
@@ -70,7 +129,7 @@ def test_a_site_that_is_seen_no_more_is_gone_once():
 
     def judged(now_s: float) -> tuple[list[Condition], list[Condition]]:
         conditions = mesh_conditions(
-            mesh, "s", here="me", expected=expected, begun=frozenset(), now_s=now_s, settled_s=5.0
+            mesh, "s", here="me", expected=expected, begun=frozenset(), now=EPOCH, now_s=now_s, settled_s=5.0
         )
         began, _, over = judge.judge(conditions, now_s)
         return began, over
@@ -103,7 +162,7 @@ def test_who_is_ended_on_purpose_is_not_missed(service, robot, missed):
 
     def gone() -> list[str]:
         conditions = mesh_conditions(
-            mesh, "s", here="me", expected=expected, begun=frozenset(), now_s=0.0, settled_s=0.0
+            mesh, "s", here="me", expected=expected, begun=frozenset(), now=EPOCH, now_s=0.0, settled_s=0.0
         )
         return [condition.code for condition in conditions]
 

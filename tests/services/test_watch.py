@@ -305,6 +305,34 @@ def test_a_service_that_is_gone_is_an_alarm_until_it_is_back_or_known(mesh, tmp_
     run(main(), timeout_s=90.0)
 
 
+def test_what_a_process_told_is_over_when_another_has_taken_its_place(mesh, tmp_path):
+    async def main():
+        async def telling(session, text):
+            said = session.declare_publisher("s", "-", "events/recorder")
+            told = event(schema.Event.WARNING, "recorder.space", text)
+            told.source = "recorder"
+            said.put(told)
+
+        async with watched(mesh, tmp_path) as desk:
+            async with seeming(mesh, "recorder") as recorder:
+                await desk.sees("recorder")
+                await telling(recorder, "little space is left")
+                await desk.until(lambda: "-:recorder.space" in desk.alarms)
+                await desk.ask(action=Request.ACKNOWLEDGE, ids=["-:recorder.space"])
+            await desk.until(lambda: "-:service.gone:recorder" in desk.alarms)
+            assert "-:recorder.space" in desk.alarms, "nobody knows whether there is space again"
+        # The machine of both is started again: there is more space than before, and no word of it.
+        async with watched(mesh, tmp_path) as desk, seeming(mesh, "recorder") as recorder:
+            await desk.until(lambda: "-:recorder.space" in desk.alarms)
+            await desk.until(lambda: "-:recorder.space" not in desk.alarms)
+            await telling(recorder, "little space is left again")
+            await desk.until(lambda: "-:recorder.space" in desk.alarms)
+            await asyncio.sleep(1.0)
+            assert desk.alarms["-:recorder.space"].state == Alarm.UNACKNOWLEDGED
+
+    run(main(), timeout_s=120.0)
+
+
 def test_a_robot_whose_gateway_is_gone_is_forgotten_once_somebody_knows(mesh, tmp_path):
     async def main():
         async with watched(mesh, tmp_path) as desk:
