@@ -111,6 +111,8 @@ class _Player:
         self._replays[identity] = replay
         if asked.session:
             self._of_session.setdefault(asked.session, set()).add(identity)
+            # It may have gone while the file was opened.
+            asyncio.get_running_loop().call_later(_SESSION_GOES_S, self._end_if_gone, asked.session)
         self._group.create_task(self._run(identity, replay))
         log.info("%s/%s: playing %s", self._settings.site, replay.robot, path.name)
         return replay.describe()

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import threading
 import time
 from contextlib import asynccontextmanager
 from datetime import datetime
@@ -269,6 +270,34 @@ def test_a_replay_ends_when_its_askers_session_goes(mesh, folder, monkeypatch):
                     await asyncio.sleep(0.02)
 
     run(main())
+
+
+def test_a_replay_whose_asker_goes_while_it_is_opened_ends_too(mesh, folder, monkeypatch):
+    monkeypatch.setattr(player.player, "_SESSION_GOES_S", 0.1)
+    opening, go_on, open_replay = threading.Event(), threading.Event(), player.player.open_replay
+
+    def slowly(*args, **values):
+        opening.set()
+        go_on.wait(30.0)
+        return open_replay(*args, **values)
+
+    monkeypatch.setattr(player.player, "open_replay", slowly)
+
+    async def main():
+        async with playing_site(mesh, folder) as session:
+            token = session.declare_presence_of("site", "-", "operator", "tab")
+            asked = asyncio.create_task(opened(session, session="tab", loop=True))
+            async with asyncio.timeout(60):
+                while not opening.is_set():
+                    await asyncio.sleep(0.02)
+                token.undeclare()
+                await asyncio.sleep(1.0)
+                go_on.set()
+                state = await asked
+                while any(who.robot == state.robot for who in await session.present()):
+                    await asyncio.sleep(0.02)
+
+    run(main(), timeout_s=90)
 
 
 def test_what_cannot_be_played_is_refused_in_words(mesh, folder):
