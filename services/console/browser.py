@@ -42,7 +42,7 @@ _MOST_UNREAD = 4 << 20
 _CLOSED_WITHIN_S = 1.0
 _LONGEST_ASK_S = 30.0  # a check of a program's motion
 _KEY_FRAME_EACH_S = 1.0
-_POLICY_VIOLATION = 1008
+_POLICY_VIOLATION, _LONGEST_REASON = 1008, 120
 
 
 class Browser:
@@ -135,7 +135,7 @@ class Browser:
             log.warning("a browser was cut off: %s", error)
             with contextlib.suppress(TimeoutError):  # who reads nothing is not told either
                 async with asyncio.timeout(_CLOSED_WITHIN_S):
-                    await websocket.close(_POLICY_VIOLATION, str(error)[:120])
+                    await websocket.close(_POLICY_VIOLATION, _reason(error))
         finally:
             self.operator.close()
             for expression in tuple(self._watches):
@@ -270,6 +270,8 @@ class Browser:
 
     def _want_key_frame(self, key: str) -> None:
         now = time.monotonic()
+        if self._line is None or not self._line.ready:
+            return  # it would be made for all who watch, and this one takes nothing
         if now - self._key_frame_asked.get(key, -_KEY_FRAME_EACH_S) < _KEY_FRAME_EACH_S:
             return
         self._key_frame_asked[key] = now
@@ -341,6 +343,11 @@ async def _bytes(websocket: WebSocket) -> bytes:
         raise WatchError("a page sends binary messages")
     data: bytes = message["bytes"]
     return data
+
+
+def _reason(error: Exception) -> str:
+    """In words, as many of them as a closing frame holds: it counts bytes."""
+    return str(error).encode()[:_LONGEST_REASON].decode(errors="ignore")
 
 
 def refusal(ask_id: int, text: str, *, no_answer: bool = False) -> ToPage:

@@ -5,6 +5,7 @@ of ours (else a foreign name could be pointed at us: DNS rebinding), and the Ori
 and of whatever changes something must be the page's own.
 """
 
+import contextlib
 import ipaddress
 from collections.abc import Collection
 from urllib.parse import urlsplit
@@ -43,7 +44,10 @@ def refused_host(host: str, names: Collection[str]) -> str | None:
     Args:
         names: Further names that the console is known by.
     """
-    name = (urlsplit(f"//{host}").hostname or "") if host else ""
+    try:
+        name = urlsplit(f"//{host}").hostname or ""
+    except ValueError:  # brackets around what is no address
+        name = ""
     if name in _OWN_NAMES or name in {each.lower() for each in names}:
         return None
     try:
@@ -59,9 +63,10 @@ def refused_origin(origin: str, host: str, *, secure: bool = False) -> str | Non
     Args:
         secure: The page is served over TLS: one of this name without is somebody else's.
     """
-    parts = urlsplit(origin)
-    if origin and parts.netloc.lower() == host.lower() and (parts.scheme == "https" or not secure):
-        return None
+    with contextlib.suppress(ValueError):  # brackets around what is no address
+        parts = urlsplit(origin)
+        if origin and parts.netloc.lower() == host.lower() and (parts.scheme == "https" or not secure):
+            return None
     return f"origin {origin!r} is not this page's: {host}"
 
 

@@ -8,6 +8,8 @@ from starlette.websockets import WebSocket
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 _MOST_WAITING = 16 * 1024
+# Answers to pings that nobody reads [bytes], and parts of a message without end: more, and it is cut off.
+_MOST_HELD, _MOST_PARTS = 16 << 20, 1024
 # Among the extensions of a WebSocket's ASGI scope.
 _LINE = "robomesh.line"
 
@@ -50,16 +52,25 @@ class Line(WebSocketsSansIOProtocol):
         if self.on_ready is not None:
             self.on_ready()
 
+    def keepalive_timeout(self) -> None:
+        """As uvicorn does, which would wait until all that is unread has been read."""
+        super().keepalive_timeout()
+        self.transport.abort()
+
     async def run_asgi(self) -> None:
         """As uvicorn does; the application finds this line with `line_of`."""
         self.scope["extensions"][_LINE] = {"line": self}
         await super().run_asgi()
 
     def data_received(self, data: bytes) -> None:
-        """As uvicorn does, which forgets an upgrade that cannot be read: it would stay open for ever."""
+        """As uvicorn does, which forgets an upgrade that cannot be read (it would stay open for ever), and
+        bounds neither the answers to pings nor the parts of a message.
+        """
         super().data_received(data)
         if self.conn.handshake_exc is not None and not self.handshake_initiated:
             self.transport.close()
+        elif self.transport.get_write_buffer_size() > _MOST_HELD or len(self.frames) > _MOST_PARTS:
+            self.transport.abort()
 
 
 def line_of(websocket: WebSocket) -> Line:

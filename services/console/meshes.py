@@ -2,18 +2,20 @@
 
 import contextlib
 import hashlib
+import math
 from collections import OrderedDict
 
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
 from bus import keys
-from bus.errors import KeyNameError, NoAnswerError, RefusedError
+from bus.errors import BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError
 from bus.session import Session
 
 _MOST_BYTES = 256 * 1024 * 1024
 # On a busy machine an answer can be lost: asking again costs less than an arm without a link.
 _TIMEOUTS_S = (3.0, 5.0, 10.0)
+_BUSY_AGAIN_S = 1.0
 
 
 class MeshCache:
@@ -60,6 +62,10 @@ async def mesh_response(request: Request, session: Session, cache: MeshCache) ->
             data = await _ask(session, key)
         except KeyNameError as error:
             return PlainTextResponse(str(error), status_code=400)
+        except (BusyError, QuotaError) as error:
+            again_s = error.again_s if isinstance(error, QuotaError) else _BUSY_AGAIN_S
+            headers = {"Retry-After": str(math.ceil(again_s))}
+            return PlainTextResponse(str(error), status_code=503, headers=headers)
         except RefusedError as error:
             return PlainTextResponse(str(error), status_code=404)
         except NoAnswerError as error:

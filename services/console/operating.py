@@ -52,22 +52,19 @@ class OperatorPresence:
             RefusedError: If it is asked for a lease with something else.
         """
         site, robot, topic = keys.parse_key(key)
-        if topic == _OPENS and (site, robot) not in self._tokens:
-            self._tokens[site, robot] = self._session.declare_presence_of(site, robot, OPERATOR, self.id)
-        if not topic.startswith(_REQUEST):
-            yield
-            return
-        try:
-            action = LeaseRequest.FromString(payload).action
-        except DecodeError:
-            raise RefusedError("this is no LeaseRequest") from None
-        new = action in _GIVES_CONTROL and (site, robot) not in self._tokens
+        action: LeaseRequest.Action | None = None
+        if topic.startswith(_REQUEST):
+            try:
+                action = LeaseRequest.FromString(payload).action
+            except DecodeError:
+                raise RefusedError("this is no LeaseRequest") from None
+        new = (topic == _OPENS or action in _GIVES_CONTROL) and (site, robot) not in self._tokens
         if new:
             self._tokens[site, robot] = self._session.declare_presence_of(site, robot, OPERATOR, self.id)
         try:
             yield
         except BusError:
-            # Refused, or not answered: if control was given all the same, nobody knows of it.
+            # Refused, or not answered: if it was done all the same, nobody knows of it.
             if new:
                 self._end(site, robot)
             raise

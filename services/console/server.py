@@ -40,6 +40,8 @@ def server_of(app: ASGIApp, tls: ssl.SSLContext | None) -> "Server":
             log_level="warning",
             access_log=False,
             server_header=False,
+            # Else who comes over loopback names any address, and tries passwords as another each time.
+            proxy_headers=False,
             timeout_graceful_shutdown=1,
             ssl_context_factory=None if tls is None else lambda *_: tls,
         )

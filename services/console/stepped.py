@@ -64,6 +64,7 @@ class SteppedVideo:
         self._pushed_at = self._late_at = time.monotonic()
         self._joined_at = self._pushed_at
         self._raised_at = self._refused_at = -math.inf
+        self._too_much = False
         self._try_more_after_s = _TRY_MORE_AFTER_S[0]
         self._join(key)
 
@@ -75,7 +76,9 @@ class SteppedVideo:
         self._leave()
 
     def pop(self) -> Sample | None:
-        """The next frame to send."""
+        """The next frame to send, to a line that takes something now."""
+        if self._too_much:
+            self._step_down()
         return self._lane.pop()
 
     def _push(self, moment: Moment) -> None:
@@ -94,6 +97,12 @@ class SteppedVideo:
             return
         self._late_at = now
         self._lane.skip()
+        # Less of it is drawn for who takes some of it, not for who takes nothing.
+        self._too_much = True
+
+    def _step_down(self) -> None:
+        now = time.monotonic()
+        self._too_much = False
         if self._changing is not None or self.step == LOWEST_STEP:
             return
         if now - self._refused_at < _ASK_AGAIN_AFTER_S:
@@ -128,6 +137,7 @@ class SteppedVideo:
             async with self._beginning(source) if step < self.step else contextlib.nullcontext():
                 self._leave()
                 self._lane = VideoLane()
+                self._too_much = False
                 self.step = step
                 self._pushed_at = self._late_at = time.monotonic()
                 self._join(source)

@@ -279,6 +279,8 @@ def test_a_page_that_watches_nonsense_or_sends_it_is_told_and_cut_off(mesh, page
         async with console(mesh, page) as (address, _):
             for message, words in (
                 (schema.FromPage(watch={"key": "robomesh/**"}).SerializeToString(), "robomesh/**"),
+                # A closing frame counts bytes, not characters.
+                (schema.FromPage(watch={"key": "é" * 150}).SerializeToString(), "ééé"),
                 (b"\xff\xff\xff", ""),
             ):
                 async with browse(address) as browser:

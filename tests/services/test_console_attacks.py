@@ -7,14 +7,16 @@ import socket
 from contextlib import asynccontextmanager
 
 import pytest
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
-from services.console import meshes, recordings
+from bus.schemas.robomesh_pb2 import FromPage
+from services.console import line, meshes, recordings, server
 from services.console.connection import Connection
 from services.console.listener import Listener
 from tests.conftest import run
 from tests.services.signing_in import Client, guarded
-from tests.services.test_console import page
+from tests.services.test_console import console, get, page
 
 __all__ = ["page"]  # a fixture
 ENDS_S = 10.0
@@ -339,3 +341,76 @@ def test_a_stranger_who_waits_in_the_handshake_is_counted_like_any_other(monkeyp
             with socket.create_connection(listener.getsockname()):
                 third, _ = listener.accept()
                 third.close()
+
+
+@asynccontextmanager
+async def page_of_bytes(address):
+    """A page's WebSocket as bare bytes, of which hardly any are read."""
+    host, port = address.split(":")
+    connection = socket.socket()
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    connection.setblocking(False)
+    await asyncio.get_running_loop().sock_connect(connection, (host, int(port)))
+    reader, writer = await asyncio.open_connection(sock=connection, limit=1024)
+    upgrade = [("Origin", f"http://{address}"), ("Connection", "Upgrade"), ("Upgrade", "websocket")]
+    secret = [("Sec-WebSocket-Version", 13), ("Sec-WebSocket-Key", "x3JJHMbDL1EzLkh9GBhXDw==")]
+    try:
+        writer.write(http("GET", "/mesh", address, upgrade + secret))
+        assert b" 101 " in await reader.readline()
+        yield writer
+    finally:
+        writer.transport.abort()
+
+
+def masked(first, payload=b""):
+    """A WebSocket frame of a browser's: its first byte, and less than 126 bytes."""
+    return bytes([first, 0x80 | len(payload), 0, 0, 0, 0]) + payload
+
+
+async def endlessly(writer, data):
+    while True:
+        writer.write(data)
+        await writer.drain()
+
+
+@pytest.mark.parametrize(
+    ("begin", "again"),
+    [(b"", masked(0x89, bytes(125))), (masked(0x02), masked(0x00))],
+    ids=["pings", "parts"],
+)
+def test_a_page_whose_frames_never_end_is_cut_off_before_it_takes_memory(
+    mesh, page, monkeypatch, begin, again
+):
+    monkeypatch.setattr(line, "_MOST_HELD", 1 << 20)
+    monkeypatch.setattr(server, "_PING_EACH_S", 300.0)  # it is not that it answers none
+
+    async def main():
+        async with console(mesh, page) as (address, _), page_of_bytes(address) as writer:
+            writer.write(begin)
+            with pytest.raises(ConnectionError):
+                await asyncio.wait_for(endlessly(writer, again * 1000), 3 * ENDS_S)
+            assert (await get(address, "/health"))[0] == 200
+
+    run(main())
+
+
+def test_a_page_that_reads_nothing_any_more_is_gone_once_it_answers_no_ping(mesh, page, monkeypatch):
+    monkeypatch.setattr(server, "_PING_EACH_S", 0.2)
+    monkeypatch.setattr(server, "_PONG_WITHIN_S", 0.5)
+    watch = FromPage(watch=FromPage.Watch(key="robomesh/s/r/joints")).SerializeToString()
+    large = JointStates()
+    large.joints.add(name="x" * 100_000)
+
+    async def main():
+        async with console(mesh, page) as (address, other), page_of_bytes(address) as writer:
+            publisher = other.declare_publisher("s", "r", "joints")
+            writer.write(masked(0x82, watch))
+            async with asyncio.timeout(2 * ENDS_S):
+                while not publisher.watched:
+                    await asyncio.sleep(0.01)
+                # What it was sent waits to be read, and it is gone all the same.
+                while publisher.watched:
+                    publisher.put(large)
+                    await asyncio.sleep(0.05)
+
+    run(main())

@@ -16,7 +16,9 @@ def test_hosts_of_ours_are_answered(host):
     assert refused_host(host, ("console.plant",)) is None
 
 
-@pytest.mark.parametrize("host", ["", "evil.example", "evil.example:8080", "localhost.evil.example", "a@b:c"])
+@pytest.mark.parametrize(
+    "host", ["", "evil.example", "evil.example:8080", "localhost.evil.example", "a@b:c", "[::1", "[evil]"]
+)
 def test_a_name_that_could_be_pointed_at_us_is_refused(host):
     assert "not this console's" in (refused_host(host, ("console.plant",)) or "")
 
@@ -30,6 +32,8 @@ def test_only_the_pages_own_origin_may_open_the_websocket():
         "http://evil.example",
         "http://127.0.0.1:8081",
         "http://127.0.0.1.evil.example:8080",
+        "http://[127.0.0.1:8080",
+        "http://[evil]",
     ):
         assert refused_origin(origin, "127.0.0.1:8080")
 

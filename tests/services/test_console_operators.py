@@ -4,7 +4,7 @@ import asyncio
 
 from bus.asking import ask_all
 from bus.errors import RefusedError
-from bus.schemas.robomesh_pb2 import LeaseAnswer, LeaseRequest
+from bus.schemas.robomesh_pb2 import LeaseAnswer, LeaseRequest, ReplayState
 from tests.conftest import run
 from tests.services.test_console import browse, console, page
 
@@ -116,5 +116,23 @@ def test_a_busy_gateway_is_to_the_page_one_that_does_not_answer_and_may_be_asked
             go_on.set()
             assert (await browser.ask(2, KEY, payload)).ok
             await asyncio.gather(*waiting)
+
+    run(main())
+
+
+def test_nobody_is_present_where_no_replay_was_opened(mesh, page):
+    async def main():
+        async with console(mesh, page) as (address, other), browse(address) as browser:
+            for number in range(1, 4):
+                key = f"robomesh/nowhere{number}/-/player/open"
+                assert not (await browser.ask(number, key, timeout_s=0.1)).ok
+            await until_present(other)
+
+            async def opened(_):
+                return ReplayState(robot="replay-1")
+
+            other.answer("s", "-", "player/open", opened)
+            assert (await browser.ask(9, "robomesh/s/-/player/open")).ok
+            await until_present(other, await session_of(browser))
 
     run(main())

@@ -4,6 +4,8 @@ import asyncio
 import time
 from types import SimpleNamespace
 
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+
 from bus.header import Header
 from bus.schemas.robomesh_pb2 import FromPage, ToPage
 from bus.subscription import Sample
@@ -12,7 +14,8 @@ from services.console.turns import Turns
 from services.console.wire import Moment, frame, moments, state_frame
 from tests.conftest import run
 
-KEY = "robomesh/s/r/joints"
+KEY, VIDEO = "robomesh/s/r/joints", "robomesh/s/r/video/top"
+DELTA = b"\0\0\0\1\x41\x9a\x01"
 
 
 def sample(number, *, key=KEY, payload=b"state", received=None):
@@ -71,7 +74,8 @@ class Line:
 class Socket:
     """A WebSocket whose page watches one key, and then only reads."""
 
-    def __init__(self, line):
+    def __init__(self, line, key=KEY):
+        self.key = key
         self.scope = {"extensions": {"robomesh.line": {"line": line}}}
         self.watched = False
 
@@ -79,7 +83,7 @@ class Socket:
         if self.watched:
             await asyncio.Event().wait()
         self.watched = True
-        watch = FromPage(watch=FromPage.Watch(key=KEY))
+        watch = FromPage(watch=FromPage.Watch(key=self.key))
         return {"type": "websocket.receive", "bytes": watch.SerializeToString()}
 
 
@@ -118,6 +122,36 @@ def test_who_keeps_step_gets_all_in_one_write_and_who_does_not_the_newest_until_
             task.cancel()
         await asyncio.gather(*serving, return_exceptions=True)
         assert not feeds.sinks
+
+    run(main())
+
+
+class Asked:
+    """A session that is only asked."""
+
+    def __init__(self):
+        self.asked = []
+
+    async def ask(self, key, _):
+        self.asked.append(key)
+
+
+def test_who_takes_nothing_has_no_key_frames_made_for_all_who_watch():
+    async def main():
+        feeds, line, session = Feeds(), Line(), Asked()
+        browser = Browser(session, feeds, None, greet=lambda _: ToPage(), site="s", own_name="li")
+        serving = asyncio.create_task(browser.run(Socket(line, VIDEO)))
+        while not feeds.sinks:
+            await asyncio.sleep(0)
+        line.ready = False
+        delta = CompressedVideo(data=DELTA).SerializeToString()
+        await feeds.give(sample(1, key=VIDEO, payload=delta))
+        assert session.asked == []
+        line.ready = True
+        await feeds.give(sample(2, key=VIDEO, payload=delta))
+        assert session.asked == [f"{VIDEO}/keyframe/li"]
+        serving.cancel()
+        await asyncio.gather(serving, return_exceptions=True)
 
     run(main())
 

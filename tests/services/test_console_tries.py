@@ -50,3 +50,19 @@ def test_what_nobody_had_time_to_look_at_is_no_wrong_try(mesh, page, tmp_path):
             assert (await client.sign_in("li"))[0] == 200
 
     run(main())
+
+
+def test_who_names_another_address_each_time_is_the_same_stranger(mesh, page, tmp_path):
+    async def main():
+        async with guarded(mesh, page, tmp_path) as (client, _, _):
+            told = []
+            for number in range(12):
+                body = {"name": f"nobody{number}", "password": "not the password"}
+                answer = await client.post(
+                    "/account/sign-in", body, **{"X-Forwarded-For": f"10.0.0.{number}"}
+                )
+                told.append(answer[0])
+            assert told[:10] == [401] * 10
+            assert 429 in told
+
+    run(main())

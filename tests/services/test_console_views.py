@@ -115,24 +115,43 @@ def test_who_takes_every_frame_is_never_reduced(monkeypatch):
     run(main())
 
 
-def test_who_takes_none_is_stepped_down_and_is_sent_nothing_old(monkeypatch):
+def test_who_takes_too_little_is_stepped_down_and_is_sent_nothing_old(monkeypatch):
     async def main():
         clock, feeds = Clock(monkeypatch), Feeds()
         video = watch(feeds)
         for number in range(40):
             clock.now += 0.033
             feeds.give(KEY, sample(number, DELTA if number else KEY_FRAME))
+        assert video.pop() is None
         await settled()
         assert (video.step, list(feeds.joined)) == (1, [f"{KEY}-1"])
-        assert video.pop() is None
         for number in range(40):
             clock.now += 0.066
             if f"{KEY}-1" in feeds.joined:
                 feeds.give(f"{KEY}-1", sample(number, DELTA if number else KEY_FRAME))
             await settled()
+        video.pop()
+        await settled()
         assert (video.step, list(feeds.joined)) == (2, [f"{KEY}-2"])
         video.close()
         assert feeds.joined == {}
+
+    run(main())
+
+
+def test_for_who_takes_nothing_at_all_nothing_smaller_is_drawn(monkeypatch):
+    async def main():
+        clock, feeds, steps = Clock(monkeypatch), Feeds(), Steps()
+        video = watch(feeds, steps)
+        for number in range(300):
+            clock.now += 0.033
+            feeds.give(KEY, sample(number, DELTA if number % 60 else KEY_FRAME))
+            await settled()
+        assert steps.asked == 0
+        video.pop()  # it takes something again
+        await settled()
+        assert (video.step, list(feeds.joined)) == (1, [f"{KEY}-1"])
+        video.close()
 
     run(main())
 
@@ -163,6 +182,8 @@ def test_who_cannot_be_given_less_is_not_asked_about_with_every_picture(monkeypa
         for number in range(300):
             clock.now += 0.033
             feeds.give(KEY, sample(number, DELTA if number % 10 else KEY_FRAME))
+            if number % 20 == 0:
+                video.pop()
             await settled()
         assert 1 <= steps.asked <= 2  # in ten seconds
         video.close()
@@ -180,6 +201,7 @@ def test_who_takes_all_again_is_given_more_later_and_less_soon_after_too_much(mo
             for number in range(40):
                 clock.now += 0.033
                 feeds.give_all(sample(number, DELTA if number else KEY_FRAME))
+            video.pop()
             await settled()
 
         async def take(seconds):

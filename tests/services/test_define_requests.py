@@ -2,20 +2,30 @@
 
 import hashlib
 import io
+import json
 import shutil
+import socket
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 import zenoh
+from starlette.requests import Request
 
 from bus.endpoints import router_config
 from bus.session import SessionSettings
 from robots.description import LIBRARY, load
 from robots.save import read_robot, write_folder
 from services.command_line import roles
-from tests.conftest import free_port
+from services.console.define import routes, store
+from services.console.define.errors import RefusedRequest
+from services.console.define.routes import Define
+from services.console.define.settings import DefineSettings
+from services.site import Define as DefinePart
+from services.site import Site
+from tests.conftest import free_port, run
 from tests.services.defining import defining
+from tests.site import wait_until
 
 TRIANGLE = (
     b"#VRML V2.0 utf8\n"
@@ -373,3 +383,39 @@ def test_a_running_robot_of_the_pages_reads_its_own_folder_only(tmp_path, monkey
         for each in robot.place.robots
     }
     assert found == {"listed": True, "own": False, "known": False, "mine": True}
+
+
+@pytest.mark.parametrize("job", ["mesh", "collisions", "import_robot", "unzip"])
+def test_a_job_whose_asker_has_gone_takes_nobody_elses_time(tmp_path, job):
+    site = Site(site="s", define=DefinePart(folder=tmp_path / "robots"))
+
+    async def main():
+        define = Define(DefineSettings(site=site, store=tmp_path / "store"))
+        asked = {"file": "a.wrl", "files": {"a.wrl": store.put(define.store, TRIANGLE)}, "description": {}}
+        came = [{"type": "http.request", "body": json.dumps(asked).encode()}]
+
+        async def receive():
+            return came.pop() if came else {"type": "http.disconnect"}
+
+        request = Request({"type": "http", "method": "POST", "headers": []}, receive)
+        with pytest.raises(RefusedRequest, match="nobody waits"):
+            await getattr(define, job)(request)
+        assert define.workshop.slow.pid is None
+        await define.close()
+
+    run(main())
+
+
+def test_only_so_many_files_are_taken_at_once(page, monkeypatch):
+    monkeypatch.setattr(routes, "_MOST_UPLOADS", 1)
+    host, port = page.address.removeprefix("http://").split(":")
+
+    def status():
+        return page.post("/files?name=a.wrl", TRIANGLE).status
+
+    assert [status(), status()] == [200, 200]
+    with socket.create_connection((host, int(port))) as slow:
+        head = f"POST /define/files?name=a.wrl HTTP/1.1\r\nHost: {host}:{port}\r\nOrigin: {page.address}\r\n"
+        slow.sendall(f"{head}Content-Length: 100\r\n\r\nhalf".encode())
+        wait_until(lambda: status() == 503, what="nobody was told to wait")
+    wait_until(lambda: status() == 200, what="the place of a file that was broken off is still taken")

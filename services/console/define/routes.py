@@ -8,6 +8,7 @@ import json
 import logging
 import sys
 from collections import OrderedDict
+from collections.abc import Awaitable, Callable
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -32,6 +33,8 @@ Json = dict[str, Any]
 Key = TypeVar("Key")
 Value = TypeVar("Value")
 _MOST_REMEMBERED = 256
+# What has not come whole is in no store, which would make room for it.
+_MOST_UPLOADS = 16
 
 
 class Define:
@@ -44,6 +47,7 @@ class Define:
         self._meshes: OrderedDict[tuple[str, str], Json] = OrderedDict()
         self._joint_counts: OrderedDict[str, int] = OrderedDict()
         self._writing = asyncio.Lock()
+        self._uploads = 0
 
     async def close(self) -> None:
         """End the workers."""
@@ -146,9 +150,15 @@ class Define:
         name = request.query_params.get("name", "")
         if reason := refused_path(name):
             raise RefusedRequest(422, f"name {name!r}: {reason}")
-        sha, size = await store.put_stream(
-            self.store, request.stream(), most_bytes=self.settings.most_file_bytes
-        )
+        if self._uploads >= _MOST_UPLOADS:
+            raise RefusedRequest(503, f"{_MOST_UPLOADS} files are being sent already: try again in a moment")
+        self._uploads += 1
+        try:
+            sha, size = await store.put_stream(
+                self.store, request.stream(), most_bytes=self.settings.most_file_bytes
+            )
+        finally:
+            self._uploads -= 1
         return JSONResponse({"sha": sha, "size": size})
 
     async def mesh(self, request: Request) -> Response:
@@ -158,7 +168,7 @@ class Define:
         file = self._file_of(asked)
         known = self._meshes.get((folder.name, file))
         if known is None or store.stored(self.store, known["glb"]) is None:
-            known = await self.workshop.slow.do("mesh", folder, {"file": file})
+            known = await self.workshop.slow.do("mesh", folder, {"file": file}, wanted=_waits(request))
             _remember(self._meshes, (folder.name, file), known)
         return JSONResponse(known)
 
@@ -167,30 +177,29 @@ class Define:
         asked = await self._json(request, description=dict)
         folder = await self._laid_out(asked)
 
-        async def wanted() -> bool:
-            return not await request.is_disconnected()
-
         request_ = {"description": asked["description"], "joints": asked.get("joints")}
-        return JSONResponse(await self.workshop.quick.do("check", folder, request_, wanted=wanted))
+        return JSONResponse(await self.workshop.quick.do("check", folder, request_, wanted=_waits(request)))
 
     async def collisions(self, request: Request) -> Response:
         """How often each pair of links touches."""
         asked = await self._json(request, description=dict)
-        return await self._slow("collisions", asked, {"description": asked["description"]})
+        return await self._slow(request, "collisions", asked, {"description": asked["description"]})
 
     async def import_robot(self, request: Request) -> Response:
         """A URDF, an OpenHRP VRML file or a robot.toml as a draft."""
         asked = await self._json(request, file=str)
-        return await self._slow("import", asked, {"file": self._file_of(asked), "files": asked["files"]})
+        return await self._slow(
+            request, "import", asked, {"file": self._file_of(asked), "files": asked["files"]}
+        )
 
     async def unzip(self, request: Request) -> Response:
         """The files of a zip archive, kept each for itself."""
         asked = await self._json(request, file=str)
-        return await self._slow("unzip", asked, {"file": self._file_of(asked)})
+        return await self._slow(request, "unzip", asked, {"file": self._file_of(asked)})
 
-    async def _slow(self, job: str, asked: Json, request: Json) -> Response:
+    async def _slow(self, request: Request, job: str, asked: Json, of: Json) -> Response:
         folder = await self._laid_out(asked)
-        return JSONResponse(await self.workshop.slow.do(job, folder, request))
+        return JSONResponse(await self.workshop.slow.do(job, folder, of, wanted=_waits(request)))
 
     # ------------------------------------------------------------------ save and start
 
@@ -292,6 +301,15 @@ class Define:
         if file not in asked["files"]:
             raise RefusedRequest(422, f"file {file!r}: is not one of the files given")
         return file
+
+
+def _waits(request: Request) -> Callable[[], Awaitable[bool]]:
+    """Whether whoever asked is still there: a job that nobody waits for takes no other's time."""
+
+    async def waits() -> bool:
+        return not await request.is_disconnected()
+
+    return waits
 
 
 def _whole_number(text: str) -> int:

@@ -1,0 +1,37 @@
+"""What a page is told where a mesh cannot be had: now, for a while, or at all."""
+
+import pytest
+from starlette.requests import Request
+
+from bus.errors import BusyError, NoAnswerError, QuotaError, RefusedError
+from services.console import meshes
+from services.console.meshes import MeshCache, mesh_response
+from tests.conftest import run
+
+
+class Owner:
+    """A session whose meshes' owner answers so."""
+
+    def __init__(self, error):
+        self._error = error
+
+    async def ask_bytes(self, key, *, timeout_s):
+        raise self._error
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "again"),
+    [
+        (BusyError("too many requests wait"), 503, "1"),
+        (QuotaError("too many meshes a minute", again_s=2.5), 503, "3"),
+        (NoAnswerError("nobody answered"), 504, None),
+        (RefusedError("no mesh 'base' here"), 404, None),
+    ],
+)
+def test_who_is_busy_may_be_asked_again_and_who_has_no_mesh_need_not(monkeypatch, error, status, again):
+    monkeypatch.setattr(meshes, "_TIMEOUTS_S", (0.1, 0.1))
+    path = {"site": "s", "robot": "r", "name": "base"}
+    request = Request({"type": "http", "query_string": b"", "headers": [], "path_params": path})
+    answer = run(mesh_response(request, Owner(error), MeshCache()))
+    assert (answer.status_code, answer.headers.get("retry-after")) == (status, again)
+    assert answer.body.decode() == str(error)
