@@ -13,8 +13,9 @@ import { Fleet } from "./fleet/fleet";
 import { fleetRobots } from "./fleet/known";
 import { timeOfDay } from "./format";
 import { hello, lostAt } from "./mesh";
+import { Missing } from "./missing";
 import { NoticeLine } from "./parts";
-import { defined, isReplay, plain, programming, recorded, robotLink, route, walled } from "./route";
+import { canBe, defined, isReplay, plain, programming, recorded, robotLink, route, walled } from "./route";
 import { stop, stopNotice } from "./stop";
 import { language, switchLanguage, t } from "./texts";
 import { switchTheme, theme } from "./theme";
@@ -22,13 +23,27 @@ import { switchTheme, theme } from "./theme";
 /** A page that is loaded when it is first shown. */
 function onDemand<Props>(load: () => Promise<ComponentType<Props>>) {
   const loaded = signal<ComponentType<Props> | null>(null);
+  const failed = signal(false);
   return function OnDemand(props: Props & object) {
     useEffect(() => {
-      if (!loaded.value) void load().then((page) => (loaded.value = page));
+      failed.value = false;
+      if (!loaded.value) load().then((page) => (loaded.value = page), () => (failed.value = true));
     }, []);
     const Page = loaded.value;
-    return Page && <Page {...props} />;
+    return Page ? <Page {...props} /> : failed.value && <NotLoaded />;
   };
+}
+
+/** A console that was renewed has other files. */
+function NotLoaded() {
+  return (
+    <div class="empty" role="alert">
+      <p>{t("page_not_loaded")}</p>
+      <button class="action" onClick={() => location.reload()}>
+        {t("load_again")}
+      </button>
+    </div>
+  );
 }
 
 // The robot's page brings three.js: the fleet's words do not wait for it.
@@ -54,7 +69,8 @@ function place(): Place {
 
 export function App() {
   const shown = route.value;
-  const key = shown ? `robomesh/${shown.site}/${shown.robot}` : null;
+  const nowhere = shown !== null && !canBe(shown);
+  const key = shown && !nowhere ? `robomesh/${shown.site}/${shown.robot}` : null;
   const replay = shown !== null && isReplay(shown.robot);
   const at = place();
   // Control does not outlive the robot's pages; between them it stays.
@@ -95,6 +111,8 @@ export function App() {
       <main lang={language.value === "zh" ? "zh-Hans" : "en"}>
         {mustSignIn.value ? (
           <SignIn />
+        ) : nowhere ? (
+          <Missing {...shown} />
         ) : at === "program" ? (
           <Program shown={shown} />
         ) : shown ? (
@@ -164,7 +182,7 @@ function PageLinks({ at }: { at: Place }) {
 }
 
 function StopButton({ robots }: { robots: readonly string[] }) {
-  const robot = route.value && !isReplay(route.value.robot) ? route.value.robot : "";
+  const robot = route.value && canBe(route.value) && !isReplay(route.value.robot) ? route.value.robot : "";
   const one = robot !== "";
   return (
     <div class="stop-place">

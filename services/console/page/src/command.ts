@@ -4,6 +4,7 @@ import { timestampFromMs } from "@bufbuild/protobuf/wkt";
 import { signal } from "@preact/signals";
 import { controlNotice, held, reasonOf } from "./control";
 import type { Notice } from "./control";
+import { gatewayText } from "./gateway-words";
 import { CommandAnswerSchema, CommandRequestSchema, CommandRequest_Command as Command } from "./gen/robomesh_pb";
 import { ask } from "./mesh";
 import { t } from "./texts";
@@ -62,7 +63,7 @@ export async function command(
     const answer = await ask(key, CommandRequestSchema, request, CommandAnswerSchema, withinS);
     const target = positions && { what, positions, id: request.id };
     if (answer.accepted && MOTIONS.includes(name)) newestMotion.value = request.id;
-    const mind = answer.text.split(MIND)[1];
+    const mind = gatewayText(answer.text.split(MIND)[1] ?? "");
     if (answer.accepted) tell({ kind: "done", text: t("sent", { what }), ...(mind && { mind }), ...(target && { target }) });
     else tell({ kind: "refused", text: t("not_sent", { text: answer.text }) });
     return answer.accepted;

@@ -7,6 +7,7 @@
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { Timestamp } from "@bufbuild/protobuf/wkt";
 import { signal } from "@preact/signals";
+import { gatewayText } from "./gateway-words";
 import { LeaseAnswerSchema, LeaseRequestSchema, LeaseRequest_Action as Action } from "./gen/robomesh_pb";
 import type { Lease, LeaseAnswer } from "./gen/robomesh_pb";
 import { AskError, ask, hello, lostAt } from "./mesh";
@@ -75,7 +76,7 @@ export function holds(robotKey: string): boolean {
 
 export function reasonOf(error: unknown): string {
   // The gateway says so too.
-  return error instanceof Error ? error.message.replace(/^Not (sent|run): /, "") : String(error);
+  return error instanceof Error ? gatewayText(error.message.replace(/^Not (sent|run): /, "")) : String(error);
 }
 
 export function ms(stamp: Timestamp | undefined): number {
@@ -251,7 +252,7 @@ function seeLoss(robotKey: string, lease: Lease): void {
   controlNotice.value =
     offeredTo && lease.holder === offeredTo
       ? { kind: "done", text: t("handed_over", { name: offeredTo }) }
-      : { kind: "lost", text: t("control_lost", { text: lease.ended || t("lost_unknown") }) };
+      : { kind: "lost", text: t("control_lost", { text: gatewayText(lease.ended) || t("lost_unknown") }) };
 }
 
 /** A loss is told of until somebody else is in control than was right after it. */

@@ -2,6 +2,7 @@
 
 import { useState } from "preact/hooks";
 import { count, stampFull, stampTime } from "./format";
+import { gatewayText } from "./gateway-words";
 import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "./gen/robomesh_pb";
 import type { AuditEntry, ControllerState, Event } from "./gen/robomesh_pb";
 import { eventInChinese } from "./events/event-words";
@@ -106,6 +107,7 @@ export function eventText(event: Event): string {
 }
 
 function AuditLine(entry: AuditEntry) {
+  const text = gatewayText(entry.text);
   const [word, level] = OUTCOMES[entry.outcome] ?? ["state_unknown", "normal"];
   return (
     <li title={`${stampFull(entry.timestamp)} · ${entry.source}`}>
@@ -118,7 +120,7 @@ function AuditLine(entry: AuditEntry) {
             {` × ${count(entry.repeatedCount)}`}
           </strong>
         )}
-        {entry.text && <span lang="en">{`: ${entry.text}`}</span>}
+        {text && <span lang={text === entry.text ? "en" : undefined}>{`: ${text}`}</span>}
       </span>
     </li>
   );

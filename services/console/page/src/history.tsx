@@ -4,6 +4,7 @@ import { fromBinary } from "@bufbuild/protobuf";
 import { useEffect, useRef, useState } from "preact/hooks";
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
+import { ageClock } from "./age-clock";
 import { JointStatesSchema } from "./gen/foxglove/JointStates_pb";
 import { jointUnit } from "./format";
 import type { Description } from "./gen/robomesh_pb";
@@ -38,7 +39,7 @@ export function History({ robotKey, description }: { robotKey: string; descripti
     let ahead = Infinity; // this page's clock before the source's, less the quickest way here, in ms
     return watch(`${robotKey}/${topic}`, (sample) => {
       if (!sample.live) return;
-      const early = sample.arrived - sample.sourceTime;
+      const early = ageClock() - sample.sourceTime;
       if (early < ahead || early - ahead > CLOCK_SET_MS) ahead = early;
       const last = rows.time.at(-1);
       // By the source's time: what the network held back is drawn when it was.
@@ -68,7 +69,7 @@ export function History({ robotKey, description }: { robotKey: string; descripti
   useEffect(() => {
     const element = place.current;
     if (!element || joints.length === 0) return;
-    let end = performance.now() / 1000;
+    let end = ageClock() / 1000;
     const shown = (): [number, number] => [end - SPAN_S, end];
     const style = getComputedStyle(document.documentElement);
     const colour = (name: string) => style.getPropertyValue(name).trim();
@@ -119,7 +120,7 @@ export function History({ robotKey, description }: { robotKey: string; descripti
     );
     const draw = () => {
       if (stopped.current) return;
-      end = performance.now() / 1000;
+      end = ageClock() / 1000;
       plot.setData([rows.time, ...rows.values] as uPlot.AlignedData, true);
     };
     const timer = setInterval(draw, 200);

@@ -3,12 +3,13 @@
 import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
 import type { DescMessage, MessageInitShape, MessageShape } from "@bufbuild/protobuf";
 import { signal } from "@preact/signals";
+import { ageClock } from "./age-clock";
 import { FromPageSchema, ToPageSchema } from "./gen/robomesh_pb";
 import type { ToPage_Hello } from "./gen/robomesh_pb";
 import { lateness } from "./lateness";
 import { t } from "./texts";
 
-/** A publication as it came. Times are on this page's monotonic clock, in ms. */
+/** A publication as it came. Times are on this page's monotonic clock, in ms; ages on that of `ageClock`. */
 export interface Sample {
   key: string;
   payload: Uint8Array;
@@ -18,7 +19,7 @@ export interface Sample {
   sourceTime: number;
   live: boolean;
   arrived: number;
-  /** When it was new; null: its age is not known. */
+  /** When it was new, on the clock of ages; null: its age is not known. */
   newAt: number | null;
   /** Of video: how much less than was asked for, because this browser's line takes no more; 0: as asked for. */
   step: number;
@@ -37,6 +38,11 @@ export class AskError extends Error {
 
 type Listener = (sample: Sample) => void;
 
+// As long as the console waits for this page. A line that is cut, or a machine that slept, tells nobody.
+const QUIET_MS = 5000;
+const ANSWERED_WITHIN_MS = 15_000;
+const LOOK_EACH_MS = 1000;
+const PRESENCE_EACH_MS = 20;
 /** The console ended the session that this page belongs to; the reason says why. */
 const SIGNED_OUT = 4401;
 
@@ -48,10 +54,15 @@ export const lostAt = signal<number | null>(0);
 
 const listeners = new Map<string, Set<Listener>>();
 const newest = new Map<string, Sample>();
+/** Of presence, not told yet. */
+const changes = new Map<string, boolean>();
 const asked = new Map<bigint, { resolve: (payload: Uint8Array) => void; reject: (error: AskError) => void }>();
 let socket: WebSocket | null = null;
 let lastAsk = 0n;
 let retryMs = 250;
+/** When anything came [ms], and what ends a connection through which nothing does. */
+let heardAt = 0;
+let giveUp: () => void = () => undefined;
 
 /** Connects, and keeps connecting.
  *
@@ -75,23 +86,55 @@ function connect(again: () => void, ended: (why: string) => void): void {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
   const opened = new WebSocket(`${scheme}://${location.host}/mesh`);
   opened.binaryType = "arraybuffer";
-  opened.onopen = () => {
-    socket = opened;
-    retryMs = 250;
-    presence.value = new Set();
-    for (const expression of listeners.keys()) send({ case: "watch", value: { key: expression } });
-  };
-  opened.onmessage = (event: MessageEvent<ArrayBuffer>) => receive(new Uint8Array(event.data));
-  opened.onclose = (event) => {
+  let askedAt = performance.now(); // to open is to answer
+  heardAt = 0;
+  const heard = () => (heardAt = performance.now());
+  const end = (code: number, reason: string) => {
+    clearInterval(looking);
+    giveUp = () => undefined;
+    opened.onopen = opened.onmessage = opened.onclose = null;
     socket = null;
     if (lostAt.value === null) lostAt.value = Date.now();
     for (const { reject } of asked.values()) reject(new AskError(t("not_connected"), true));
     asked.clear();
-    if (event.code === SIGNED_OUT) {
+    if (code === SIGNED_OUT) {
       hello.value = null;
-      ended(event.reason);
+      ended(reason);
     } else again();
   };
+  const look = () => {
+    const at = performance.now();
+    if (askedAt > heardAt) {
+      if (at - askedAt < ANSWERED_WITHIN_MS) return;
+      giveUp();
+    } else if (at - heardAt > QUIET_MS) {
+      askedAt = at;
+      send({ case: "ask", value: { id: ++lastAsk, key: "" } }); // no such request: it is answered at once
+    }
+  };
+  const looking = setInterval(look, LOOK_EACH_MS);
+  giveUp = () => {
+    opened.close(); // which would wait for the other end to say so too
+    end(0, "");
+  };
+  opened.onopen = () => {
+    heard();
+    socket = opened;
+    retryMs = 250;
+    changes.clear();
+    presence.value = new Set();
+    for (const expression of listeners.keys()) send({ case: "watch", value: { key: expression } });
+  };
+  opened.onmessage = (event: MessageEvent<ArrayBuffer>) => {
+    heard();
+    receive(new Uint8Array(event.data));
+  };
+  opened.onclose = ({ code, reason }) => end(code, reason);
+}
+
+/** Opens the connection anew where nothing has come through it since a time of `performance.now`. */
+export function reopenIfSilent(since: number): void {
+  if (socket && heardAt < since) giveUp();
 }
 
 /** Hears every publication on a key expression until the returned function is called. */
@@ -170,10 +213,8 @@ function receive(bytes: Uint8Array): void {
       lostAt.value = null;
       break;
     case "presence": {
-      const keys = new Set(presence.value);
-      if (message.value.alive) keys.add(message.value.key);
-      else keys.delete(message.value.key);
-      presence.value = keys;
+      if (changes.size === 0) setTimeout(settlePresence, PRESENCE_EACH_MS);
+      changes.set(message.value.key, message.value.alive);
       break;
     }
     case "answer": {
@@ -193,7 +234,7 @@ function receive(bytes: Uint8Array): void {
       if (repeated && before.newAt !== null) newAt = before.newAt;
       else if (live) {
         // What the console's server knows of its age, or what it was late on the whole way to here.
-        newAt = arrived - Math.max((ageS ?? 0) * 1000, lateness(key, header.publisher, header.sourceTime, arrived));
+        newAt = ageClock() - Math.max((ageS ?? 0) * 1000, lateness(key, header.publisher, header.sourceTime, arrived));
       }
       const sample = { key, payload, ...header, live, arrived, newAt, step };
       newest.set(key, sample);
@@ -203,6 +244,17 @@ function receive(bytes: Uint8Array): void {
       break;
     }
   }
+}
+
+/** A new page is told of every process of the mesh: one by one, thousands would be copied thousands of times. */
+function settlePresence(): void {
+  const keys = new Set(presence.value);
+  for (const [key, alive] of changes) {
+    if (alive) keys.add(key);
+    else keys.delete(key);
+  }
+  changes.clear();
+  presence.value = keys;
 }
 
 function readHeader(attachment: Uint8Array) {

@@ -3,10 +3,11 @@
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { Timestamp } from "@bufbuild/protobuf/wkt";
 import { clock, staleText } from "./format";
+import { gatewayText } from "./gateway-words";
 import { ProgramState_Outcome as Outcome } from "./gen/robomesh_pb";
 import type { Event, ProgramState } from "./gen/robomesh_pb";
 import { t } from "./texts";
-import { ageOf, isStale, now } from "./topics";
+import { ageOf, isStale } from "./topics";
 import type { Latest } from "./topics";
 
 const SHOWN_MS = 60_000; // after its end
@@ -46,10 +47,10 @@ function programText({ message, sample }: Latest<ProgramState>): string {
     case Outcome.DONE:
       return t("program_done", { name, operator });
     case Outcome.ENDED:
-      return t("program_ended", { name, operator, at, text });
+      return t("program_ended", { name, operator, at, text: gatewayText(text) });
     default: {
       const told = between(message.since, message.timestamp) / 1000;
-      const gone = clock(told + Math.max(0, now.value - sample.arrived) / 1000);
+      const gone = clock(told + (performance.now() - sample.arrived) / 1000);
       const time = durationS > 0 ? t("program_of", { gone, all: clock(durationS) }) : gone;
       return t("program_runs", { name, operator, at, time, step, steps });
     }

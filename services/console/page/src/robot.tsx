@@ -7,6 +7,7 @@ import type { VideoPlace } from "./camera";
 import { seeLease } from "./control";
 import { ControlPanel } from "./control-panel";
 import { EventsPanel } from "./events-panel";
+import { gatewayText } from "./gateway-words";
 import {
   ControllerStateSchema,
   ControllerState_Check as Check,
@@ -158,7 +159,8 @@ function Headline(props: {
     if (message.legacyClients?.attached) facts.push(t("legacy_some", { count: message.legacyClients.attached }));
   }
   const flooding = message?.health?.flooding === true;
-  const trouble = message?.fault || (message?.link !== Link.UP && message?.linkText);
+  const told = message?.fault || (message?.link !== Link.UP && message?.linkText) || "";
+  const trouble = message?.fault ? told : gatewayText(told);
   return (
     <div class="headline">
       <h1>{props.name}</h1>
@@ -171,7 +173,11 @@ function Headline(props: {
       {description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>}
       <FarChoice robotKey={`robomesh/${props.site}/${props.name}`} />
       <ClockHint site={props.site} />
-      {trouble && <span class={`trouble ${state.level}`} lang="en">{trouble}</span>}
+      {trouble && (
+        <span class={`trouble ${state.level}`} lang={trouble === told ? "en" : undefined}>
+          {trouble}
+        </span>
+      )}
       {flooding && (
         <span class="trouble warning">
           <span class="shape warning" aria-hidden="true" />

@@ -17,11 +17,29 @@ export interface RobotName {
   robot: string;
 }
 
+// As sites and robots are named, and views; the console cuts a page off that watches what cannot be.
+const NAME = /^[a-z0-9][a-z0-9_-]{0,62}$/;
+const VIEW = /^[A-Za-z0-9][\w.-]{0,62}$/;
+
+/** Whether there can be a robot of that name. */
+export function canBe({ site, robot }: RobotName): boolean {
+  return NAME.test(site) && NAME.test(robot);
+}
+
+/** What a link says; one that was cut or mistyped says what stands there. */
+function decoded(text: string): string {
+  try {
+    return decodeURIComponent(text);
+  } catch {
+    return text;
+  }
+}
+
 function readRobot(): RobotName | null {
   const [, first, ...rest] = location.hash.split("/");
   if (first === DEFINE || first === RECORDINGS || first === WALL || readPlain()) return null;
   const [site, robot] = first === PROGRAM ? rest : [first, ...rest];
-  return site && robot ? { site: decodeURIComponent(site), robot: decodeURIComponent(robot) } : null;
+  return site && robot ? { site: decoded(site), robot: decoded(robot) } : null;
 }
 
 /** A page that shows no one thing. */
@@ -34,7 +52,7 @@ function readPlain(): PlainPage | null {
 
 function readDefined(): string | null {
   const [, page, name] = location.hash.split("/");
-  return page === DEFINE ? decodeURIComponent(name ?? "") : null;
+  return page === DEFINE ? decoded(name ?? "") : null;
 }
 
 function readsProgram(): boolean {
@@ -48,7 +66,7 @@ export interface RecordingName {
 }
 
 function readRecordings(): readonly RecordingName[] | null {
-  const [, page, ...rest] = location.hash.split("/").map(decodeURIComponent);
+  const [, page, ...rest] = location.hash.split("/").map(decoded);
   if (page !== RECORDINGS) return null;
   return [0, 2].flatMap((i) => (rest[i] && rest[i + 1] ? [{ site: rest[i], file: rest[i + 1] as string }] : []));
 }
@@ -59,12 +77,12 @@ export interface ViewName extends RobotName {
 }
 
 function readWall(): readonly ViewName[] | null {
-  const [, page, ...rest] = location.hash.split("/").map(decodeURIComponent);
+  const [, page, ...rest] = location.hash.split("/").map(decoded);
   if (page !== WALL) return null;
   const shown: ViewName[] = [];
   for (let i = 0; i + 2 < rest.length; i += 3) {
     const [site, robot, view] = rest.slice(i, i + 3);
-    if (site && robot && view) shown.push({ site, robot, view });
+    if (site && robot && view && VIEW.test(view) && canBe({ site, robot })) shown.push({ site, robot, view });
   }
   return shown;
 }

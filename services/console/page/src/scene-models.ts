@@ -3,8 +3,9 @@
 import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { toCreasedNormals } from "three/addons/utils/BufferGeometryUtils.js";
+import { t } from "./texts";
 
-const NO_ANSWER = 504; // the mesh's service did not answer
+const NOT_YET: readonly number[] = [503, 504]; // the mesh's service is busy, or did not answer
 const ASK_AGAIN_MS = 2000;
 const CREASE_ANGLE = 0.6; // rad: sharper edges stay sharp
 const STALE_COLOUR = new THREE.Color("#7d8387");
@@ -33,17 +34,30 @@ export async function loadModel(
   wanted: () => boolean,
   failed: (why: string) => void,
 ): Promise<THREE.Group | null> {
-  let answer = await fetch(url);
-  // Its service may be starting: said at once, and asked until it is there.
-  while (answer.status === NO_ANSWER && wanted()) {
-    failed(await answer.text());
+  let glb: ArrayBuffer | null = null;
+  // Its service, or the console, may be starting or busy: said at once, and asked until it is there.
+  while (wanted() && !(glb = await fetched(url, failed))) {
     await new Promise((resolve) => setTimeout(resolve, ASK_AGAIN_MS));
-    answer = await fetch(url);
   }
-  if (!wanted()) return null;
-  if (!answer.ok) throw new Error(await answer.text());
-  const { scene } = await new GLTFLoader().parseAsync(await answer.arrayBuffer(), "");
+  if (!wanted() || !glb) return null;
+  const { scene } = await new GLTFLoader().parseAsync(glb, "");
   return wanted() ? scene : null;
+}
+
+/** A GLB; null, and why, where it cannot be had yet. */
+async function fetched(url: string, failed: (why: string) => void): Promise<ArrayBuffer | null> {
+  let answer: Response;
+  try {
+    answer = await fetch(url);
+    if (answer.ok) return await answer.arrayBuffer();
+  } catch {
+    failed(t("not_connected"));
+    return null;
+  }
+  const why = await answer.text();
+  if (!NOT_YET.includes(answer.status)) throw new Error(why);
+  failed(why);
+  return null;
 }
 
 /** A group that holds a model with materials of the page's own; its matrix is set by hand. */

@@ -4,7 +4,7 @@ import { signal } from "@preact/signals";
 import { operator, reasonOf } from "./control";
 import type { Notice } from "./control";
 import { StopAnswerSchema, StopRequestSchema } from "./gen/robomesh_pb";
-import { ask } from "./mesh";
+import { AskError, ask, reopenIfSilent } from "./mesh";
 import { t } from "./texts";
 
 const TOLD_MS = 15_000; // how long a stop that went well is told of
@@ -16,6 +16,7 @@ export async function stop(robotKeys: readonly string[]): Promise<void> {
   const name = (key: string) => key.split("/").slice(1).join("/");
   stopNotice.value = { kind: "busy", text: t("stop_sending", { robot: robotKeys.map(name).join(", ") }) };
   const by = operator.value.trim();
+  const askedAt = performance.now();
   const outcomes = await Promise.all(
     robotKeys.map(async (key): Promise<Notice> => {
       const robot = name(key);
@@ -25,6 +26,8 @@ export async function stop(robotKeys: readonly string[]): Promise<void> {
           ? { kind: "done", text: t("stop_done", { robot, id: String(answer.stopId) }) }
           : { kind: "refused", text: t("stop_latched", { robot, text: answer.text }) };
       } catch (error) {
+        // The next one must not go the same way.
+        if (error instanceof AskError && error.noAnswer) reopenIfSilent(askedAt);
         return { kind: "refused", text: t("stop_failed", { robot, text: reasonOf(error) }) };
       }
     }),

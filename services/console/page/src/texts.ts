@@ -24,6 +24,8 @@ const TEXTS = {
 
   connecting: ["Connecting to the console…", "正在连接控制台…"],
   reconnecting: ["No connection to the console since {time}. Nothing on this page is live; trying again.", "自 {time} 起与控制台断开，页面数据均非实时，正在重连。"],
+  page_not_loaded: ["This page could not be loaded. The console may have been renewed, or is gone.", "此页面无法加载：控制台可能已更新或已离线。"],
+  load_again: ["Load again", "重新加载"],
   router_lost: ["The console has lost the mesh's router. Nothing on this page is live; trying again.", "控制台与网络路由器断开，页面数据均非实时，正在重连。"],
   insecure: ["Insecure: this console is open to the network, without sign-in or encryption.", "不安全：此控制台对网络开放，无登录、无加密。"],
   language: ["中文", "English"],

@@ -7,6 +7,7 @@ import type { Timestamp } from "@bufbuild/protobuf/wkt";
 import { signal } from "@preact/signals";
 import type { Signal } from "@preact/signals";
 import { useEffect, useMemo } from "preact/hooks";
+import { ageClock } from "./age-clock";
 import { AuditListSchema, AuditEntrySchema, EventListSchema, EventSchema } from "./gen/robomesh_pb";
 import type { AuditEntry, ControllerState, Event } from "./gen/robomesh_pb";
 import { hello, watch } from "./mesh";
@@ -18,9 +19,12 @@ export interface Latest<M> {
   sample: Sample;
 }
 
-/** The page's monotonic clock in ms, four times a second: what ages are drawn by. */
-export const now = signal(performance.now());
-setInterval(() => (now.value = performance.now()), 250);
+/** The clock of ages in ms, four times a second: what ages are drawn by. */
+export const now = signal(ageClock());
+const tick = () => (now.value = ageClock());
+setInterval(tick, 250);
+// A page that is hidden has few ticks: what it showed is old before anybody sees it again.
+document.addEventListener("visibilitychange", tick);
 
 const REDRAW_MS = 50; // a person reads no faster; 3-D and plots take samples as they come
 const LIST_LENGTH = 200;

@@ -31,6 +31,7 @@ export class AccountError extends Error {
 }
 
 const ACTIVE_EACH_MS = 60_000;
+const ANSWERED_WITHIN_MS = 10_000; // else a page on a dead line would wait for it, and try no other
 
 /** Null: not known yet. */
 export const me = signal<Me | null>(null);
@@ -46,7 +47,7 @@ let connects = () => undefined as void;
 /** Asks the console who one is; null: it does not answer. */
 export async function whoAmI(): Promise<Me | null> {
   try {
-    const answer = await fetch("/account/me", { cache: "no-store" });
+    const answer = await fetch("/account/me", { cache: "no-store", signal: AbortSignal.timeout(ANSWERED_WITHIN_MS) });
     if (!answer.ok) return null;
     const told = (await answer.json()) as Me;
     // A console that was started anew knows no sessions.

@@ -5,6 +5,7 @@ import type { GivenDescription } from "./description";
 import { identity } from "./draft";
 import type { Draft } from "./draft";
 import { keptFile } from "./kept-files";
+import { t } from "../texts";
 
 export interface Problem {
   path: (string | number)[];
@@ -83,7 +84,7 @@ async function send(path: string, init?: RequestInit): Promise<Response> {
     answer = await fetch(`/define${path}`, init);
   } catch (error) {
     if (init?.signal?.aborted) throw error;
-    throw new Refused(0, "the console does not answer");
+    throw new Refused(0, t("not_connected"));
   }
   if (answer.ok) return answer;
   const text = await answer.text();

@@ -5,6 +5,7 @@ import { count, stampFull } from "../format";
 import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "../gen/robomesh_pb";
 import { Mark, OUTCOMES, SEVERITIES, eventText } from "../events-panel";
 import { fleetRobots } from "../fleet/known";
+import { gatewayText } from "../gateway-words";
 import { Choice, NoticeLine, Toggle } from "../parts";
 import type { Notice } from "../control";
 import { alarmTitle } from "./alarm-words";
@@ -53,7 +54,7 @@ export function Journal() {
       ("event" in entry
         ? entry.event.severity >= LEAST[least]
         : WHAT[outcome] === null || entry.audit.outcome === WHAT[outcome]) &&
-      wordsOf(entry).toLowerCase().includes(wanted),
+      (!wanted || wordsOf(entry).toLowerCase().includes(wanted)),
   );
   const robots = fleetRobots.value.filter((key) => !site || key.split("/")[1] === site);
   const sites = [...new Set([...fleetRobots.value.map((key) => key.split("/")[1] ?? ""), ...all.map((entry) => entry.site)])];
@@ -157,7 +158,7 @@ function wordsOf(entry: Entry): string {
     return `${entry.site}/${entry.robot} ${source} ${code} ${text} ${eventText(entry.event)} ${alarmTitle(code) ?? ""}`;
   }
   const { operator, source, request, text } = entry.audit;
-  return `${entry.site}/${entry.robot} ${operator} ${source} ${request} ${text}`;
+  return `${entry.site}/${entry.robot} ${operator} ${source} ${request} ${text} ${gatewayText(text)}`;
 }
 
 function Line({ entry, open, choose }: { entry: Entry; open: boolean; choose: (entry: Entry) => void }) {
@@ -187,11 +188,12 @@ function EventWords({ entry: { event } }: { entry: EventEntry }) {
 function AuditWords({ entry: { audit } }: { entry: AuditLine }) {
   const [word, level] = OUTCOMES[audit.outcome] ?? ["state_unknown", "normal"];
   const repeated = audit.repeatedCount > 0n ? ` × ${count(audit.repeatedCount)}` : "";
+  const text = gatewayText(audit.text);
   return (
     <>
       <Mark word={word} level={level} /> <strong>{audit.operator || audit.source}</strong> {audit.request}
       {repeated}
-      {audit.text && <span lang="en">{`: ${audit.text}`}</span>}
+      {text && <span lang={text === audit.text ? "en" : undefined}>{`: ${text}`}</span>}
     </>
   );
 }
@@ -200,6 +202,7 @@ function AuditWords({ entry: { audit } }: { entry: AuditLine }) {
 function Details({ entry, close }: { entry: Entry; close: () => void }) {
   const event = "event" in entry ? entry.event : null;
   const audit = "audit" in entry ? entry.audit : null;
+  const told = event?.text ?? audit?.text ?? "";
   const facts: [string, string][] = [
     [e("time"), stampFull(event?.timestamp ?? audit?.timestamp)],
     [e("entry_source"), event?.source ?? audit?.source ?? ""],
@@ -209,9 +212,9 @@ function Details({ entry, close }: { entry: Entry; close: () => void }) {
   return (
     <div class="entry-details" role="region" aria-label={wordsOf(entry)}>
       <p>{"event" in entry ? <EventWords entry={entry} /> : <AuditWords entry={entry} />}</p>
-      {event && eventText(event) !== event.text && (
+      {told !== (event ? eventText(event) : gatewayText(told)) && (
         <p class="dim">
-          {e("in_its_words")} <span lang="en">{event.text}</span>
+          {e("in_its_words")} <span lang="en">{told}</span>
         </p>
       )}
       <dl>

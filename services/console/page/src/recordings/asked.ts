@@ -3,6 +3,7 @@
 import { create, fromBinary } from "@bufbuild/protobuf";
 import { timestampFromMs, timestampMs } from "@bufbuild/protobuf/wkt";
 import { useEffect, useState } from "preact/hooks";
+import { gatewayText } from "../gateway-words";
 import {
   AuditEntrySchema,
   AuditEntry_Outcome as Outcome,
@@ -98,7 +99,7 @@ function askedFor({ timestamp, operator, source, request, outcome, text }: Audit
   const words = outcome === Outcome.REFUSED ? "asked_refused" : outcome === Outcome.FAILED ? "asked_failed" : "asked";
   const said = r(words, { who: operator || source, what: request.toLowerCase().replaceAll("_", " ") });
   const severity = words === "asked" ? Severity.INFO : Severity.WARNING;
-  const event = create(EventSchema, { severity, source, code: request, text: text ? `${said}: ${text}` : said });
+  const event = create(EventSchema, { severity, source, code: request, text: text ? `${said}: ${gatewayText(text)}` : said });
   if (timestamp) event.timestamp = timestamp;
   return event;
 }

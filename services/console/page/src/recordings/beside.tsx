@@ -1,5 +1,6 @@
 // How a second recording lies beside the first: aligned at their starts, or at an event of each.
 
+import { eventText } from "../events-panel";
 import { recordingsLink } from "../route";
 import type { RecordingName } from "../route";
 import type { Happened } from "./asked";
@@ -64,7 +65,7 @@ function Events({ name, label, events }: { name: string; label: string; events: 
       <option value="">{`${label}…`}</option>
       {events.map(({ at, event }, i) => (
         <option key={i} value={String(i)}>
-          {`${momentText(at)} ${event.text.slice(0, SHOWN_TEXT)}`}
+          {`${momentText(at)} ${eventText(event).slice(0, SHOWN_TEXT)}`}
         </option>
       ))}
     </select>

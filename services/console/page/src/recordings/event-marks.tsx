@@ -3,12 +3,11 @@
 import { useComputed, useSignal } from "@preact/signals";
 import type { ReadonlySignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
+import { SEVERITIES, eventText } from "../events-panel";
 import { count, fullTime } from "../format";
-import { Event_Severity as Severity } from "../gen/robomesh_pb";
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import { Panel } from "../parts";
 import { t } from "../texts";
-import type { TextName } from "../texts";
 import type { Asked, Happened } from "./asked";
 import { momentText } from "./facts";
 import { r } from "./texts";
@@ -16,14 +15,6 @@ import "./contents.css";
 
 const NONE: readonly Happened[] = [];
 const MOST_MARKS = 200; // more cannot be told apart; the gravest are shown
-
-const SEVERITIES: Partial<Record<Severity, [TextName, string]>> = {
-  [Severity.DEBUG]: ["severity_debug", "normal"],
-  [Severity.INFO]: ["severity_info", "normal"],
-  [Severity.WARNING]: ["severity_warning", "warning"],
-  [Severity.ERROR]: ["severity_error", "alarm"],
-  [Severity.CRITICAL]: ["severity_critical", "alarm"],
-};
 
 function severityOf({ event }: Happened): [string, string] {
   const [word, level] = SEVERITIES[event.severity] ?? ["severity_info", "normal"];
@@ -46,14 +37,14 @@ export function EventMarks(props: { events: readonly Happened[]; duration: numbe
       {duration > 0 &&
         shown.map((happened, i) => {
           const [word, level] = severityOf(happened);
-          const text = `${momentText(happened.at)} ${word}: ${happened.event.text}`;
+          const text = `${momentText(happened.at)} ${word}: ${eventText(happened.event)}`;
           return (
             <button
               key={i}
               class={`event-mark ${sideOf(happened.at / duration)}`}
               style={{ left: `${(100 * Math.min(duration, Math.max(0, happened.at))) / duration}%` }}
               data-text={text}
-              aria-label={r("go_to_event", { time: momentText(happened.at), text: happened.event.text })}
+              aria-label={r("go_to_event", { time: momentText(happened.at), text: eventText(happened.event) })}
               onClick={() => props.seek(happened.at)}
             >
               <span class={`shape ${level}`} aria-hidden="true" />
@@ -98,7 +89,7 @@ export function EventList(props: {
                       {word}
                     </span>
                   )}
-                  {event.text}
+                  {eventText(event)}
                 </span>
               </button>
             </li>
