@@ -6,6 +6,7 @@ Exit status 1 when something is wrong with it. Nothing moves.
 """
 
 import asyncio
+import signal
 import sys
 from pathlib import Path
 
@@ -22,6 +23,7 @@ async def main() -> int:
     async with open_session(SessionSettings(connect=(ROUTER,), wait_s=2.0)) as session:
         key = f"robomesh/{ROBOT}/kinematics/check/{session.own_name}"
         answer = await session.ask(key, CheckRequest(program=PROGRAM), timeout_s=30.0)
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # from here on `| head` may end it
     for each in answer.violations:
         print(f"line {each.line}, {each.time_s:.2f} s: {each.kind}: {each.text}")
     print(f"{answer.duration_s:.2f} s, {'nothing wrong' if answer.ok else 'not as it should be'}")

@@ -6,6 +6,7 @@ Control is a lease: it is renewed while the block runs, and the robot stops when
 """
 
 import asyncio
+import signal
 import sys
 
 from bus.lease import control
@@ -30,7 +31,8 @@ async def main() -> None:
         async for sample in session.subscribe(f"robomesh/{ROBOT}/lease", newest=20):
             if sample.live and not sample.message().motion:
                 break
-    print("home")
 
 
 asyncio.run(main())
+signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # nobody may read any more
+print("home")

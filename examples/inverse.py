@@ -6,6 +6,7 @@ Exit status 1 when the arm cannot get there; the answer says why.
 """
 
 import asyncio
+import signal
 import sys
 from math import degrees
 
@@ -28,6 +29,7 @@ async def main() -> int:
         task = InverseRequest.POSITION_AND_AXIS_5D if len(robot.joints) < 6 else InverseRequest.POSE_6D
         request = InverseRequest(pose=POSE, task=task, all_solutions=True)
         answer = await session.ask(f"robomesh/{ROBOT}/kinematics/inverse", request, timeout_s=30.0)
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # from here on `| head` may end it
     for solution in answer.solutions:
         told = zip(robot.joints, solution.joint_positions, strict=True)
         print(

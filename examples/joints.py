@@ -3,7 +3,9 @@
 ./dev run python examples/joints.py
 """
 
+import os
 import sys
+from contextlib import suppress
 
 import zenoh
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
@@ -14,9 +16,12 @@ config = zenoh.Config()
 config.insert_json5("mode", '"client"')
 config.insert_json5("connect/endpoints", f'["{ROUTER}"]')
 
-with zenoh.open(config) as session, session.declare_subscriber("robomesh/*/*/joints/slow") as states:
+with (
+    suppress(BrokenPipeError, KeyboardInterrupt),  # `| head`, Ctrl-C
+    zenoh.open(config) as session,
+    session.declare_subscriber("robomesh/*/*/joints/slow") as states,
+):
     for sample in states:
         joints = JointStates.FromString(sample.payload.to_bytes()).joints
-        print(
-            sample.key_expr, " ".join(f"{joint.name} {joint.position:+.3f}" for joint in joints), flush=True
-        )
+        words = " ".join(f"{joint.name} {joint.position:+.3f}" for joint in joints)
+        os.write(1, f"{sample.key_expr} {words}\n".encode())

@@ -19,6 +19,8 @@ _FAR_SIZE, _FAR_FPS, _FAR_BITS_PER_S = (640, 360), 15.0, 250e3
 
 _LEAST_PX, _MOST_PX, _MOST_PIXELS = 64, 1920, 1920 * 1080
 _LEAST_FPS, _MOST_FPS = 1.0, 60.0
+# Of 1920 x 1080 a drawing and an encoder hold 150 MB, however slow it is.
+_LEAST_COUNTED_FPS = 10.0
 _LEAST_BITS_PER_S, _MOST_BITS_PER_S = 50e3, 100e6
 _MOST_POINTS = 5000
 _NAME_LENGTH = 10
@@ -51,8 +53,8 @@ class Shot:
 
     @property
     def pixels_per_s(self) -> float:
-        """What it costs, at its full rate."""
-        return self.size[0] * self.size[1] * self.fps
+        """What it costs, at its full rate; a slow one holds as much memory as another."""
+        return self.size[0] * self.size[1] * max(self.fps, _LEAST_COUNTED_FPS)
 
     @property
     def aspect(self) -> float:

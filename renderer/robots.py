@@ -29,6 +29,7 @@ _RING = 512
 _TOPICS = ("description", "frames", "joints", "controller", "kinematics")
 # Who makes a robot be there. A service that begins anew is back sooner than its robot is forgotten.
 _MAKERS = ("gateway", "kinematics", "player")
+_DESCRIBERS = ("kinematics", "player")
 _FORGET_AFTER_S, _FORGET_REPLAY_AFTER_S = 15.0, 1.0
 
 
@@ -69,6 +70,8 @@ class Robots:
         self._loading: dict[str, asyncio.Task[None]] = {}
         self._makers: defaultdict[str, set[tuple[str, str]]] = defaultdict(set)
         self._forgetting: dict[str, asyncio.TimerHandle] = {}
+        # They may come again, be what they were, and then nobody tells it again.
+        self._forgotten: set[str] = set()
 
     async def follow(self) -> None:
         """Follow the site's robots until cancelled."""
@@ -77,7 +80,7 @@ class Robots:
                 subscription = self._session.subscribe(f"{ROOT}/{self._site}/*/{name}", newest=_RING)
                 self._subscriptions[name] = subscription
                 group.create_task(self._take_all(subscription, group))
-            group.create_task(self._watch_makers())
+            group.create_task(self._watch_makers(group))
 
     def ages(self, state: RobotState) -> Ages:
         """How old what is known of a robot is, now."""
@@ -128,10 +131,26 @@ class Robots:
         elif isinstance(message, KinematicState):
             state.take_kinematics(message, self.states)
         elif isinstance(message, Description):
-            before = self._loading.get(state.name)
-            if before is not None:
-                before.cancel()
-            self._loading[state.name] = group.create_task(self._load(state, message))
+            self._describe(state, message, group)
+
+    def _describe(self, state: RobotState, description: Description, group: asyncio.TaskGroup) -> None:
+        self._forgotten.discard(state.name)
+        before = self._loading.get(state.name)
+        if before is not None:
+            before.cancel()
+        self._loading[state.name] = group.create_task(self._load(state, description))
+
+    async def _describe_again(self, robot: str, group: asyncio.TaskGroup) -> None:
+        """Ask what a robot is that was forgotten: told once, it is nothing new to the subscription."""
+        key = robot_key(self._site, robot, "description")
+        while robot in self._forgotten and robot in self._makers:
+            try:
+                told = await self._session.last(key)
+            except BusError as error:
+                log.warning("%s: %s", key, error)
+                return
+            if isinstance(told, Description) and robot in self._forgotten:
+                self._describe(self.states.setdefault(robot, RobotState(self._site, robot)), told, group)
 
     async def _load(self, state: RobotState, description: Description) -> None:
         """Make a robot's pictures possible: its look, its meshes."""
@@ -178,7 +197,7 @@ class Robots:
         except RendererError as error:
             log.error("%s of %s/%s is not drawn: %s", body.name, state.site, state.name, error)
 
-    async def _watch_makers(self) -> None:
+    async def _watch_makers(self, group: asyncio.TaskGroup) -> None:
         async for who, alive in self._session.watch_presence(f"{ROOT}/{self._site}/*/alive/*/*"):
             if who.service not in _MAKERS:
                 continue
@@ -187,6 +206,8 @@ class Robots:
             waiting = self._forgetting.pop(who.robot, None)
             if waiting is not None:
                 waiting.cancel()
+            if alive and who.robot in self._forgotten and who.service in _DESCRIBERS:
+                group.create_task(self._describe_again(who.robot, group))
             if not makers:
                 del self._makers[who.robot]
                 state = self.states.get(who.robot)
@@ -204,6 +225,7 @@ class Robots:
         state = self.states.pop(robot, None)
         if state is not None:
             log.info("%s/%s is there no more", state.site, state.name)
+            self._forgotten.add(robot)
             self._follower.gone(state)
 
 

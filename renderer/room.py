@@ -1,11 +1,12 @@
 """Room for views that are asked for: what all of them may cost together, and each name's share."""
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Protocol
 
 from bus.errors import QuotaError
-from renderer.errors import NoRoomError
+from renderer.errors import NoRoomError, ViewRequestError
 from renderer.requested import Shot
 
 # Of as many views as may be asked for, so many may be as large and fast as the renderer's own, or as this.
@@ -50,6 +51,7 @@ class Room:
             views: Those that are drawn because somebody asked.
 
         Raises:
+            ViewRequestError: If there never is room for it here.
             NoRoomError: If there is no place for it, whoever asks.
             QuotaError: If this asker has its share.
         """
@@ -58,12 +60,17 @@ class Room:
                 f"{len(views)} views were asked for already, and {self.most_views} are possible "
                 "(most_views of the site file's [renderer]): ask again when some of them end"
             )
-        left = self._most_pixels_per_s - _pixels_per_s(views)
+        most = self._most_pixels_per_s
+        if shot.pixels_per_s > most:
+            raise ViewRequestError(
+                f"{_cost(shot)}: {most / 1e6:.1f} million is all that there is for views that are asked for; "
+                f"{math.floor(most / (shot.size[0] * shot.size[1]))} a second is possible, more with a "
+                "larger size, fps or most_views in the site file's [renderer]"
+            )
+        left = most - _pixels_per_s(views)
         if shot.pixels_per_s > left:
             raise NoRoomError(
-                f"{shot.size[0]} x {shot.size[1]} at {shot.fps:g} a second is {shot.pixels_per_s / 1e6:.1f} "
-                f"million pixels a second: {max(left, 0.0) / 1e6:.1f} of "
-                f"{self._most_pixels_per_s / 1e6:.1f} million are left "
+                f"{_cost(shot)}: {max(left, 0.0) / 1e6:.1f} of {most / 1e6:.1f} million are left "
                 "for views that are asked for; ask for a smaller or slower one"
             )
         while not self._fits(views, shot, asker):
@@ -107,6 +114,11 @@ class Room:
 
 def _had(views: Collection[AskedFor], asker: str) -> list[AskedFor]:
     return [view for view in views if view.askers[:1] == [asker]]
+
+
+def _cost(shot: Shot) -> str:
+    size = f"{shot.size[0]} x {shot.size[1]}"
+    return f"{size} at {shot.fps:g} a second counts for {shot.pixels_per_s / 1e6:.1f} million pixels a second"
 
 
 def _pixels_per_s(views: Collection[AskedFor]) -> float:

@@ -191,12 +191,9 @@ class Stream:
     async def _publish(
         self, now: float, drawn: Drawn, order: Order, source_time_ns: int, dated_by: int | None
     ) -> None:
-        try:
-            finished = await self._workshop.finish(drawn, order)
-        except Exception as error:
-            self._failed(now, error)
-            return
-        if self._closed:
+        # Of a stream that is closed the encoder is released, and a new one would be nobody's.
+        finished = None if self._closed else await self._finished(now, drawn, order)
+        if finished is None or self._closed:
             return
         if finished.packet is not None:
             message = CompressedVideo(frame_id=self._frame_id, data=finished.packet.data, format="h264")
@@ -215,6 +212,13 @@ class Stream:
             if self._image_watched:
                 self._image.put(picture, source_time_ns=source_time_ns, dated_by=dated_by)
 
+    async def _finished(self, now: float, drawn: Drawn, order: Order) -> Finished | None:
+        try:
+            return await self._workshop.finish(drawn, order)
+        except Exception as error:
+            self._failed(now, error)
+            return None
+
     def _failed(self, now: float, error: Exception) -> None:
         where = f"{self.state.site}/{self.name}"
         if isinstance(error, RendererError):
@@ -223,6 +227,8 @@ class Stream:
             log.exception("%s could not be drawn; tried again in %g s", where, _TRY_AGAIN_S)
         # A new encoder begins with a key frame.
         self._key_frames = KeyFrameClock()
+        # What was drawn before is not how it is now.
+        self._last_image = None
         self._not_before = now + _TRY_AGAIN_S
 
     async def _answer_get(self) -> CompressedImage | None:

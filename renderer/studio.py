@@ -21,8 +21,9 @@ from renderer.overlay import Picture
 from renderer.scene import Scene
 
 _NICE = 5
-# A size that nobody watches any more is let go; the next who does pays for opening it.
-_UNUSED_S = 20.0
+# A size that nobody watches any more is let go: 1920 x 1080 holds a hundred megabytes. The next who watches
+# it pays for opening it.
+_UNUSED_S = 6.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,5 +1,7 @@
 """Each example is a whole program, run as a user runs it."""
 
+import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -19,16 +21,42 @@ def site(tmp_path_factory):
         yield running
 
 
-def test_joints_prints_joints(site):
+def test_joints_prints_joints_and_ends_quietly_with_its_reader(site):
     program = subprocess.Popen(
-        [sys.executable, str(EXAMPLES / "joints.py"), site.router], stdout=subprocess.PIPE, text=True
+        [sys.executable, str(EXAMPLES / "joints.py"), site.router],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
     try:
         lines = [program.stdout.readline() for _ in range(3)]
+        program.stdout.close()
+        assert (program.stderr.read(), program.wait(40)) == ("", 0)
     finally:
         program.kill()
-        program.communicate()
+        program.wait()
+        program.stderr.close()
     assert all(line.startswith("robomesh/test/arm/joints/slow waist ") for line in lines)
+
+
+@pytest.mark.parametrize(
+    "arguments", [("check.py", "examples/square.program"), ("inverse.py", "400", "0", "300")]
+)
+def test_what_nobody_reads_any_more_ends_quietly(site, arguments):
+    reader, writer = os.pipe()
+    os.close(reader)
+    name, *words = arguments
+    try:
+        result = subprocess.run(
+            [sys.executable, f"examples/{name}", *words, "test/arm", site.router],
+            stdout=writer,
+            stderr=subprocess.PIPE,
+            timeout=60,
+            cwd=EXAMPLES.parent,
+        )
+    finally:
+        os.close(writer)
+    assert (result.stderr, result.returncode) == (b"", -signal.SIGPIPE)
 
 
 def test_home_goes_home_and_gives_control_back(site):

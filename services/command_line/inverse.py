@@ -1,7 +1,6 @@
 """`robomesh ik`: where the joints must be for the tool to be there."""
 
 import json
-import sys
 from collections.abc import Sequence
 from math import degrees, isfinite, radians
 from typing import Any
@@ -15,7 +14,7 @@ from robots.inverse import InverseResult, InverseSolver, Task, build_solver, nat
 from robots.joints import JointType
 from robots.poses import rpy_rotation
 from services.command_line.find import print_json
-from services.command_line.robots import RequestError
+from services.command_line.robots import RequestError, request_lines
 
 _KEYS = {"pose", "task", "near", "all", "seed"}
 _EXAMPLE = '{"pose": [[1, 0, 0, 0.3], ...], "task": "6d", "near": [...], "all": false, "seed": 0}'
@@ -85,9 +84,7 @@ def _print_result(solver: InverseSolver, result: InverseResult) -> None:
 
 def _answer_lines(solver: InverseSolver, task: Task | None, all_solutions: bool) -> None:
     failed = False
-    for line in sys.stdin:
-        if not line.strip():
-            continue
+    for line in request_lines():
         try:
             result = _answer(solver, line, task, all_solutions)
         except (RobotError, RequestError) as error:
@@ -119,7 +116,7 @@ def _answer(solver: InverseSolver, line: str, task: Task | None, all_solutions: 
     except (ValueError, RecursionError):
         unknown = None
     if unknown is None or "pose" not in request:
-        raise RequestError(f"{line.strip()[:200]!r} is no request; {_EXAMPLE} is right, in rad and m")
+        raise RequestError(f"{line[:200]!r} is no request; {_EXAMPLE} is right, in rad and m")
     if unknown:
         raise RequestError(f"{unknown[0]!r}: {', '.join(sorted(_KEYS))} are right")
     seed, near, every = request.get("seed", 0), request.get("near"), request.get("all", all_solutions)

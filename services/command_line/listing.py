@@ -55,6 +55,7 @@ async def _once(router: str, as_json: bool) -> None:
 
 
 async def _watch(router: str, as_json: bool) -> None:
+    from rich.console import Console
     from rich.live import Live
 
     async with find.attached(router) as session:
@@ -63,9 +64,13 @@ async def _watch(router: str, as_json: bool) -> None:
             while True:
                 find.print_json(await _collect(session, around))
                 await asyncio.sleep(_AGAIN_S)
-        with Live(screen=False, auto_refresh=False, vertical_overflow="crop") as live:
+        console = Console()
+        while not console.is_terminal:  # Live draws on a screen alone, and a pipe has none
+            console.print(picture(await _collect(session, around), console.width))
+            await asyncio.sleep(_AGAIN_S)
+        with Live(console=console, screen=False, auto_refresh=False, vertical_overflow="crop") as live:
             while True:
-                live.update(picture(await _collect(session, around), live.console.width), refresh=True)
+                live.update(picture(await _collect(session, around), console.width), refresh=True)
                 await asyncio.sleep(_AGAIN_S)
 
 

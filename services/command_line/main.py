@@ -5,6 +5,7 @@ Everything heavy is imported by the command that needs it.
 """
 
 import os
+import select
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -245,7 +246,14 @@ def ik(
 
 def main() -> None:
     """The program."""
-    sys.exit(run(sys.argv[1:]))
+    status = run(sys.argv[1:])
+    try:
+        # What waits yet is said now: the interpreter's own end would tell who cannot hear it.
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        _say_no_more()
+    sys.exit(status)
 
 
 def run(arguments: list[str]) -> int:
@@ -260,19 +268,34 @@ def run(arguments: list[str]) -> int:
         )
     except (KeyboardInterrupt, typer.Abort):
         return 130
-    except BrokenPipeError:
-        # Whoever read our output has gone; nothing more can be said there.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except SystemExit:
+        # So typer and rich end a command whose reader has gone.
+        _say_no_more()
         return 0
     except Exception as error:
         # Services run their robots in task groups.
         while isinstance(error, ExceptionGroup):
             error = error.exceptions[0]
+        if isinstance(error, BrokenPipeError) and _is_unread():
+            _say_no_more()
+            return 0
         if isinstance(error, _known_errors()):
             return _could_not(str(error))
         if os.environ.get("ROBOMESH_DEBUG"):
             raise
         return _could_not(f"a fault of robomesh itself: {error!r} (ROBOMESH_DEBUG=1 shows where)")
+
+
+def _is_unread() -> bool:
+    """Whether whoever read our output has gone: another pipe that breaks is a fault."""
+    output = select.poll()
+    output.register(1, 0)
+    return any(event & select.POLLERR for _, event in output.poll(0))
+
+
+def _say_no_more() -> None:
+    """Let what would still be said go nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _could_not(text: str) -> int:

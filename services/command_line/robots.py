@@ -2,6 +2,7 @@
 
 import json
 import sys
+from collections.abc import Iterator
 from math import degrees, isfinite
 from pathlib import Path
 from typing import Any
@@ -164,9 +165,7 @@ def forward(robot: str, requests: str) -> None:
         raise RequestError(f"{requests!r}: '-' is right, and one JSON request a line on standard input")
     model = build_model(load(robot))
     failed = False
-    for line in sys.stdin:
-        if not line.strip():
-            continue
+    for line in request_lines():
         try:
             positions = _joint_positions(line)
             placements = link_placements(model, positions)
@@ -179,6 +178,13 @@ def forward(robot: str, requests: str) -> None:
         raise typer.Exit(1)
 
 
+def request_lines() -> Iterator[str]:
+    """Standard input's lines, but for empty ones; what is no UTF-8 is no reason to answer none behind it."""
+    for line in sys.stdin.buffer:
+        if text := line.decode(errors="replace").strip():
+            yield text
+
+
 def _joint_positions(line: str) -> list[float]:
     try:
         positions = json.loads(line, parse_constant=_refuse)["joints"]
@@ -186,9 +192,9 @@ def _joint_positions(line: str) -> list[float]:
         if not all(map(isfinite, found)):
             raise ValueError
         return found
-    except (ValueError, TypeError, KeyError):
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
         raise RequestError(
-            f'{line.strip()!r} is no request; {{"joints": [0.1, 0.2]}} is right, in rad and m'
+            f'{line[:200]!r} is no request; {{"joints": [0.1, 0.2]}} is right, in rad and m'
         ) from None
 
 

@@ -4,7 +4,6 @@ import asyncio
 import logging
 import socket
 import ssl
-import sys
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Hashable
@@ -26,6 +25,8 @@ from services.site import Robot, Site
 from services.started import may_start, read_started
 from services.supervisor import Program, supervise
 
+log = logging.getLogger(__name__)
+
 _CONSOLE_POLL_S = 0.1
 
 
@@ -35,6 +36,7 @@ def run(path: Path | None, metrics: str = "") -> None:
     Args:
         metrics: HOST:PORT of the first service's numbers for Prometheus; empty: nobody serves them.
     """
+    _say_lines_as_they_are()
     # The services say themselves that they wait for their router.
     logging.getLogger("bus").setLevel(logging.ERROR)
     site = site_file.load(path)
@@ -188,7 +190,8 @@ async def _until_on_the_page(site: Site, endpoint: str) -> None:
 
 def _console_url(site: Site) -> str:
     host, port = split_address(site.console.listen)
-    return f"{site.console.scheme}://{'127.0.0.1' if host in ('0.0.0.0', '::') else host}:{port}/"
+    host = "127.0.0.1" if host in ("0.0.0.0", "::") else host
+    return f"{site.console.scheme}://{f'[{host}]' if ':' in host else host}:{port}/"
 
 
 def _answers(url: str) -> bool:
@@ -210,5 +213,13 @@ def _free_port() -> int:
         return port
 
 
+def _say_lines_as_they_are() -> None:
+    """A terminal that is held, or whose reader has gone, must hold no site: restarts go on unseen."""
+    service.log_to_stderr(logging.WARNING)
+    for handler in logging.getLogger().handlers:
+        handler.setFormatter(logging.Formatter("%(message)s"))
+    log.setLevel(logging.INFO)
+
+
 def _write(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)
+    log.info("%s", line)

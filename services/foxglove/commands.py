@@ -146,6 +146,7 @@ class Commands:
         answered: "asyncio.Future[tuple[bool, str]]",
     ) -> None:
         """Take control, send, answer, and keep it until the motion ends or the client lets go."""
+        holding: _Holding | None = None
         try:
             async with control(self._session, site, robot, self._operator) as own:
                 holding = _Holding(client, own)
@@ -162,7 +163,9 @@ class Commands:
             else:
                 answered.set_exception(error)
         finally:
-            self._holding.pop((site, robot), None)
+            # Whoever was refused control leaves it to the client that has it.
+            if holding is not None and self._holding.get((site, robot)) is holding:
+                del self._holding[site, robot]
             if not answered.done():
                 answered.cancel()
 

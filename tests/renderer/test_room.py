@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from bus.errors import QuotaError
-from renderer.errors import NoRoomError
+from renderer.errors import NoRoomError, ViewRequestError
 from renderer.requested import Shot
 from renderer.room import Room
 from renderer.service import Settings
@@ -17,7 +17,7 @@ def room(**changed):
     width, height = settings.size
     own = width * height * settings.fps
     values = {"most_views": settings.most_views, "quota": settings.quotas.views, "again_s": 5.0}
-    return Room(own_pixels_per_s=own, **(values | changed))
+    return Room(**({"own_pixels_per_s": own} | values | changed))
 
 
 def shot(width=320, height=180, fps=15.0):
@@ -42,6 +42,16 @@ def test_the_largest_view_is_within_everybody_s_share_and_a_second_one_is_not():
         room().check(views(["li"], of=largest), largest, "wang")
 
 
+def test_what_never_has_room_is_told_so_and_what_would_have_it():
+    fastest = shot(1920, 1080, 60.0)
+    with pytest.raises(ViewRequestError, match=r"124\.4 million .* 53 a second is possible") as caught:
+        room().check([], fastest, "li")
+    assert not isinstance(caught.value, NoRoomError)
+    room().check([], shot(1920, 1080, 53.0), "li")
+    # As a site file with a GPU behind it has it.
+    room(own_pixels_per_s=1920 * 1080 * 60.0).check([], fastest, "li")
+
+
 def test_a_view_that_another_asked_for_too_counts_for_that_one_before_its_asker_is_refused():
     there = views(["li", "wang"], ["li"])
     small = room(quota=2)
@@ -60,3 +70,10 @@ def test_a_view_that_another_asked_for_too_counts_for_that_one_before_its_asker_
 def test_without_views_that_may_be_asked_for_there_is_no_room():
     with pytest.raises(NoRoomError, match="0 are possible"):
         room(most_views=0).check([], shot(), "li")
+
+
+def test_a_slow_view_counts_for_the_memory_that_it_holds():
+    slow = shot(1920, 1080, 1.0)
+    room().check(views(["li"], of=slow), slow, "li")
+    with pytest.raises(QuotaError, match="li has 2 views already"):
+        room().check(views(["li"], ["li"], of=slow), slow, "li")

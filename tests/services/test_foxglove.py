@@ -240,7 +240,7 @@ def test_commands_are_one_operators_and_end_with_the_client_that_gave_them(mesh,
             bridge(mesh, operator="li") as address,
         ):
             plant.own.declare_presence("hall", "arm", "gateway")
-            async with attached(address) as client:
+            async with attached(address) as client, attached(address) as other:
                 answer = await client.call(f"{ARM}/home")
                 assert not answer["accepted"]
                 assert "watches nothing of hall/arm" in answer["text"]
@@ -258,6 +258,9 @@ def test_commands_are_one_operators_and_end_with_the_client_that_gave_them(mesh,
                 assert answer["accepted"], answer
                 await client.until(lambda: plant.controller.activity == STATE.MOVING)
                 assert plant.seen["lease"][-1].holder == "li"
+                # Another client is refused, and takes nothing from the one that moves it.
+                answer = await other.call(f"{ARM}/hold")
+                assert "li is in control with another lease" in answer["text"]
                 # The same control, for as long as it moves.
                 assert (await client.call(f"{ARM}/hold"))["accepted"]
                 await client.until(lambda: plant.controller.activity == STATE.HOLDING)

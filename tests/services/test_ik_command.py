@@ -25,7 +25,7 @@ def asked(
     lines: list[Any], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> tuple[int, list[dict[str, Any]]]:
     text = "\n".join(line if isinstance(line, str) else json.dumps(line) for line in lines)
-    monkeypatch.setattr("sys.stdin", io.StringIO(text))
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
     status = run(["ik", "--robot", "pt600", "-"])
     return status, [json.loads(line) for line in capsys.readouterr().out.splitlines()]
 

@@ -4,6 +4,7 @@ import asyncio
 import csv
 import json
 import math
+import sys
 from datetime import datetime
 
 import av
@@ -248,3 +249,76 @@ def test_a_recording_of_a_site_has_one_name_for_every_command(mesh, router, tmp_
     assert "no recording 'no', neither a file here nor in robomesh recordings list" in told.err
     assert (tmp_path / "2026_trial.mcap").read_bytes() == source.read_bytes()
     assert len((tmp_path / "out.csv").read_text().splitlines()) == 51
+
+
+def test_one_recorder_s_silence_hides_no_other_s_recordings(mesh, router, capsys):
+    async def main():
+        async with open_session(mesh) as own:
+
+            async def list_(_):
+                return schema.RecordingList(recordings=[schema.Recording(name="trial", robot="arm")])
+
+            own.answer("site", "-", "recordings/list", list_)
+            for site in ("site", "silent"):
+                own.declare_presence(site, "-", "recorder")
+            assert await asyncio.to_thread(run, ["recordings", "list", "--connect", router]) == 0
+
+    run_async(main())
+    told = capsys.readouterr()
+    assert "site/arm" in told.out
+    assert "without the recordings of silent" in told.err
+
+
+def test_a_recorder_cannot_choose_where_its_file_goes(mesh, router, tmp_path, capsys):
+    folder = tmp_path / "own"
+    folder.mkdir()
+
+    async def main():
+        async with open_session(mesh) as own:
+
+            async def list_(_):
+                return schema.RecordingList(recordings=[schema.Recording(name="trial", file="../taken.mcap")])
+
+            async def piece(_):
+                return schema.Piece(data=b"x", total=1, version="1")
+
+            own.answer("site", "-", "recordings/list", list_)
+            own.answer("site", "-", "recordings/piece/*", piece)
+            own.declare_presence("site", "-", "recorder")
+            arguments = ["recordings", "fetch", "trial", str(folder), "--connect", router]
+            assert await asyncio.to_thread(run, arguments) == 2
+
+    run_async(main())
+    assert "'../taken.mcap', which is no file's name" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["own"]
+    assert not list(folder.iterdir())
+
+
+def test_a_replay_whose_player_goes_ends_for_who_plays_it(mesh, router):
+    async def main():
+        async with open_session(mesh) as own:
+
+            async def list_(_):
+                return schema.RecordingList(recordings=[schema.Recording(name="trial", file="trial.mcap")])
+
+            async def open_(_):
+                return schema.ReplayState(robot="replay-x", file="trial.mcap")
+
+            own.answer("site", "-", "recordings/list", list_)
+            own.answer("site", "-", "player/open", open_)
+            own.declare_presence("site", "-", "recorder")
+            playing = await asyncio.create_subprocess_exec(
+                *(sys.executable, "-m", "services.command_line.main"),
+                *("recordings", "play", "trial", "--connect", router),
+                stdout=asyncio.subprocess.PIPE,
+                stderr=asyncio.subprocess.PIPE,
+            )
+            try:
+                _, told = await playing.communicate()
+            finally:
+                if playing.returncode is None:
+                    playing.kill()
+                    await playing.wait()
+            assert (playing.returncode, b"its player is gone" in told) == (2, True), told
+
+    run_async(main())

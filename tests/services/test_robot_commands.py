@@ -1,5 +1,6 @@
 """`robomesh robot check|show|import|export`: what they print, write and refuse."""
 
+import io
 import json
 from pathlib import Path
 
@@ -216,3 +217,16 @@ def test_exported_urdf_names_meshes_that_are_there(arm: Path, tmp_path: Path) ->
         placements(robot, [1.0, 0.2])[1],
         atol=1e-12,
     )
+
+
+@pytest.mark.parametrize(
+    "line",
+    [b'{"joints": \xff}', b'{"joints": [1' + 400 * b"0" + b", 0, 0, 0, 0]}", b'{"joints": ' + 100_000 * b"["],
+)
+def test_a_line_that_fk_cannot_answer_is_told_and_the_next_is_answered(line, capsys, monkeypatch):
+    lines = line + b'\n{"joints": [0, 0, 0, 0, 0]}\n'
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(lines)))
+    assert run(["fk", "-"]) == 1
+    wrong, right = map(json.loads, capsys.readouterr().out.splitlines())
+    assert "is no request" in wrong["error"]
+    assert len(right["tool"]) == 4

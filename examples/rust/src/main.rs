@@ -4,6 +4,8 @@
 //!
 //! Get, then subscribe: the answer to a get is the last value, as old as it may be; what comes afterwards is live.
 
+use std::io::{self, ErrorKind, Write};
+
 use prost::Message;
 use robomesh::{controller_state::Activity, controller_state::Link, controller_state::Mode, ControllerState};
 use zenoh::{Config, Wait};
@@ -16,6 +18,14 @@ mod robomesh {
 const STATES: &str = "robomesh/*/*/controller";
 
 fn main() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+    match watch() {
+        // Whoever read it has gone: `| head`.
+        Err(error) if error.downcast_ref::<io::Error>().is_some_and(|e| e.kind() == ErrorKind::BrokenPipe) => Ok(()),
+        ended => ended,
+    }
+}
+
+fn watch() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
     let mut arguments = std::env::args().skip(1);
     let router = arguments.next().unwrap_or_else(|| "tcp/127.0.0.1:7447".to_string());
 
@@ -35,22 +45,23 @@ fn main() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
     let live = session.declare_subscriber(STATES).wait()?;
     for reply in session.get(STATES).wait()? {
         if let Ok(last) = reply.result() {
-            print_state(last, "last");
+            print_state(last, "last")?;
         }
     }
     while let Ok(sample) = live.recv() {
-        print_state(&sample, "live");
+        print_state(&sample, "live")?;
     }
     Ok(())
 }
 
-fn print_state(sample: &zenoh::sample::Sample, how: &str) {
+fn print_state(sample: &zenoh::sample::Sample, how: &str) -> io::Result<()> {
     // Attached to every publication: publisher, sequence, source time [ns], little-endian.
     let sequence = sample
         .attachment()
         .and_then(|bytes| Some(u64::from_le_bytes(bytes.to_bytes().get(8..16)?.try_into().ok()?)));
     match ControllerState::decode(&*sample.payload().to_bytes()) {
-        Ok(state) => println!(
+        Ok(state) => writeln!(
+            io::stdout(),
             "{how} {} #{} link {} mode {} {}{}",
             sample.key_expr(),
             sequence.unwrap_or(0),
@@ -59,6 +70,6 @@ fn print_state(sample: &zenoh::sample::Sample, how: &str) {
             Activity::try_from(state.activity).map_or("?", |activity| activity.as_str_name()),
             state.last_unit_age_s.map_or(String::new(), |age| format!(", {age:.2} s old")),
         ),
-        Err(error) => eprintln!("{}: {error}", sample.key_expr()),
+        Err(error) => writeln!(io::stderr(), "{}: {error}", sample.key_expr()),
     }
 }

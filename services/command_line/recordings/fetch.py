@@ -69,6 +69,9 @@ async def _fetch(what: str, out: Path, router: str, *, into: bool) -> _Fetched:
     async with attached_for(what, router) as session:
         site, recording = await found(session, what)
         name = recording.file
+        # It comes from whoever answered there: nothing but a name may become a path here.
+        if name in ("", ".", "..") or Path(name).name != name:
+            raise ExportError(f"{what}: its recorder names the file {name!r}, which is no file's name")
         out = out / name if into else out
         key = robot_key(site, WHOLE_SITE, f"recordings/piece/{session.own_name}")
         first = await _piece(session, key, schema.PieceRequest(file=name, length=1))

@@ -1,17 +1,21 @@
 """`robomesh recordings list` and `info`: what is recorded, and what a file holds."""
 
+import asyncio
+import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from bus.errors import SessionError
+from bus.errors import BusError, SessionError
 from bus.keys import WHOLE_SITE, robot_key
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
 from services.command_line import find
 from services.command_line.recordings.errors import ExportError
+
+_TIMEOUT_S = 10.0
 
 
 def list_all(router: str, as_json: bool) -> None:
@@ -69,14 +73,29 @@ class Listed(NamedTuple):
 
 
 async def listed(session: Session) -> list[Listed]:
-    """The recordings of every site, the newest first."""
-    sites = {key.site for key in await session.present() if key.service == "recorder"}
+    """The recordings of every site, the newest first; a recorder that does not answer hides no other's.
+
+    Raises:
+        BusError: If none answers.
+    """
+    sites = sorted({key.site for key in await session.present() if key.service == "recorder"})
+    answers = await asyncio.gather(*(_of_site(session, site) for site in sites), return_exceptions=True)
     found: list[Listed] = []
-    for site in sorted(sites):
-        answer = await session.ask(robot_key(site, WHOLE_SITE, "recordings/list"), timeout_s=10.0)
-        assert isinstance(answer, schema.RecordingList)
-        found += [Listed(site, recording) for recording in answer.recordings]
+    for site, answer in zip(sites, answers, strict=True):
+        if isinstance(answer, schema.RecordingList):
+            found += [Listed(site, recording) for recording in answer.recordings]
+        elif not isinstance(answer, BusError) or all(isinstance(each, BusError) for each in answers):
+            raise answer
+        else:
+            print(f"robomesh: without the recordings of {site}: {answer}", file=sys.stderr)
     return sorted(found, key=lambda each: each.recording.start.ToNanoseconds(), reverse=True)
+
+
+async def _of_site(session: Session, site: str) -> schema.RecordingList:
+    key = robot_key(site, WHOLE_SITE, "recordings/list")
+    answer = await session.ask(key, timeout_s=_TIMEOUT_S)
+    assert isinstance(answer, schema.RecordingList)
+    return answer
 
 
 async def found(session: Session, what: str, *, closed: bool = False) -> Listed:
@@ -118,7 +137,7 @@ def info(what: str, router: str, as_json: bool) -> None:
         async with attached_for(what, router) as session:
             site, recording = await found(session, what)
             key = robot_key(site, WHOLE_SITE, "recordings/info")
-            answer = await session.ask(key, schema.RecordingQuery(file=recording.file), timeout_s=10.0)
+            answer = await session.ask(key, schema.RecordingQuery(file=recording.file), timeout_s=_TIMEOUT_S)
             assert isinstance(answer, schema.Recording)
             return answer
 

@@ -19,6 +19,8 @@ from services.command_line.recordings.listing import attached_for, found
 from services.command_line.recordings.output import progress
 
 _OPEN_WITHIN_S = 20.0
+# A player tells where it is five times a second, paused too.
+_SILENT_S = 5.0
 
 
 def run(what: str, asked: schema.PlayRequest, router: str) -> None:
@@ -89,7 +91,11 @@ async def _of_site(
 
 
 async def _until_ended(session: Session, key: str) -> None:
-    """Until Ctrl-C, or the end of what is not played again and again."""
+    """Until Ctrl-C.
+
+    Raises:
+        ExportError: If it ends by itself, with the reason.
+    """
     ended = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -98,8 +104,16 @@ async def _until_ended(session: Session, key: str) -> None:
     with progress("playing") as tell:
 
         async def follow() -> None:
-            async for sample in subscription:
-                state = sample.message()
+            while True:
+                try:
+                    async with asyncio.timeout(_SILENT_S):
+                        state = (await anext(subscription)).message()
+                except StopAsyncIteration:
+                    return
+                except TimeoutError:
+                    raise ExportError(
+                        "the replay has ended: somebody closed it, or its player is gone"
+                    ) from None
                 assert isinstance(state, schema.ReplayState)
                 tell(state.position_s / state.duration_s if state.duration_s else 1.0)
                 if state.text:

@@ -1,0 +1,91 @@
+"""What the command line says, and where nobody reads it: `robomesh ... | head`, a terminal that is held."""
+
+import os
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from services.command_line.up import _console_url
+from services.site import Site
+from services.site_console import Console
+
+ROBOMESH = (sys.executable, "-m", "services.command_line.main")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "lines"),
+    [
+        (("robot", "show", "pt600"), ""),
+        (("fk", "-"), '{"joints": [0, 0, 0, 0, 0]}\n' * 3),
+        (("simulate", "--listen", "127.0.0.1:0"), ""),
+    ],
+)
+def test_a_command_ends_quietly_when_its_reader_has_gone(arguments, lines):
+    reader, writer = os.pipe()
+    os.close(reader)
+    try:
+        result = subprocess.run(
+            [*ROBOMESH, *arguments],
+            input=lines,
+            stdout=writer,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=60,
+            # As in a shell: what is said waits for the end.
+            env={name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"},
+        )
+    finally:
+        os.close(writer)
+    assert (result.stderr, result.returncode) == ("", 0)
+
+
+def test_a_site_goes_on_when_nobody_takes_its_log():
+    program = (
+        "from services.command_line import up\n"
+        "up._say_lines_as_they_are()\n"
+        "for number in range(3000): up._write(f'{number:<200}')\n"
+        "print('goes on', flush=True)\n"
+    )
+    held = subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    deadline = threading.Timer(40.0, held.kill)
+    deadline.start()
+    try:
+        assert held.stdout.readline() == "goes on\n"
+        # And what it said is there for who comes later, as it was said.
+        assert held.stderr.readline() == f"{0:<200}\n"
+    finally:
+        deadline.cancel()
+        held.kill()
+        held.communicate()
+
+
+def test_list_watch_fills_a_pipe_and_ends_quietly_with_its_reader(router):
+    watching = subprocess.Popen(
+        [*ROBOMESH, "list", "--watch", "--connect", router],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    deadline = threading.Timer(50.0, watching.kill)
+    deadline.start()
+    try:
+        assert any("service" in line for line in watching.stdout)
+        watching.stdout.close()
+        assert (watching.stderr.read(), watching.wait()) == ("", 0)
+    finally:
+        deadline.cancel()
+        watching.kill()
+        watching.wait()
+        watching.stderr.close()
+
+
+@pytest.mark.parametrize(
+    ("listen", "told"),
+    [("0.0.0.0:8443", "127.0.0.1:8443"), ("[::1]:8080", "[::1]:8080"), ("10.0.0.7:80", "10.0.0.7:80")],
+)
+def test_up_tells_where_a_browser_finds_the_page(listen, told):
+    assert _console_url(Site(site="hall", console=Console(listen=listen))) == f"http://{told}/"
