@@ -149,15 +149,18 @@ def alive(pid: int) -> bool:
 
 
 def wait_until(condition, timeout_s: float = 40.0, what: str = "") -> None:
-    """Wait for a condition.
+    """Wait for a condition, with as much time between two looks at it as a look takes.
 
     Raises:
         AssertionError: If it does not come about in time.
     """
-    deadline = time.monotonic() + timeout_s
+    began = time.monotonic()
+    deadline = began + timeout_s
     while not condition():
-        assert time.monotonic() < deadline, what or "it did not come about in time"
-        time.sleep(0.05)
+        looked = time.monotonic()
+        assert looked < deadline, what or "it did not come about in time"
+        time.sleep(max(looked - began, 0.05))
+        began = time.monotonic()
 
 
 def kill(pid: int, number: int = signal.SIGKILL) -> None:

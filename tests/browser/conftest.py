@@ -26,13 +26,19 @@ from tests.cells import arm_alone
 from tests.conftest import free_port
 
 CHROMIUM = Path("/usr/bin/chromium")
+# What an address bar offers is drawn for each page by two processes more, and a third waits for the next one.
+# The last such list counts: the others are Playwright's that could matter here.
+WITHOUT = (
+    *("WebUIOmniboxPopup", "WebUIOmniboxAimPopup", "SpareRendererForSitePerProcess"),
+    *("HttpsUpgrades", "PaintHolding", "OptimizationHints"),
+)
 ARGUMENTS = [
     "--no-sandbox",
-    "--use-angle=swiftshader",
+    # Only 3-D is drawn as a graphics processor would: of the page itself that costs more than plain drawing.
+    "--use-angle=swiftshader-webgl",
     "--enable-unsafe-swiftshader",
-    # What an address bar offers is drawn for each page by two processes more, half of what a page costs. The
-    # last such list counts: the others are Playwright's that could matter here.
-    "--disable-features=WebUIOmniboxPopup,WebUIOmniboxAimPopup,HttpsUpgrades,PaintHolding,OptimizationHints",
+    "--disable-gpu-rasterization",  # which Debian asks for
+    f"--disable-features={','.join(WITHOUT)}",
 ]
 STARTED_S = 60.0
 NO_WEBGL = """
@@ -52,6 +58,7 @@ class Plant:
         console: Settings of the console beyond where it listens.
         address: Of the console.
         endpoint: Of the router.
+        rate_hz: States a second of each arm: as lively to a person as the 100 of real ones, and cheaper.
         legacy_port: Where old client programs attach to `pt600`; to `arm` none may.
         session: A session of the tests' own on the mesh; use it in the plant's thread, by `call`.
     """
@@ -60,6 +67,7 @@ class Plant:
     fixtures: tuple[Fixture, ...] = ()
     robots: tuple[str, ...] = ("arm", "pt600")
     console: dict = field(default_factory=dict)
+    rate_hz: float = 25.0
     address: str = ""
     endpoint: str = field(default_factory=lambda: f"tcp/127.0.0.1:{free_port()}")
     legacy_port: int = field(default_factory=free_port)
@@ -76,7 +84,9 @@ class Plant:
     def start_controller(self, name, port=0, **settings):
         async def start():
             said = self.loop.create_future()
-            settings_ = simulator.Settings(robot="pt600", listen=f"127.0.0.1:{port}", **settings)
+            settings_ = simulator.Settings(
+                robot="pt600", listen=f"127.0.0.1:{port}", **{"rate_hz": self.rate_hz, **settings}
+            )
             task = self.loop.create_task(simulator.serve(settings_, ready=said.set_result))
             await asyncio.wait([said, task], return_when=asyncio.FIRST_COMPLETED)
             self.controllers[name] = (task, int((await said).rpartition(":")[2]))
@@ -93,7 +103,8 @@ class Plant:
         mesh = SessionSettings(connect=(self.endpoint,), wait_s=5.0)
         with zenoh.open(router_config((self.endpoint,))):
             await self.start_controller("arm", mesh=Mesh(site="hall", robot="arm", session=mesh))
-            await self.start_controller("pt600", demo=True)
+            if "pt600" in self.robots:
+                await self.start_controller("pt600", demo=True)
             async with (
                 open_session(mesh) as self.session,
                 open_session(mesh) as for_gateway,
@@ -173,9 +184,16 @@ class Plant:
 
 @pytest.fixture(scope="module")
 def plant(request, tmp_path_factory) -> Iterator[Plant]:
-    """A site `hall` of two arms, a module's FIXTURES around them: `arm` rests, `pt600` moves by itself."""
-    fixtures = getattr(request.module, "FIXTURES", ())
-    yield from run_plant(Plant(audit=tmp_path_factory.mktemp("audit"), fixtures=fixtures))
+    """A site `hall` of two arms, a module's FIXTURES around them: `arm` rests, `pt600` moves by itself.
+
+    A module that says ROBOTS has those alone.
+    """
+    of_module = {
+        name: getattr(request.module, name.upper())
+        for name in ("fixtures", "robots")
+        if hasattr(request.module, name.upper())
+    }
+    yield from run_plant(Plant(audit=tmp_path_factory.mktemp("audit"), **of_module))
 
 
 def run_plant(running: Plant) -> Iterator[Plant]:
@@ -196,7 +214,7 @@ def run_plant(running: Plant) -> Iterator[Plant]:
 
 @pytest.fixture(scope="module")
 def chromium(plant):
-    """A headless Chromium that draws 3-D in software."""
+    """A headless Chromium that draws 3-D in software; it ends before the site does."""
     from playwright.sync_api import expect, sync_playwright
 
     expect.set_options(timeout=40_000)  # 5 s are not enough on a busy machine
@@ -206,28 +224,65 @@ def chromium(plant):
         browser.close()
 
 
+class Contexts:
+    """Contexts of a browser, lent anew when they are as new: to make one costs more than to open a page."""
+
+    def __init__(self, browser):
+        self._browser = browser
+        self._idle = {}
+
+    def lend(self, **settings):
+        """A context that knows nothing, and what it is to be given back with."""
+        kind = tuple(sorted(settings.items()))
+        if idle := self._idle.get(kind):
+            return idle.pop(), kind
+        context = self._browser.new_context(**{"locale": "en-GB", "color_scheme": "dark", **settings})
+        context.set_default_timeout(60_000)  # a click waits until nothing moves below it
+        return context, kind
+
+    def give_back(self, context, kind, address):
+        """Ends its pages and forgets what they kept; a context where that cannot be is not lent again."""
+        from playwright.sync_api import Error
+
+        try:
+            for page in context.pages:
+                page.goto("about:blank", timeout=10_000)  # nothing is written after it was forgotten
+            kept = context.new_cdp_session(context.pages[0])
+            kept.send("Storage.clearDataForOrigin", {"origin": address, "storageTypes": "all"})
+            for page in context.pages:
+                page.close()
+        except (Error, IndexError):
+            context.close()
+        else:
+            self._idle.setdefault(kind, []).append(context)
+
+
+@pytest.fixture(scope="module")
+def contexts(chromium):
+    return Contexts(chromium)
+
+
 @pytest.fixture
-def open_page(chromium, plant):
+def open_page(contexts, plant):
     """Opens the page at a robot (or the fleet), and at the end checks that nothing went wrong in it.
 
     `drawn=False`: without 3-D, which the processor draws here, so that several pages at once have time
-    to renew their leases.
+    to renew their leases. `refused=True`: the console refuses something, which a browser takes for an error.
     """
-    contexts, wrong = [], []
+    lent, wrong = [], []
 
-    def open_one(path="", width=1440, height=900, drawn=True, **settings):
-        context = chromium.new_context(
-            viewport={"width": width, "height": height}, locale="en-GB", color_scheme="dark", **settings
-        )
-        context.set_default_timeout(60_000)  # a click waits until nothing moves below it
+    def open_one(path="", width=1440, height=900, drawn=True, refused=False, **settings):
+        context, kind = contexts.lend(**settings)
+        lent.append((context, kind))
         page = context.new_page()
+        page.set_viewport_size({"width": width, "height": height})
         page.on("pageerror", lambda error: wrong.append(f"error: {error}"))
         page.on(
             "console",
             # 504: a service that is starting or busy did not answer yet; the page asks it again.
             lambda line: (
                 wrong.append(f"{line.type}: {line.text}")
-                if line.type == "error" and "status of 504" not in line.text
+                if line.type == "error" and "status of 504" not in line.text and not refused
                 else None
             ),
         )
@@ -242,13 +297,13 @@ def open_page(chromium, plant):
         if not drawn:
             page.add_init_script(NO_WEBGL)
         page.goto(f"{plant.address}/{path}")
-        contexts.append(context)
         return page
 
     yield open_one
-    for context in contexts:
-        context.close()
-    assert wrong == []
+    found = [*wrong]  # what pages say of their end is none of it
+    for context, kind in lent:
+        contexts.give_back(context, kind, plant.address)
+    assert found == []
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,8 @@ from tests.browser.robot_page import serious
 
 pytestmark = pytest.mark.browser
 
+ROBOTS = ("arm",)
+
 PAGES = {
     "#/": ".tile .state",
     "#/hall/arm": '[data-joint="waist"]',

@@ -20,6 +20,8 @@ from tests.browser.robot_page import (
 
 pytestmark = pytest.mark.browser
 
+ROBOTS = ("arm",)
+
 
 @pytest.fixture
 def open_arm(open_page):

@@ -41,7 +41,7 @@ def test_a_flooding_controller_is_told_in_words(open_page, plant):
     expect(page.locator(".headline .state")).to_have_text(re.compile("Idle|Moving"))
     port = plant.call(plant.stop_controller("pt600"))
     try:
-        plant.call(plant.start_controller("pt600", port, demo=True, faults=("flood",)))
+        plant.call(plant.start_controller("pt600", port, demo=True, rate_hz=100.0, faults=("flood",)))
         expect(page.locator(".headline .trouble.warning")).to_contain_text("flooded", timeout=20_000)
         plant.call(plant.stop_controller("pt600"))
     finally:

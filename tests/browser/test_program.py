@@ -105,7 +105,7 @@ def test_a_program_that_is_typed_is_checked_and_its_motion_is_shown_as_a_ghost(o
 def test_a_program_that_collides_leads_to_its_line_and_the_gateway_refuses_it_and_nothing_moves(
     open_page, plant
 ):
-    page = open_page(PAGE)
+    page = open_page(PAGE, drawn=False)
     write(page, COLLIDES)
     verdict(page, ok=False)
     row = page.locator('.violation[data-kind="collision"]').first
@@ -197,18 +197,19 @@ def test_points_are_taught_named_shown_and_taken_back_and_the_draft_outlives_a_r
     expect(field).to_have_value(f"{kept}# more")
 
 
-@pytest.mark.parametrize("path", ["#/program", PAGE])
-def test_a_phone_shows_programs_in_one_column_and_axe_finds_nothing_serious(open_page, path):
-    page = open_page(path, width=360, height=740, has_touch=True, drawn=False)
-    page.wait_for_selector(".program-choose a" if path == "#/program" else ".points li")
-    assert page.evaluate("document.documentElement.scrollWidth") == 360
-    small = page.evaluate(
-        """[...document.querySelectorAll("main button, main a, main input:not([type=file])")]
-           .map((each) => [each.outerHTML.slice(0, 80), each.getBoundingClientRect().height])
-           .filter(([, height]) => height > 0 && height < 44)"""
-    )
-    assert small == []
-    assert serious(page) == []
+def test_a_phone_shows_programs_in_one_column_and_axe_finds_nothing_serious(open_page):
+    page = open_page("#/program", width=360, height=740, has_touch=True, drawn=False)
+    for path, there in (("#/program", ".program-choose a"), (PAGE, ".points li")):
+        page.evaluate("path => (location.hash = path)", path)
+        page.wait_for_selector(there)
+        assert page.evaluate("document.documentElement.scrollWidth") == 360
+        small = page.evaluate(
+            """[...document.querySelectorAll("main button, main a, main input:not([type=file])")]
+               .map((each) => [each.outerHTML.slice(0, 80), each.getBoundingClientRect().height])
+               .filter(([, height]) => height > 0 && height < 44)"""
+        )
+        assert small == []
+        assert serious(page) == []
 
 
 def test_on_a_desk_only_lists_of_a_program_scroll_and_axe_finds_nothing_serious(open_page):

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.browser
 ROBOT = "robomesh/hall/pt600"
 NAME = "swing"
 QUARTER = "quarter.mcap"
-ENOUGH = 200  # joint states: some seconds of motion
+LONG_S = 3.0  # of motion
 _Ask = schema.RecorderRequest
 
 
@@ -42,7 +42,8 @@ def recorded(plant, tmp_path_factory):
         await own.ask(f"{ROBOT}/lease/request/li", acquire, timeout_s=15.0)
         async with asyncio.timeout(40):
             async for sample in own.subscribe(f"{ROBOT}/recording"):
-                if joints_in(sample.message()) >= ENOUGH:
+                recording = sample.message()
+                if joints_in(recording) and recording.duration.ToTimedelta().total_seconds() >= LONG_S:
                     break
         closed = await ask_recorder(plant, _Ask.TRACE_OFF)
         path = next(folder.rglob(closed.file))

@@ -27,28 +27,27 @@ def plant(accounts, tmp_path_factory):
     """A site whose console has accounts and TLS."""
     certificate, key = self_signed(tmp_path_factory.mktemp("tls"))
     settings = {"accounts": accounts, "certificate": certificate, "key": key}
-    yield from run_plant(Plant(audit=tmp_path_factory.mktemp("audit"), console=settings))
+    yield from run_plant(Plant(audit=tmp_path_factory.mktemp("audit"), robots=("arm",), console=settings))
 
 
 @pytest.fixture
-def open_tab(chromium, plant):
+def open_tab(contexts, plant):
     """Opens tabs of one browser, which shares its cookies; nothing may go wrong in them."""
-    context = chromium.new_context(
-        viewport={"width": 1440, "height": 900}, locale="en-GB", color_scheme="dark", ignore_https_errors=True
-    )
-    context.set_default_timeout(60_000)
+    context, kind = contexts.lend(ignore_https_errors=True)
     wrong = []
 
     def open_one(path=ARM):
         page = context.new_page()
+        page.set_viewport_size({"width": 1440, "height": 900})
         page.add_init_script(NO_WEBGL)  # drawn by the processor here, it would take all of it
         page.on("pageerror", lambda error: wrong.append(str(error)))
         page.goto(f"{plant.address}/{path}")
         return page
 
     yield open_one
-    context.close()
-    assert wrong == []
+    found = [*wrong]
+    contexts.give_back(context, kind, plant.address)
+    assert found == []
 
 
 def sign_in(page, name, password=PASSWORD):
@@ -136,15 +135,11 @@ def test_the_right_to_command_that_rests_is_given_back_for_the_password(open_tab
     expect(page.locator(".holder")).to_have_text("You are in control")
 
 
-def test_on_a_phone_in_chinese_signing_in_fits_and_has_no_serious_finding(chromium, plant):
-    context = chromium.new_context(
-        viewport={"width": 360, "height": 740},
-        locale="zh-CN",
-        color_scheme="light",
-        ignore_https_errors=True,
-    )
-    context.set_default_timeout(60_000)
+def test_on_a_phone_in_chinese_signing_in_fits_and_has_no_serious_finding(contexts, plant):
+    context, kind = contexts.lend(locale="zh-CN", color_scheme="light", ignore_https_errors=True)
     page = context.new_page()
+    page.set_viewport_size({"width": 360, "height": 740})
+    page.add_init_script(NO_WEBGL)
     page.goto(plant.address)
     expect(page.get_by_role("heading", name="hall 的控制台")).to_be_visible()
     assert serious(page) == []
@@ -156,4 +151,4 @@ def test_on_a_phone_in_chinese_signing_in_fits_and_has_no_serious_finding(chromi
     signed_in(page).click()
     expect(page.locator(".account-sheet")).to_contain_text("操作员")
     assert page.locator("html").evaluate("html => html.scrollWidth") == 360
-    context.close()
+    contexts.give_back(context, kind, plant.address)

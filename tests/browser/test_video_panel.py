@@ -13,6 +13,8 @@ from playwright.sync_api import expect
 
 pytestmark = pytest.mark.browser
 
+ROBOTS = ("arm",)
+
 WIDTH, HEIGHT = 320, 180
 
 
@@ -67,7 +69,7 @@ def test_a_joiner_sees_the_frames_since_the_key_frame_then_live_ones(open_page, 
     for colour in ((200, 30, 30), (30, 200, 30)):
         message, key = encoder.frame(*colour)
         publisher.put(message, key_frame=key)
-    page = open_page("#/hall/arm")
+    page = open_page("#/hall/arm", drawn=False)
     page.wait_for_selector('.camera canvas[data-drawn="true"]')
     page.wait_for_function("() => document.querySelector('.camera canvas').width === 320")
     # What was there before is shown, but as old: nobody knows its age.
@@ -86,7 +88,7 @@ def test_a_joiner_sees_the_frames_since_the_key_frame_then_live_ones(open_page, 
 
 def test_a_browser_without_a_decoder_shows_still_pictures_and_says_so(open_page, plant):
     publisher = publisher_of(plant, "image/front")
-    page = open_page("#/hall/arm")
+    page = open_page("#/hall/arm", drawn=False)
     page.add_init_script("delete window.VideoDecoder")
     page.reload()
     picture = av.VideoFrame.from_ndarray(np.full((90, 160, 3), 90, dtype=np.uint8), format="rgb24")

@@ -33,8 +33,36 @@ def changes(page, place=".wall-tile"):
     return before.split()[0]
 
 
+def test_what_is_chosen_stands_in_the_address_and_keys_go_from_tile_to_tile(open_page):
+    page = open_page("#/wall", drawn=False)
+    tiles = page.locator(".wall-tile")
+    expect(tiles).to_have_count(2)
+    page.get_by_role("button", name="Choose pictures").click()
+    page.get_by_role("group", name="hall/pt600").get_by_role("button", name="Top").click()
+    expect(tiles).to_have_count(3)
+    page.get_by_role("button", name="Done").click()
+    assert page.url.endswith("/wall/hall/arm/close/hall/pt600/close/hall/pt600/top")
+    page.reload()
+    expect(tiles).to_have_count(3)
+    tiles.nth(0).focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    expect(tiles.nth(2)).to_be_focused()
+    tiles.nth(2).get_by_role("button").click()
+    expect(tiles).to_have_count(2)
+    assert page.url.endswith("/wall/hall/arm/close/hall/pt600/close")
+    tiles.nth(1).dblclick(position={"x": 40, "y": 40})
+    expect(page.get_by_role("heading", level=1)).to_have_text("pt600")
+
+
+def test_a_robot_that_there_is_not_is_said_so_and_a_picture_that_does_not_come_too(open_page):
+    page = open_page("#/wall/hall/nobody/close/hall/arm/front", drawn=False)
+    expect(page.locator(".wall-tile").nth(0)).to_contain_text("not on the mesh")
+    expect(page.locator(".wall-tile").nth(1)).to_contain_text("Waiting for a picture")
+
+
 def test_a_tile_asks_for_a_picture_of_its_size_which_moves_as_the_arm_does(open_page, rendered):
-    page = open_page("#/wall/hall/pt600/close", width=400, height=700)
+    page = open_page("#/wall/hall/pt600/close", width=400, height=700, drawn=False)
     page.wait_for_selector('.wall-tile canvas[data-drawn="true"]', timeout=60_000)
     assert changes(page) in ("320", "480")
     expect(page.locator(".wall-line")).to_contain_text("pt600")
@@ -59,36 +87,8 @@ def test_the_robot_page_shows_live_video_that_can_be_taken_home(open_page, rende
         assert sum(1 for _ in video.decode(video=0)) > 0
 
 
-def test_what_is_chosen_stands_in_the_address_and_keys_go_from_tile_to_tile(open_page):
-    page = open_page("#/wall")
-    tiles = page.locator(".wall-tile")
-    expect(tiles).to_have_count(2)
-    page.get_by_role("button", name="Choose pictures").click()
-    page.get_by_role("group", name="hall/pt600").get_by_role("button", name="Top").click()
-    expect(tiles).to_have_count(3)
-    page.get_by_role("button", name="Done").click()
-    assert page.url.endswith("/wall/hall/arm/close/hall/pt600/close/hall/pt600/top")
-    page.reload()
-    expect(tiles).to_have_count(3)
-    tiles.nth(0).focus()
-    page.keyboard.press("ArrowRight")
-    page.keyboard.press("ArrowRight")
-    expect(tiles.nth(2)).to_be_focused()
-    tiles.nth(2).get_by_role("button").click()
-    expect(tiles).to_have_count(2)
-    assert page.url.endswith("/wall/hall/arm/close/hall/pt600/close")
-    tiles.nth(1).dblclick(position={"x": 40, "y": 40})
-    expect(page.get_by_role("heading", level=1)).to_have_text("pt600")
-
-
-def test_a_robot_that_there_is_not_is_said_so_and_a_picture_that_does_not_come_too(open_page):
-    page = open_page("#/wall/hall/nobody/close/hall/arm/front")
-    expect(page.locator(".wall-tile").nth(0)).to_contain_text("not on the mesh")
-    expect(page.locator(".wall-tile").nth(1)).to_contain_text("Waiting for a picture")
-
-
 def test_the_wall_never_scrolls_sideways_and_axe_finds_nothing_serious(open_page):
-    page = open_page("#/wall")
+    page = open_page("#/wall", drawn=False)
     expect(page.locator(".wall-tile")).to_have_count(2)
     page.get_by_role("button", name="Choose pictures").click()
     for width in (1440, 768, 360):

@@ -1,38 +1,15 @@
-"""Define's page before a real site, and the hands that work it."""
+"""Hands that work Define's page."""
 
 import base64
 import contextlib
 import json
-import os
-from types import SimpleNamespace
 
 import numpy as np
-import pytest
 from playwright.sync_api import expect
 
 from robots.description import LIBRARY
-from services.console import build_page
-from tests.browser.conftest import CHROMIUM
-from tests.site import running_site
 
 SHAPES = LIBRARY / "pt500" / "meshes"
-
-
-@contextlib.contextmanager
-def define_site(tmp_path_factory):
-    """A site of real processes: its page, the folder of its robots, the store of Define's files."""
-    if not CHROMIUM.exists():
-        pytest.skip(f"no {CHROMIUM}: the page is not driven here")
-    build_page.build()
-    cache = tmp_path_factory.mktemp("cache")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(os.environ, "XDG_CACHE_HOME", str(cache))
-        with running_site(tmp_path_factory.mktemp("site")) as site:
-            yield SimpleNamespace(
-                address=site.console.rstrip("/"),
-                robots=site.folder / "robots",
-                store=cache / "robomesh" / "define",
-            )
 
 
 def drop(page, *files):

@@ -1,6 +1,5 @@
 """Define, as a user does it: from files to a robot that moves, before a real site's page."""
 
-import contextlib
 import math
 import re
 import shutil
@@ -13,11 +12,10 @@ from playwright.sync_api import expect
 from robots.description import load
 from robots.glb import link_meshes
 from robots.urdf.write import to_urdf
-from tests.browser.defining_page import (
+from tests.browser.define.page import (
     SHAPES,
     button,
     choose,
-    define_site,
     drop,
     field,
     opened,
@@ -39,15 +37,10 @@ ROWS = [
 ]
 
 
-@pytest.fixture(scope="module")
-def plant(tmp_path_factory):
-    with define_site(tmp_path_factory) as site:
-        yield site
-
-
 def test_an_arm_of_dropped_files_gets_rows_and_limits_is_saved_started_and_moves(open_page, plant):
     page = open_page("#/define")
-    expect(page.locator(".robot-card")).to_have_count(3)
+    for name in ("pt500", "pt600", "puma560"):
+        expect(page.locator(f'.robot-card[href="#/define/{name}"]')).to_be_visible()
     drop(page, *map(shape, ("base.wrl", "column.3ds", "forearm.3ds", "upper_arm.wrl", "wrist.wrl")))
     expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "5", timeout=60_000)
     # The upper arm comes before the forearm, by keys; the flange by a button, with a joint of its own.
@@ -132,7 +125,7 @@ def test_the_arm_is_drawn_where_the_server_says_that_it_is(open_page):
 
 
 def test_a_wrong_limit_is_told_marked_and_found_again_by_a_click(open_page):
-    page = opened(open_page, "pt500")
+    page = opened(open_page, "pt500", drawn=False)
     settled(page)
     expect(page.locator(".check-list")).to_have_text("Nothing is wrong with it.")
     choose(page, 2)
@@ -150,45 +143,41 @@ def test_a_wrong_limit_is_told_marked_and_found_again_by_a_click(open_page):
     expect(page.locator(".problem")).to_have_count(0)
 
 
-@pytest.mark.parametrize("typed", ["1,234", "1.5in", "1/2", "0x10", "1e400", "abc", ""])
-def test_what_is_no_number_stays_marked_and_is_not_saved(open_page, typed):
-    page = opened(open_page, "pt500")
+def test_what_is_no_number_stays_marked_and_is_not_saved(open_page):
+    page = opened(open_page, "pt500", drawn=False)
     cell = field(page, "joint/1/a")
-    cell.fill(typed)
-    cell.blur()
-    expect(cell).to_have_value(typed)
-    expect(cell).to_have_attribute("aria-invalid", "true")
-    expect(page.locator(".checks")).to_contain_text("is no number: write it as 1234.5")
-    button(page, "Save").click()
-    expect(cell).to_be_focused()
-    page.keyboard.press("Escape")
-    expect(page.locator(".checks")).to_contain_text("Nothing is wrong with it.")
-    expect(cell).to_have_attribute("aria-invalid", "false")
+    for typed in ("1,234", "1.5in", "1/2", "0x10", "1e400", "abc", ""):
+        cell.fill(typed)
+        cell.blur()
+        expect(cell).to_have_value(typed)
+        expect(cell).to_have_attribute("aria-invalid", "true")
+        expect(page.locator(".checks")).to_contain_text("is no number: write it as 1234.5")
+        button(page, "Save").click()
+        expect(cell).to_be_focused()
+        page.keyboard.press("Escape")
+        expect(page.locator(".checks")).to_contain_text("Nothing is wrong with it.")
+        expect(cell).to_have_attribute("aria-invalid", "false")
 
 
 def test_a_shape_in_the_wrong_unit_is_told(open_page):
-    page = opened(open_page, "pt500")
+    page = opened(open_page, "pt500", drawn=False)
     choose(page, 0)
     page.locator(".scale-row").get_by_role("button", name="m", exact=True).click()
     expect(page.locator(".checks")).to_contain_text("column.3ds is 242 m large: is the file’s unit right?")
 
 
-def test_checks_go_on_when_the_console_is_there_again(chromium, plant):
-    with contextlib.closing(
-        chromium.new_context(locale="en-GB")
-    ) as context:  # a refused fetch is an error here
-        page = context.new_page()
-        page.goto(f"{plant.address}/#/define/pt500")
-        settled(page)
-        page.route("**/define/check", lambda route: route.abort())
-        field(page, "joint/1/a").fill("260")
-        expect(page.locator(".checks")).to_contain_text("Not checked: the console does not answer")
-        page.unroute("**/define/check")
-        expect(page.locator(".checks")).to_contain_text("Nothing is wrong with it.")
+def test_checks_go_on_when_the_console_is_there_again(open_page):
+    page = opened(open_page, "pt500", drawn=False, refused=True)
+    settled(page)
+    page.route("**/define/check", lambda route: route.abort())
+    field(page, "joint/1/a").fill("260")
+    expect(page.locator(".checks")).to_contain_text("Not checked: the console does not answer")
+    page.unroute("**/define/check")
+    expect(page.locator(".checks")).to_contain_text("Nothing is wrong with it.")
 
 
 def test_each_change_is_one_step_of_undo_and_comes_back_by_redo(open_page):
-    page = opened(open_page, "pt500")
+    page = opened(open_page, "pt500", drawn=False)
     expect(button(page, "Undo")).to_be_disabled()
     for path, text in (("joint/0/d", "4125"), ("joint/1/a", "77")):
         field(page, path).select_text()
@@ -212,7 +201,7 @@ def test_each_change_is_one_step_of_undo_and_comes_back_by_redo(open_page):
 
 
 def test_joints_are_reordered_by_dragging_and_removed_by_the_keyboard(open_page):
-    page = opened(open_page, "pt500")
+    page = opened(open_page, "pt500", drawn=False)
     names = page.locator(".chain-words strong")
     page.locator('.chain-row[data-part="3"]').drag_to(page.locator('.chain-row[data-part="0"]'))
     expect(names).to_have_text(["Base", "wrist", "waist", "shoulder", "elbow", "roll", "Tool"])
@@ -268,26 +257,24 @@ def test_a_reload_keeps_unsaved_work_and_says_so_until_it_is_discarded(open_page
     expect(page.get_by_text("From link files")).to_be_visible()
 
 
-def test_files_that_the_server_forgot_are_sent_again(chromium, plant):
-    with contextlib.closing(chromium.new_context(locale="en-GB")) as context:
-        page = context.new_page()
-        page.goto(f"{plant.address}/#/define")
-        drop(page, shape("base.wrl"), shape("wrist.wrl"))
-        canvas = page.locator(".define-scene canvas")
-        expect(canvas).to_have_attribute("data-shapes", "2", timeout=60_000)
-        settled(page)
-        for folder in ("files", "drafts"):
-            for path in (plant.store / folder).iterdir():
-                shutil.rmtree(path) if path.is_dir() else path.unlink()
-        field(page, "joint/0/d").fill("77")
-        settled(page)
-        expect(page.locator(".check-list")).to_have_text("Nothing is wrong with it.", timeout=30_000)
-        page.reload()
-        expect(canvas).to_have_attribute("data-shapes", "2", timeout=60_000)
+def test_files_that_the_server_forgot_are_sent_again(open_page, plant):
+    page = open_page("#/define", refused=True)
+    drop(page, shape("base.wrl"), shape("wrist.wrl"))
+    canvas = page.locator(".define-scene canvas")
+    expect(canvas).to_have_attribute("data-shapes", "2", timeout=60_000)
+    settled(page)
+    for folder in ("files", "drafts"):
+        for path in (plant.store / folder).iterdir():
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+    field(page, "joint/0/d").fill("77")
+    settled(page)
+    expect(page.locator(".check-list")).to_have_text("Nothing is wrong with it.", timeout=30_000)
+    page.reload()
+    expect(canvas).to_have_attribute("data-shapes", "2", timeout=60_000)
 
 
 def test_a_file_that_another_refers_to_is_asked_for_by_name(open_page):
-    page = open_page("#/define")
+    page = open_page("#/define", drawn=False)
     outer = b'#VRML V2.0 utf8\nInline { url "part.wrl" }\nShape { geometry Box { } }\n'
     drop(page, ("outer.wrl", outer))
     missing = page.locator(".missing")
@@ -298,14 +285,12 @@ def test_a_file_that_another_refers_to_is_asked_for_by_name(open_page):
     expect(page.locator(".chain-row")).to_have_count(2)
 
 
-def test_a_file_that_cannot_be_read_is_refused_by_name_and_the_others_are_taken(chromium, plant):
-    with contextlib.closing(chromium.new_context(locale="en-GB")) as context:
-        page = context.new_page()
-        page.goto(f"{plant.address}/#/define")
-        drop(page, shape("base.wrl"), ("bad.3ds", b"MM\x00"))
-        expect(page.locator(".outcome.refused")).to_contain_text("bad.3ds", timeout=60_000)
-        expect(page.locator(".chain-row")).to_have_count(2)
-        expect(page.locator(".chain-row").first).to_contain_text("base.wrl")
+def test_a_file_that_cannot_be_read_is_refused_by_name_and_the_others_are_taken(open_page):
+    page = open_page("#/define", drawn=False, refused=True)
+    drop(page, shape("base.wrl"), ("bad.3ds", b"MM\x00"))
+    expect(page.locator(".outcome.refused")).to_contain_text("bad.3ds", timeout=60_000)
+    expect(page.locator(".chain-row")).to_have_count(2)
+    expect(page.locator(".chain-row").first).to_contain_text("base.wrl")
 
 
 def test_a_urdf_and_its_shapes_become_rows(open_page, tmp_path):
@@ -350,24 +335,23 @@ def test_a_robot_of_openhrp_is_chosen_as_one(open_page, tmp_path):
     assert limits == ["−85.943669", "85.943669"]
 
 
-def test_saving_over_a_robot_is_asked_first(chromium, plant):
-    with contextlib.closing(chromium.new_context(locale="en-GB")) as context:
-        page = context.new_page()
-        for title in ("First", "Second"):
-            page.goto(f"{plant.address}/")
-            page.goto(f"{plant.address}/#/define")
-            button(page, "Start empty").click()
-            tab(page, "Robot")
-            field(page, "name").fill("twice")
-            field(page, "title").fill(title)
-            button(page, "Save").click()
-            if title == "Second":
-                expect(page.get_by_role("alertdialog")).to_contain_text("Save over it?")
-                assert load(plant.robots / "twice").title == "First"
-                button(page, "Save over it").click()
-            expect(page.locator(".save-state")).to_have_text("Saved")
-            expect(page).to_have_url(f"{plant.address}/#/define/twice")
-        assert load(plant.robots / "twice").title == "Second"
+def test_saving_over_a_robot_is_asked_first(open_page, plant):
+    page = open_page(drawn=False, refused=True)
+    for title in ("First", "Second"):
+        page.goto(f"{plant.address}/")
+        page.goto(f"{plant.address}/#/define")
+        button(page, "Start empty").click()
+        tab(page, "Robot")
+        field(page, "name").fill("twice")
+        field(page, "title").fill(title)
+        button(page, "Save").click()
+        if title == "Second":
+            expect(page.get_by_role("alertdialog")).to_contain_text("Save over it?")
+            assert load(plant.robots / "twice").title == "First"
+            button(page, "Save over it").click()
+        expect(page.locator(".save-state")).to_have_text("Saved")
+        expect(page).to_have_url(f"{plant.address}/#/define/twice")
+    assert load(plant.robots / "twice").title == "Second"
 
 
 def test_a_zip_holds_the_description_and_its_shapes(open_page, tmp_path):
@@ -423,7 +407,7 @@ def test_pairs_are_sampled_and_ignored_frames_constraints_and_views_are_kept(ope
 
 
 def test_renaming_a_joint_and_a_link_leaves_nothing_that_names_the_old(open_page):
-    page = opened(open_page, "pt500")
+    page = opened(open_page, "pt500", drawn=False)
     tab(page, "Constraints")
     button(page, "Add constraint").click()
     tab(page, "Frames")
@@ -452,8 +436,6 @@ def test_other_units_say_the_same_robot(open_page):
     assert np.allclose(after, said, atol=1e-9)
 
 
-def test_a_robot_that_is_not_here_is_said(chromium, plant):
-    with contextlib.closing(chromium.new_context(locale="en-GB")) as context:
-        page = context.new_page()
-        page.goto(f"{plant.address}/#/define/nobody")
-        expect(page.locator(".outcome.refused")).to_contain_text("nobody cannot be opened: there is no robot")
+def test_a_robot_that_is_not_here_is_said(open_page):
+    page = open_page("#/define/nobody", drawn=False, refused=True)
+    expect(page.locator(".outcome.refused")).to_contain_text("nobody cannot be opened: there is no robot")

@@ -1,17 +1,16 @@
 """Define's drafts: what comes late, or from another tab, lands in no draft but its own."""
 
-import contextlib
 import shutil
 
 import pytest
 from playwright.sync_api import expect
 
 from robots.description import load
-from tests.browser.defining_page import (
+from tests.browser.conftest import NO_WEBGL
+from tests.browser.define.page import (
     SHAPES,
     button,
     choose,
-    define_site,
     drop,
     field,
     held,
@@ -22,16 +21,6 @@ from tests.browser.defining_page import (
 )
 
 pytestmark = pytest.mark.browser
-
-
-@pytest.fixture(scope="module")
-def plant(tmp_path_factory):
-    with define_site(tmp_path_factory) as site:
-        yield site
-
-
-def links(page):
-    return page.locator(".chain-words strong")
 
 
 def go(page, name):
@@ -64,7 +53,7 @@ def test_a_file_that_is_read_late_is_not_put_into_the_robot_opened_meanwhile(ope
 
 
 def test_a_robot_that_is_answered_late_does_not_replace_the_one_opened_meanwhile(open_page):
-    page = open_page("#/define")
+    page = open_page("#/define", drawn=False)
     with held(page, "**/define/robots/pt500"):
         go(page, "pt500")
         expect(page.get_by_text("Loading…")).to_be_visible()
@@ -89,7 +78,7 @@ def test_two_shapes_chosen_in_a_row_are_both_kept(open_page):
 
 
 def test_a_save_that_is_answered_late_leaves_the_robot_opened_meanwhile_as_it_is(open_page, plant):
-    page = open_page("#/define")
+    page = open_page("#/define", drawn=False)
     button(page, "Start empty").click()
     tab(page, "Robot")
     field(page, "name").fill("slow")
@@ -110,78 +99,78 @@ def test_a_save_that_is_answered_late_leaves_the_robot_opened_meanwhile_as_it_is
     expect(page.locator(".start-draft")).to_have_count(0)
 
 
-def test_what_somebody_else_saved_meanwhile_is_asked_about_and_ones_own_is_not(chromium, plant):
-    with contextlib.closing(chromium.new_context(locale="en-GB")) as context:
-        page = context.new_page()
+def test_what_somebody_else_saved_meanwhile_is_asked_about_and_ones_own_is_not(open_page, plant):
+    page = open_page("#/define", drawn=False, refused=True)
+    save_new(page, "shared", "First")
+    field(page, "title").fill("Own")
+    button(page, "Save").click()
+    expect(page.locator(".save-state")).to_have_text("Saved")
+    assert load(plant.robots / "shared").title == "Own"
+
+    (plant.robots / "shared" / "README.md").write_text("Ours.")
+    field(page, "title").fill("Mine")
+    button(page, "Save").click()
+    question = page.get_by_role("alertdialog")
+    expect(question).to_contain_text("shared was changed at the site since it was opened here")
+    assert load(plant.robots / "shared").title == "Own"
+    button(page, "Cancel").click()
+    # A question about one robot is no answer for another.
+    button(page, "Save").click()
+    field(page, "title").fill("Mine after all")
+    button(page, "Save over it").click()
+    expect(page.locator(".save-state")).to_have_text("Saved")
+    assert load(plant.robots / "shared").title == "Mine after all"
+
+
+def test_every_tab_has_a_new_draft_of_its_own_and_another_tab_offers_them_all(open_page, plant):
+    first = open_page(drawn=False)
+
+    def beside():
+        page = first.context.new_page()
+        page.add_init_script(NO_WEBGL)
+        return page
+
+    tabs = [first, beside()]
+    for number, page in enumerate(tabs):
         page.goto(f"{plant.address}/#/define")
-        save_new(page, "shared", "First")
-        field(page, "title").fill("Own")
-        button(page, "Save").click()
-        expect(page.locator(".save-state")).to_have_text("Saved")
-        assert load(plant.robots / "shared").title == "Own"
-
-        (plant.robots / "shared" / "README.md").write_text("Ours.")
-        field(page, "title").fill("Mine")
-        button(page, "Save").click()
-        question = page.get_by_role("alertdialog")
-        expect(question).to_contain_text("shared was changed at the site since it was opened here")
-        assert load(plant.robots / "shared").title == "Own"
-        button(page, "Cancel").click()
-        # A question about one robot is no answer for another.
-        button(page, "Save").click()
-        field(page, "title").fill("Mine after all")
-        button(page, "Save over it").click()
-        expect(page.locator(".save-state")).to_have_text("Saved")
-        assert load(plant.robots / "shared").title == "Mine after all"
+        button(page, "Start empty").click()
+        tab(page, "Robot")
+        field(page, "title").fill(f"Arm {number}")
+    for number, page in enumerate(tabs):
+        page.reload()
+        expect(page.locator(".toolbar h1")).to_have_text(f"Arm {number}")
+    other = beside()
+    other.goto(f"{plant.address}/#/define")
+    expect(other.locator(".start-draft")).to_have_count(2)
+    other.get_by_role("button", name="Continue Arm 0").click()
+    expect(other.locator(".toolbar h1")).to_have_text("Arm 0")
 
 
-def test_every_tab_has_a_new_draft_of_its_own_and_another_tab_offers_them_all(chromium, plant):
-    with contextlib.closing(chromium.new_context(locale="en-GB")) as context:
-        tabs = [context.new_page(), context.new_page()]
-        for number, page in enumerate(tabs):
-            page.goto(f"{plant.address}/#/define")
-            button(page, "Start empty").click()
-            tab(page, "Robot")
-            field(page, "title").fill(f"Arm {number}")
-        for number, page in enumerate(tabs):
-            page.reload()
-            expect(page.locator(".toolbar h1")).to_have_text(f"Arm {number}")
-        other = context.new_page()
-        other.goto(f"{plant.address}/#/define")
-        expect(other.locator(".start-draft")).to_have_count(2)
-        other.get_by_role("button", name="Continue Arm 0").click()
-        expect(other.locator(".toolbar h1")).to_have_text("Arm 0")
-
-
-def test_a_shape_that_cannot_be_read_is_among_the_problems(chromium, plant):
+def test_a_shape_that_cannot_be_read_is_among_the_problems(open_page, plant):
     folder = plant.robots / "broken"
     folder.mkdir(parents=True)
     shutil.copytree(SHAPES, folder / "meshes")
     text = (SHAPES.parent / "robot.toml").read_text().replace('name = "pt500"', 'name = "broken"', 1)
     (folder / "robot.toml").write_text(text)
     (folder / "meshes" / "column.3ds").write_bytes(b"MM\x00")
-    with contextlib.closing(chromium.new_context(locale="en-GB")) as context:
-        page = context.new_page()
-        page.goto(f"{plant.address}/#/define/broken")
-        expect(page.locator(".problem")).to_have_count(1, timeout=60_000)
-        expect(page.locator(".problem")).to_contain_text("column.3ds")
-        page.locator(".problem").click()
-        expect(field(page, "joint/0/link/mesh")).to_be_focused()
-        expect(page.locator(".tab-panel .problem-word")).to_have_count(1)
-        field(page, "joint/0/d").fill("301")
-        settled(page)
-        expect(page.locator(".problem")).to_have_count(1)
+    page = open_page("#/define/broken", drawn=False, refused=True)
+    expect(page.locator(".problem")).to_have_count(1, timeout=60_000)
+    expect(page.locator(".problem")).to_contain_text("column.3ds")
+    page.locator(".problem").click()
+    expect(field(page, "joint/0/link/mesh")).to_be_focused()
+    expect(page.locator(".tab-panel .problem-word")).to_have_count(1)
+    field(page, "joint/0/d").fill("301")
+    settled(page)
+    expect(page.locator(".problem")).to_have_count(1)
 
 
-def test_files_of_which_nothing_can_be_made_are_said(chromium, plant):
-    with contextlib.closing(chromium.new_context(locale="en-GB")) as context:
-        page = context.new_page()
-        page.goto(f"{plant.address}/#/define")
-        drop(page, ("notes.txt", b"none"))
-        expect(page.locator(".outcome.refused")).to_have_text(
-            "There is no mesh file, URDF or zip among them.Dismiss"
-        )
-        for name in ("part.off", "part.wrl.gz"):
-            drop(page, (name, b"OFF\n0 0 0\n"))
-            expect(page.locator(".outcome.refused")).to_contain_text(f"{name}: ")
-            expect(page.locator(".outcome.refused")).to_contain_text("is not read")
+def test_files_of_which_nothing_can_be_made_are_said(open_page):
+    page = open_page("#/define", drawn=False, refused=True)
+    drop(page, ("notes.txt", b"none"))
+    expect(page.locator(".outcome.refused")).to_have_text(
+        "There is no mesh file, URDF or zip among them.Dismiss"
+    )
+    for name in ("part.off", "part.wrl.gz"):
+        drop(page, (name, b"OFF\n0 0 0\n"))
+        expect(page.locator(".outcome.refused")).to_contain_text(f"{name}: ")
+        expect(page.locator(".outcome.refused")).to_contain_text("is not read")

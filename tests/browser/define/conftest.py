@@ -1,0 +1,27 @@
+"""One site for all of Define's tests: it has no robots, so that nothing takes the time of what is defined."""
+
+import os
+from types import SimpleNamespace
+
+import pytest
+
+from services.console import build_page
+from tests.browser.conftest import CHROMIUM
+from tests.site import running_site
+
+
+@pytest.fixture(scope="package")
+def plant(tmp_path_factory):
+    """A site of real processes: its page, the folder of its robots, the store of Define's files."""
+    if not CHROMIUM.exists():
+        pytest.skip(f"no {CHROMIUM}: the page is not driven here")
+    build_page.build()
+    cache = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(os.environ, "XDG_CACHE_HOME", str(cache))
+        with running_site(tmp_path_factory.mktemp("site"), robots="") as site:
+            yield SimpleNamespace(
+                address=site.console.rstrip("/"),
+                robots=site.folder / "robots",
+                store=cache / "robomesh" / "define",
+            )
