@@ -203,8 +203,7 @@ class _Renderer:
 
     def watched(self, stream: Stream) -> None:
         (self._active.add if stream.watched else self._active.discard)(stream)
-        if not self._active:
-            self._pace.rested()
+        self._rest_if_unwatched()
         self._wake.set()
 
     async def draw(self, stream: str, shot: Shot, composition: Composition) -> Drawn:
@@ -228,6 +227,7 @@ class _Renderer:
     def _close(self, key: tuple[str, str]) -> None:
         stream = self._streams.pop(key)
         self._active.discard(stream)
+        self._rest_if_unwatched()
         stream.close()
         self._encoding.submit(self._finishing.end, [stream.name])
 
@@ -307,11 +307,24 @@ class _Renderer:
     def _drew(self, began: float) -> None:
         self._pictures += 1
         now, slow = time.monotonic(), self._pace.slow
-        wanted_hz = sum(stream.wanted_hz for stream in self._active)
-        self._pace.drew(now, now - began, wanted_hz=wanted_hz)
-        if self._pace.slow == slow:
+        self._pace.drew(now, now - began, wanted_hz=self._wanted_hz)
+        self._tell(was_slow=slow)
+
+    @property
+    def _wanted_hz(self) -> float:
+        return sum(stream.wanted_hz for stream in self._active)
+
+    def _rest_if_unwatched(self) -> None:
+        if not self._active:
+            slow = self._pace.slow
+            self._pace.rested()
+            self._tell(was_slow=slow)
+
+    def _tell(self, *, was_slow: bool) -> None:
+        """Say so where the machine has begun to keep up, or ceased to; also as nobody watches any more."""
+        if self._pace.slow == was_slow:
             return
-        if slow:
+        if was_slow:
             severity, code, text = (
                 Event.INFO,
                 "renderer.keeps_up",
@@ -320,10 +333,10 @@ class _Renderer:
         else:
             severity, code = Event.WARNING, "renderer.slow"
             text = (
-                f"the renderer draws {self._pace.rate_hz(now):.0f} of the {wanted_hz:.0f} pictures a second "
-                "that are watched: this machine can do no more"
+                f"the renderer draws {self._pace.rate_hz(time.monotonic()):.0f} of the {self._wanted_hz:.0f} "
+                "pictures a second that are watched: this machine can do no more"
             )
-        log.log(logging.INFO if slow else logging.WARNING, "%s", text)
+        log.log(logging.INFO if was_slow else logging.WARNING, "%s", text)
         event = Event(severity=severity, code=code, text=text, source="renderer")
         event.timestamp.GetCurrentTime()
         self._events.put(event)

@@ -5,11 +5,14 @@ import re
 import pytest
 from playwright.sync_api import expect
 
+from bus.errors import RefusedError
 from bus.keys import WHOLE_SITE
 from bus.schemas import robomesh_pb2 as schema
 from tests.browser.robot_page import button
 
 pytestmark = pytest.mark.browser
+
+ROBOTS = ("arm",)
 
 EVENTS = "#/events"
 Event = schema.Event
@@ -90,6 +93,8 @@ def test_the_audit_of_every_robot_is_there_and_its_logs_are_searched_when_asked(
         await plant.session.ask(
             key, schema.LeaseRequest(action=schema.LeaseRequest.RELEASE, lease=given.lease)
         )
+        with pytest.raises(RefusedError):
+            await plant.session.ask(key, schema.LeaseRequest(action=schema.LeaseRequest.OFFER, to="zhao"))
 
     plant.call(acquire_and_release())
     page = open_page(EVENTS, drawn=False)
@@ -100,6 +105,12 @@ def test_the_audit_of_every_robot_is_there_and_its_logs_are_searched_when_asked(
     journal.get_by_label("Robot", exact=True).select_option(label="arm")
     button(journal, "Search the audit logs").click()
     expect(journal.locator(".notice")).to_have_text(re.compile("^Found in the logs: [1-9]"))
+    refused = journal.locator(".journal-line").filter(has_text="OFFER").first
+    expect(refused).to_contain_text("refused wang OFFER: nobody is in control, or the lease has ended")
+    button(page, "中文").click()
+    expect(refused).to_contain_text("已拒绝 wang OFFER: 无人控制，或控制权已结束：请先取得控制（ACQUIRE）")
+    refused.click()
+    expect(page.locator(".entry-details [lang=en]")).to_contain_text("nobody is in control, or the lease")
 
 
 def test_settings_shows_a_service_that_is_gone(open_page, plant, raised):

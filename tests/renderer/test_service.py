@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+import threading
 import time
 
 import av
@@ -9,10 +10,10 @@ import numpy as np
 import pytest
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from bus.errors import RefusedError
+from bus.errors import NoAnswerError, RefusedError
 from bus.schemas.robomesh_pb2 import ControllerState, Event, KeyFrameRequest, VideoFrames
 from bus.session import open_session
-from renderer import finishing, pace, service, stream
+from renderer import finishing, pace, robots, service, stream
 from renderer.encoder import H264Encoder
 from renderer.errors import NoEncoderError, RendererError
 from renderer.service import Settings
@@ -292,5 +293,109 @@ def test_a_machine_that_cannot_keep_up_draws_without_anti_aliasing_and_says_so_o
             # Both views get their turns.
             for video in videos:
                 await anext(video)
+            # It is over as well when nobody watches any more.
+            for video in videos:
+                video.close()
+            event = (await anext(events)).message()
+            assert isinstance(event, Event)
+            assert (event.severity, event.code) == (Event.INFO, "renderer.keeps_up")
 
     run(main())
+
+
+def test_what_can_be_drawn_no_more_is_no_picture_of_now(mesh, tmp_path, monkeypatch):
+    broken = threading.Event()
+
+    class Breaking(service.Studio):
+        def draw(self, *args, **options):
+            if broken.is_set():
+                raise RuntimeError("the test took the GPU away")
+            return super().draw(*args, **options)
+
+    monkeypatch.setattr(service, "Studio", Breaking)
+
+    async def main():
+        async with hall(mesh, tmp_path) as (_, monitor):
+            await picture(monitor)
+            broken.set()
+            async with asyncio.timeout(40):
+                while await monitor.last("robomesh/hall/arm/image/front", timeout_s=0.5) is not None:
+                    pass
+
+    run(main())
+
+
+def test_a_robot_that_was_away_for_long_is_drawn_again(mesh, tmp_path, monkeypatch):
+    """As when the router was away: its kinematics was there all the time, and has nothing new to tell."""
+    monkeypatch.setattr(robots, "_FORGET_AFTER_S", 0.2)
+
+    async def main():
+        async with hall(mesh, tmp_path) as (robot, monitor):
+            token = robot.declare_presence_of("hall", "arm", "kinematics", "1")
+            await picture(monitor)
+            token.undeclare()
+            async with asyncio.timeout(40):
+                while await monitor.last("robomesh/hall/arm/image/front", timeout_s=0.5) is not None:
+                    pass
+            robot.declare_presence("hall", "arm", "kinematics")
+            async with asyncio.timeout(40):
+                await picture(monitor)
+
+    run(main())
+
+
+def test_a_robot_that_goes_while_it_is_drawn_leaves_no_encoder_behind(mesh, tmp_path, monkeypatch):
+    made, may_draw, draws = [], threading.Event(), threading.Event()
+    may_draw.set()
+
+    class Held(service.Studio):
+        def draw(self, *args, **options):
+            draws.set()
+            may_draw.wait(40)
+            return super().draw(*args, **options)
+
+    class Finishing(service.Finishing):
+        def __init__(self, *args):
+            super().__init__(*args)
+            made.append(self)
+
+    monkeypatch.setattr(service, "Studio", Held)
+    monkeypatch.setattr(service, "Finishing", Finishing)
+
+    async def main():
+        async with hall(mesh, tmp_path) as (_, monitor), open_session(mesh) as player:
+            await picture(monitor)
+            replayed = await monitor.last("robomesh/hall/arm/description")
+            replayed.replay.id = "x"
+            token = player.declare_presence_of("hall", "replay-x", "player", "1")
+            player.declare_publisher("hall", "replay-x", "description").put(replayed)
+            keyframe = "robomesh/hall/replay-x/video/front/keyframe/li"
+            async with asyncio.timeout(40):
+                while not await asked(monitor, keyframe):
+                    pass
+            may_draw.clear()
+            draws.clear()
+            video = monitor.subscribe("robomesh/hall/replay-x/video/front", newest=10, history=False)
+            try:
+                assert await asyncio.to_thread(draws.wait, 40)
+                token.undeclare()
+                async with asyncio.timeout(40):
+                    while await asked(monitor, keyframe):
+                        pass
+            finally:
+                may_draw.set()
+            # Drawn and finished behind the other.
+            await picture(monitor)
+            video.close()
+            assert not [stream for stream in made[0]._encoders if stream.startswith("replay-x/")]
+
+    run(main())
+
+
+async def asked(monitor, key):
+    """Whether somebody answers."""
+    try:
+        await monitor.ask(key, KeyFrameRequest(), timeout_s=1.0)
+        return True
+    except NoAnswerError:
+        return False
