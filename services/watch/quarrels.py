@@ -156,6 +156,8 @@ def _gone(mesh: Mesh, tokens: list[PresenceKey], site: str, expected: Expected) 
 
 def _clocks(mesh: Mesh, here: str, begun: frozenset[str]) -> Iterator[Condition]:
     own = mesh.processes.get(here)
+    if own is None:
+        return  # nobody is told of a clock without being told whose it is not
     hosts: dict[str, list[tuple[float, float]]] = defaultdict(list)
     for process in mesh.processes.values():
         best = process.clock.best
@@ -166,7 +168,7 @@ def _clocks(mesh: Mesh, here: str, begun: frozenset[str]) -> Iterator[Condition]
         limit = _CLOCK_OVER_S if f"{WHOLE_SITE}:clock.off:{host}" in begun else _CLOCK_S
         if abs(offset_s) - round_trip_s / 2 > limit:
             way = "ahead of" if offset_s > 0 else "behind"
-            mine = own.health.host if own is not None else "the watch"
+            mine = own.health.host
             yield Condition(
                 code="clock.off",
                 text=f"the clock of {host} is {abs(offset_s):.1f} s {way} that of {mine} (the watch's)",

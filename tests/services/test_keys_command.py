@@ -1,6 +1,7 @@
 """`robomesh keys` as people use it, and a whole site that runs by its keys."""
 
 import json
+import logging
 import re
 import stat
 from concurrent.futures import ThreadPoolExecutor
@@ -147,8 +148,9 @@ def test_no_router_opens_anew_for_the_first_start_of_a_robot_that_was_there_befo
 
 
 def test_where_no_names_can_be_written_ahead_the_robots_that_were_started_run_on(
-    site, tmp_path, monkeypatch, capsys
+    site, tmp_path, monkeypatch, caplog
 ):
+    caplog.set_level(logging.INFO)
     keys("init", str(site))
     folder = Folder(tmp_path / "keys")
     started = tmp_path / "robots" / "started.toml"
@@ -162,11 +164,12 @@ def test_where_no_names_can_be_written_ahead_the_robots_that_were_started_run_on
     monkeypatch.setattr(deeds, "save", full)
     following = up._Started(load(site), site, load(site).listened[0])
     assert [key[0] for key in following.wanted()] == ["mine"]
-    assert "no space left on device; the robots that were started run" in capsys.readouterr().err
+    assert "no space left on device; the robots that were started run" in caplog.text
+    caplog.clear()
     # Nobody would let in a gateway of this one.
     started.write_text(started.read_text() + ONE_ARM.replace('"arm"', '"new"'))
     assert [key[0] for key in following.wanted()] == ["mine"]
-    assert "no space left on device; the robots that were started before stay" in capsys.readouterr().err
+    assert "no space left on device; the robots that were started before stay" in caplog.text
 
 
 def test_a_bundle_knows_where_the_routers_are(site):

@@ -86,6 +86,7 @@ def test_an_alarm_keeps_its_words_while_only_a_number_in_them_counts_on():
     def judged(now_s: float, left_s: float, received: int, lost: int) -> tuple[list[Condition], ...]:
         told = health(values={"certificate_seconds": left_s}, received=received, lost=lost)
         mesh.see("s", told, now_s)
+        mesh.see("s", ServiceHealth(service="watch", id="me", host="host-b", version="1.0"), now_s)
         conditions = mesh_conditions(
             mesh,
             "s",
@@ -109,7 +110,7 @@ def test_an_alarm_keeps_its_words_while_only_a_number_in_them_counts_on():
     mesh.read("a1", Reading(offset_s=-2.0, round_trip_s=0.01))
     _, changed, _ = judged(4.0 + 9 * day_s, -2.0, 5000, 150)
     assert [each.text for each in changed] == [
-        "the clock of host-a is 2.0 s behind that of the watch (the watch's)"
+        "the clock of host-a is 2.0 s behind that of host-b (the watch's)"
     ]
 
 
