@@ -171,7 +171,7 @@ def test_checks_go_on_when_the_console_is_there_again(open_page):
     settled(page)
     page.route("**/define/check", lambda route: route.abort())
     field(page, "joint/1/a").fill("260")
-    expect(page.locator(".checks")).to_contain_text("Not checked: the console does not answer")
+    expect(page.locator(".checks")).to_contain_text("Not checked: this page has no connection to the console")
     page.unroute("**/define/check")
     expect(page.locator(".checks")).to_contain_text("Nothing is wrong with it.")
 
