@@ -11,7 +11,8 @@ delay      80 ms there and back, with and without 1 % of the packets lost each w
            links, as stops are, and over one, as other requests are
 narrow     100, 20 and 2 Mbit/s, 40 ms each way, beside publications like 8 Mbit/s of video: how late the
            joints are and how many come, and how much of the video comes; then 2 Mbit/s of which the plant's
-           router was told (`line_mbit`), and meshes of 3 MB fetched over it, with and without that video
+           router was told (`line_mbit`), and meshes of 3 MB fetched over it, with and without that video;
+           then a view of a moving arm, drawn by the plant's own renderer
 cut        the link cut for 5 and 60 s: how soon the room sees it, how soon all is live again, and whether
            what was lost is what was counted
 kills      the plant's router killed with -9, 20 times: how soon the room has live joints and the last state
@@ -46,17 +47,19 @@ from benchmarks.wan_bytes import bytes_per_topic, over_border
 from tests.wan.network import Link, Network, missing
 from tests.wan.sites import ARM, PORT, Probe, Site
 
-JOINTS = "robomesh/plant/arm/joints"
-CONTROLLER = "robomesh/plant/arm/controller"
-EVENTS = "robomesh/plant/arm/events"
-VIDEO = "robomesh/plant/arm/video/free"
+ROBOT = "robomesh/plant/arm"
+JOINTS = f"{ROBOT}/joints"
+CONTROLLER = f"{ROBOT}/controller"
+EVENTS = f"{ROBOT}/events"
+VIDEO = f"{ROBOT}/video/free"
 ONE_WAY_MS = 40.0
 # As much as a few views of 1280 x 720; and what a line's own router queues, 0.26 s at 2 Mbit/s.
 VIDEO_MBIT = 8.0
 QUEUE_BYTES = 64_000
 NARROW_MBIT = 2
-MESH = "robomesh/plant/arm/mesh/base"
+MESH = f"{ROBOT}/mesh/base"
 MESH_BYTES = 3_000_000
+START_S = 120.0
 
 
 @dataclass
@@ -79,10 +82,11 @@ class Stage:
 
 
 @contextlib.contextmanager
-def stage(*, told_mbit: float | None = None, **link: Any) -> Iterator[Stage]:
+def stage(*, told_mbit: float | None = None, moving: bool = False, **link: Any) -> Iterator[Stage]:
     """Everything up, and joints live in the room.
 
     Args:
+        moving: The arm swings by itself.
         told_mbit: What the plant's router is told that its line carries [Mbit/s]; None: nothing.
     """
     with tempfile.TemporaryDirectory() as folder, Network() as network:
@@ -93,7 +97,7 @@ def stage(*, told_mbit: float | None = None, **link: Any) -> Iterator[Stage]:
         hub.start("router")
         plant = Site(hosts["plant"], "plant", Path(folder), links=(f"tcp/{far.far}:{PORT}",), more=ARM)
         plant.router = "" if told_mbit is None else f"line_mbit = {told_mbit}"
-        beside = plant.with_arm()
+        beside = plant.with_arm(moving=moving)
         room = Probe(hosts["room"], f"tcp/{near.far}:{PORT}")
         made = Stage(network, plant, hub, far, near, beside, room)
         read = threading.Thread(target=note_stops, args=(made,), daemon=True)
@@ -147,8 +151,8 @@ def delay(seconds: float, stops: int) -> dict[str, Any]:
             lags = [lag for _, lag in joints_for(made, seconds)]
             row = {"joints_ms": quantiles(lags), "joints_lost": made.room.do("state", JOINTS, JOINTS)["lost"]}
             for name, order in (
-                ("stop_ms", ("ask", "robomesh/plant/arm/stop", {"by": "zhao"}, 5.0)),
-                ("stop_over_one_link_ms", ("stop_over_one_link", "robomesh/plant/arm/stop")),
+                ("stop_ms", ("ask", f"{ROBOT}/stop", {"by": "zhao"}, 5.0)),
+                ("stop_over_one_link_ms", ("stop_over_one_link", f"{ROBOT}/stop")),
             ):
                 row[name] = stops_asked(made, stops, order)
             rows[f"loss {loss:.0%}"] = row
@@ -187,7 +191,26 @@ def narrow(seconds: float, meshes: int) -> dict[str, Any]:
                 rows[f"{NARROW_MBIT} Mbit/s, told"] = beside_video(made, NARROW_MBIT, seconds)
             made.far.change(rate_bps=NARROW_MBIT * 1e6, queue_bytes=QUEUE_BYTES)
             rows["meshes beside video" if video else "meshes alone"] = fetch_meshes(made, meshes)
+    with stage(told_mbit=NARROW_MBIT, moving=True, delay_ms=ONE_WAY_MS) as made:
+        view = drawn_view(made)
+        for mbit in (100, NARROW_MBIT):
+            rows[f"{mbit} Mbit/s, told, a view of 1280 x 720"] = beside_video(made, mbit, seconds, view)
     return rows
+
+
+def drawn_view(made: Stage) -> str:
+    """Have the plant's own renderer draw for the room; the view's key."""
+    for service in ("kinematics", "renderer"):
+        made.plant.start(service)
+    wanted, deadline = {"of": "free", "width": 1280, "height": 720}, time.monotonic() + START_S
+    while "answer" not in (asked := made.room.do("ask", f"{ROBOT}/views/room", wanted, 5.0)):
+        if time.monotonic() > deadline:
+            sys.exit(f"no view: {asked['error']}")
+        time.sleep(0.5)
+    key = f"{ROBOT}/{asked['answer']['topic']}"
+    made.room.do("watch", key)
+    made.room.wait_for("samples", key)
+    return key
 
 
 def pour_video(made: Stage) -> None:
@@ -196,15 +219,15 @@ def pour_video(made: Stage) -> None:
     made.room.do("watch", VIDEO)
 
 
-def beside_video(made: Stage, mbit: float, seconds: float) -> dict[str, Any]:
+def beside_video(made: Stage, mbit: float, seconds: float, video: str = VIDEO) -> dict[str, Any]:
     """Joints and video over a line of that rate."""
     made.far.change(rate_bps=mbit * 1e6, queue_bytes=QUEUE_BYTES)
     time.sleep(5.0)
-    made.room.do("samples", VIDEO)
+    made.room.do("samples", video)
     before = made.far.counters()["forth"]
     lags = [lag for _, lag in joints_for(made, seconds)]
     after = made.far.counters()["forth"]
-    pictures = [each for each in made.room.do("samples", VIDEO) if each[2]]
+    pictures = [each for each in made.room.do("samples", video) if each[2]]
     return {
         "joints_ms": quantiles(lags),
         "joints_share": round(len(lags) / (100 * seconds), 4),
