@@ -1,6 +1,7 @@
 """`robomesh keys`: a site's certificate authority, and who may do what."""
 
 import json
+import tomllib
 from datetime import timedelta
 from pathlib import Path
 from typing import Annotated, Any
@@ -31,11 +32,14 @@ def init(
     """
     from services import site as site_file
     from services.keys import Folder, deeds
+    from services.keys.errors import KeysError
     from services.site_router import public
     from services.started import may_start
 
     read = site_file.load(site)
     if read.keys.folder is None:
+        if "keys" in tomllib.loads(site.read_text(encoding="utf-8")):
+            raise KeysError(f'{site}: [keys] has no folder: write folder = "keys" below it')
         # Appended: whoever wrote the file finds it as it was.
         with site.open("a", encoding="utf-8") as file:
             file.write(_SECTION)

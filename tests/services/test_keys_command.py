@@ -172,6 +172,13 @@ def test_where_no_names_can_be_written_ahead_the_robots_that_were_started_run_on
     assert "no space left on device; the robots that were started before stay" in caplog.text
 
 
+def test_an_empty_section_of_keys_is_not_written_a_second_time(site, capsys):
+    site.write_text(text := site.read_text() + "\n[keys]\n")
+    assert keys("init", str(site)) == 2
+    assert '[keys] has no folder: write folder = "keys" below it' in capsys.readouterr().err
+    assert site.read_text() == text
+
+
 def test_a_bundle_knows_where_the_routers_are(site):
     keys("init", str(site))
     keys("issue", "li", "--role", "operator")
