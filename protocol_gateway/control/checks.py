@@ -29,6 +29,7 @@ from protocol_gateway.motion import has_arrived
 from robots.joints import Joints
 
 _C = CommandRequest.Command
+_CLOSE, _FAILED, _SKIPPED = "check.warning", "check.failed", "check.skipped"
 # What a robot at rest may seem to move by [rad] or [m].
 _STOOD = 1e-3
 
@@ -40,16 +41,22 @@ class Finding:
     Attributes:
         refusal: Why they must not be sent; None: they may.
         warning: What is to be said of them all the same.
-        serious: It would have been refused where checks are required.
+        code: Of the event that says it. "check.warning": something is close; "check.failed": the check found
+            what "require" refuses; "check.skipped": something was not checked.
         start: Where the robot stood, where that must still be so when they are sent.
         others: Where the others were and went, where that must still be so.
     """
 
     refusal: Answer | None = None
     warning: str = ""
-    serious: bool = False
+    code: str = _CLOSE
     start: Positions | None = None
     others: Mapping[str, tuple[Positions, ...]] | None = None
+
+    @property
+    def serious(self) -> bool:
+        """Whether it would have been refused where checks are required."""
+        return self.code != _CLOSE
 
 
 class Checks:
@@ -229,7 +236,7 @@ class Checks:
         if self.policy is Policy.REQUIRE:
             text = f'Not sent: it cannot be checked, and this robot\'s site says check = "require": {why}.'
             return Finding(refusal=Answer(False, text))
-        return Finding(warning=f"not checked: {why}", serious=True)
+        return Finding(warning=f"not checked: {why}", code=_SKIPPED)
 
     def _judged(
         self,
@@ -245,8 +252,8 @@ class Checks:
             if checked.refusals:
                 return Finding(refusal=Answer(False, f"{refused} {_few(checked.refusals)}."))
             return Finding(warning=_few(said), start=start, others=others)
-        serious = bool(checked.refusals or left_out)
-        return Finding(warning=_few([*checked.refusals, *said]), serious=serious)
+        code = _FAILED if checked.refusals else _SKIPPED if left_out else _CLOSE
+        return Finding(warning=_few([*checked.refusals, *said]), code=code)
 
 
 def _moves(controller: Controller, moving: bool | None) -> bool:

@@ -232,7 +232,7 @@ class Control:
         else:
             text = f"{names}: it runs"
         if finding.warning and (finding.serious or not attempt.step):
-            self._journal.say(_S.WARNING, "check.warning", f"{names}: {finding.warning}")
+            self._journal.say(_S.WARNING, finding.code, f"{names}: {finding.warning}")
         if finding.warning:
             text = f"{text}; mind: {finding.warning}"
         return Answer(True, text)

@@ -121,7 +121,7 @@ class Programs:
         if first is not None and (text := self._control.why_not(_request(first, ""))):
             return text, "", lambda: None
         if finding.warning:
-            self._guarded.journal.say(_S.WARNING, "check.warning", f"program {name}: {finding.warning}")
+            self._guarded.journal.say(_S.WARNING, finding.code, f"program {name}: {finding.warning}")
         targets = tuple(tuple(each.target.tolist()) for each in checked.steps if each.target is not None)
 
         def begin() -> None:

@@ -79,6 +79,15 @@ RULES: Mapping[str, Rule] = MappingProxyType(
             MEDIUM, "See at which line and why, then run it again.", ("program.started", "program.done")
         ),
         "check.warning": Rule(LOW, "It passes near something: slow down, or go around.", (), _MINUTE_S),
+        "check.failed": Rule(
+            MEDIUM,
+            "It moves although its check failed: watch it, ready to stop; see the reason.",
+            (),
+            _MINUTE_S,
+        ),
+        "check.skipped": Rule(
+            LOW, "It moves unchecked: watch it, ready to stop; the text says what is missing.", (), _MINUTE_S
+        ),
         "audit.failed": Rule(
             HIGH,
             "Make room where the gateway keeps its audit log: no motion until it can be written.",

@@ -16,6 +16,7 @@ from robots.cells import CellDescription, CellRobot, Fixture
 from robots.poses import pose_matrix
 from robots.schema import Pose, Units
 from services import site_fixtures
+from services.watch.rules import RULES
 from tests.conftest import run
 from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
 
@@ -106,7 +107,7 @@ def test_warned_what_collides_is_made_and_said(mesh, tmp_path):
             answer = await move(plant, INTO_POST)
             assert answer.accepted
             assert "post" in answer.text
-            event = (await until(lambda: plant.events("check.warning")))[0]
+            event = (await until(lambda: plant.events("check.failed")))[0]
             assert event.severity == schema.Event.WARNING
             assert "post" in event.text
             await until(lambda: plant.joints[0] > 0.1)
@@ -158,6 +159,27 @@ def test_required_a_robot_without_shapes_is_not_moved(mesh, tmp_path):
             await until(lambda: "no link a shape" in plant.controller.check_text, timeout_s=60)
             await plant.lease(A.ACQUIRE, ttl_s=5)
             assert "no link a shape" in await refusal(plant.command(C.HOME))
+
+    run(main(), timeout_s=90)
+
+
+def test_a_motion_that_was_not_checked_is_not_said_to_pass_near_something(mesh, tmp_path):
+    urdf = tmp_path / "bare.urdf"
+    urdf.write_text(BARE)
+
+    async def main():
+        bare = CellDescription((CellRobot("arm", urdf, np.eye(4)),))
+        async with (
+            simulator(robot=str(urdf)) as port,
+            gateway(mesh, tmp_path, port, check="warn", cell=bare, description=str(urdf)) as plant,
+        ):
+            # Also at once, while the check is getting ready.
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            await plant.command(C.HOME)
+            event = (await until(lambda: plant.events("check.skipped")))[0]
+            assert event.text.startswith("HOME: not checked: ")
+            assert "unchecked" in RULES[event.code].advice
+            assert not plant.events("check.warning")
 
     run(main(), timeout_s=90)
 

@@ -23,6 +23,8 @@ const CHINESE: Record<string, readonly [title: string, advice: string]> = {
   "lease.ended": ["控制权未归还", "控制权未被归还，请查看原控制者。"],
   "program.ended": ["程序提前结束", "查看结束的行和原因，然后重新运行。"],
   "check.warning": ["运动接近障碍", "运动靠近其他物体：请减速或绕行。"],
+  "check.failed": ["检查未通过仍在运动", "检查未通过但运动已执行：请注视机器人并准备停止；原因见文本。"],
+  "check.skipped": ["运动未经检查", "运动未经检查：请注视机器人并准备停止；文本说明缺少什么。"],
   "audit.failed": ["审计日志无法写入", "请清理审计日志所在磁盘；可写入之前拒绝一切运动。"],
   "audit.damaged": ["审计日志损坏", "请备份日志；robomesh audit verify 可指出断裂处。"],
   "gateway.failed": ["网关出错", "网关日志中有原因，请上报。"],
