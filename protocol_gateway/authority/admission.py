@@ -1,7 +1,8 @@
 """Whether a command may be done: it is its holder's, in time and new, and no stop forbids it. No I/O.
 
     id > the last one           judged, and used up whatever becomes of it
-    id = the last one           a repeat: the first answer again, nothing is done
+    id = the last one           the same content: the first answer again, nothing is done
+                                other content: refused; the answer of the first is kept
     id < the last one, or 0     refused
     not_after has passed        refused: it was delayed on the way
     waited here for over 1 s    refused: its sender may have been told that nobody answered
@@ -19,6 +20,7 @@ from protocol_gateway.authority.rules import (
     MOTION_COMMANDS,
     Answer,
     Authority,
+    Content,
     Now,
     Why,
     holds,
@@ -47,8 +49,13 @@ def admit(authority: Authority, request: CommandRequest, *, operator: str, now: 
     if not holds(authority, operator, request.lease) or authority.lease is None:
         return Verdict(Answer(False, f"Not sent: {why_not_holder(authority, operator)}.", Why.NOT_IN_CONTROL))
     lease = authority.lease
-    if request.id == lease.last_id and lease.last_answer is not None:
-        return Verdict(lease.last_answer, repeat=True)
+    if request.id == lease.last_id and lease.last_answer is not None and lease.last_content is not None:
+        if content_of(request) == lease.last_content:
+            return Verdict(lease.last_answer, repeat=True)
+        used = lease.last_content.in_words()
+        return Verdict(
+            Answer(False, f"Not sent: id {request.id} was used for {used}: count up with each command.")
+        )
     if request.id <= lease.last_id:
         return Verdict(
             Answer(
@@ -59,6 +66,18 @@ def admit(authority: Authority, request: CommandRequest, *, operator: str, now: 
         )
     refusal = lateness(request, now) or stop_refusal(authority, request)
     return Verdict(refusal or Answer(True, ""), counted=True)
+
+
+def content_of(request: CommandRequest) -> Content:
+    """Return what a request asks for: two requests of one id are the same command if these are equal."""
+    return Content(
+        command=request.command,
+        joint_positions=tuple(request.joint_positions),
+        speed_percent=request.speed_percent if request.HasField("speed_percent") else None,
+        stop_id=request.stop_id,
+        program=request.program,
+        program_name=request.program_name,
+    )
 
 
 def lateness(request: CommandRequest, now: Now) -> Answer | None:
@@ -124,7 +143,9 @@ def remember(authority: Authority, request: CommandRequest, answer: Answer) -> A
         return authority
     if request.id < lease.last_id:
         return authority  # a HOLD overtook it
-    return replace(authority, lease=replace(lease, last_id=request.id, last_answer=answer))
+    return replace(
+        authority, lease=replace(lease, last_id=request.id, last_content=content_of(request), last_answer=answer)
+    )
 
 
 def used_up(authority: Authority, request: CommandRequest) -> Authority:

@@ -33,6 +33,7 @@ from enum import Enum, auto
 from typing import NamedTuple
 
 from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
+from protocol_gateway.texts import one_line
 
 DEFAULT_TTL_S = 2.0
 SHORTEST_TTL_S = 0.5
@@ -99,6 +100,30 @@ class Answer(NamedTuple):
     why: Why = Why.OTHER
 
 
+class Content(NamedTuple):
+    """A command and its values: what makes two requests the same command, whenever they are sent.
+
+    Attributes:
+        joint_positions: [rad] or [m].
+    """
+
+    command: CommandRequest.Command
+    joint_positions: tuple[float, ...] = ()
+    speed_percent: float | None = None
+    stop_id: int = 0
+    program: str = ""
+    program_name: str = ""
+
+    def in_words(self) -> str:
+        """Return it for people, on one line."""
+        words = [CommandRequest.Command.Name(self.command), *(f"{each:.6g}" for each in self.joint_positions)]
+        if self.speed_percent is not None:
+            words.append(f"{self.speed_percent:g} %")
+        if self.stop_id:
+            words.append(f"of stop {self.stop_id}")
+        return one_line(" ".join([*words, self.program_name]).strip())
+
+
 @dataclass(frozen=True, kw_only=True)
 class Lease:
     """Control of a robot by one operator, for a time.
@@ -106,7 +131,7 @@ class Lease:
     Attributes:
         until_s: End, monotonic; `until_ns` is the same moment on the wall clock.
         session: Of its holder's program or page; when that is gone, so is the lease. Empty: not told.
-        last_id: Highest command id so far, and `last_answer` what it got.
+        last_id: Highest command id so far; `last_content` is what it was used for, `last_answer` what it got.
         commanded: Motion was commanded under it.
         tolerates_motion: The robot moved by itself when the lease began, so that is no surprise.
     """
@@ -119,6 +144,7 @@ class Lease:
     until_ns: int
     session: str = ""
     last_id: int = 0
+    last_content: Content | None = field(default=None, repr=False)
     last_answer: Answer | None = None
     offered_to: str = ""
     renewals: int = 0

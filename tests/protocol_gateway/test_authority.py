@@ -259,6 +259,33 @@ def test_an_id_is_used_once():
     assert admit(state, command(C.HOME, 6), operator="li", now=at(0)).answer.accepted
 
 
+MOVE = {"joint_positions": [0.1, 0.0], "program_name": ""}
+
+
+@pytest.mark.parametrize(
+    ("kind", "fields", "words"),
+    [
+        (C.HOME, {}, "id 5 was used for MOVE_ABSOLUTE 0.1 0:"),
+        (C.MOVE_RELATIVE, MOVE, "id 5 was used for MOVE_ABSOLUTE 0.1 0:"),
+        (C.MOVE_ABSOLUTE, {"joint_positions": [0.1, 1e-12]}, "id 5 was used for MOVE_ABSOLUTE 0.1 0:"),
+        (C.MOVE_ABSOLUTE, {**MOVE, "speed_percent": 0.0}, "id 5 was used for MOVE_ABSOLUTE 0.1 0:"),
+        (C.MOVE_ABSOLUTE, {"joint_positions": [0.1, -0.0]}, ""),
+    ],
+)
+def test_an_id_names_one_command_and_its_values(kind, fields, words):
+    first = command(C.MOVE_ABSOLUTE, 5, **MOVE)
+    state = remember(held(), first, Answer(True, "done"))
+    verdict = admit(state, command(kind, 5, **fields), operator="li", now=at(0))
+    if words:
+        assert words in verdict.answer.text
+        assert not (verdict.repeat or verdict.counted or verdict.answer.accepted)
+    else:
+        assert verdict.repeat
+    late = command(C.MOVE_ABSOLUTE, 5, **MOVE)
+    late.not_after.FromNanoseconds(1)
+    assert admit(state, late, operator="li", now=at(9)).answer == Answer(True, "done")
+
+
 def test_an_answer_is_not_kept_under_somebody_elses_lease():
     state = ask(held(), A.TAKE, "wang", reason="he left", secret="w").authority
     assert remember(state, command(C.HOME, 9), Answer(True, "")) == state

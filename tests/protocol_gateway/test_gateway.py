@@ -1,6 +1,7 @@
 """The gateway end to end: a real simulated controller behind a real socket, over a real router."""
 
 import asyncio
+import json
 import time
 
 import pytest
@@ -182,11 +183,47 @@ def test_a_command_is_done_once_and_its_repeat_gets_the_first_answer(mesh, tmp_p
             assert "id 6 is not higher than 7" in await refusal(plant.command(C.HOME, id=6))
             refused = await refusal(plant.command(C.SPEED, speed_percent=300, id=8))
             assert refused == "Not sent: speed 300 % is outside 1 to 100 %."
-            assert await refusal(plant.command(C.SPEED, speed_percent=30, id=8)) == refused
+            assert await refusal(plant.command(C.SPEED, speed_percent=300, id=8)) == refused
             late = schema.CommandRequest().not_after
             late.FromNanoseconds(time.time_ns() - 10**9)
             assert "after its not_after" in await refusal(plant.command(C.HOME, id=9, not_after=late))
             await until(lambda: plant.controller.counters.units_sent == 1)
+
+    run(main())
+
+
+def test_a_command_id_that_was_used_for_other_content_is_refused_and_written_down(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.home()
+            key = plant.key("command/li")
+
+            async def as_json(**fields):
+                """What a plain Zenoh client of another language sends, and what it gets."""
+                payload = json.dumps({"lease": plant.secret, "id": 9, **fields})
+                get = plant.session.zenoh_session.get
+                replies = await asyncio.to_thread(lambda: list(get(key, payload=payload, timeout=5.0)))
+                (reply,) = replies
+                return (reply.ok or reply.err).payload.to_string()
+
+            first = await as_json(command="SPEED", speed_percent=50)
+            for other in (
+                {"command": "SPEED", "speed_percent": 100},
+                {"command": "SPEED"},
+                {"command": "HOLD"},
+                {"command": "MOVE_ABSOLUTE", "joint_positions": [0.5, 0, 0, 0, 0]},
+                {"command": "RUN_PROGRAM", "program": "home"},
+            ):
+                refused = await as_json(**other)
+                assert refused == "Not sent: id 9 was used for SPEED 50 %: count up with each command."
+            # Another encoding, another date: the same command.
+            soon = schema.CommandRequest().not_after
+            soon.FromNanoseconds(time.time_ns() + 10**9)
+            again = await plant.command(C.SPEED, speed_percent=50, id=9, not_after=soon)
+            assert json.loads(first)["text"] == again.text
+            await until(lambda: plant.controller.counters.units_sent == 2)
+            refused = [each.text for each in plant.seen["audit"] if each.outcome == schema.AuditEntry.REFUSED]
+            assert sum("id 9 was used for SPEED 50 %" in text for text in refused) == 5
 
     run(main())
 

@@ -39,6 +39,7 @@ const SENTENCES: readonly (readonly [english: string, chinese: string])[] = [
   ["RESUME and another motion are two units: resume first, or RESET", "RESUME 与另一运动须分两次发送：请先继续，或复位"],
   ["the program {name} runs: stop it, or wait until it has ended", "程序 {name} 正在运行：请停止它，或等待其结束"],
   ["id {id} is not higher than {last}, the last one under this lease: count up with each command", "编号 {id} 不大于此控制权下的上一编号 {last}：每条命令须递增"],
+  ["id {id} was used for {what}: count up with each command", "编号 {id} 已用于 {what}：每条命令须递增"],
   ["it came {seconds} s after its not_after: delayed on the way, or dated by another clock than the gateway's (`now` in each lease answer)", "晚于其 not_after {seconds} 秒到达：途中延迟，或所用时钟与网关不同（见每次控制权应答中的 now）"],
   ["it waited {waited} s in the gateway (for the audit log, or others before it); after {seconds} s nobody may be waiting for it: send it again", "在网关中等待了 {waited} 秒（等待审计日志或前面的请求）；超过 {seconds} 秒可能已无人等待，请重新发送"],
   ["stop {id} is not latched; nothing is", "停止 {id} 未锁定，目前没有锁定的停止"],
