@@ -36,7 +36,7 @@ from protocol_gateway.drivers.registry import DRIVERS
 from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.journal import Journal
 from protocol_gateway.legacy.clients import LegacyClients
-from protocol_gateway.link.link import ControllerLink, LinkSettings, LinkState, LinkStatus
+from protocol_gateway.link.link import JOINT_COUNT, ControllerLink, LinkSettings, LinkState, LinkStatus
 from protocol_gateway.link.status import news
 from protocol_gateway.settings import RobotSettings
 from protocol_gateway.states import controller_state, lease_state, timestamp
@@ -319,6 +319,8 @@ class Robot:
         before, self._link_status = self._link_status, status
         if status.state is LinkState.DOWN:
             self._telemetry.forget()
+        elif status.code == JOINT_COUNT:
+            self._telemetry.forget_positions()
         for severity, code, text in news(before, status):
             self._journal.say(severity, code, text)
         if before.state is not status.state:

@@ -97,6 +97,12 @@ class Telemetry:
         self.controller_time_s: float | None = None
         self.watch.forget()
 
+    def forget_positions(self) -> None:
+        """Count the positions as gone: the controller may be another robot's now."""
+        if self._positions is not None:
+            self._positions = self._positions[0], float("-inf")
+        self.watch.forget()
+
     def positions(self, now_s: float) -> tuple[float, ...] | None:
         """The newest [rad] or [m]; None: not told since the link came up, or not for the stale time."""
         return None if self._positions is None or self.positions_gone(now_s) else self._positions[0]

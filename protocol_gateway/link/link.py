@@ -54,6 +54,7 @@ _FIRST_PAUSE_S = 0.2
 _LONGEST_PAUSE_S = 5.0
 # Of a deluge a piece of 16 KiB is thrown away so often: costs little, and its end is seen.
 _DELUGE_EACH_S = 0.01
+JOINT_COUNT = "controller.joint_count"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -281,8 +282,13 @@ class ControllerLink:
         for event in events:
             self._count(event, now.monotonic_s)
         self._handing.flood.count(max(units, len(events)))
+        other_joints = self._sends_other_joints(now.monotonic_s)
+        if other_joints:
+            # The link says so, once; which of the positions are this robot's is not known.
+            events = [each for each in events if not _is_of_joints(each)]
+            self._fall_silent()
         dates = [self._date(event, now) for event in events]
-        if units > self._driver.refusals_received - refusals_before:
+        if units > self._driver.refusals_received - refusals_before and not other_joints:
             self._refusal, self._unusable = "", None
             self._alive(max(dates, key=lambda date: date.monotonic_s, default=now), now)
         elif not units and self._unusable is not None and self._status.state is LinkState.SILENT:
@@ -306,6 +312,12 @@ class ControllerLink:
             self._driver.connected()
             self._losses.forget()
         return before or self._handing.flood.deluge
+
+    def _sends_other_joints(self, now_s: float) -> bool:
+        """Return whether a unit of another joint count came within the stale time."""
+        if self._unusable is None or self._unusable[2] != JOINT_COUNT:
+            return False
+        return now_s - self._unusable[0] < self._settings.stale_after_s
 
     def _fall_silent(self) -> None:
         if self._unusable is None:
@@ -340,7 +352,7 @@ class ControllerLink:
                 self._counts["units_malformed"] += 1
                 if event.joint_count:
                     text = f"{self._where} sends {event.reason}"
-                    self._unusable = now_s, text, "controller.joint_count"
+                    self._unusable = now_s, text, JOINT_COUNT
             case UnknownReceived():
                 self._counts["records_unknown"] += 1
             case Refused(_, text):
@@ -357,3 +369,8 @@ class ControllerLink:
         self._status = status
         logger.info("link %s: %s", state.value, text)
         self._on_status(status)
+
+
+def _is_of_joints(event: ControllerEvent) -> bool:
+    """Return whether an event holds joint positions, or says that their count is wrong."""
+    return isinstance(event, JointsReceived) or (isinstance(event, MalformedReceived) and event.joint_count)

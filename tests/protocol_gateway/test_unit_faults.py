@@ -5,8 +5,9 @@ import time
 
 from bus.keys import robot_key
 from tests.conftest import run
+from tests.protocol_gateway.bare import bare_controller, repeated
 from tests.protocol_gateway.faulty import faulty
-from tests.protocol_gateway.hall import STATE, A, C, refusal, simulator, until
+from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
 from tests.protocol_gateway.old_program import legacy, program
 
 
@@ -47,6 +48,60 @@ def test_a_controller_that_restarts_with_another_joint_count_is_never_taken_for_
             assert len(plant.seen["joints"]) == joints
             await fault("joints", off=True)
             await until(lambda: plant.controller.link == STATE.UP)
+
+    run(main())
+
+
+STATE_5 = "2#ABSOLUTE.DEG*{:.2f};0;0;0;0&STATUS*{};remote;homed@"
+STATE_6 = "2#ABSOLUTE.DEG*0;0;0;0;0;0&STATUS*idle;remote;homed@"
+
+
+def test_one_unit_of_another_joint_count_invalidates_the_positions_and_a_motion_behind_it_is_refused(
+    mesh, tmp_path
+):
+    async def main():
+        async with bare_controller() as (port, say, heard), gateway(mesh, tmp_path, port, up=False) as plant:
+            async with repeated(say, lambda: STATE_5.format(0, "idle")):
+                await until(lambda: plant.controller.link == STATE.UP)
+                await plant.lease(A.ACQUIRE, ttl_s=5)
+                # One among all the others, as a controller's second program may send it.
+                say(STATE_6)
+                await until(lambda: plant.controller.link == STATE.SILENT)
+                text = await refusal(plant.command(C.MOVE_ABSOLUTE, joint_positions=[0.3, 0, 0, 0, 0]))
+                assert "sends 6 joint values, the description has 5" in text
+                assert "the description has 5" in await refusal(plant.command(C.HOME))
+                assert heard == b""
+                # No motion ran, so nothing is stopped; and what comes again for a while counts again.
+                await until(lambda: plant.controller.link == STATE.UP)
+                assert not plant.controller.HasField("stop")
+                await plant.lease(A.RENEW, ttl_s=5)
+                await plant.command(C.MOVE_ABSOLUTE, joint_positions=[0.3, 0, 0, 0, 0])
+                await until(lambda: b"ABSOLUTE.DEG" in heard)
+
+    run(main())
+
+
+def test_a_motion_that_runs_when_the_joint_count_changes_is_stopped_as_at_a_lost_link(mesh, tmp_path):
+    async def main():
+        async with bare_controller() as (port, say, heard), gateway(mesh, tmp_path, port, up=False) as plant:
+            waist = 0.0
+
+            def state():
+                nonlocal waist
+                waist += 0.1 if b"ABSOLUTE" in heard else 0.0
+                return STATE_5.format(waist, "moving" if waist else "idle")
+
+            async with repeated(say, state):
+                await until(lambda: plant.controller.link == STATE.UP)
+                await plant.lease(A.ACQUIRE, ttl_s=5)
+                await plant.command(C.MOVE_ABSOLUTE, joint_positions=[1.0, 0, 0, 0, 0])
+                await until(lambda: plant.controller.activity == STATE.MOVING)
+                say(STATE_6)
+                await until(lambda: b"COMMAND*stop" in heard)
+            await until(lambda: plant.controller.HasField("stop"))
+            reason = plant.controller.stop.reason
+            assert reason.startswith("li's motion ran, and 127.0.0.1:")
+            assert reason.endswith("sends 6 joint values, the description has 5")
 
     run(main())
 
