@@ -5,6 +5,7 @@ zero that frame stands at `joint_to_parent`. A link hangs on a joint, or on the 
 Nothing heavier than NumPy is imported.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -130,6 +131,18 @@ class Tree:
     def free(self) -> tuple[int, ...]:
         """Numbers of the joints that follow no other: the robot's joints."""
         return tuple(number for number, joint in enumerate(self.joints) if joint.mimic is None)
+
+
+def bare_links(tree: Tree, shaped: Collection[int]) -> tuple[int, ...]:
+    """Numbers of the links that no check covers.
+
+    A bare frame (`tool0`, `flange`) that is fixed to a link with a shape is none of them.
+
+    Args:
+        shaped: Numbers of the links that have a shape.
+    """
+    covered = {tree.links[number].joint for number in shaped}
+    return tuple(number for number, link in enumerate(tree.links) if link.joint not in covered)
 
 
 def tree_of(description: RobotDescription) -> Tree:

@@ -29,7 +29,7 @@ from robots import description
 from robots.description import Pose
 from robots.errors import DescriptionError
 from robots.schema import UrdfDescription
-from robots.tree import tree_of
+from robots.tree import BASE, bare_links, tree_of
 from services.errors import ListenError, SiteFileError
 from services.listen import cannot_both_listen, check_page_reach, check_reach, same_address, split_address
 from services.site_console import Console
@@ -262,10 +262,16 @@ def load(path: Path | None) -> Site:
             raise SiteFileError(f"{path}: robot {robot.name}: model = {robot.model!r}: {error}") from None
         links[robot.name] = {link.name: bool(link.shapes) for link in tree.links}
         missing = described.robot.missing if isinstance(described, UrdfDescription) else ()
-        if not any(links[robot.name].values()):
+        shaped = [number for number, link in enumerate(tree.links) if link.shapes]
+        moving = [tree.links[number] for number in bare_links(tree, shaped)]
+        moving = [link for link in moving if link.joint != BASE]
+        if not shaped:
             unseen[robot.name] = f"{robot.model} has no shapes that could be checked"
         elif missing:
             unseen[robot.name] = f"{robot.model}: no such mesh file: {', '.join(missing)}"
+        elif moving:
+            names = ", ".join(link.name for link in moving)
+            unseen[robot.name] = f"{robot.model}: {names} moves and has no shape that could be checked"
     if problem := _unseen_problem(site.robot, unseen) or fixture_problem(site.fixture, links):
         raise SiteFileError(f"{path}: {problem}")
     return site

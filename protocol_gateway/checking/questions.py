@@ -46,6 +46,7 @@ class Checked:
 
     Attributes:
         refusals: Why the motion must not be made.
+        uncovered: What moves in the cell and cannot be checked: where checks are required, that refuses too.
         warnings: What is close, but allowed.
         readable: The program could be read and planned: it has steps.
         steps: Of a program.
@@ -53,6 +54,7 @@ class Checked:
     """
 
     refusals: tuple[str, ...] = ()
+    uncovered: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     readable: bool = True
     steps: tuple[Step, ...] = ()

@@ -7,7 +7,7 @@ import numpy as np
 
 from bus.worker import answer_all
 from protocol_gateway.checking.questions import Cells, Checked, CheckMotion, CheckProgram, Positions, Prepare
-from robots.collision import Cell, build_cell, missing_meshes, unshaped
+from robots.collision import Cell, build_cell, missing_meshes, unshaped, unshaped_moving
 from robots.joints import FloatArray
 from robots.programs.check import check_plan, check_program
 from robots.programs.steps import CheckResult, Step, StepKind, Violation, ViolationKind
@@ -57,17 +57,20 @@ def _why_not(cell: Cell, robot: str) -> str:
 
 
 def _coverage(cell: Cell) -> tuple[list[str], list[str]]:
-    """What of a cell no check covers: that must not be so, and that is only to be known."""
-    refusals, warnings = [], []
+    """What of a cell no check covers: what moves, and what does not."""
+    uncovered, warnings = [], []
     for name, arm in cell.arms.items():
         bare, missing = unshaped(cell, name), missing_meshes(cell, name)
+        moving = unshaped_moving(cell, name)
         if len(bare) == len(arm.model.link_names):
-            refusals.append(f"{name}'s description gives no link a shape, so nothing of it can be checked")
+            uncovered.append(f"{name}'s description gives no link a shape, so nothing of it can be checked")
         elif missing:
-            refusals.append(f"{name} cannot be checked whole: no such mesh file: {', '.join(missing)}")
+            uncovered.append(f"{name} cannot be checked whole: no such mesh file: {', '.join(missing)}")
+        elif moving:
+            uncovered.append(f"{name} cannot be checked whole: {', '.join(moving)} moves and has no shape")
         elif bare:
             warnings.append(f"not checked, for they have no shape: {', '.join(bare)} of {name}")
-    return refusals, warnings
+    return uncovered, warnings
 
 
 def _paths(others: Mapping[str, tuple[Positions, ...]]) -> dict[str, FloatArray]:
@@ -75,9 +78,10 @@ def _paths(others: Mapping[str, tuple[Positions, ...]]) -> dict[str, FloatArray]
 
 
 def _checked(cell: Cell, result: CheckResult) -> Checked:
-    refusals, warnings = _coverage(cell)
+    uncovered, warnings = _coverage(cell)
     return Checked(
-        refusals=(*refusals, *(_sentence(each) for each in result.violations if each.refuses)),
+        refusals=tuple(_sentence(each) for each in result.violations if each.refuses),
+        uncovered=tuple(uncovered),
         warnings=(*(_sentence(each) for each in result.violations if not each.refuses), *warnings),
         readable=not any(each.kind in _UNREADABLE for each in result.violations),
         steps=result.steps,

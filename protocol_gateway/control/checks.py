@@ -249,11 +249,13 @@ class Checks:
     ) -> Finding:
         said = [*checked.warnings, *filter(None, [left_out])]
         if self.policy is Policy.REQUIRE:
+            if checked.uncovered:
+                return self._unchecked(_few(checked.uncovered))
             if checked.refusals:
                 return Finding(refusal=Answer(False, f"{refused} {_few(checked.refusals)}."))
             return Finding(warning=_few(said), start=start, others=others)
-        code = _FAILED if checked.refusals else _SKIPPED if left_out else _CLOSE
-        return Finding(warning=_few([*checked.refusals, *said]), code=code)
+        code = _FAILED if checked.refusals else _SKIPPED if left_out or checked.uncovered else _CLOSE
+        return Finding(warning=_few([*checked.refusals, *checked.uncovered, *said]), code=code)
 
 
 def _moves(controller: Controller, moving: bool | None) -> bool:

@@ -11,6 +11,7 @@ from robots.collision.cell import (
     distances,
     missing_meshes,
     unshaped,
+    unshaped_moving,
 )
 from robots.collision.nearest import (
     Nearest,
@@ -51,4 +52,5 @@ __all__ = [
     "own_nearest",
     "sample_pairs",
     "unshaped",
+    "unshaped_moving",
 ]

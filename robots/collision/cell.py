@@ -20,7 +20,7 @@ from robots.errors import MeshError
 from robots.joints import FloatArray, Joints
 from robots.model import RobotModel, build_model
 from robots.schema import RobotDescription, UrdfDescription, nearest
-from robots.tree import BASE, Tree, tree_of
+from robots.tree import BASE, Tree, bare_links, tree_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,13 +136,21 @@ def unshaped(cell: Cell, robot: str) -> tuple[str, ...]:
 
     A bare frame on a link that has one is none of them, unless files of meshes are missing: it may be theirs.
     """
+    return tuple(cell.arms[robot].tree.links[number].name for number in _bare(cell, robot))
+
+
+def unshaped_moving(cell: Cell, robot: str) -> tuple[str, ...]:
+    """Those of the `unshaped` links that a joint moves: the check cannot say that a motion is free."""
+    links = cell.arms[robot].tree.links
+    return tuple(links[number].name for number in _bare(cell, robot) if links[number].joint != BASE)
+
+
+def _bare(cell: Cell, robot: str) -> tuple[int, ...]:
     arm = cell.arms[robot]
-    links = arm.tree.links
-    bare = set(range(len(links))) - set(arm.links.tolist())
-    if not missing_meshes(cell, robot):
-        covered = {links[number].joint for number in arm.links.tolist()}
-        bare = {number for number in bare if links[number].joint not in covered}
-    return tuple(links[number].name for number in sorted(bare))
+    shaped = set(arm.links.tolist())
+    if missing_meshes(cell, robot):
+        return tuple(number for number in range(len(arm.tree.links)) if number not in shaped)
+    return bare_links(arm.tree, shaped)
 
 
 def missing_meshes(cell: Cell, robot: str) -> tuple[str, ...]:

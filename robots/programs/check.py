@@ -240,9 +240,10 @@ def _start_violations(joints: Joints, start: FloatArray) -> tuple[Violation, ...
 
 def _cover_notes(cell: Cell, robot: str, others: Mapping[str, FloatArray]) -> tuple[str, ...]:
     notes = []
-    bare = unshaped(cell, robot)
-    if bare:
-        notes.append(f"without a shape, so never found to touch anything: {', '.join(bare)}")
+    for name in (robot, *(other for other in others if other != robot)):
+        if bare := unshaped(cell, name):
+            whose = "" if name == robot else f" of {name}"
+            notes.append(f"without a shape, so never found to touch anything: {', '.join(bare)}{whose}")
     notes += [
         f"{name} is left out: nobody knows where it is now"
         for name in cell.arms

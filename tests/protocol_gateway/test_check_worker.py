@@ -136,15 +136,25 @@ def test_a_mate_without_shapes_or_with_missing_meshes_is_refused(tmp_path):
             CellRobot(name, tmp_path / f"{name}.urdf", placed(5.0)),
         )
         answer = begin({"arm": CellDescription(robots)})
-        (refusal,) = answer(motion("arm", others={name: ((0.0,),)})).refusals
-        assert refusal.startswith(words)
+        (uncovered,) = answer(motion("arm", others={name: ((0.0,),)})).uncovered
+        assert uncovered.startswith(words)
 
 
-def test_links_that_no_check_covers_are_said_of_each_motion(tmp_path):
-    arm = CellRobot("arm", bar_arm(tmp_path, bare=("elbow",)), placed(0.0))
+def test_a_moving_link_without_a_shape_is_not_covered_whichever_robot_of_the_cell_has_it(tmp_path):
+    whole, half = bar_arm(tmp_path / "whole"), bar_arm(tmp_path / "half", bare=("elbow",))
+    for arm, mate in ((half, whole), (whole, half)):
+        cell = CellDescription((CellRobot("arm", arm, placed(0.0)), CellRobot("mate", mate, placed(5.0))))
+        checked = begin({"arm": cell})(motion("arm", others={"mate": (STANDING,)}))
+        whose = "arm" if arm is half else "mate"
+        assert checked.uncovered == (f"{whose} cannot be checked whole: elbow moves and has no shape",)
+        assert checked.refusals == checked.warnings == ()
+
+
+def test_what_has_no_shape_and_does_not_move_is_only_said(tmp_path):
+    arm = CellRobot("arm", bar_arm(tmp_path, bare=("base",)), placed(0.0))
     checked = begin({"arm": CellDescription((arm,))})(motion("arm"))
-    assert checked.refusals == ()
-    assert checked.warnings == ("not checked, for they have no shape: elbow of arm",)
+    assert checked.uncovered == checked.refusals == ()
+    assert checked.warnings == ("not checked, for they have no shape: base of arm",)
 
 
 def test_a_mates_long_program_is_gone_through_only_where_it_is_near(tmp_path):

@@ -19,6 +19,7 @@ from services import site_fixtures
 from services.watch.rules import RULES
 from tests.conftest import run
 from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
+from tests.robots.boxes import bar_arm
 
 # Beside the arm, which at home reaches out along x: waist at +90 degrees is in it.
 POST = site_fixtures.Fixture(
@@ -159,6 +160,24 @@ def test_required_a_robot_without_shapes_is_not_moved(mesh, tmp_path):
             await until(lambda: "no link a shape" in plant.controller.check_text, timeout_s=60)
             await plant.lease(A.ACQUIRE, ttl_s=5)
             assert "no link a shape" in await refusal(plant.command(C.HOME))
+
+    run(main(), timeout_s=90)
+
+
+def test_required_a_moving_link_without_a_shape_keeps_the_arm_where_it_is(mesh, tmp_path):
+    model = bar_arm(tmp_path / "half", bare=("elbow",))
+
+    async def main():
+        half = CellDescription((CellRobot("arm", model, np.eye(4)),))
+        async with (
+            simulator(robot=str(model)) as port,
+            gateway(mesh, tmp_path, port, check="require", cell=half, description=str(model)) as plant,
+        ):
+            await until(lambda: not plant.controller.check_text, timeout_s=60)
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            text = await refusal(plant.command(C.HOME))
+            assert "cannot be checked" in text
+            assert "elbow moves and has no shape" in text
 
     run(main(), timeout_s=90)
 

@@ -14,6 +14,7 @@ from services.errors import SiteFileError
 from services.site_cells import cells_of
 from services.site_fixtures import Fixture, fixture_shape
 from services.started import read_started
+from tests.robots.boxes import bar_arm
 
 ROBOT = '[[robot]]\nname = "arm"\nmodel = "pt600"\n'
 IN_A = f'{ROBOT}cell = "a"\n'
@@ -120,6 +121,25 @@ def test_a_robot_without_shapes_cannot_require_checks(tmp_path):
     assert load(tmp_path, text).robot[0].check == "warn"
     with pytest.raises(SiteFileError, match="has no shapes that could be checked"):
         load(tmp_path, f'{text}check = "require"\n')
+
+
+def test_a_robot_with_a_moving_link_without_a_shape_cannot_require_checks_nor_can_its_mates(tmp_path):
+    bar_arm(tmp_path / "half", bare=("elbow",))
+    half = '[[robot]]\nname = "half"\nmodel = "half/robot.toml"\ncell = "a"\n'
+    mate = '[[robot]]\nname = "mate"\nmodel = "pt600"\ncell = "a"\npose = { xyz = [3000.0, 0.0, 0.0] }\n'
+    assert len(load(tmp_path, half + mate).robot) == 2
+    for text in (half + 'check = "require"\n' + mate, half + mate + 'check = "require"\n'):
+        with pytest.raises(SiteFileError, match="elbow moves and has no shape that could be checked"):
+            load(tmp_path, text)
+
+
+def test_a_bare_frame_that_is_fixed_to_a_link_with_a_shape_counts_as_covered(tmp_path):
+    tool = '<link name="tool0"/><joint name="t" type="fixed"><parent link="b"/><child link="tool0"/></joint>'
+    whole = HALF.replace('<mesh filename="nowhere.stl"/>', '<sphere radius="0.1"/>')
+    whole = whole.replace("</robot>", f"{tool}</robot>")
+    (tmp_path / "whole.urdf").write_text(whole)
+    text = '[[robot]]\nname = "whole"\nmodel = "whole.urdf"\ncheck = "require"\n'
+    assert load(tmp_path, text).robot[0].check == "require"
 
 
 HALF = (
