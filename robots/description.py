@@ -13,13 +13,14 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from robots.bounded_toml import MOST_CHARACTERS, parse_toml
 from robots.checks import Problem, Step, file_problems, row_problems, type_problem
 from robots.errors import DescriptionError, MeshError
 from robots.example_robots import EXAMPLES, ExampleRobot, example_names, example_robot, example_values
 from robots.schema import DhDescription, JointType, Pose, RobotDescription, UrdfDescription, nearest
 from robots.urdf.checks import urdf_problems
 from robots.urdf.files import files_of
-from robots.urdf.read import UrdfRobot, read_urdf
+from robots.urdf.read import MOST_URDF_CHARACTERS, UrdfRobot, read_urdf
 
 __all__ = [
     "JointType",
@@ -38,6 +39,9 @@ DESCRIPTION_FILE = "robot.toml"
 _VRML = (".wrl", ".vrml", ".wrz")
 # What describes a robot without a robot.toml.
 ROBOT_FILES = (".urdf", ".xacro", *_VRML)
+
+# Each may be wrong in several ways, and each way is a sentence.
+_MOST_VALUES = 20_000
 
 # In place of what is wrong, so that all the rest can be checked too.
 _STAND_INS: Mapping[str, Any] = {
@@ -102,8 +106,8 @@ def parse(text: str, source: Path, *, confined: bool = False) -> RobotDescriptio
         DescriptionError: As `load`.
     """
     try:
-        values = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # a number of too many digits is a plain ValueError
+        values = parse_toml(text)
+    except tomllib.TOMLDecodeError as error:
         raise DescriptionError(source, [f"is not TOML: {error}"]) from error
     description, problems = from_values(values, folder=source.parent, confined=confined)
     if description is None:
@@ -129,6 +133,8 @@ def from_values(
     Returns:
         A description, or None where there is a problem.
     """
+    if _is_huge(values):
+        return None, (Problem((), f"holds more than {_MOST_VALUES} values; no robot needs so many"),)
     files = tuple(file_problems(values, folder, confined=confined))
     try:
         description = _model(values).read_from(folder / DESCRIPTION_FILE, "")
@@ -152,6 +158,17 @@ def from_values(
     return (None, problems) if problems else (description, ())
 
 
+def _is_huge(values: Any) -> bool:
+    """Return whether there are more values than are worth a problem each."""
+    ahead, count = [values], 0
+    while ahead and count <= _MOST_VALUES:
+        inside = ahead.pop()
+        more = list(inside.values()) if isinstance(inside, dict) else inside
+        ahead += [each for each in more if isinstance(each, dict | list)]
+        count += len(more)
+    return count > _MOST_VALUES
+
+
 def _model(values: Mapping[str, Any]) -> DhDescription | UrdfDescription:
     form = UrdfDescription if "urdf" in values else DhDescription
     return form.model_validate(values)
@@ -172,12 +189,13 @@ def _urdf_robot(description: UrdfDescription, *, confined: bool) -> UrdfRobot:
         return UrdfRobot(found.name, found.tree, found.notes)
     packages = [folder / package for package in description.packages]
     resolve = files_of(urdf, packages, confined=folder if confined else None)
-    return read_urdf(_text(urdf), urdf, resolve=resolve)
+    return read_urdf(_text(urdf, most=MOST_URDF_CHARACTERS), urdf, resolve=resolve)
 
 
-def _text(path: Path) -> str:
+def _text(path: Path, *, most: int = MOST_CHARACTERS) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        with path.open(encoding="utf-8") as file:
+            return file.read(most + 1)  # one more than its reader takes
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "is not UTF-8 text"
         raise DescriptionError(path, [f"cannot be read: {reason}"]) from error

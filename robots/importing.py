@@ -1,12 +1,12 @@
 """Robots from elsewhere as a robot.toml and its files: what `robot import` writes."""
 
 import os
-import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from robots.bounded_toml import parse_toml
 from robots.description import ROBOT_FILES, described, load, robot_name
 from robots.dh import dh_form
 from robots.errors import DescriptionError
@@ -96,7 +96,7 @@ def _provenance(description: RobotDescription) -> str:
 
 def _copied(description: DhDescription) -> Imported:
     """A description by D-H rows with its mesh files, and those that they name, all below its folder."""
-    values = tomllib.loads(description.text)
+    values = parse_toml(description.text)
     files: dict[str, bytes] = {}
     places: dict[Path, str] = {}
     notes: list[str] = []

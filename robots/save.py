@@ -16,7 +16,6 @@ import re
 import secrets
 import shutil
 import sys
-import tomllib
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -25,6 +24,7 @@ from math import isfinite
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from robots.bounded_toml import read_toml
 from robots.description import DESCRIPTION_FILE
 from robots.errors import DescriptionError, RobotExistsError, SaveError
 from robots.save_text import description_text
@@ -259,10 +259,10 @@ def read_robot(folder: Path) -> tuple[dict[str, Any], dict[str, Path]]:
     """
     source = folder / DESCRIPTION_FILE
     try:
-        values = tomllib.loads(source.read_text(encoding="utf-8"))
+        values = read_toml(source)
     except OSError as error:
         raise DescriptionError(source, [f"cannot be read: {error.strerror}"]) from error
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise DescriptionError(source, [f"is not TOML: {error}"]) from error
     if strange := list(_strange(values)):
         raise DescriptionError(source, strange)

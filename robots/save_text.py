@@ -11,6 +11,8 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import AoT, Table
 
+from robots.bounded_toml import check_bounds
+
 _VALUES = ("name", "title", "provenance", "units", "urdf", "packages")
 # Tables of their own; every other table is written inline.
 _TABLES = ("base", "tool", "collision")
@@ -31,6 +33,7 @@ def description_text(values: Mapping[str, Any], before: str = "") -> str:
     if not before:
         return fresh
     try:
+        check_bounds(before)
         document = tomlkit.parse(before)
         _merge(document, tomlkit.parse(fresh))
         merged = tomlkit.dumps(document)

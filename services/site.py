@@ -26,6 +26,7 @@ from protocol_gateway.core.codes import code_table
 from protocol_gateway.drivers.registry import DRIVERS
 from protocol_gateway.errors import CodeTableError
 from robots import description
+from robots.bounded_toml import read_toml
 from robots.description import Pose
 from robots.errors import DescriptionError
 from robots.schema import UrdfDescription
@@ -43,6 +44,8 @@ from services.site_router import RoutedSite, beside
 from services.site_sentences import sentence
 
 Triple = tuple[float, float, float]
+# Of a wrong site file, that are named.
+_MOST_PROBLEMS = 100
 
 
 class Robot(BaseModel):
@@ -233,19 +236,19 @@ def load(path: Path | None) -> Site:
     if path is None:
         return DEMO
     try:
-        text = path.read_text(encoding="utf-8")
+        values = read_toml(path)
+        site = Site.model_validate(values)
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise SiteFileError(f"{path}: cannot be read: {reason}") from None
-    try:
-        values = tomllib.loads(text)
-        site = Site.model_validate(values)
     except tomllib.TOMLDecodeError as error:
         raise SiteFileError(f"{path}: not TOML: {error}") from None
     except ValidationError as error:
-        raise SiteFileError(
-            "\n".join(sentence(path, problem, values, Site) for problem in error.errors())
-        ) from None
+        found = error.errors(include_url=False)
+        sentences = [sentence(path, problem, values, Site) for problem in found[:_MOST_PROBLEMS]]
+        if len(found) > _MOST_PROBLEMS:
+            sentences.append(f"{path}: and {len(found) - _MOST_PROBLEMS} more problems")
+        raise SiteFileError("\n".join(sentences)) from None
     site = _beside(site, path.parent)
     # What no service could run with is told before any starts.
     try:

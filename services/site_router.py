@@ -1,7 +1,6 @@
 """The parts of a site file that say how its router and its services meet: addresses, links, keys."""
 
 import re
-import tomllib
 from pathlib import Path
 from typing import Annotated
 
@@ -12,6 +11,7 @@ from bus.endpoints import Link, Tls
 from bus.errors import KeyNameError
 from bus.identity import read_identity
 from bus.keys import check_name
+from robots.bounded_toml import read_toml
 from services.keys import Folder
 from services.keys.errors import KeysError
 from services.listen import reachable
@@ -118,7 +118,7 @@ def read_routed(path: Path) -> RoutedSite | None:
         None: not in order; `services.site.load` says in words what is wrong.
     """
     try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
+        values = read_toml(path)
         site = RoutedSite.model_validate({name: values[name] for name in values.keys() - OF_OTHERS})
     except (OSError, ValueError, ValidationError):
         return None

@@ -6,11 +6,11 @@ as processes of its own, now and whenever the site comes up.
 
 import os
 import tempfile
-import tomllib
 from pathlib import Path
 
 from pydantic import ValidationError
 
+from robots.bounded_toml import read_toml
 from robots.description import DESCRIPTION_FILE, library_names
 from services.errors import SiteFileError
 from services.site import Robot, Site
@@ -26,7 +26,7 @@ def read_started(site: Site) -> tuple[Robot, ...]:
     """
     path = site.define.folder / STARTED_FILE
     try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
+        values = read_toml(path)
     except FileNotFoundError:
         return ()
     except OSError as error:

@@ -24,7 +24,7 @@ from robots.urdf.files import Resolve
 from robots.urdf.shapes import Shapes
 from robots.urdf.values import WrongElement, numbers, origin, said
 
-_MOST_CHARACTERS = 20_000_000
+MOST_URDF_CHARACTERS = 20_000_000
 _MOST_LINKS = 2_000
 _TYPES = {"revolute": JointType.ROTARY, "continuous": JointType.ROTARY, "prismatic": JointType.PRISMATIC}
 # A continuous joint gets limits, for sliders, planners and controllers want some: every direction can be
@@ -67,8 +67,8 @@ def read_urdf(text: str, source: Path, *, resolve: Resolve) -> UrdfRobot:
 
 
 def _root(text: str) -> Xml.Element:
-    if len(text) > _MOST_CHARACTERS:
-        raise WrongElement(f"has {len(text):,} characters; at most {_MOST_CHARACTERS:,} are read")
+    if len(text) > MOST_URDF_CHARACTERS:
+        raise WrongElement(f"has {len(text):,} characters; at most {MOST_URDF_CHARACTERS:,} are read")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise WrongElement("has a DOCTYPE or ENTITY, which no URDF needs; take it out")
     try:

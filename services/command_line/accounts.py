@@ -10,6 +10,7 @@ import sys
 import tomllib
 from pathlib import Path
 
+from robots.bounded_toml import read_toml
 from services.console.accounts.desk import change_account
 from services.console.accounts.file import check_account_name, read_accounts, role_of
 from services.console.accounts.passwords import check_password, hash_password
@@ -65,7 +66,7 @@ def list_(where: Path, as_json: bool) -> None:
 def _file(where: Path) -> tuple[Path, str]:
     """The accounts file, and the site where it is known: of a site file, the one that it names."""
     try:
-        values = tomllib.loads(where.read_text(encoding="utf-8")) if where.exists() else {}
+        values = read_toml(where) if where.exists() else {}
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise AccountsError(f"{where}: cannot be read: {error}") from None
     if "site" not in values:

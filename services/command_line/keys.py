@@ -1,7 +1,6 @@
 """`robomesh keys`: a site's certificate authority, and who may do what."""
 
 import json
-import tomllib
 from datetime import timedelta
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from bus.topic_rows import Role
+from robots.bounded_toml import read_toml
 from services.command_line.keys_folder import KeysFolder, keys_folder
 from services.command_line.options import Json
 
@@ -38,7 +38,7 @@ def init(
 
     read = site_file.load(site)
     if read.keys.folder is None:
-        if "keys" in tomllib.loads(site.read_text(encoding="utf-8")):
+        if "keys" in read_toml(site):
             raise KeysError(f'{site}: [keys] has no folder: write folder = "keys" below it')
         # Appended: whoever wrote the file finds it as it was.
         with site.open("a", encoding="utf-8") as file:

@@ -1,13 +1,13 @@
 """Where a site's keys lie: as `--folder` says, or found near where one stands."""
 
 import os
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from robots.bounded_toml import read_toml
 from services.keys.errors import KeysError
 from services.keys.folder import Folder
 
@@ -52,7 +52,7 @@ def _of_site_files() -> Iterator[Path]:
     """The folders that site files in the working directory name; a file with faults names none."""
     for file in sorted(Path().glob("*.toml")):
         try:
-            values = tomllib.loads(file.read_text(encoding="utf-8"))
+            values = read_toml(file)
         except (OSError, ValueError):
             continue
         keys = values.get("keys")

@@ -1,6 +1,7 @@
 """The list of who has a certificate at a site: a TOML file that people can read, and edit in need."""
 
 import tomllib
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -10,6 +11,7 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationErro
 
 from bus.access import Border, Principal
 from bus.topics import Role
+from robots.bounded_toml import parse_toml
 from services.keys.errors import KeysError
 
 _QUIET = ConfigDict(extra="forbid", frozen=True)
@@ -108,16 +110,15 @@ def read_principals(text: str, where: str) -> Principals:
         KeysError: With the file, the key and what is wrong with it.
     """
     try:
-        listed = _List.model_validate(tomllib.loads(text))
+        listed = _List.model_validate(parse_toml(text))
     except tomllib.TOMLDecodeError as error:
         raise KeysError(f"{where}: not TOML: {error}") from None
     except ValidationError as error:
         problem = error.errors()[0]
         place = ".".join(map(str, problem["loc"]))
         raise KeysError(f"{where}: {place} = {problem['input']!r}: {problem['msg']}") from None
-    names = [entry.name for entry in listed.principal]
-    for name in names:
-        if names.count(name) > 1:
+    for name, count in Counter(entry.name for entry in listed.principal).items():
+        if count > 1:
             raise KeysError(f"{where}: {name} stands there twice: every name needs one entry")
     return Principals(
         site=listed.site, border=listed.border, routers=listed.routers, entries=listed.principal

@@ -24,6 +24,7 @@ from typing import Any
 
 from bus import keys
 from bus.errors import KeyNameError
+from robots.bounded_toml import read_toml
 from services.console.errors import AccountsError
 from services.whole_file import write_whole
 
@@ -98,7 +99,7 @@ def read_accounts(path: Path) -> dict[str, Account]:
         AccountsError: File, place and what would be right.
     """
     try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
+        values = read_toml(path)
     except FileNotFoundError:
         raise AccountsError(
             f"{path}: no such file: make it with `robomesh accounts add {path} NAME --role admin`"

@@ -1,10 +1,10 @@
 """The robots that can be opened: the library's, and those that were saved at this site."""
 
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from robots.bounded_toml import read_toml
 from robots.description import DESCRIPTION_FILE, LIBRARY, library_names
 from services.site import Site
 
@@ -39,8 +39,8 @@ def _names(folder: Path) -> list[str]:
 
 def _row(folder: Path, name: str, origin: str, *, running: bool) -> Json:
     try:
-        values = tomllib.loads((folder / DESCRIPTION_FILE).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        values = read_toml(folder / DESCRIPTION_FILE)
+    except (OSError, ValueError):
         values = {}  # what is wrong with it is told when it is opened
     return {
         "name": name,
