@@ -101,6 +101,7 @@ class Robot:
             journal=self._journal,
             stale_after_s=settings.stale_after_s,
             on_status=self._on_told,
+            on_activity=lambda activity, dated_s: self._control.reported(activity, dated_s),
             on_refused=lambda: self._control.refused(),
         )
         self._link = ControllerLink(

@@ -71,6 +71,7 @@ class Telemetry:
         journal: Journal,
         stale_after_s: float,
         on_status: Callable[[], None],
+        on_activity: Callable[[Activity | None, float], None],
         on_refused: Callable[[], None],
     ) -> None:
         self._message = JointStatesMessage(joints.names)
@@ -79,6 +80,7 @@ class Telemetry:
         self._raw = raw
         self._journal = journal
         self._on_status = on_status
+        self._on_activity = on_activity
         self._on_refusal = on_refused
         self._stale_after_s = stale_after_s
         self._next_slow_s = 0.0
@@ -181,6 +183,8 @@ class Telemetry:
         if changed:
             self._say_what_changed(before, status)
             self._on_status()
+        positions_s = float("-inf") if self._positions is None else self._positions[1]
+        self._on_activity(status.activity, min(now_s, positions_s))
 
     def _say_what_changed(self, before: StatusReceived, now: StatusReceived) -> None:
         if now.mode is Mode.LOCAL and before.mode is not Mode.LOCAL:

@@ -6,12 +6,16 @@
     seen                   seen           over          -               -         -
 
 A motion command begins it, a stop or the lease's end forgets it; motion seen without one is foreign.
+
+A motion that was seen has demonstrably ended when two consecutive controller units report idle, with
+positions at its target. The end of a lease then needs no stop; the half second above still decides
+whether new motion is the holder's.
 """
 
 from dataclasses import replace
 
 from bus.schemas.robomesh_pb2 import CommandRequest
-from protocol_gateway.authority.rules import MOTION_COMMANDS, Authority, Motion, Now
+from protocol_gateway.authority.rules import ENDED_AFTER_UNITS, MOTION_COMMANDS, Authority, Motion, Now
 
 # Servos and brakes take their time: this long even a robot that is at its target already may begin to move.
 START_S = 2.0
@@ -23,6 +27,8 @@ ANSWERED_WITHIN_S = 2.0
 SETTLE_S = 0.5
 # Of motions told before the first of them was over.
 LONGEST_WAY = 64
+# Places nearer to each other [rad] or [m] are not told apart: well above what counts as arrived.
+_APART = 0.01
 
 _C = CommandRequest.Command
 
@@ -50,6 +56,7 @@ def command_sent(
         return authority
     motion = lease.motion
     if request.command in MOTION_COMMANDS:
+        conclusive = _is_conclusive(authority, request, way)
         if motion is not None and request.command == _C.RESUME:
             way = motion.way
         elif motion is not None and not arrived:
@@ -57,10 +64,25 @@ def command_sent(
             way = _behind(motion.way, way)
         # From its first motion on, whatever else moves the robot is a surprise.
         lease = replace(lease, commanded=True, tolerates_motion=False)
-        motion = Motion(last_s=now.monotonic_s, way=way, alone=alone)
+        motion = Motion(last_s=now.monotonic_s, way=way, alone=alone, conclusive=conclusive)
     elif motion is not None:
-        motion = replace(motion, held=motion.held or request.command == _C.HOLD, alone=False)
+        held = motion.held or request.command == _C.HOLD
+        motion = replace(motion, held=held, alone=False, rests=0 if held else motion.rests)
     return replace(authority, lease=replace(lease, motion=motion))
+
+
+def _is_conclusive(authority: Authority, request: CommandRequest, way: tuple[tuple[float, ...], ...]) -> bool:
+    """Whether the robot cannot rest at a new motion's target before the motion has brought it there."""
+    motion = None if authority.lease is None else authority.lease.motion
+    if motion is None:
+        return authority.moving is False
+    if request.command == _C.RESUME:
+        return motion.conclusive
+    # It may rest at any place of the motions that were commanded before.
+    return bool(motion.way and way) and all(
+        any(abs(there - here) > _APART for there, here in zip(place, way[-1], strict=True))
+        for place in motion.way
+    )
 
 
 def _behind(
@@ -79,6 +101,24 @@ def refused(authority: Authority) -> Authority:
     if lease.motion.seen or not lease.motion.alone:
         return authority
     return replace(authority, lease=replace(lease, motion=None))
+
+
+def reported(authority: Authority, *, resting: bool, dated_s: float) -> Authority:
+    """Follow one status unit of the controller.
+
+    Args:
+        resting: The unit reports idle, and the newest positions are at the target of the holder's motion.
+        dated_s: When the unit and the positions were new (monotonic); the older of both.
+    """
+    lease = authority.lease
+    if lease is None or lease.motion is None:
+        return authority
+    motion = lease.motion
+    proves = resting and motion.conclusive and motion.seen and not motion.held and dated_s > motion.last_s
+    rests = min(motion.rests + 1, ENDED_AFTER_UNITS) if proves else 0
+    if rests == motion.rests:
+        return authority
+    return replace(authority, lease=replace(lease, motion=replace(motion, rests=rests)))
 
 
 def observe(
@@ -101,7 +141,7 @@ def observe(
         if not moving:
             motion = _at_rest(lease.motion, pending=pending, arrived=arrived, now=now)
         else:
-            motion = replace(lease.motion, last_s=now.monotonic_s, seen=True)
+            motion = replace(lease.motion, last_s=now.monotonic_s, seen=True, rests=0)
         return replace(authority, lease=replace(lease, motion=motion)), False
     foreign_s = authority.foreign_s
     goes_on = foreign_s is not None and now.monotonic_s - foreign_s < SETTLE_S

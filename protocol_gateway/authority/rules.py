@@ -45,6 +45,9 @@ RECENT_S = 10.0
 ASKED_FOR_S = 30.0
 MOST_ASKERS = 20
 
+# One unit may have been on its way when the motion was commanded, or be the pause between two motions.
+ENDED_AFTER_UNITS = 2
+
 _C = CommandRequest.Command
 MOTION_COMMANDS = frozenset({_C.HOME, _C.RESUME, _C.MOVE_ABSOLUTE, _C.MOVE_RELATIVE, _C.RUN_PROGRAM})
 
@@ -66,6 +69,8 @@ class Motion:
         held: HOLD was sent; it goes on with RESUME.
         way: Everywhere that it goes, in order, its target last [rad] or [m]; empty: not known.
         alone: No other unit was sent shortly before it, or since: a refusal is an answer to it.
+        conclusive: Rest at its target proves that it has ended: the robot does not rest there before.
+        rests: Consecutive controller units that reported rest at its target, after it was seen to move.
     """
 
     last_s: float
@@ -73,11 +78,18 @@ class Motion:
     held: bool = False
     way: tuple[tuple[float, ...], ...] = ()
     alone: bool = True
+    conclusive: bool = False
+    rests: int = 0
 
     @property
     def target(self) -> tuple[float, ...] | None:
         """Where it ends [rad] or [m]; None: not known."""
         return self.way[-1] if self.way else None
+
+    @property
+    def ended(self) -> bool:
+        """Whether it has demonstrably ended: control that ends now needs no stop."""
+        return self.rests >= ENDED_AFTER_UNITS
 
 
 class Why(Enum):
@@ -247,7 +259,7 @@ def request_lease(
             text = f"control offered to {offered.offered_to}" if offered.offered_to else "offer withdrawn"
             return LeaseOutcome(replace(authority, lease=offered), Answer(True, text), offered)
         case action.ACCEPT if lease is not None and lease.offered_to == operator:
-            if lease.motion is not None:
+            if _may_run(lease.motion):
                 return _refused(
                     authority, f"{lease.holder}'s motion still runs: wait until it ends, then accept"
                 )
@@ -314,9 +326,13 @@ def end_lease(authority: Authority, why: str, *, foreign: bool = False) -> tuple
     lease = authority.lease
     if lease is None:
         return authority, None
-    stop = lease.motion is not None or (foreign and lease.commanded)
+    stop = _may_run(lease.motion) or (foreign and lease.commanded)
     ended = LeaseEnd(holder=lease.holder, why=why, renewals=lease.renewals, stop=stop)
     return replace(authority, lease=None, ended=why), ended
+
+
+def _may_run(motion: Motion | None) -> bool:
+    return motion is not None and not motion.ended
 
 
 def _grant(

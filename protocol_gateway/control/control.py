@@ -382,6 +382,14 @@ class Control:
             self._guarded.on_change()
         self._stops.check_heeded(moving=moving, now=now)
 
+    def reported(self, activity: Activity | None, dated_s: float) -> None:
+        """Follow a status unit; it and the newest positions were new at `dated_s` (monotonic)."""
+        lease = self.authority.lease
+        if lease is None or lease.motion is None:
+            return
+        resting = activity is Activity.IDLE and self._has_arrived()
+        self._guarded.authority = holders_motion.reported(self.authority, resting=resting, dated_s=dated_s)
+
     def _stop_orphan(self, moving: bool) -> None:
         """Stop what still moves of a motion that a killed gateway's holder commanded: nobody holds it now."""
         mover, self._guarded.orphan = self._guarded.orphan, ""

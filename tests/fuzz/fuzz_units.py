@@ -145,6 +145,7 @@ class Gateway:
             journal=journal,
             stale_after_s=1.0,
             on_status=lambda: None,
+            on_activity=lambda activity, dated_s: None,
             on_refused=lambda: None,
         )
 

@@ -75,11 +75,19 @@ class Plant:
         request = schema.CommandRequest(command=command, **fields)
         return await self.session.ask(self.key(f"command/{operator}"), request)
 
+    async def units(self, number):
+        """Wait until the gateway has taken so many more units of the controller's."""
+        seen = self.seen["joints"]
+        more = len(seen) + number
+        await until(lambda: len(seen) >= more)
+
     async def home(self):
-        """Take control for long enough, and home."""
+        """Take control for long enough, and home; until the motion has demonstrably ended."""
         await self.lease(A.ACQUIRE, ttl_s=5)
         await self.command(C.HOME)
         await until(lambda: self.controller.homed == STATE.YES)
+        await until(lambda: self.controller.activity in (STATE.IDLE, STATE.ACTIVITY_UNKNOWN))
+        await self.units(3)
         await self.lease(A.RENEW, ttl_s=5)
 
 

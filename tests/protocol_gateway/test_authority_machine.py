@@ -6,7 +6,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from protocol_gateway.authority.admission import admit, remember
-from protocol_gateway.authority.holders_motion import command_sent, observe, refused
+from protocol_gateway.authority.holders_motion import command_sent, observe, refused, reported
 from protocol_gateway.authority.rules import (
     MOTION_COMMANDS,
     Answer,
@@ -39,15 +39,20 @@ class Machine(RuleBasedStateMachine):
         self.known: dict[str, str] = {}
         self.made = 0
         self.sent_under: dict[str, int] = {}
+        self.rests = 0  # units in a row that reported rest at the target, behind motion that was seen
 
     @property
     def now(self):
         return Now(self.now_s, round(self.now_s * 1e9))
 
+    @property
+    def motion_may_run(self):
+        return self.authority.lease.motion is not None and self.rests < 2
+
     def ends(self, authority, ended):
         """The lease was `self.authority.lease` and is over."""
         if ended is not None:
-            assert ended.stop or self.authority.lease.motion is None
+            assert ended.stop or not self.motion_may_run
             assert ended.why == authority.ended
         self.authority = authority
 
@@ -84,7 +89,7 @@ class Machine(RuleBasedStateMachine):
             assert (action == A.TAKE and reason) or (action == A.ACCEPT and lease.offered_to == name)
             assert outcome.ended is not None
         if outcome.ended is not None:
-            assert outcome.ended.stop == (lease.motion is not None)
+            assert outcome.ended.stop == self.motion_may_run
         self.authority = outcome.authority
 
     @rule(name=names, command=commands, stop_back=st.integers(0, 2), repeat=st.booleans())
@@ -111,6 +116,8 @@ class Machine(RuleBasedStateMachine):
         self.sent_under[secret] = number
         self.authority = remember(self.authority, request, Answer(True, ""))
         self.authority = command_sent(self.authority, request, self.now)
+        if command in MOTION_COMMANDS or command == C.HOLD:
+            self.rests = 0
         assert command not in MOTION_COMMANDS or self.authority.lease.motion is not None
         assert (self.authority.stop is None) == (latched is None or command == C.RESET)
 
@@ -143,11 +150,24 @@ class Machine(RuleBasedStateMachine):
             self.authority, moving=moving, pending=pending, arrived=arrived, now=self.now
         )
         assert not (foreign and commanded)
+        if moving:
+            self.rests = 0
         if foreign and self.authority.lease is not None and not self.authority.lease.tolerates_motion:
             lease = self.authority.lease
             authority, ended = end_lease(self.authority, "foreign", foreign=True)
             assert ended.stop == lease.commanded
             self.authority = authority
+
+    @rule(resting=st.booleans())
+    def unit_is_received(self, resting):
+        lease = self.authority.lease
+        if lease is None or lease.motion is None:
+            return
+        counts = resting and lease.motion.seen and not lease.motion.held
+        counts = counts and lease.motion.conclusive and lease.motion.last_s < self.now_s
+        self.rests = self.rests + 1 if counts else 0
+        self.authority = reported(self.authority, resting=resting, dated_s=self.now_s)
+        assert self.authority.lease.motion is not None
 
     @rule()
     def controller_refuses(self):

@@ -25,6 +25,7 @@ class Desk:
             journal=Journal(self, "arm", monotonic_s=lambda: self.now_s),
             stale_after_s=1.0,
             on_status=lambda: None,
+            on_activity=lambda activity, dated_s: None,
             on_refused=lambda: None,
         )
 

@@ -1,0 +1,186 @@
+"""When a motion has demonstrably ended: control that ends then stops nothing, and any sooner it does."""
+
+from dataclasses import replace
+
+import pytest
+
+from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
+from protocol_gateway.audit.log import GATEWAY
+from protocol_gateway.authority.holders_motion import command_sent, observe, reported
+from protocol_gateway.authority.rules import Authority, Now, end_lease, request_lease
+from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
+from robots.description import load
+from robots.joints import joints_of
+from tests.conftest import run
+from tests.protocol_gateway.hall import gateway, simulator, until
+from tests.protocol_gateway.place import place
+
+A = LeaseRequest.Action
+C = CommandRequest.Command
+HOME = tuple(joints_of(load("pt600")).home.tolist())
+HERE, THERE, ELSEWHERE = (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)
+
+
+def at(seconds):
+    return Now(1000.0 + seconds, round((5000.0 + seconds) * 1e9))
+
+
+def ask(authority, action, operator="li", **fields):
+    request = LeaseRequest(action=action, **fields)
+    return request_lease(authority, request, operator=operator, now=at(0), secret="s")
+
+
+def command(state, kind, time_s, way=(THERE,)):
+    return command_sent(state, CommandRequest(lease="s", command=kind), at(time_s), way=way)
+
+
+def see(state, moves, time_s):
+    return observe(state, moving=moves, pending=False, arrived=not moves, now=at(time_s))[0]
+
+
+def report(state, time_s, *, resting=True):
+    return reported(state, resting=resting, dated_s=at(time_s).monotonic_s)
+
+
+@pytest.fixture
+def controlled():
+    """Li has control of a robot that is seen to rest."""
+    return ask(see(Authority(), False, -1.0), A.ACQUIRE).authority
+
+
+@pytest.fixture
+def at_rest(controlled):
+    """Li's motion was seen, and the robot has just come to rest."""
+    return see(see(command(controlled, C.MOVE_ABSOLUTE, 0.0), True, 0.9), False, 1.0)
+
+
+def stops(state):
+    return end_lease(state, "over")[1].stop
+
+
+def test_two_units_that_report_rest_at_the_target_prove_that_a_motion_has_ended(at_rest):
+    once = report(at_rest, 1.0)
+    assert stops(at_rest)
+    assert stops(once)
+    ended = report(once, 1.01)
+    assert not stops(ended)
+    assert not ask(ended, A.RELEASE, lease="s").ended.stop
+    assert not ask(ended, A.TAKE, "wang", reason="lunch").ended.stop
+    offered = ask(ended, A.OFFER, lease="s", to="wang").authority
+    accepted = ask(offered, A.ACCEPT, "wang")
+    assert accepted.granted.holder == "wang"
+    assert not accepted.ended.stop
+    refused = ask(ask(once, A.OFFER, lease="s", to="wang").authority, A.ACCEPT, "wang")
+    assert "motion still runs" in refused.answer.text
+
+
+def test_the_two_units_are_consecutive(at_rest):
+    state = report(report(report(at_rest, 1.0), 1.01, resting=False), 1.02)
+    assert stops(state)
+    assert not stops(report(state, 1.03))
+
+
+def test_what_was_received_before_the_motion_was_last_seen_proves_nothing(at_rest):
+    assert stops(report(report(at_rest, 0.8), 0.9))
+
+
+def test_a_motion_that_was_never_seen_has_not_ended(controlled):
+    state = see(command(controlled, C.HOME, 0.0), False, 0.1)
+    assert stops(report(report(state, 0.2), 0.3))
+
+
+def test_a_robot_that_moves_once_more_is_the_holders_until_it_rests_once_more(at_rest):
+    state = see(report(report(at_rest, 1.0), 1.01), True, 1.1)
+    assert stops(state)
+    state = see(state, False, 1.2)
+    assert stops(report(state, 1.21))
+    assert not stops(report(report(state, 1.21), 1.22))
+
+
+def test_a_new_motion_begins_the_proof_again(at_rest):
+    state = command(report(report(at_rest, 1.0), 1.01), C.MOVE_ABSOLUTE, 1.1, way=(ELSEWHERE,))
+    assert stops(report(report(state, 1.2), 1.3))
+    state = see(see(state, True, 1.9), False, 2.0)
+    assert not stops(report(report(state, 2.1), 2.2))
+
+
+def test_home_of_a_robot_that_was_on_its_way_home_is_not_over_with_the_first_of_both(controlled):
+    state = see(command(controlled, C.MOVE_ABSOLUTE, 0.0, way=(HERE,)), True, 0.1)
+    state = see(see(command(state, C.HOME, 0.9, way=(HERE,)), True, 1.0), False, 1.1)
+    assert stops(report(report(state, 1.2), 1.3))
+    assert see(state, False, 1.5).lease.motion is None  # 0.5 s later, as ever
+
+
+def test_a_place_that_is_passed_twice_proves_nothing_when_it_is_reached_first(controlled):
+    state = command(controlled, C.MOVE_ABSOLUTE, 0.0, way=(THERE,))
+    state = command(
+        command(state, C.MOVE_ABSOLUTE, 0.1, way=(ELSEWHERE,)), C.MOVE_ABSOLUTE, 0.2, way=(THERE,)
+    )
+    state = see(see(state, True, 0.9), False, 1.0)
+    assert stops(report(report(state, 1.1), 1.2))
+
+
+def test_a_motion_behind_another_has_ended_at_its_own_target(controlled):
+    state = see(command(controlled, C.MOVE_ABSOLUTE, 0.0, way=(THERE,)), True, 0.1)
+    state = see(see(command(state, C.MOVE_ABSOLUTE, 0.2, way=(ELSEWHERE,)), True, 1.9), False, 2.0)
+    assert not stops(report(report(state, 2.1), 2.2))
+
+
+def test_a_motion_on_hold_has_not_ended_and_what_is_resumed_has_at_its_target(at_rest):
+    held = command(report(report(at_rest, 1.0), 1.01), C.HOLD, 1.1)
+    assert stops(report(report(held, 1.2), 1.3))
+    resumed = see(see(command(held, C.RESUME, 2.0), True, 2.4), False, 2.5)
+    assert not stops(report(report(resumed, 2.6), 2.7))
+
+
+def test_a_robot_that_others_moved_when_it_was_commanded_proves_nothing_by_resting():
+    moved = ask(see(Authority(), True, -1.0), A.ACQUIRE).authority
+    state = see(see(command(moved, C.HOME, 0.0), True, 0.1), False, 0.2)
+    assert stops(report(report(state, 0.3), 0.4))
+
+
+@pytest.mark.parametrize(
+    ("activity", "positions", "age_s", "latched"),
+    [
+        (Activity.IDLE, HOME, 0.0, False),
+        (None, HOME, 0.0, True),
+        (Activity.MOVING, HOME, 0.0, True),
+        (Activity.IDLE, (0.1, *HOME[1:]), 0.0, True),
+        (Activity.IDLE, HOME, 9.0, True),
+    ],
+)
+def test_control_given_back_stops_what_is_not_proven_to_be_at_rest(
+    tmp_path, clock, activity, positions, age_s, latched
+):
+    async def main():
+        async with place(tmp_path) as it:
+            it.status = StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=False)
+            it.control.observe(moving=False)
+            await it.lease(A.ACQUIRE)
+            await it.commands((C.HOME, {}))
+            clock.goes_on(0.1)
+            it.control.observe(moving=True)
+            it.status, it.positions = replace(it.status, activity=activity, homed=True), positions
+            clock.goes_on(0.1)
+            it.control.observe(moving=False)
+            for _ in range(2):
+                clock.goes_on(0.01)
+                it.control.reported(activity, clock.now.monotonic_s - age_s)
+            await it.lease(A.RELEASE, lease=it.secret)
+            assert (it.control.authority.stop is not None) is latched
+            assert any(unit == b"1#COMMAND*stop@" for unit in it.socket) is latched
+
+    run(main())
+
+
+def test_control_given_back_as_soon_as_the_arm_is_at_home_stops_nothing(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.home()
+            await plant.lease(A.RELEASE)
+            await until(lambda: not plant.seen["lease"][-1].holder)
+            await plant.units(3)
+            assert [each.request for each in plant.seen["audit"] if each.operator == GATEWAY] == []
+            assert plant.controller.stop.id == 0
+
+    run(main())
