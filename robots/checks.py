@@ -23,6 +23,8 @@ from robots.units import length_factor
 
 Step = str | int
 
+# Keys of a body that name a mesh file.
+_MESHES = ("mesh", "collision_mesh")
 # No arm is as long: such a number is a slip, or metres where the file says millimetres.
 _LONGEST_M = 100.0
 
@@ -247,7 +249,7 @@ def file_problems(values: Mapping[str, Any], folder: Path, *, confined: bool) ->
         confined: What lies outside the folder is refused, and not looked for.
     """
     for place, name in named_files(values):
-        what = f"link {_link_name(values, place)!r} mesh" if place[-1] == "mesh" else str(place[0])
+        what = f"link {_link_name(values, place)!r} {place[-1]}" if place[-1] in _MESHES else str(place[0])
         path = folder / name
         if "\0" in name:
             yield Problem(place, f"{what} = {_short(name)}: no file has such a name")
@@ -278,8 +280,9 @@ def named_files(values: Mapping[str, Any]) -> Iterator[tuple[tuple[Step, ...], s
         if isinstance(row, dict)
     ]
     for place, body in bodies:
-        if isinstance(body, dict) and isinstance(body.get("mesh"), str):
-            yield (*place, "mesh"), body["mesh"]
+        for key in _MESHES if isinstance(body, dict) else ():
+            if isinstance(body.get(key), str):
+                yield (*place, key), body[key]
     if isinstance(values.get("urdf"), str):
         yield ("urdf",), values["urdf"]
         folders = values.get("packages")

@@ -33,11 +33,13 @@ class DhForm:
     Attributes:
         values: Of its robot.toml, in degrees and millimetres, without meshes.
         shapes: Of each link by name, "base" first, in the link's frame [m].
+        collision: What is checked in their place, likewise; none where that is the same.
         notes: What changed on the way, a sentence each.
     """
 
     values: dict[str, Any]
     shapes: Mapping[str, tuple[Shape, ...]]
+    collision: Mapping[str, tuple[Shape, ...]]
     notes: tuple[str, ...]
 
 
@@ -93,13 +95,20 @@ def dh_form(description: UrdfDescription) -> DhForm:
     places = {name: chain.place(link.joint) for name, link in links.items()}
     values |= _whole_robot_values(description, chain, names, places)
     shapes: dict[str, list[Shape]] = {name: [] for name in names}
+    checked: dict[str, list[Shape]] = {name: [] for name in names}
+    own: set[str] = set()
     for each in tree.links:
         place, placement = on_row(each.name, np.eye(4))
-        for shape in each.shapes:
-            shapes[names[place]].append(replace(shape, shape_to_link=placement @ shape.shape_to_link))
+        for some, found in ((each.shapes, shapes), (each.checked, checked)):
+            found[names[place]] += [
+                replace(shape, shape_to_link=placement @ shape.shape_to_link) for shape in some
+            ]
+        if each.collision:
+            own.add(names[place])
     return DhForm(
         {key: value for key, value in values.items() if value not in ("", [], {})},
         {name: tuple(found) for name, found in shapes.items()},
+        {name: tuple(found) if name in own else () for name, found in checked.items()},
         tuple(_notes(chain, joints, tool_to_last)),
     )
 

@@ -23,7 +23,15 @@ from robots.meshes.write_glb import glb_of
 from robots.schema import RobotDescription
 from robots.tree import Shape, tree_of
 
-__all__ = ["MOST_TRIANGLES", "cache_folder", "glb_of", "link_mesh", "link_meshes", "shapes_glb"]
+__all__ = [
+    "MOST_TRIANGLES",
+    "cache_folder",
+    "collision_meshes",
+    "glb_of",
+    "link_mesh",
+    "link_meshes",
+    "shapes_glb",
+]
 
 logger = logging.getLogger(__name__)
 
@@ -45,6 +53,17 @@ def link_meshes(description: RobotDescription, *, cache: Path | None = None) -> 
     folder = cache_folder() if cache is None else cache
     links = tree_of(description).links
     return {link.name: shapes_glb(link.shapes, cache=folder) for link in links if link.shapes}
+
+
+def collision_meshes(description: RobotDescription, *, cache: Path | None = None) -> dict[str, bytes]:
+    """GLB of what is checked of each link that has collision geometry of its own, as `link_meshes`.
+
+    Raises:
+        MeshError: If a mesh file cannot be read.
+    """
+    folder = cache_folder() if cache is None else cache
+    links = tree_of(description).links
+    return {link.name: shapes_glb(link.collision, cache=folder) for link in links if link.collision}
 
 
 def shapes_glb(shapes: tuple[Shape, ...], *, cache: Path | None = None) -> bytes:

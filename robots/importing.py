@@ -10,11 +10,11 @@ from robots.bounded_toml import parse_toml
 from robots.description import ROBOT_FILES, described, load, robot_name
 from robots.dh import dh_form
 from robots.errors import DescriptionError
-from robots.glb import glb_of, link_mesh, link_meshes
+from robots.glb import collision_meshes, glb_of, link_mesh, link_meshes
 from robots.meshes.read import read_mesh
 from robots.schema import DhDescription, RobotDescription, UrdfDescription
 from robots.tree import tree_of
-from robots.urdf.write import glb_beside, tree_urdf
+from robots.urdf.write import collision_beside, glb_beside, tree_urdf
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +67,7 @@ def _urdf(description: UrdfDescription) -> Imported:
         values.pop(gone, None)
     text = tree_urdf(description.name, tree_of(description))
     files = {values["urdf"]: text.encode()} | {glb_beside(link): glb for link, glb in meshes.items()}
+    files |= {collision_beside(link): glb for link, glb in collision_meshes(description).items()}
     robot = description.robot
     return Imported(values, files, tuple(robot.notes), tuple(robot.missing))
 
@@ -82,10 +83,14 @@ def as_rows(description: UrdfDescription) -> Imported:
     values, files = dict(form.values), {}
     values["provenance"] = _provenance(description)
     bodies = [values.setdefault("base", {}), *(row["link"] for row in values["joint"])]
-    for (link, shapes), body in zip(form.shapes.items(), bodies, strict=True):
-        if shapes:
-            body |= {"mesh": glb_beside(link), "mesh_scale": 1.0}
-            files[body["mesh"]] = glb_of(link_mesh(shapes))
+    for key, of_links, address in (
+        ("mesh", form.shapes, glb_beside),
+        ("collision_mesh", form.collision, collision_beside),
+    ):
+        for (link, shapes), body in zip(of_links.items(), bodies, strict=True):
+            if shapes:
+                body |= {key: address(link), "mesh_scale": 1.0}
+                files[body[key]] = glb_of(link_mesh(shapes))
     robot = description.robot
     return Imported(values, files, (*robot.notes, *form.notes), tuple(robot.missing))
 
@@ -102,16 +107,17 @@ def _copied(description: DhDescription) -> Imported:
     notes: list[str] = []
     tables = [values.get("base", {}), *(row.get("link", {}) for row in values["joint"])]
     for table, body in zip(tables, description.bodies.values(), strict=True):
-        path = description.mesh_path(body)
-        if path is None:
-            continue
-        if path not in places:
-            places[path] = _inside(str(table["mesh"]), set(files))
-            files[places[path]] = _bytes(path)
-            mesh = read_mesh(path, within=description.within)
-            notes += [f"{places[path]} names {name!r}, which is not there" for name in mesh.missing]
-            notes += _copied_beside(path, places[path], mesh.files, files)
-        table["mesh"] = places[path]
+        paths = {"mesh": description.mesh_path(body), "collision_mesh": description.collision_path(body)}
+        for key, path in paths.items():
+            if path is None:
+                continue
+            if path not in places:
+                places[path] = _inside(str(table[key]), set(files))
+                files[places[path]] = _bytes(path)
+                mesh = read_mesh(path, within=description.within)
+                notes += [f"{places[path]} names {name!r}, which is not there" for name in mesh.missing]
+                notes += _copied_beside(path, places[path], mesh.files, files)
+            table[key] = places[path]
     return Imported(values, files, tuple(notes), ())
 
 

@@ -31,7 +31,7 @@ def mesh_findings(description: RobotDescription) -> tuple[list[Finding], list[Fi
         problems += [Finding(source, f"mesh {name!r}: no such file") for name in description.robot.missing]
         warnings += [Finding(source, note) for note in description.robot.notes]
     for link in tree_of(description).links:
-        for shape in link.shapes:
+        for shape in (*link.shapes, *link.collision):
             if not isinstance(shape.mesh, Path):
                 continue
             file, what = str(shape.mesh), f"link {link.name!r}"

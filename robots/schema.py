@@ -80,12 +80,14 @@ class Body(_Table):
 
     Attributes:
         mesh: File, relative to the description's folder; none: the link is not drawn.
-        mesh_scale: The mesh file's unit in metres.
-        mesh_pose: Of the mesh in the link's frame.
+        collision_mesh: File that collision checks use in place of `mesh`.
+        mesh_scale: The unit of both files in metres.
+        mesh_pose: Of both in the link's frame.
         color: Of the mesh's materials named "paint", or of all where none is; none: the mesh's own.
     """
 
     mesh: str | None = None
+    collision_mesh: str | None = None
     mesh_scale: Positive = 0.001
     mesh_pose: Pose = Pose()
     color: Color | None = None
@@ -240,7 +242,14 @@ class DhDescription(RobotDescription):
 
     def mesh_path(self, body: Body) -> Path | None:
         """Where a body's mesh file is; None without one."""
-        return None if body.mesh is None else self._source.parent / body.mesh
+        return self._beside(body.mesh)
+
+    def collision_path(self, body: Body) -> Path | None:
+        """Where the file is that collision checks use in place of a body's mesh; None without one."""
+        return self._beside(body.collision_mesh)
+
+    def _beside(self, name: str | None) -> Path | None:
+        return None if name is None else self._source.parent / name
 
 
 class UrdfDescription(RobotDescription):

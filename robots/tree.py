@@ -112,12 +112,19 @@ class TreeLink:
         joint: Number of the joint that moves it; BASE: it does not move.
         link_to_joint: (4, 4) its frame in that joint's frame (or the base's).
         shapes: What it looks like; none for a bare frame.
+        collision: What is checked in place of `shapes`; none: `shapes` are checked.
     """
 
     name: str
     joint: int
     link_to_joint: FloatArray
     shapes: tuple[Shape, ...] = ()
+    collision: tuple[Shape, ...] = ()
+
+    @property
+    def checked(self) -> tuple[Shape, ...]:
+        """The shapes that a collision check uses."""
+        return self.collision or self.shapes
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +168,11 @@ def _confined(tree: Tree, folder: Path) -> Tree:
     return replace(
         tree,
         links=tuple(
-            replace(link, shapes=tuple(replace(shape, within=folder) for shape in link.shapes))
+            replace(
+                link,
+                shapes=tuple(replace(shape, within=folder) for shape in link.shapes),
+                collision=tuple(replace(shape, within=folder) for shape in link.collision),
+            )
             for link in tree.links
         ),
     )
@@ -180,7 +191,7 @@ def _tree_of_rows(description: DhDescription) -> Tree:
     units = description.units
     length, angle = length_factor(units), angle_factor(units)
     before = np.eye(4)  # link i-1 in joint i-1
-    links = [TreeLink(BASE_LINK, BASE, before, _shapes(description, description.base))]
+    links = [TreeLink(BASE_LINK, BASE, before, *_shapes(description, description.base))]
     joints = []
     for number, row in enumerate(description.joints):
         rotary = row.type is JointType.ROTARY
@@ -201,17 +212,20 @@ def _tree_of_rows(description: DhDescription) -> Tree:
             )
         )
         before = dh_fixed_part(row.d * length if rotary else 0.0, row.a * length, row.alpha * angle)
-        links.append(TreeLink(row.link_name, number, before, _shapes(description, row.link)))
+        links.append(TreeLink(row.link_name, number, before, *_shapes(description, row.link)))
     return Tree(tuple(joints), tuple(links))
 
 
-def _shapes(description: DhDescription, body: Body) -> tuple[Shape, ...]:
-    path = description.mesh_path(body)
-    if path is None:
-        return ()
+def _shapes(description: DhDescription, body: Body) -> tuple[tuple[Shape, ...], tuple[Shape, ...]]:
+    """What a body looks like, and what is checked in its place."""
     scale = np.diag([body.mesh_scale, body.mesh_scale, body.mesh_scale, 1.0])
+    placement = pose_matrix(body.mesh_pose, description.units) @ scale
     color = None if body.color is None else rgb(body.color)
-    return (Shape(path, pose_matrix(body.mesh_pose, description.units) @ scale, color),)
+    drawn, checked = description.mesh_path(body), description.collision_path(body)
+    return (
+        () if drawn is None else (Shape(drawn, placement, color),),
+        () if checked is None else (Shape(checked, placement),),
+    )
 
 
 def _painted(link: TreeLink, color: Color | None) -> TreeLink:

@@ -263,9 +263,9 @@ def load(path: Path | None) -> Site:
             tree = tree_of(described)
         except DescriptionError as error:
             raise SiteFileError(f"{path}: robot {robot.name}: model = {robot.model!r}: {error}") from None
-        links[robot.name] = {link.name: bool(link.shapes) for link in tree.links}
-        missing = described.robot.missing if isinstance(described, UrdfDescription) else ()
-        shaped = [number for number, link in enumerate(tree.links) if link.shapes]
+        links[robot.name] = {link.name: bool(link.checked) for link in tree.links}
+        missing = described.robot.unchecked if isinstance(described, UrdfDescription) else ()
+        shaped = [number for number, link in enumerate(tree.links) if link.checked]
         moving = [tree.links[number] for number in bare_links(tree, shaped)]
         moving = [link for link in moving if link.joint != BASE]
         if not shaped:

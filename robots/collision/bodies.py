@@ -3,6 +3,7 @@
 A hull misses no collision of its mesh, and a distance between hulls costs a hundredth of one between meshes.
 """
 
+import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -19,6 +20,10 @@ from robots.tree import Shape
 TOUCH_M = 1e-5
 # What is flat becomes a plate of this thickness: a hull needs a volume.
 _THINNEST_M = 1e-4
+# More points than these are joggled at once.
+_MOST_EXACT = 2_000
+# What coal's hulls cannot be made of is rounded to cells of this share of its extent, then to larger ones.
+_FINEST_CELL = 1e-3
 # A box longer than wide is covered by several balls, at most so many.
 _MOST_BALLS = 6
 
@@ -81,11 +86,39 @@ def exact_bodies(shapes: Sequence[Shape]) -> tuple[Body, ...]:
 def hull_body(points: FloatArray) -> Body:
     """The convex hull of (n, 3) points, n at least 1."""
     points = _with_volume(points)
+    return _body(_convex(points), points)
+
+
+def _convex(points: FloatArray) -> Any:
+    """Coal's hull of points, or the least coarse hull about it that coal takes.
+
+    Coal raises RuntimeError for a vertex of more than 255 neighbours. Qhull makes one of a flat, round face,
+    as whose triangles it takes a fan (Qt), in a time that grows with the square of its corners. Where it
+    joggles the points by 1e-10 of their extent (QJ), it does not, but keeps more points of flat faces.
+    The tip of a round cone has as many neighbours as its rim has points: those are rounded outwards.
+    """
+    for options in ("Qt", "QJ") if len(points) <= _MOST_EXACT else ("QJ",):
+        with contextlib.suppress(RuntimeError):
+            return _qhull(points, options)
+    cell = _FINEST_CELL * float(np.ptp(points, axis=0).max())
+    while True:
+        with contextlib.suppress(RuntimeError):
+            return _qhull(_about(points, cell), "Qt")
+        cell *= 2
+
+
+def _qhull(points: FloatArray, options: str) -> Any:
     vertices = coal.StdVec_Vec3s()
     for point in points:
         vertices.append(point)
-    # Qt: facets as triangles, which coal's hulls are made of.
-    return _body(coal.Convex.convexHull(vertices, False, "Qt"), points)
+    return coal.Convex.convexHull(vertices, False, options)
+
+
+def _about(points: FloatArray, cell_m: float) -> FloatArray:
+    """The corners of all cells of a grid that hold a point: they are about the points, and far fewer."""
+    cells = np.unique(np.floor(points / cell_m), axis=0)
+    corners = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1]), axis=-1).reshape(-1, 3)
+    return np.unique((cells[:, None] + corners).reshape(-1, 3), axis=0) * cell_m
 
 
 def _body(geometry: Any, points: FloatArray) -> Body:

@@ -94,7 +94,7 @@ def _read(
     description = load(model, confined=confined)
     bodies_of = exact_bodies if exact else hull_bodies
     links = enumerate(tree_of(description).links)
-    return description, tuple((number, body) for number, link in links for body in bodies_of(link.shapes))
+    return description, tuple((number, body) for number, link in links for body in bodies_of(link.checked))
 
 
 def _arm(robot: CellRobot, *, exact: bool) -> Arm:
@@ -156,7 +156,7 @@ def _bare(cell: Cell, robot: str) -> tuple[int, ...]:
 def missing_meshes(cell: Cell, robot: str) -> tuple[str, ...]:
     """Mesh files of an arm that were not found, as its description names them: no check covers them."""
     description = cell.arms[robot].description
-    return description.robot.missing if isinstance(description, UrdfDescription) else ()
+    return description.robot.unchecked if isinstance(description, UrdfDescription) else ()
 
 
 def distances(cell: Cell, pair: tuple[str, str]) -> tuple[float, float]:

@@ -70,7 +70,7 @@ def sample_pairs(description: RobotDescription, *, samples: int = SAMPLES, seed:
         MeshError: If a link's mesh cannot be read.
     """
     tree, model = tree_of(description), build_model(description)
-    hulls = {link.name: body.geometry for link in tree.links for body in hull_bodies(link.shapes)}
+    hulls = {link.name: body.geometry for link in tree.links for body in hull_bodies(link.checked)}
     joints = {link.name: link.joint for link in tree.links}
     neighbours = {
         pair for pair in combinations(hulls, 2) if are_neighbours(tree, *(joints[name] for name in pair))

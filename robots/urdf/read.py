@@ -42,12 +42,14 @@ class UrdfRobot:
         name: As the file has it.
         notes: What was odd and how it was taken, a sentence each.
         missing: Mesh files that were not found, as the URDF names them.
+        unchecked: Those of them that a collision check would use.
     """
 
     name: str
     tree: Tree
     notes: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
+    unchecked: tuple[str, ...] = ()
 
 
 def read_urdf(text: str, source: Path, *, resolve: Resolve) -> UrdfRobot:
@@ -131,7 +133,7 @@ class _Reading:
             raise WrongElement("has no joint that moves; an arm has at least one")
         notes = (*self.notes, *self.shapes.notes)
         name = self.root.get("name") or "robot"
-        return UrdfRobot(name, tree, notes, tuple(self.shapes.missing))
+        return UrdfRobot(name, tree, notes, tuple(self.shapes.missing), tuple(self.shapes.unchecked))
 
     def _safe_names(self, kind: str, elements: Mapping[str, Xml.Element]) -> dict[str, str]:
         """Names that may stand in keys, files and frames; most are so already."""
@@ -173,7 +175,7 @@ class _Reading:
             if joint is not None:
                 number, link_to_joint = self._step(joint, number, link_to_joint)
             shapes = self.shapes.of(self.links[link], link)
-            self.tree_links.append(TreeLink(self.link_names[link], number, link_to_joint, shapes))
+            self.tree_links.append(TreeLink(self.link_names[link], number, link_to_joint, *shapes))
             waiting += [
                 (child, name, number, link_to_joint) for name, child in reversed(children.get(link, []))
             ]

@@ -1,7 +1,7 @@
-"""What the links of a URDF look like: their visuals, or their collision shapes where there is none."""
+"""What the links of a URDF look like, and what of them is checked: their visual and collision geometry."""
 
 import xml.etree.ElementTree as Xml
-from math import pi
+from math import cos, pi
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from robots.urdf.files import Resolve
 from robots.urdf.values import WrongElement, numbers, origin
 
 _ROUND = 32
+# Of collision geometry, faces go about what is round, not through it: a check must not miss the half per
+# cent between them.
+_ROUNDER = 1 / cos(pi / _ROUND)
 _Paint = tuple[tuple[float, float, float], float]
 
 
@@ -22,11 +25,13 @@ class Shapes:
 
     Attributes:
         missing: Mesh files that were not found, as the file names them.
+        unchecked: Those of them that a collision check would use.
     """
 
     def __init__(self, root: Xml.Element, resolve: Resolve) -> None:
         self._resolve = resolve
         self.missing: list[str] = []
+        self.unchecked: list[str] = []
         self.notes: list[str] = []
         self._paints: dict[str, _Paint] = {}
         # A material may be named before the element that says what it is.
@@ -35,15 +40,21 @@ class Shapes:
             if paint is not None:
                 self._paints[material.get("name", "")] = paint
 
-    def of(self, link: Xml.Element, name: str) -> tuple[Shape, ...]:
-        """The shapes of a link, in its own frame."""
-        for kind in ("visual", "collision"):
-            shapes = [self._shape(element, f"link {name!r} {kind}") for element in link.findall(kind)]
-            if shapes:
-                return tuple(shape for shape in shapes if shape is not None)
-        return ()
+    def of(self, link: Xml.Element, name: str) -> tuple[tuple[Shape, ...], tuple[Shape, ...]]:
+        """The shapes of a link that are drawn, and those that are checked in their place; in its frame."""
+        collisions = link.findall("collision")
+        drawn = [
+            self._shape(element, f"link {name!r} visual", checked=not collisions)
+            for element in link.findall("visual")
+        ]
+        checked = [self._shape(element, f"link {name!r} collision", checked=True) for element in collisions]
+        shapes, collision = (tuple(each for each in some if each is not None) for some in (drawn, checked))
+        if not drawn:
+            return collision, ()
+        same = len(shapes) == len(collision) and all(map(_same, shapes, collision))
+        return shapes, () if same else collision
 
-    def _shape(self, element: Xml.Element, what: str) -> Shape | None:
+    def _shape(self, element: Xml.Element, what: str, *, checked: bool) -> Shape | None:
         placement = origin(element, what)
         geometry = element.find("geometry")
         found = next(iter(geometry), None) if geometry is not None else None
@@ -56,8 +67,11 @@ class Shapes:
             paint = _paint(material) or self._paints.get(material.get("name", ""))
             color, opacity = paint or (None, None)
         if found.tag == "mesh":
-            return self._mesh(found, what, placement, color, opacity)
-        solid = _solid(found, f"{what} {found.tag}")
+            shape = self._mesh(found, what, placement, color, opacity)
+            if shape is None and checked:
+                self.unchecked.append(found.get("filename", ""))
+            return shape
+        solid = _solid(found, f"{what} {found.tag}", rounder=_ROUNDER if element.tag == "collision" else 1.0)
         if solid is None:
             self.notes.append(f"{what}: {found.tag} is no shape that is drawn; left out")
             return None
@@ -89,6 +103,16 @@ class Shapes:
         return Shape(path, placement @ np.diag([*scale, 1.0]), color, opacity, in_stated_unit=True)
 
 
+def _same(one: Shape, other: Shape) -> bool:
+    """Return whether two shapes have one geometry, whatever their colours."""
+    if not np.array_equal(one.shape_to_link, other.shape_to_link):
+        return False
+    if isinstance(one.mesh, Mesh) and isinstance(other.mesh, Mesh):
+        (one_part,), (other_part,) = one.mesh.parts, other.mesh.parts
+        return np.array_equal(one_part.vertices, other_part.vertices)
+    return one.mesh == other.mesh
+
+
 def _paint(material: Xml.Element) -> _Paint | None:
     color = material.find("color")
     if color is None:
@@ -98,17 +122,24 @@ def _paint(material: Xml.Element) -> _Paint | None:
     return (red, green, blue), opacity
 
 
-def _solid(element: Xml.Element, what: str) -> Solid | None:
+def _solid(element: Xml.Element, what: str, *, rounder: float) -> Solid | None:
+    """A box, a ball, a cylinder or a capsule.
+
+    Args:
+        rounder: Factor of the radius of what is round.
+    """
     match element.tag:
         case "box":
             half = np.array(numbers(element, "size", 3, what, "")) / 2
             return box(-half, half)
         case "sphere":
             (radius,) = numbers(element, "radius", 1, what, "")
-            return ball(radius, _ROUND)
+            return ball(radius * rounder, _ROUND)
         case "cylinder" | "capsule":
             (radius,), (length,) = (numbers(element, key, 1, what, "") for key in ("radius", "length"))
-            return turned(_round_profile(radius, length / 2, capsule=element.tag == "capsule"), _ROUND)
+            return turned(
+                _round_profile(radius * rounder, length / 2, capsule=element.tag == "capsule"), _ROUND
+            )
         case _:
             return None
 

@@ -23,13 +23,24 @@ def glb_beside(link: str) -> str:
     return f"meshes/{link}.glb"
 
 
-def to_urdf(description: RobotDescription, *, mesh_uri: Callable[[str], str] = glb_beside) -> str:
-    """The description as URDF text, with the meshes that `robots.glb.link_meshes` gives.
+def collision_beside(link: str) -> str:
+    """What is checked of a link, as a file in the folder meshes beside the URDF."""
+    return f"meshes/{link}_collision.glb"
+
+
+def to_urdf(
+    description: RobotDescription,
+    *,
+    mesh_uri: Callable[[str], str] = glb_beside,
+    collision_uri: Callable[[str], str] | None = None,
+) -> str:
+    """Return a description as URDF text, with the meshes that `robots.glb.link_meshes` gives.
 
     Limits and speeds are the description's, which may be tighter than those of the URDF that it is of.
 
     Args:
         mesh_uri: Address of a link's GLB by the link's name.
+        collision_uri: Of the GLB that `robots.glb.collision_meshes` gives; None: `mesh_uri` for both uses.
     """
     tree = tree_of(description)
     joints = joints_of(description)
@@ -37,21 +48,22 @@ def to_urdf(description: RobotDescription, *, mesh_uri: Callable[[str], str] = g
         tree.free, joints.lower, joints.upper, joints.max_speed, strict=True
     ):
         tree = _with_limits(tree, number, float(lower), float(upper), float(speed))
-    return tree_urdf(description.name, tree, named_frames(description), mesh_uri=mesh_uri)
+    return tree_urdf(description.name, tree, named_frames(description), mesh_uri, collision_uri)
 
 
 def tree_urdf(
     name: str,
     tree: Tree,
     frames: Mapping[str, tuple[str, FloatArray]] | None = None,
-    *,
     mesh_uri: Callable[[str], str] = glb_beside,
+    collision_uri: Callable[[str], str] | None = collision_beside,
 ) -> str:
     """A tree of joints and links as URDF text.
 
     Args:
         frames: Bare frames by name: the link that carries each, and where it is there (4, 4) [m].
         mesh_uri: Address of the GLB of a link that has a shape, by the link's name.
+        collision_uri: As `to_urdf`.
     """
     robot = Xml.Element("robot", name=name)
     robot.append(
@@ -74,7 +86,7 @@ def tree_urdf(
         if joint is not None:
             _add_joint(robot, tree, joint, carriers[joint.parent], carrier)
         for link in here:
-            _add_link(robot, link, mesh_uri)
+            _add_link(robot, link, mesh_uri, collision_uri or mesh_uri)
             if link.name != carrier:
                 on, on_to_joint = carriers.get(number, (carrier, np.eye(4)))
                 _add_fixed(robot, on, link.name, inverse(on_to_joint) @ link.link_to_joint, taken_joints)
@@ -102,12 +114,17 @@ def _unused(name: str, taken: set[str]) -> str:
     return name
 
 
-def _add_link(robot: Xml.Element, link: TreeLink, mesh_uri: Callable[[str], str]) -> None:
+def _add_link(
+    robot: Xml.Element,
+    link: TreeLink,
+    mesh_uri: Callable[[str], str],
+    collision_uri: Callable[[str], str],
+) -> None:
     element = Xml.SubElement(robot, "link", name=link.name)
-    if link.shapes:
-        for use in ("visual", "collision"):
-            geometry = Xml.SubElement(Xml.SubElement(element, use), "geometry")
-            Xml.SubElement(geometry, "mesh", filename=mesh_uri(link.name))
+    uses = {"visual": mesh_uri, "collision": collision_uri if link.collision else mesh_uri}
+    for use, address in uses.items() if link.shapes else ():
+        geometry = Xml.SubElement(Xml.SubElement(element, use), "geometry")
+        Xml.SubElement(geometry, "mesh", filename=address(link.name))
 
 
 def _add_joint(

@@ -120,8 +120,8 @@ def _cell(value: float) -> str:
 
 def export(robot: str, folder: Path) -> None:
     """Write URDF and GLB meshes into a folder."""
-    from robots.glb import link_meshes
-    from robots.urdf.write import to_urdf
+    from robots.glb import collision_meshes, link_meshes
+    from robots.urdf.write import collision_beside, glb_beside, to_urdf
 
     description = load(robot)
     urdf = folder / f"{description.name}.urdf"
@@ -131,12 +131,13 @@ def export(robot: str, folder: Path) -> None:
         raise RequestError(
             f"{folder}: holds another robot ({there}); its meshes would be lost: name a new folder"
         )
-    meshes = link_meshes(description)
+    files = {glb_beside(link): glb for link, glb in link_meshes(description).items()}
+    files |= {collision_beside(link): glb for link, glb in collision_meshes(description).items()}
     try:
         (folder / "meshes").mkdir(parents=True, exist_ok=True)
-        for link, glb in meshes.items():
-            (folder / "meshes" / f"{link}.glb").write_bytes(glb)
-        urdf.write_text(to_urdf(description), encoding="utf-8")
+        for path, glb in files.items():
+            (folder / path).write_bytes(glb)
+        urdf.write_text(to_urdf(description, collision_uri=collision_beside), encoding="utf-8")
     except OSError as error:
         raise RequestError(f"{folder}: cannot be written: {error.strerror}") from None
     print(urdf)

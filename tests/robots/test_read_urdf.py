@@ -131,15 +131,52 @@ def test_limits_and_speeds_are_the_files_and_a_continuous_joint_gets_one_turn_ea
     np.testing.assert_allclose(joints.home, np.zeros(5))
 
 
-def test_shapes_are_the_visuals_or_else_the_collision_shapes() -> None:
+def test_visuals_are_drawn_and_collision_shapes_checked_each_in_place_of_the_other() -> None:
     links = {link.name: link for link in read(ARM).tree.links}
     box, cylinder = links["pillar"].shapes
     assert (box.color, box.opacity) == ((0.0, 0.0, 1.0), 0.5)
     assert bounds_in_link(box) == ([-1, -2, -2], [1, 2, 4])
     assert bounds_in_link(cylinder) == ([-1, -1, -2], [1, 1, 2])
+    (around,) = links["pillar"].checked
+    assert bounds_in_link(around)[1] == pytest.approx([9, 9, 9], rel=0.01)
     (ball,) = links["arm"].shapes
-    assert bounds_in_link(ball) == ([-0.5, -0.5, -0.5], [0.5, 0.5, 0.5])
-    assert links["hand"].shapes == ()
+    assert links["arm"].checked == links["arm"].shapes
+    assert bounds_in_link(ball)[1] == pytest.approx([0.5, 0.5, 0.5], rel=0.01)
+    assert links["hand"].shapes == links["hand"].checked == ()
+
+
+def test_round_collision_shapes_are_nowhere_smaller_than_they_say() -> None:
+    links = {link.name: link for link in read(ARM).tree.links}
+    (around,) = links["pillar"].checked
+    assert isinstance(around.mesh, Mesh)
+    (part,) = around.mesh.parts
+    corners = part.vertices[part.triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    depths = np.einsum("ij,ij->i", normals, corners[:, 0]) / np.linalg.norm(normals, axis=1)
+    assert depths.min() > 9 * 0.995
+    assert np.linalg.norm(part.vertices, axis=1).max() < 9 * 1.005
+
+
+def test_collision_geometry_that_is_the_visual_geometry_is_kept_once() -> None:
+    visual = '<visual><geometry><box size="1 2 3"/></geometry></visual>'
+    both = visual + visual.replace("visual", "collision")
+    text = with_change('<link name="hand"/>', f'<link name="hand">{both}</link>')
+    (hand,) = (link for link in read(text).tree.links if link.name == "hand")
+    assert len(hand.shapes) == 1
+    assert hand.collision == ()
+
+
+def test_a_missing_file_counts_as_unchecked_only_where_a_check_would_use_it() -> None:
+    seen = '<visual><geometry><mesh filename="seen.stl"/></geometry></visual>'
+    checked = '<collision><geometry><mesh filename="checked.stl"/></geometry></collision>'
+    box = '<collision><geometry><box size="1 1 1"/></geometry></collision>'
+
+    def unchecked(inside: str) -> tuple[str, ...]:
+        return read(with_change('<link name="hand"/>', f'<link name="hand">{inside}</link>')).unchecked
+
+    assert unchecked(seen) == ("seen.stl",)
+    assert unchecked(seen + box) == ()
+    assert unchecked(seen + checked) == ("checked.stl",)
 
 
 def bounds_in_link(shape: Shape) -> tuple[list[float], list[float]]:

@@ -169,10 +169,10 @@ def _description(folder: Path, values: Json) -> RobotDescription:
 def _without_meshes(values: Mapping[str, Any]) -> Json:
     without = dict(values)
     if isinstance(values.get("base"), dict):
-        without["base"] = {key: each for key, each in values["base"].items() if key != "mesh"}
+        without["base"] = {key: each for key, each in values["base"].items() if not key.endswith("mesh")}
     if isinstance(values.get("joint"), list):
         without["joint"] = [
-            {**row, "link": {key: each for key, each in row["link"].items() if key != "mesh"}}
+            {**row, "link": {key: each for key, each in row["link"].items() if not key.endswith("mesh")}}
             if isinstance(row, dict) and isinstance(row.get("link"), dict)
             else row
             for row in values["joint"]

@@ -12,6 +12,8 @@ export interface Pose {
 /** How a link looks; an empty mesh or colour: none. */
 export interface Body {
   mesh: string;
+  /** What collision checks use in place of the mesh; empty: the mesh. */
+  collision_mesh: string;
   mesh_scale: number;
   mesh_pose: Pose;
   color: string;
@@ -91,6 +93,7 @@ function pose(given: Partly<Pose> | undefined): Pose {
 function body(given: Partly<Body> | undefined): Body {
   return {
     mesh: given?.mesh ?? "",
+    collision_mesh: given?.collision_mesh ?? "",
     mesh_scale: given?.mesh_scale ?? 0.001,
     mesh_pose: pose(given?.mesh_pose),
     color: given?.color ?? "",
@@ -128,8 +131,10 @@ export function complete(given: GivenDescription): Description {
 export function concise(from: Description): object {
   const isZero = (at: Pose) => [...at.xyz, ...at.rpy].every((value) => value === 0);
   const shape = (of: Body) => ({
-    ...(of.mesh && { mesh: of.mesh, mesh_scale: of.mesh_scale }),
-    ...(of.mesh && !isZero(of.mesh_pose) && { mesh_pose: of.mesh_pose }),
+    ...(of.mesh && { mesh: of.mesh }),
+    ...(of.collision_mesh && { collision_mesh: of.collision_mesh }),
+    ...((of.mesh || of.collision_mesh) && { mesh_scale: of.mesh_scale }),
+    ...((of.mesh || of.collision_mesh) && !isZero(of.mesh_pose) && { mesh_pose: of.mesh_pose }),
     ...(of.color && { color: of.color }),
   });
   return {

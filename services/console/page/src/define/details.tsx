@@ -131,6 +131,9 @@ function BodyDetails({ body, description }: { body: Body; description: Descripti
         <span class="mesh-name" title={body.mesh}>
           <span class="label">{d("mesh")}</span>
           {body.mesh ? fileName(body.mesh) : <span class="dim">{d("mesh_none")}</span>}
+          {body.collision_mesh && (
+            <span class="dim small"> {d("mesh_checked", { file: fileName(body.collision_mesh) })}</span>
+          )}
         </span>
         <FileButton path={`${path}/mesh`} label={d("mesh_choose")} quiet take={(files) => void takeShapeFor(files, find)} />
         {body.mesh && (
@@ -138,7 +141,7 @@ function BodyDetails({ body, description }: { body: Body; description: Descripti
             class="quiet"
             onClick={() => {
               seal();
-              set("mesh", (own) => void (own.mesh = ""));
+              set("mesh", (own) => void (own.mesh = own.collision_mesh = ""));
             }}
           >
             {d("mesh_remove")}

@@ -223,6 +223,7 @@ function addLink(into: Description, path: string, info: MeshInfo): void {
 /** Gives a link a mesh file, with its guessed unit, and upright. */
 function shapeBody(of: Description, body: Body, path: string, info: MeshInfo): void {
   body.mesh = path;
+  body.collision_mesh = "";
   body.mesh_scale = info.scale;
   const quarter = tidy(Math.PI / 2 / radians(of.units));
   body.mesh_pose = { xyz: [0, 0, 0], rpy: [info.up === "y" ? quarter : 0, 0, 0] };

@@ -156,6 +156,7 @@ const TEXTS = {
   colour_own: ["the file’s own", "文件自带"],
   colour_choose: ["Paint", "喷涂"],
   mesh: ["Shape", "外形文件"],
+  mesh_checked: ["checked as {file}", "碰撞检查使用 {file}"],
   mesh_none: ["none", "无"],
   mesh_choose: ["Choose a file…", "选择文件…"],
   mesh_remove: ["Take it off", "移除"],

@@ -1,0 +1,109 @@
+"""What of a robot is checked: its collision geometry, whole, wherever the robot goes."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robots.cells import CellDescription, CellRobot
+from robots.collision import build_cell, outside_nearest
+from robots.collision.bodies import hull_body
+from robots.description import load
+from robots.glb import link_mesh
+from robots.joints import FloatArray
+from robots.tree import tree_of
+from services.command_line.main import run
+from tests.robots.boxes import block, placed
+
+REAL = Path(__file__).parents[3] / "shared" / "testdata" / "urdf"
+needs_real_robots = pytest.mark.skipif(not REAL.is_dir(), reason="no ../shared/testdata/urdf: no real robots")
+IRB2400 = REAL / "abb_irb2400_support" / "urdf" / "irb2400_12_155.urdf"
+GP8 = REAL / "motoman_gp8_support" / "urdf" / "gp8.urdf"
+
+# The arm reaches to x = 0.5 m as it looks, to 0.6 m as it is to be checked.
+PADDED = """<robot name="padded">
+<link name="root"><visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual></link>
+<link name="arm">
+  <visual><origin xyz="0.25 0 0.3"/><geometry><box size="0.5 0.1 0.1"/></geometry></visual>
+  <collision><origin xyz="0.3 0 0.3"/><geometry><box size="0.6 0.2 0.2"/></geometry></collision>
+</link>
+<joint name="turn" type="revolute"><axis xyz="0 0 1"/><parent link="root"/><child link="arm"/>
+  <limit lower="-3" upper="3" velocity="1" effort="1"/></joint>
+</robot>"""
+
+
+def cell_of(model: Path) -> CellDescription:
+    return CellDescription((CellRobot("arm", model, np.eye(4)),), (block("wall", (0.1, 2, 2), placed(0.7)),))
+
+
+def corners(model: Path, link: str) -> tuple[FloatArray, FloatArray]:
+    """Of the box about what is checked of a link."""
+    (found,) = (each for each in tree_of(load(model)).links if each.name == link)
+    vertices = np.concatenate([part.vertices for part in link_mesh(found.checked).parts])
+    return vertices.min(axis=0), vertices.max(axis=0)
+
+
+def test_a_wall_is_as_far_as_the_collision_geometry_does_not_reach(tmp_path: Path) -> None:
+    arm = tmp_path / "padded.urdf"
+    arm.write_text(PADDED)
+    (found,) = outside_nearest(build_cell(cell_of(arm)), "arm", np.zeros(1), {})
+    assert found.pair == ("arm/arm", "wall")
+    assert found.distance_m == pytest.approx(0.05, abs=1e-6)
+
+
+@pytest.mark.parametrize("options", [[], ["--dh"]])
+def test_an_imported_robot_keeps_its_collision_geometry(tmp_path: Path, options: list[str]) -> None:
+    arm = tmp_path / "padded.urdf"
+    arm.write_text(PADDED)
+    assert run(["robot", "import", str(arm), str(tmp_path / "out"), *options]) == 0
+    imported = tmp_path / "out" / "robot.toml"
+    (found,) = outside_nearest(build_cell(cell_of(imported)), "arm", np.zeros(1), {})
+    assert found.distance_m == pytest.approx(0.05, abs=1e-6)
+    # An import of the import does, too.
+    assert run(["robot", "import", str(imported), str(tmp_path / "again"), *options]) == 0
+    again = tmp_path / "again" / "robot.toml"
+    np.testing.assert_allclose(corners(again, "arm"), corners(imported, "arm"), atol=1e-6)
+
+
+def test_an_exported_robot_keeps_its_collision_geometry(tmp_path: Path) -> None:
+    arm = tmp_path / "padded.urdf"
+    arm.write_text(PADDED)
+    assert run(["robot", "export", str(arm), str(tmp_path / "out")]) == 0
+    exported = tmp_path / "out" / "padded.urdf"
+    np.testing.assert_allclose(corners(exported, "arm"), corners(arm, "arm"), atol=1e-6)
+
+
+@needs_real_robots
+def test_of_a_real_robot_the_collision_files_are_checked_and_the_visual_files_drawn() -> None:
+    links = {link.name: link for link in tree_of(load(IRB2400)).links if link.shapes}
+    assert len(links) == 9
+    for link in links.values():
+        for shapes, folder in ((link.checked, "collision"), (link.shapes, "visual")):
+            (shape,) = shapes
+            assert isinstance(shape.mesh, Path)
+            assert shape.mesh.parent.name == folder
+
+
+@needs_real_robots
+def test_a_real_hull_with_a_vertex_of_many_neighbours_is_checked() -> None:
+    description = CellDescription((CellRobot("gp8", GP8, np.eye(4)),))
+    assert len(build_cell(description).arms["gp8"].bodies) == 7
+
+
+def round_points(count: int, z: float) -> FloatArray:
+    angles = np.linspace(0, 2 * np.pi, count, endpoint=False)
+    return np.column_stack([0.1 * np.cos(angles), 0.1 * np.sin(angles), np.full(count, z)])
+
+
+@pytest.mark.parametrize("count", [100, 300, 5_000])
+def test_round_faces_and_tips_of_any_fineness_become_hulls_that_hold_them(count: int) -> None:
+    disc = np.concatenate([round_points(count, 0.0), round_points(count, 0.05)])
+    cone = np.concatenate([round_points(count, 0.0), [[0.0, 0.0, 0.2]]])
+    for points in (disc, cone):
+        body = hull_body(points)
+        vertices = np.array(body.geometry.points())
+        for direction in np.random.default_rng(0).standard_normal((200, 3)):
+            direction /= np.linalg.norm(direction)
+            beyond = (vertices @ direction).max() - (points @ direction).max()
+            # Not less than the points, and at most a few cells more.
+            assert -1e-9 <= beyond < 2e-3
