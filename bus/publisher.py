@@ -18,10 +18,9 @@ from bus.header import Header, pack
 from bus.messages import PROTOBUF
 from bus.schemas.robomesh_pb2 import VideoFrames
 from bus.topics import History, Topic, topic
+from bus.wall_clock import WallClock
 
 LIST_LENGTH = 100
-# A clock that is set jumps by more than this between two messages; one that is slewed does not.
-_SET_NS = 250_000_000
 # Two key frame intervals at 30 Hz: a publisher that never marks a key frame must not grow.
 _MOST_FRAMES = 150
 
@@ -42,7 +41,7 @@ class Publisher:
         # New at each start, so that a number that begins again is not taken for an old one; and whenever
         # another clock dates what follows: receivers compare the lags of one identity (`bus/lateness.py`).
         self._identity = secrets.randbits(64)
-        self._epoch_ns = _epoch_ns()
+        self._wall_clock = WallClock()
         self._dated_by: int | None = None
         self._sequence = 0
         self._closed = False
@@ -70,7 +69,8 @@ class Publisher:
 
         Args:
             source_time_ns: When what it tells was so, ns since the Unix epoch; now, unless given.
-            dated_by: The publisher in whose message that time stood; None: our own clock says it.
+            dated_by: Which clock says that time, by any number: the publisher in whose message it stood, or
+                a clock of a controller's; None: this machine's. Another one begins another identity.
             key_frame: Of a video topic: the joiner's frames begin here.
 
         Returns:
@@ -106,8 +106,7 @@ class Publisher:
     def _clock_is_another(self, dated_by: int | None) -> bool:
         """Whether what follows is dated by another clock than what went before, or by one that was set."""
         before, self._dated_by = self._dated_by, dated_by
-        epoch_before_ns, self._epoch_ns = self._epoch_ns, _epoch_ns()
-        was_set = dated_by is None and abs(self._epoch_ns - epoch_before_ns) > _SET_NS
+        was_set = dated_by is None and self._wall_clock.was_set()
         return self._sequence > 0 and (dated_by != before or was_set)
 
     def remember(self, message: Message, *, source_time_ns: int) -> None:
@@ -186,11 +185,6 @@ class Publisher:
 
         if not loop.is_closed():
             asyncio.run_coroutine_threadsafe(answer(), loop)
-
-
-def _epoch_ns() -> int:
-    """When this machine's monotonic clock began, by its clock of the day."""
-    return time.time_ns() - time.monotonic_ns()
 
 
 def _history_length(row: Topic) -> int:

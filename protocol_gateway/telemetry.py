@@ -160,7 +160,8 @@ class Telemetry:
                     self._beat.see(_told(event), received.monotonic_s)
                     self._on_told(event, received.monotonic_s)
             case UnknownReceived():
-                self._raw.put(raw_record(event, received.wall_ns), source_time_ns=received.wall_ns)
+                record = raw_record(event, received.wall_ns)
+                self._raw.put(record, source_time_ns=received.wall_ns, dated_by=received.clock)
             case MalformedReceived(offset, text, reason):
                 self._journal.say(
                     _S.WARNING,
@@ -201,11 +202,11 @@ class Telemetry:
         if joints.controller_time_s is not None:
             self.controller_time_s = joints.controller_time_s
         message = self._message.of(joints, received.wall_ns)
-        self._fast.put(message, source_time_ns=received.wall_ns)
+        self._fast.put(message, source_time_ns=received.wall_ns, dated_by=received.clock)
         if received.monotonic_s >= self._next_slow_s:
             # In step with the grid, so that 100 Hz gives 10 Hz and not 9; after a gap it begins anew.
             self._next_slow_s = max(self._next_slow_s + _SLOW_S, received.monotonic_s + _SLOW_S / 2)
-            self._slow.put(message, source_time_ns=received.wall_ns)
+            self._slow.put(message, source_time_ns=received.wall_ns, dated_by=received.clock)
         self.watch.see(joints.positions, received.monotonic_s)
 
     def _on_refused(self, number: int, text: str) -> None:

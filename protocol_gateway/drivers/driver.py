@@ -88,11 +88,13 @@ class UnknownReceived:
 
     Attributes:
         raw: The bytes of the whole unit that it stood in.
+        controller_time_s: Seconds on the controller's own clock; None: it does not tell.
     """
 
     type: str
     items: tuple[str, ...]
     raw: bytes
+    controller_time_s: float | None = None
 
 
 ControllerEvent: TypeAlias = JointsReceived | StatusReceived | Refused | MalformedReceived | UnknownReceived

@@ -180,14 +180,15 @@ def _tell(record: Record, unit: Unit, time_s: float | None, events: list[Control
             said, unknown = _said(words)
             events.append(StatusReceived(*said, time_s))
             if unknown:
-                events.append(UnknownReceived("STATUS", unknown, unit.data))
+                events.append(UnknownReceived("STATUS", unknown, unit.data, time_s))
         case Unknown(type_name, items):
-            events.append(UnknownReceived(type_name, items, unit.data))
+            events.append(UnknownReceived(type_name, items, unit.data, time_s))
         case Command(words):
             # A controller that sends a client's record commands nobody: shown raw.
-            events.append(UnknownReceived("COMMAND", words, unit.data))
+            events.append(UnknownReceived("COMMAND", words, unit.data, time_s))
         case RelativePositions(values):
-            events.append(UnknownReceived("RELATIVE.DEG", tuple(map(write_number, values)), unit.data))
+            items = tuple(map(write_number, values))
+            events.append(UnknownReceived("RELATIVE.DEG", items, unit.data, time_s))
 
 
 # A controller says the same all day.

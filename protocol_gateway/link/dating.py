@@ -1,26 +1,49 @@
-"""When data was new. What a cable or a sleeping process held back must not be dated as if it were fresh.
+"""Time stamps of what a controller sends: each unit has its own, as its controller's clock says.
 
-TCP delivers everything: after a gap of seconds the units of all that time come in a burst. Where
-the controller tells its own clock, the burst can be told from news:
+TCP delivers everything: a cable, a sleeping process or a busy machine holds units back, and several come
+in one read. Where a unit carries the controller's TIME, the quickest unit so far says how both clocks lie:
 
-    expected = when the last fresh unit came + how far the controller's clock has gone since
-    late     = now - expected
+    stamp = TIME + the least (receipt - TIME) so far
 
-Only what comes within a second after a gap is looked at like this, so neither a drifting or stuck
-clock nor one that was set can make live data look old for longer.
+So stamps are spaced as TIME is, and what was held back is as old as it is. No stamp is after its receipt.
+Of units that come together without TIME, the newest is stamped with its receipt and the others before it,
+at the measured rate.
 
-Of what comes without a clock nobody can say how old it is: of a burst after a gap, the newest alone is new.
+A controller's clock may drift, or be set. The line follows a drift slowly. Where it cannot be followed (TIME
+goes back, a unit is quicker by more than 1 ms, everything stays late), another clock begins
+(`Received.clock`), and with it another publisher identity: within one, stamps strictly increase and are
+spaced as TIME is. What stays late for a second is no longer believed to be late, so no clock can make live
+data look old for longer.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
+from protocol_gateway.drivers.driver import (
+    ControllerEvent,
+    JointsReceived,
+    StatusReceived,
+    UnknownReceived,
+)
+
+_MS = 1_000_000
+_S = 1_000_000_000
 # Arrivals further apart than this leave room for something held back.
 _GAP_S = 0.25
-# How long a burst may last: it comes as fast as the network can.
-_BURST_S = 1.0
-_TOLERANCE_S = 0.1
 # A live stream without pauses must not be taken for a burst for longer.
 _LONGEST_HOLD_S = 0.25
+# Later than this for so long: the controller's clock was set, or is slow. A burst comes as fast as the
+# network can.
+_LATE_NS, _BURST_NS = 100 * _MS, _S
+# By how much a unit may come sooner than all before it, for its stamp still to be spaced as TIME is.
+_SOONER_NS, _SOONER_SHARE = 900_000, 0.09
+# A slower clock is followed by this share of the time, once the quickest of a window is 1 ms behind.
+_FOLLOWED_SHARE, _WINDOW_NS, _BEHIND_NS = 0.05, 2 * _S, _MS
+# Between stamps of units with one TIME, together within a millisecond.
+_TWICE_NS = 100_000
+# Of units that come together before any rate is known.
+_UNKNOWN_PERIOD_NS = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,40 +53,270 @@ class Received:
     Attributes:
         monotonic_s: On the gateway's monotonic clock: for ages.
         wall_ns: On the gateway's wall clock, ns since the Unix epoch: the stamp of what is published.
+        clock: Number of the clock that says so. Times of two numbers cannot be compared.
     """
 
     monotonic_s: float
     wall_ns: int
+    clock: int = 0
 
 
 class Dating:
-    """Dates of one connection's events."""
+    """Time stamps of one link's events."""
 
     def __init__(self) -> None:
-        self._fresh: tuple[float, Received] | None = None
+        self._clock = 0
         self._arrived_s = float("inf")
         self._gap_end_s = float("-inf")
+        self._line = _Line()
+        self._rate = _Rate()
+        self._newest_ns: int | None = None
+        # Whether a moment without a new TIME has followed the newest TIME.
+        self._behind = True
 
     def after_gap(self, now_s: float) -> bool:
-        """Whether what comes may have been held back, and the newest of it is still to come."""
+        """Return whether what comes may have been held back, and the newest of it is still to come."""
         return now_s - self._gap_end_s < _LONGEST_HOLD_S
 
-    def date(self, controller_time_s: float | None, now: Received) -> Received:
-        """When an event that has just been read was new: now, or earlier when it was held back.
+    def connected(self) -> None:
+        """Forget the controller's clock: another connection may be another controller's."""
+        self._arrived_s, self._gap_end_s = float("inf"), float("-inf")
+        self._rate = _Rate()
+        if self._line.time_ns is not None:
+            self._begin_clock()
+
+    def wall_clock_was_set(self) -> None:
+        """Begin another clock: the gateway's own was set."""
+        self._clock += 1
+
+    def dates(self, events: Sequence[ControllerEvent], now: Received) -> list[Received]:
+        """Return when each event of a read was new: now, or earlier.
 
         Args:
-            controller_time_s: The controller's clock beside it; None: it tells none, so now it is.
-            now: When its bytes were read.
+            events: In the order in which they came.
+            now: When their bytes were read.
         """
+        if not events:
+            return []
         if now.monotonic_s - self._arrived_s > _GAP_S:
             self._gap_end_s = now.monotonic_s
         self._arrived_s = now.monotonic_s
-        if controller_time_s is None:
-            return now
-        if self._fresh is not None and now.monotonic_s - self._gap_end_s < _BURST_S:
-            fresh_time_s, fresh = self._fresh
-            late_s = now.monotonic_s - fresh.monotonic_s - (controller_time_s - fresh_time_s)
-            if late_s > _TOLERANCE_S and controller_time_s > fresh_time_s:
-                return Received(now.monotonic_s - late_s, now.wall_ns - int(late_s * 1e9))
-        self._fresh = (controller_time_s, now)
-        return now
+        times_ns, moment_of = _moments(events)
+        now_ns = round(now.monotonic_s * 1e9)
+        stamps = self._stamps(times_ns, now_ns)
+        dates = [
+            now
+            if stamp_ns == now_ns and clock == now.clock
+            else Received(stamp_ns * 1e-9, now.wall_ns - (now_ns - stamp_ns), clock)
+            for stamp_ns, clock in stamps
+        ]
+        return [dates[moment] for moment in moment_of]
+
+    def _begin_clock(self) -> None:
+        self._clock += 1
+        self._line = _Line()
+        self._newest_ns = None
+
+    def _stamps(self, times_ns: Sequence[int | None], now_ns: int) -> list[tuple[int, int]]:
+        """Return stamps on the monotonic clock [ns] and their clocks' numbers, of moments of one read."""
+        stamps: list[tuple[int, int]] = []
+        begin = 0
+        while begin < len(times_ns):
+            end = _end_of_run(times_ns, begin, self._line.time_ns)
+            if end == begin:  # TIME goes back
+                self._begin_clock()
+                continue
+            run = self._run(times_ns[begin:end], now_ns)
+            stamps += [(stamp_ns, self._clock) for stamp_ns in run]
+            begin = end
+        return stamps
+
+    def _run(self, times_ns: Sequence[int | None], now_ns: int) -> list[int]:
+        """Return stamps of moments whose TIME does not go back."""
+        before_ns = self._line.time_ns
+        new_ns = [each for each in times_ns if each is not None and (before_ns is None or each > before_ns)]
+        if new_ns and not self._line.take(new_ns[0], new_ns[-1], now_ns):
+            self._begin_clock()
+            self._line.take(new_ns[0], new_ns[-1], now_ns)
+        period_ns = self._rate.period_ns(len(times_ns), now_ns) or self._period_since(len(times_ns), now_ns)
+        twice_ns = min(_TWICE_NS, _SOONER_NS // len(times_ns))
+        stamps: list[int] = []
+        later_ns: int | None = None
+        for wanted_ns in reversed([*self._wanted(times_ns, before_ns, twice_ns)]):
+            latest_ns = now_ns if later_ns is None else later_ns - twice_ns
+            if wanted_ns is None:
+                later_ns = now_ns if later_ns is None else later_ns - max(period_ns, twice_ns)
+            else:
+                later_ns = min(wanted_ns, latest_ns)
+            stamps.append(later_ns)
+        stamps.reverse()
+        return self._in_order(stamps, now_ns)
+
+    def _wanted(
+        self, times_ns: Sequence[int | None], before_ns: int | None, twice_ns: int
+    ) -> Iterator[int | None]:
+        """Yield the stamp of each moment by its controller's clock; None: the clock says nothing of it.
+
+        A moment without a new TIME, behind one that has a new TIME, was at nearly the same time.
+        """
+        stamp_ns, old_ns = self._newest_ns, before_ns
+        for time_ns in times_ns:
+            if time_ns is not None and (before_ns is None or time_ns > before_ns):
+                stamp_ns, before_ns, self._behind = self._line.stamp_ns(time_ns), time_ns, False
+                yield stamp_ns
+            elif stamp_ns is None or (self._behind and time_ns in (None, old_ns)):
+                yield None
+            else:
+                stamp_ns, self._behind = stamp_ns + twice_ns, self._behind or time_ns in (None, old_ns)
+                yield stamp_ns
+
+    def _period_since(self, moments: int, now_ns: int) -> int:
+        """Return the period of moments that came since the newest stamp [ns], before a rate is measured."""
+        if self._newest_ns is None or now_ns - self._newest_ns > _S:
+            return _UNKNOWN_PERIOD_NS
+        return (now_ns - self._newest_ns) // moments
+
+    def _in_order(self, stamps: list[int], now_ns: int) -> list[int]:
+        """Return stamps that strictly increase, after the newest so far and not after their receipt."""
+        before_ns = self._newest_ns
+        whole = stamps if before_ns is None else [before_ns, *stamps]
+        if any(later <= earlier for earlier, later in pairwise(whole)) or stamps[-1] > now_ns:
+            first_ns = stamps[0] - 1 if before_ns is None else before_ns
+            room_ns = max(now_ns - first_ns, len(stamps))
+            stamps = [first_ns + room_ns * (number + 1) // len(stamps) for number in range(len(stamps))]
+        self._newest_ns = stamps[-1]
+        return stamps
+
+
+class _Line:
+    """The line between a controller's clock and the gateway's monotonic one.
+
+    Attributes:
+        time_ns: The newest TIME; None: none yet.
+    """
+
+    def __init__(self) -> None:
+        self.time_ns: int | None = None
+        # The line goes through this TIME at this monotonic time.
+        self._time_ns = self._at_ns = 0
+        self._late_since_ns: int | None = None
+        # The least that reads were late, in this window and in the one before.
+        self._least_ns = self._least_before_ns = 0
+        self._window_ends_ns = 0
+        self._behind_ns = 0
+
+    def stamp_ns(self, time_ns: int) -> int:
+        """Return the monotonic time of a TIME."""
+        return self._at_ns + time_ns - self._time_ns
+
+    def take(self, first_ns: int, newest_ns: int, now_ns: int) -> bool:
+        """Take the TIMEs of the first new unit and the newest of a read; return whether they fit."""
+        if self.time_ns is None:
+            self._begin(newest_ns, now_ns)
+            return True
+        since_ns = first_ns - self.time_ns
+        late_ns = now_ns - self.stamp_ns(newest_ns)
+        if late_ns < 0:
+            if -late_ns > max(_SOONER_NS, round(_SOONER_SHARE * since_ns)):
+                return False
+            self._begin(newest_ns, now_ns)
+            return True
+        if late_ns <= _LATE_NS:
+            self._late_since_ns = None
+        elif self._late_since_ns is None:
+            self._late_since_ns = now_ns
+        elif now_ns - self._late_since_ns > _BURST_NS:
+            return False
+        self.time_ns = newest_ns
+        self._follow(late_ns, since_ns, now_ns)
+        return True
+
+    def _begin(self, time_ns: int, now_ns: int) -> None:
+        self.time_ns = self._time_ns = time_ns
+        self._at_ns = now_ns
+        self._late_since_ns = None
+        self._least_ns = self._least_before_ns = self._behind_ns = 0
+        self._window_ends_ns = now_ns + _WINDOW_NS
+
+    def _follow(self, late_ns: int, since_ns: int, now_ns: int) -> None:
+        """Move the line towards the quickest of the last windows, so slowly that TIME's spacing stays."""
+        self._least_ns = min(self._least_ns, late_ns)
+        if now_ns >= self._window_ends_ns:
+            least_ns = min(self._least_ns, self._least_before_ns)
+            self._behind_ns = max(least_ns - _BEHIND_NS, 0)
+            self._least_before_ns, self._least_ns = self._least_ns, late_ns
+            self._window_ends_ns = now_ns + _WINDOW_NS
+        step_ns = min(self._behind_ns, round(_FOLLOWED_SHARE * since_ns), late_ns)
+        self._behind_ns -= step_ns
+        self._at_ns += step_ns
+        self._least_ns -= step_ns
+        self._least_before_ns -= step_ns
+
+
+class _Rate:
+    """The rate at which a controller sends, over a second or so."""
+
+    def __init__(self) -> None:
+        self._begin_ns: int | None = None
+        self._moments = 0
+        self._period_ns = 0
+
+    def period_ns(self, moments: int, now_ns: int) -> int:
+        """Take moments that came together; return the period [ns], 0: not known yet."""
+        if self._begin_ns is None or now_ns - self._begin_ns > 2 * _S:
+            self._begin_ns, self._moments, self._period_ns = now_ns, 0, 0
+            return 0
+        self._moments += moments
+        elapsed_ns = now_ns - self._begin_ns
+        if elapsed_ns >= _S:
+            self._period_ns = elapsed_ns // self._moments
+            self._begin_ns, self._moments = now_ns, 0
+        return self._period_ns
+
+
+def _moments(events: Sequence[ControllerEvent]) -> tuple[list[int | None], list[int]]:
+    """Return the TIMEs of a read's moments [ns], None without, and of each event the number of its moment.
+
+    What was said together is a moment. It ends where another TIME is said, or where something that is
+    published with its stamp is said twice.
+    """
+    times_ns: list[int | None] = []
+    moment_of: list[int] = []
+    said: set[type] = set()
+    for event in events:
+        time_ns: int | None = None
+        published = False
+        match event:
+            case JointsReceived() | UnknownReceived():
+                time_ns, published = _ns(event.controller_time_s), True
+            case StatusReceived():
+                time_ns = _ns(event.controller_time_s)
+            case _:
+                pass
+        known = times_ns[-1] if times_ns else None
+        another = time_ns is not None and known is not None and time_ns != known
+        if not times_ns or another or (published and type(event) in said):
+            times_ns.append(time_ns)
+            said = set()
+        elif known is None:
+            times_ns[-1] = time_ns
+        if published:
+            said.add(type(event))
+        moment_of.append(len(times_ns) - 1)
+    return times_ns, moment_of
+
+
+def _ns(seconds: float | None) -> int | None:
+    return None if seconds is None else round(seconds * 1e9)
+
+
+def _end_of_run(times_ns: Sequence[int | None], begin: int, before_ns: int | None) -> int:
+    """Return the end of the moments whose TIME does not go back; `begin` itself, if the first does."""
+    for number in range(begin, len(times_ns)):
+        time_ns = times_ns[number]
+        if time_ns is None:
+            continue
+        if before_ns is not None and time_ns < before_ns:
+            return number
+        before_ns = time_ns
+    return len(times_ns)

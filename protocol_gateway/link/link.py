@@ -10,8 +10,8 @@ a burst after a gap, the newest of each kind is handed over and the rest is coun
 whose units have another joint count, or one that sends over 2 MiB a second, is SILENT, and stays connected:
 a stop can be sent to it.
 
-Data is dated once, when its last byte was read from the socket (or earlier, when it was held back on
-the way: see `dating`), and never again.
+Data is dated once, when its last byte was read from the socket (or earlier, by its controller's clock:
+see `dating`), and never again.
 """
 
 import asyncio
@@ -23,6 +23,7 @@ from collections import Counter
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 
+from bus.wall_clock import WallClock
 from protocol_gateway.drivers.driver import (
     ControllerEvent,
     Driver,
@@ -105,13 +106,12 @@ class ControllerLink:
         on_event: Callable[[ControllerEvent, Received], None],
         on_status: Callable[[LinkStatus], None] = lambda status: None,
         monotonic_s: Callable[[], float] = time.monotonic,
-        wall_ns: Callable[[], int] = time.time_ns,
     ) -> None:
         self._settings = settings
         self._driver = driver
         self._on_status = on_status
         self._monotonic_s = monotonic_s
-        self._wall_ns = wall_ns
+        self._wall_clock = WallClock()
         self._where = f"{settings.host}:{settings.port}"
         self._connection: Connection | None = None
         self._status = LinkStatus(LinkState.DOWN, f"connecting to {self._where}")
@@ -256,7 +256,7 @@ class ControllerLink:
 
     def _made(self, connection: Connection) -> None:
         self._driver.connected()
-        self._dating = Dating()
+        self._dating.connected()
         self._losses.forget()
         self._handing.flood = Flood()
         self._unusable = None
@@ -271,7 +271,7 @@ class ControllerLink:
 
     def _receive(self, data: bytes) -> None:
         # Dated before it is parsed: what we do with it is not part of its age.
-        now = Received(self._monotonic_s(), self._wall_ns())
+        now = self._now()
         self._counts["bytes_received"] += len(data)
         if self._is_deluge(len(data), now.monotonic_s):
             return
@@ -287,7 +287,9 @@ class ControllerLink:
             # The link says so, once; which of the positions are this robot's is not known.
             events = [each for each in events if not _is_of_joints(each)]
             self._fall_silent()
-        dates = [self._date(event, now) for event in events]
+        for event in events:
+            self._note_losses(event)
+        dates = self._dating.dates(events, now)
         if units > self._driver.refusals_received - refusals_before and not other_joints:
             self._refusal, self._unusable = "", None
             self._alive(max(dates, key=lambda date: date.monotonic_s, default=now), now)
@@ -327,16 +329,18 @@ class ControllerLink:
             _, text, code = self._unusable
             self._tell(LinkState.SILENT, text, code)
 
-    def _date(self, event: ControllerEvent, now: Received) -> Received:
-        match event:
-            case JointsReceived() | StatusReceived():
-                if self._handing.flood.on:
-                    self._losses.forget()
-                elif event.controller_time_s is not None:
-                    self._losses.see(event.controller_time_s)
-                return self._dating.date(event.controller_time_s, now)
-            case _:
-                return self._dating.date(None, now)
+    def _now(self) -> Received:
+        if self._wall_clock.was_set():
+            self._dating.wall_clock_was_set()
+        now_s = self._monotonic_s()
+        return Received(now_s, self._wall_clock.earliest_ns(round(now_s * 1e9)))
+
+    def _note_losses(self, event: ControllerEvent) -> None:
+        if isinstance(event, JointsReceived | StatusReceived):
+            if self._handing.flood.on:
+                self._losses.forget()
+            elif event.controller_time_s is not None:
+                self._losses.see(event.controller_time_s)
 
     def _alive(self, newest: Received, now: Received) -> None:
         self._last_received = newest

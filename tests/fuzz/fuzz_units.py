@@ -188,7 +188,9 @@ class Gateway:
 class Sink:
     """Publishes to nobody, but all of it."""
 
-    def put(self, message: Message, *, source_time_ns: int | None = None) -> None:
+    def put(
+        self, message: Message, *, source_time_ns: int | None = None, dated_by: int | None = None
+    ) -> None:
         message.SerializeToString()
 
 

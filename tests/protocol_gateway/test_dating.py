@@ -1,17 +1,42 @@
+import random
+from itertools import pairwise
+
 import pytest
 
+from protocol_gateway.drivers.driver import (
+    Activity,
+    JointsReceived,
+    MalformedReceived,
+    StatusReceived,
+    UnknownReceived,
+)
 from protocol_gateway.link.dating import Dating, Received
+
+MS = 1_000_000
 
 
 def at(seconds):
     return Received(seconds, round(seconds * 1e9))
 
 
+def joints(time_s=None):
+    return JointsReceived((0.0,), None, time_s)
+
+
+def date(dating, time_s, now):
+    (received,) = dating.dates([joints(time_s)], now)
+    return received
+
+
+def near(seconds):
+    return pytest.approx(seconds, abs=1e-6)
+
+
 def fresh(dating, begin_s=100.0, clock_s=0.0):
     """A second of units at 100 Hz; when it ends."""
     for number in range(101):
         now = at(begin_s + number * 0.01)
-        assert dating.date(clock_s + number * 0.01, now) == now
+        assert date(dating, clock_s + number * 0.01, now).monotonic_s == near(now.monotonic_s)
     return begin_s + 1.0
 
 
@@ -24,40 +49,137 @@ def test_a_burst_after_a_gap_is_dated_when_it_should_have_come():
     end_s = fresh(dating)
     # Three seconds held back, then everything within a few milliseconds.
     for number in range(1, 280):
-        date = dating.date(1.0 + number * 0.01, at(end_s + 3.0))
-        assert date.monotonic_s == pytest.approx(end_s + number * 0.01)
-        assert date.wall_ns == pytest.approx((end_s + number * 0.01) * 1e9, abs=10)
+        received = date(dating, 1.0 + number * 0.01, at(end_s + 3.0 + number * 1e-5))
+        assert received.monotonic_s == near(end_s + number * 0.01)
+        assert received.wall_ns == pytest.approx((end_s + number * 0.01) * 1e9, abs=1000)
+        assert received.clock == 0
     now = at(end_s + 3.01)
-    assert dating.date(1.0 + 3.01, now) == now
+    assert date(dating, 1.0 + 3.01, now).monotonic_s == near(now.monotonic_s)
 
 
 def test_a_controller_that_was_silent_itself_is_fresh_when_it_speaks_again():
     dating = Dating()
     end_s = fresh(dating)
-    now = at(end_s + 3.0)
-    assert dating.date(1.0 + 3.0, now) == now
+    assert date(dating, 1.0 + 3.0, at(end_s + 3.0)).monotonic_s == near(end_s + 3.0)
 
 
 @pytest.mark.parametrize("clock_s", [0.2, 1.0, 5000.0])
 def test_a_clock_that_was_set_or_is_stuck_makes_nothing_look_old_without_a_gap(clock_s):
     dating = Dating()
     end_s = fresh(dating)
+    clocks = set()
     for number in range(1, 300):
         now = at(end_s + number * 0.01)
-        assert dating.date(clock_s, now) == now
+        received = date(dating, clock_s, now)
+        # Of units with one TIME the second may have come with the first.
+        assert number <= 2 or received.monotonic_s == near(now.monotonic_s)
+        clocks.add(received.clock)
+    assert clocks == ({0} if clock_s == 1.0 else {1}), "a stuck clock is no new one for each unit"
 
 
 def test_after_a_gap_a_slow_clock_is_believed_for_a_second_only():
     dating = Dating()
     end_s = fresh(dating)
-    assert dating.date(1.01, at(end_s + 2.0)).monotonic_s == pytest.approx(end_s + 0.01)
+    assert date(dating, 1.01, at(end_s + 2.0)).monotonic_s == near(end_s + 0.01)
     for number in range(1, 200):
-        dating.date(1.01 + number * 0.01, at(end_s + 2.0 + number * 0.01))
-    now = at(end_s + 4.0)
-    assert dating.date(3.01, now) == now
+        received = date(dating, 1.01 + number * 0.01, at(end_s + 2.0 + number * 0.01))
+    assert received.clock == 1
+    assert date(dating, 3.01, at(end_s + 4.0)).monotonic_s == near(end_s + 4.0)
 
 
 def test_without_a_clock_everything_is_dated_when_it_comes():
     dating = Dating()
-    for now in (at(1.0), at(1.01), at(5.0), at(5.0)):
-        assert dating.date(None, now) == now
+    for now in (at(1.0), at(1.01), at(5.0), at(5.02)):
+        assert date(dating, None, now) == now
+
+
+def test_units_of_one_read_without_time_come_at_the_measured_rate_and_none_after_its_receipt():
+    dating = Dating()
+    for number in range(150):
+        date(dating, None, at(10.0 + number * 0.01))
+    read = dating.dates([joints() for _ in range(5)], at(11.54))
+    stamps = [received.monotonic_s for received in read]
+    assert stamps == [near(11.50), near(11.51), near(11.52), near(11.53), near(11.54)]
+    # Sooner than the rate has room for: between the newest stamp and the receipt.
+    read = dating.dates([joints() for _ in range(4)], at(11.56))
+    assert [received.monotonic_s for received in read] == [near(11.545 + 0.005 * n) for n in range(4)]
+
+
+def test_what_a_unit_says_of_one_time_has_one_stamp_and_what_it_says_twice_has_two():
+    unit = [
+        joints(1.0),
+        StatusReceived(activity=Activity.IDLE, controller_time_s=1.0),
+        UnknownReceived("OVEN", ("1",), b"", 1.0),
+        UnknownReceived("OVEN", ("2",), b"", 1.0),
+        MalformedReceived(0, "", "nonsense"),
+        joints(1.01),
+    ]
+    position, status, oven, oven_again, _, following = Dating().dates(unit, at(5.0))
+    assert position == status == oven
+    assert 0 < oven_again.wall_ns - oven.wall_ns < MS
+    assert 9 * MS < following.wall_ns - oven_again.wall_ns <= 10 * MS
+    assert following == at(5.0)
+
+
+def test_the_gateways_own_clock_that_is_set_begins_another_and_keeps_the_spacing():
+    dating = Dating()
+    end_s = fresh(dating)
+    dating.wall_clock_was_set()
+    received = date(dating, 1.01, Received(end_s + 0.03, round((end_s + 500.0) * 1e9)))
+    assert (received.monotonic_s, received.clock) == (near(end_s + 0.01), 1)
+
+
+def test_a_new_connection_believes_no_clock_of_the_one_before():
+    dating = Dating()
+    end_s = fresh(dating)
+    dating.connected()
+    assert date(dating, 1.0 + 0.5, at(end_s + 2.0)) == Received(end_s + 2.0, round((end_s + 2.0) * 1e9), 1)
+
+
+@pytest.mark.parametrize("ppm", [-5000, -200, 0, 200, 5000])
+def test_a_clock_that_drifts_is_followed_in_one_identity(ppm):
+    dating = Dating()
+    dates = []
+    for number in range(6000):
+        now = at(100.0 + number * 0.01)
+        received = date(dating, 5.0 + number * 0.01 * (1.0 - ppm * 1e-6), now)
+        dates.append(received)
+        assert 0.0 <= now.monotonic_s - received.monotonic_s < 0.1
+    assert {received.clock for received in dates} == {0}
+    spans = [later.wall_ns - earlier.wall_ns for earlier, later in pairwise(dates)]
+    assert all(abs(span - 10 * MS) <= MS for span in spans)
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_whatever_comes_however_late_stamps_increase_follow_time_and_precede_their_receipt(seed):
+    chance = random.Random(seed)
+    dating = Dating()
+    period_s = chance.choice([0.001, 0.004, 0.01, 0.1])
+    digits = chance.choice([3, 6, 9])
+    now_s, made_s, waiting, last, quiet_until_s = 1000.0, 0.0, [], {}, 0.0
+    jitter_s = chance.choice([1e-4, 0.005, 0.06])
+    for _ in range(1500):
+        made_s += period_s
+        if chance.random() < 0.002:
+            made_s += chance.choice([-7.0, 0.3, 11.0])
+        waiting += [round(made_s, digits)] * (2 if chance.random() < 0.01 else 1)
+        now_s += period_s
+        if chance.random() < 0.4 and period_s < 0.1:
+            continue  # held back
+        read_s = now_s + chance.expovariate(1.0 / jitter_s)
+        now_s = max(now_s, read_s - chance.choice([0.0, 0.5]) * jitter_s)
+        times, waiting = waiting, []
+        if read_s > quiet_until_s and chance.random() < 0.02:
+            quiet_until_s = read_s + 1.0
+            times.insert(chance.randrange(len(times) + 1), None)  # a unit that tells no TIME
+        for time_s, received in zip(times, dating.dates([joints(t) for t in times], at(read_s)), strict=True):
+            before = last.get(received.clock)
+            assert received.wall_ns <= at(read_s).wall_ns
+            if before is not None:
+                span_ns = received.wall_ns - before[0]
+                assert span_ns > 0
+                if time_s is not None and before[1] is not None and time_s > before[1]:
+                    time_ns = (time_s - before[1]) * 1e9
+                    assert abs(span_ns - time_ns) <= max(0.1 * time_ns, MS), (time_ns, span_ns)
+            last[received.clock] = received.wall_ns, time_s
+        now_s = max(now_s, read_s)

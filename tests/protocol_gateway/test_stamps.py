@@ -113,9 +113,8 @@ def test_no_joints_message_is_dated_newer_than_its_unit(mesh, tmp_path, way):
             # A unit is there with its last byte: made and written are 30 ms apart.
             late_ns = [stamp_ns - controller.written_ns[number] for number, stamp_ns in seen]
         assert max(late_ns) < _SLACK_S * 1e9
-        if way is not burst:  # what was held back is dated by the controller's own clock
-            assert all(stamp_ns >= controller.written_ns[number] - 1e6 for number, stamp_ns in seen)
-        assert [stamp_ns for _, stamp_ns in seen] == sorted(stamp_ns for _, stamp_ns in seen)
+        # What was held back is dated by the controller's own clock.
+        assert all(stamp_ns >= controller.made_ns[number] - 1e6 for number, stamp_ns in seen)
 
     run(main())
 

@@ -1,0 +1,144 @@
+"""Every controller unit has a stamp of its own, and what is computed from it carries that stamp."""
+
+import asyncio
+import contextlib
+import time
+from collections import defaultdict
+from itertools import pairwise
+
+import pytest
+
+from bus.session import open_session
+from tests.conftest import run
+from tests.protocol_gateway.hall import gateway, until
+
+UNIT = b"1#ABSOLUTE.DEG*%.2f;90;-90;0;0@"
+TIMED = b"2#ABSOLUTE.DEG*%.2f;90;-90;0;0&TIME*%.6f@"
+MS = 1_000_000
+SEVERAL, ROUNDS = 4, 40
+
+
+class Samples:
+    """What came of a robot's joints: of each publisher identity the stamps and first joints, in order."""
+
+    def __init__(self):
+        self.by_identity = defaultdict(list)
+        self.count = 0
+
+    def take(self, sample):
+        header, states = sample.header, sample.message()
+        assert states.timestamp.ToNanoseconds() == header.source_time_ns
+        self.by_identity[header.publisher].append((header.source_time_ns, states.joints[0].position))
+        self.count += 1
+
+    @property
+    def spans_ns(self):
+        """Between the stamps of one identity."""
+        return [
+            later - earlier
+            for samples in self.by_identity.values()
+            for (earlier, _), (later, _) in pairwise(samples)
+        ]
+
+
+async def seen_of(mesh, folder, say):
+    """What a monitor sees of a controller that says so; `say(writer)` returns how many units it sent."""
+    sent = asyncio.get_running_loop().create_future()
+
+    async def serve(reader, writer):
+        with contextlib.suppress(ConnectionError):
+            sent.set_result(await say(writer))
+            await reader.read()
+        writer.transport.abort()
+
+    server = await asyncio.start_server(serve, "127.0.0.1", 0)
+    samples = Samples()
+    async with open_session(mesh) as monitor:
+        subscription = monitor.subscribe("robomesh/hall/arm/joints", history=False, newest=1000)
+
+        async def read():
+            async for sample in subscription:
+                samples.take(sample)
+
+        reading = asyncio.create_task(read())
+        port = server.sockets[0].getsockname()[1]
+        async with server, gateway(mesh, folder, port, up=False, stale_after_s=5.0, reconnect_after_s=20.0):
+            count = await sent
+            await until(lambda: samples.count >= count)
+        reading.cancel()
+        await asyncio.gather(reading, return_exceptions=True)
+    return samples
+
+
+def test_units_that_come_together_are_stamped_as_their_controllers_time_goes(mesh, tmp_path):
+    async def say(writer):
+        begin_s = time.monotonic()
+        number = 0
+        for _ in range(ROUNDS):
+            units = []
+            for _ in range(SEVERAL):
+                units.append(TIMED % (number * 0.1, 50.0 + number * 0.01))
+                number += 1
+            await asyncio.sleep(max(begin_s + number * 0.01 - time.monotonic(), 0.0))
+            writer.write(b"".join(units))
+        return number
+
+    samples = run(seen_of(mesh, tmp_path, say))
+    assert samples.count == SEVERAL * ROUNDS
+    assert all(abs(span - 10 * MS) <= MS for span in samples.spans_ns), sorted(samples.spans_ns)
+    # An identity ends only where a read came sooner than all before it: at the beginning.
+    assert len(samples.spans_ns) >= SEVERAL * ROUNDS * 0.7
+
+
+def test_units_that_come_together_without_time_are_stamped_at_the_measured_rate(mesh, tmp_path):
+    came = []
+
+    async def say(writer):
+        begin_s, number = time.monotonic(), 0
+        for _ in range(ROUNDS):
+            number += SEVERAL
+            await asyncio.sleep(max(begin_s + number * 0.01 - time.monotonic(), 0.0))
+            writer.write(b"".join(UNIT % ((number - SEVERAL + each) * 0.1) for each in range(SEVERAL)))
+            came.append(time.time_ns())
+        return number
+
+    samples = run(seen_of(mesh, tmp_path, say))
+    (stamps,) = samples.by_identity.values()
+    spans = samples.spans_ns
+    assert min(spans) > 0
+    last = [stamp for stamp, _ in stamps[-SEVERAL:]]
+    within = [later - earlier for earlier, later in pairwise(last)]
+    mean = (stamps[-1][0] - stamps[0][0]) / (len(stamps) - 1)
+    assert within == pytest.approx([mean] * (SEVERAL - 1), rel=0.5)
+
+
+def test_two_positions_in_one_unit_have_two_stamps_within_a_millisecond(mesh, tmp_path):
+    async def say(writer):
+        for number in range(30):
+            values = (number * 0.1, number * 0.1 + 0.05, 50.0 + number * 0.02)
+            writer.write(b"3#ABSOLUTE.DEG*%.2f;90;-90;0;0&ABSOLUTE.DEG*%.2f;90;-90;0;0&TIME*%.2f@" % values)
+            await asyncio.sleep(0.02)
+        return 60
+
+    samples = run(seen_of(mesh, tmp_path, say))
+    assert min(samples.spans_ns) > 0
+    assert sum(span <= MS for span in samples.spans_ns) == 30
+
+
+@pytest.mark.parametrize("jump_s", [-20.0, -0.5, 3.0])
+def test_a_controllers_clock_that_is_set_begins_a_new_identity(mesh, tmp_path, jump_s):
+    async def say(writer):
+        for number in range(60):
+            writer.write(TIMED % (number * 0.1, 50.0 + number * 0.01 + (jump_s if number >= 30 else 0.0)))
+            await asyncio.sleep(0.01)
+        return 60
+
+    samples = run(seen_of(mesh, tmp_path, say))
+    before, after = 29 * 0.1, 30 * 0.1
+    for stamps in samples.by_identity.values():
+        degrees = [position * 57.29577951308232 for _, position in stamps]
+        assert not (min(degrees) < before + 0.05 < max(degrees)), "one identity on both sides of the jump"
+    assert after > before
+    stamps = [stamp for of_identity in samples.by_identity.values() for stamp, _ in of_identity]
+    assert max(stamps) <= time.time_ns()
+    assert all(span > 0 for span in samples.spans_ns)
