@@ -145,7 +145,7 @@ class Dating:
         for wanted_ns in reversed([*self._wanted(times_ns, before_ns, twice_ns)]):
             latest_ns = now_ns if later_ns is None else later_ns - twice_ns
             if wanted_ns is None:
-                later_ns = now_ns if later_ns is None else later_ns - max(period_ns, twice_ns)
+                later_ns = now_ns if later_ns is None else later_ns - max(period_ns, 1)
             else:
                 later_ns = min(wanted_ns, latest_ns)
             stamps.append(later_ns)
