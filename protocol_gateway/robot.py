@@ -122,6 +122,7 @@ class Robot:
             authority=self._remembered(),
             driver=driver,
             ledger=self._ledger,
+            latch=self._audit.latch,
             journal=self._journal,
             send=self._link.send,
             controller=self._controller,

@@ -9,11 +9,11 @@ its size it becomes an older part, and a new one goes on with the chain:
 
     new file, locked, ROTATE in it -> the live one's second name, the part's -> the new one is the live one
 
-Whoever is killed meanwhile: there is one whole live file, and it is never empty.
+Whoever is killed meanwhile: there is one whole live file, and it is never empty. Beside it stands the latch
+file (`latch`), under the same lock.
 """
 
 import asyncio
-import errno
 import fcntl
 import logging
 import os
@@ -25,8 +25,18 @@ from pathlib import Path
 
 from protocol_gateway.audit.entry import Entry, Outcome, chained
 from protocol_gateway.audit.files import Verification, older_parts, part_name, read_entries, verify
-from protocol_gateway.audit.restart import ROTATE, Memory, carried, follow, with_stop
-from protocol_gateway.audit.start import find_end
+from protocol_gateway.audit.latch import LatchFile, reason_of
+from protocol_gateway.audit.restart import (
+    LATCH_UNKNOWN,
+    ROTATE,
+    UNKNOWN,
+    Memory,
+    carried,
+    follow,
+    merged,
+    with_stop,
+)
+from protocol_gateway.audit.start import Start, find_end
 from protocol_gateway.errors import AuditError
 
 __all__ = ["AuditLog", "Entry", "Outcome", "Verification", "read_entries", "verify"]
@@ -51,7 +61,8 @@ class AuditLog:
     """The open log of one robot. Its file is locked: two gateways must not write one chain.
 
     Attributes:
-        mended: What was found wrong with the file when it was opened, in words; empty: nothing.
+        latch: The file that holds the latched stop, beside the log.
+        mended: What was found wrong with the files when they were opened, in words; empty: nothing.
         problem: Why the last write failed, in words; empty: it did not.
     """
 
@@ -88,12 +99,16 @@ class AuditLog:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = _open_locked(path)
             _finish_rotation(path)
-            self._end, self.mended, in_doubt = find_end(path)
-            if in_doubt:
-                self._latch()
+            start = find_end(path)
+            self._end, self.mended = start.end, start.mended
+            if start.in_doubt:
+                # Until it is written behind a new beginning, the damage stays as it is.
+                self._torn, self._rotate_at = True, 1
             else:
                 os.ftruncate(self._file, self._end.length)
             os.fsync(self._file)
+            self.latch = LatchFile(path.with_suffix(".latch"))
+            self._remember_stops(start)
         except OSError as error:
             raise AuditError(
                 f"audit log {path} cannot be written ({error.strerror}): without it no robot is moved"
@@ -148,20 +163,34 @@ class AuditLog:
             await self._writer
 
     async def close(self) -> None:
-        """Write what waits, then close the file."""
+        """Write what waits, then close the files."""
         self.pay()
         await self.settle()
+        await asyncio.to_thread(self.latch.close)
         self._disk.shutdown()
         os.close(self._file)
 
-    def _latch(self) -> None:
-        """Remember a stop, since one may be lost; until it is written, the damage stays as it is."""
-        memory, stop = with_stop(self._end.memory, by=GATEWAY, since_ns=time.time_ns())
+    def _remember_stops(self, start: Start) -> None:
+        """Take what log and latch file leave behind; where a stop may be lost, latch one."""
+        memory, stop = merged(start.end.memory, self.latch.found)
+        self.mended = ", and ".join(filter(None, (start.mended, self.latch.damage)))
+        text = (
+            f"the gateway was killed before it wrote the entry of stop {stop.id}" if stop is not None else ""
+        )
+        # A torn line may have held a stop: the one that the latch file knows. Damage may have held any.
+        if start.damaged or self.latch.damage or (start.in_doubt and stop is None):
+            reason = UNKNOWN if start.in_doubt else LATCH_UNKNOWN
+            memory, stop = with_stop(memory, by=GATEWAY, since_ns=time.time_ns(), reason=reason)
+            text = self.mended
+        if stop is not None:
+            values = {"stop_id": str(stop.id), "reason": stop.reason}
+            entry = replace(_own_entry("STOP", Outcome.ACCEPTED, text, values), operator=stop.by)
+            self._queue.append(_Waiting(entry, None, kept=True))
         self._end = replace(self._end, memory=memory)
-        values = {"stop_id": str(stop.id), "reason": stop.reason}
-        entry = _own_entry("STOP", Outcome.ACCEPTED, self.mended, values)
-        self._queue.append(_Waiting(entry, None, kept=True))
-        self._torn, self._rotate_at = True, 1
+        known = self.latch.found
+        newest = max(start.end.memory.last_stop_id, 0 if known is None else known.last_stop_id)
+        newest = newest if memory.stop is None else memory.stop.id
+        self.latch.begin(memory.stop, newest, given_out=memory.last_stop_id)
 
     def _put(self, entry: Entry, *, kept: bool) -> asyncio.Future[Entry]:
         told: asyncio.Future[Entry] = asyncio.get_running_loop().create_future()
@@ -186,7 +215,7 @@ class AuditLog:
                 # An fsync takes milliseconds, seconds on a busy disk: the joint stream must not wait for it.
                 placed = await loop.run_in_executor(self._disk, self._write, [each.entry for each in batch])
             except Exception as error:
-                self.problem = f"the audit log {self.path.name} cannot be written ({_reason(error)})"
+                self.problem = f"the audit log {self.path.name} cannot be written ({reason_of(error)})"
                 self._left_out += left_out
                 new = bool(self._queue)
                 self._queue[:0] = self._refuse(batch[:-1] if left_out else batch)
@@ -274,13 +303,6 @@ class AuditLog:
         self._rotate_at = self._rotate_bytes
         self._end = replace(end, first=entry.number, number=entry.number, hash=entry.hash, length=len(line))
         self._untold.append(entry)
-
-
-def _reason(error: Exception) -> str:
-    if not isinstance(error, OSError):
-        return repr(error)
-    full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-    return f"{error.strerror}: {'make space on its disk' if full else 'see to its disk'}"
 
 
 def _left_out(number: int) -> Entry:

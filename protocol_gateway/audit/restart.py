@@ -1,5 +1,6 @@
 """What a gateway must remember across its own restart: the stop that was latched, and whose motion may still
-run. It is in the audit log.
+run. It is in the audit log; the latch and the newest stop's number are in the latch file (`latch`) too, which
+a full disk takes. Where that one knows a newer stop, it wins.
 
 A log's live file begins with an entry ROTATE that carries what the older files leave behind, so that
 a start reads one file, however long the log has become.
@@ -11,10 +12,12 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from protocol_gateway.audit.entry import Entry, Outcome
+from protocol_gateway.audit.latch import LatchState
 from protocol_gateway.authority.rules import Authority, Stop
 
 ROTATE = "ROTATE"
 UNKNOWN = "audit log damaged: whether a stop was latched is not known"
+LATCH_UNKNOWN = "latch file damaged: whether a stop was latched is not known"
 _MOTIONS = ("HOME", "RESUME", "MOVE_ABSOLUTE", "MOVE_RELATIVE")
 _LEASE_ENDS = ("RELEASE", "EXPIRE", "REVOKE", "TAKE", "ACCEPT")
 _STOPS = tuple(f'"request":"{name}"'.encode() for name in ("STOP", "RESET", ROTATE))
@@ -83,10 +86,25 @@ def follow(memory: Memory, entry: Entry) -> Memory:
     return memory
 
 
-def with_stop(memory: Memory, *, by: str, since_ns: int) -> tuple[Memory, Stop]:
+def with_stop(memory: Memory, *, by: str, since_ns: int, reason: str = UNKNOWN) -> tuple[Memory, Stop]:
     """What a damaged log leaves behind, with the stop that is latched because one may be lost."""
-    stop = Stop(id=memory.last_stop_id + 1, by=by, reason=UNKNOWN, since_ns=since_ns)
+    stop = Stop(id=memory.last_stop_id + 1, by=by, reason=reason, since_ns=since_ns)
     return replace(memory, stop=stop, last_stop_id=stop.id), stop
+
+
+def merged(memory: Memory, kept: LatchState | None) -> tuple[Memory, Stop | None]:
+    """Combine what the log's entries say with what the latch file holds.
+
+    Returns:
+        What must be remembered; and the stop that only the latch file knows, because the gateway was killed
+        before its entry was written.
+    """
+    if kept is None:
+        return memory, None
+    last = max(memory.last_stop_id, kept.reserved)
+    if kept.last_stop_id <= memory.last_stop_id:
+        return replace(memory, last_stop_id=last), None
+    return replace(memory, stop=kept.stop, cleared=None, last_stop_id=last, mover=""), kept.stop
 
 
 def remembered(entries: Iterable[Entry]) -> Authority:

@@ -35,11 +35,18 @@ class End:
 
 
 class Start(NamedTuple):
-    """What a start finds; `mended`: what is wrong, in words; `in_doubt`: a stop may be lost with it."""
+    """What a start finds.
+
+    Attributes:
+        mended: What is wrong, in words.
+        in_doubt: A stop may be lost with it.
+        damaged: More is wrong than a torn last line.
+    """
 
     end: End
     mended: str
     in_doubt: bool
+    damaged: bool
 
 
 class _Scan(NamedTuple):
@@ -62,7 +69,7 @@ def find_end(live: Path) -> Start:
     if torn:
         mended = f"a torn last line was cut off after entry {end.number}{damage and ', and '}{damage}"
     unknown = bool(torn) and (_REQUEST.search(torn) is None or concerns_stop(torn))
-    return Start(end, mended, bool(damage) or unknown)
+    return Start(end, mended, bool(damage) or unknown, bool(damage))
 
 
 def _behind(end: End, newest: Path) -> End:

@@ -144,7 +144,8 @@ def remember(authority: Authority, request: CommandRequest, answer: Answer) -> A
     if request.id < lease.last_id:
         return authority  # a HOLD overtook it
     return replace(
-        authority, lease=replace(lease, last_id=request.id, last_content=content_of(request), last_answer=answer)
+        authority,
+        lease=replace(lease, last_id=request.id, last_content=content_of(request), last_answer=answer),
     )
 
 

@@ -391,9 +391,15 @@ def why_not_holder(authority: Authority, operator: str) -> str:
     return f"{operator} is in control with another lease (another window or program?): this one is not valid"
 
 
-def stop(authority: Authority, *, by: str, reason: str, now: Now) -> tuple[Authority, Stop]:
-    """Latch a stop under a number of its own, and forget the motion that it ends."""
-    number = authority.last_stop_id + 1
+def stop(
+    authority: Authority, *, by: str, reason: str, now: Now, number: int | None = None
+) -> tuple[Authority, Stop]:
+    """Latch a stop under a number of its own, and forget the motion that it ends.
+
+    Args:
+        number: Above all before it; None: the next one.
+    """
+    number = authority.last_stop_id + 1 if number is None else number
     latched = Stop(id=number, by=by, reason=reason or "no reason given", since_ns=now.wall_ns)
     lease = authority.lease
     if lease is not None:

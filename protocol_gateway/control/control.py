@@ -280,6 +280,7 @@ class Control:
                 refusal
                 or lateness(request, now)
                 or stop_refusal(authority, request)
+                or self._latch_refusal(request)
                 or (None if attempt.step else self._program_refusal(request))
                 or self._obstacle(request, controller)
             )
@@ -288,6 +289,10 @@ class Control:
             authority = used_up(authority, request)
             controller = after(request, controller, self._joints)
         return refusal
+
+    def _latch_refusal(self, request: schema.CommandRequest) -> Answer | None:
+        problem = self._guarded.latch.problem if request.command in MOTION_COMMANDS else ""
+        return Answer(False, f"Not sent: {problem}, so a restart would forget a stop.") if problem else None
 
     def _program_refusal(self, request: schema.CommandRequest) -> Answer | None:
         program = self._guarded.program
@@ -333,6 +338,7 @@ class Control:
         if request.command == _C.RESET:
             self._reset_s = now.monotonic_s
             if latched is not None:
+                self._guarded.keep_latch()
                 text = f"stop request {latched.id} was reset"
                 self._journal.say(_S.INFO, "stop.reset", text, stop_id=latched.id)
         self._guarded.on_change()

@@ -57,7 +57,12 @@ class Ledger:
         """Write what was counted, and what the disk refused before; to be called each second."""
         self._write_counts()
         self._audit.pay()
-        if self._failing and not self._audit.problem and self._audit.stuck_s < LONGEST_WAIT_S:
+        latch = self._audit.latch
+        latch.retry()
+        if latch.problem:
+            if not self._failing:
+                self._say_failed(AuditError(latch.problem))
+        elif self._failing and not self._audit.problem and self._audit.stuck_s < LONGEST_WAIT_S:
             self._failing = False
             self._journal.say(Event.Severity.INFO, "audit.mended", "the audit log is written again")
 

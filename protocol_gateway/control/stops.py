@@ -1,6 +1,6 @@
 """Stops of one robot: on the wire first, latched, and only then said and written down.
 
-    stop          controller's socket -> latched -> event -> audit, owed while the disk takes none
+    stop          controller's socket -> latched, in its file -> event -> audit, owed while the disk is full
     link is back  a latched stop is sent (again): the controller may not have had it, or was restarted
     still moving  2 s after the first stop: critical event, and the stop is sent again, each 2 s
     within 0.1 s  the unit of one that was just sent is on its way for others too: the same asker's is that
@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bus.schemas import robomesh_pb2 as schema
+from protocol_gateway.audit.latch import LatchFile
 from protocol_gateway.audit.log import GATEWAY, Outcome
 from protocol_gateway.authority import rules
 from protocol_gateway.authority.obstacles import Controller
@@ -71,6 +72,7 @@ class Guarded:
 
     Attributes:
         authority: The state of `protocol_gateway.authority.rules`.
+        latch: Where the latched stop and its number outlive this process.
         send: Puts a unit on the controller's socket at once, or raises LinkError.
         controller: What is known of the controller now.
         on_change: Told when lease or stop changed.
@@ -81,12 +83,17 @@ class Guarded:
     authority: Authority
     driver: Driver
     ledger: Ledger
+    latch: LatchFile
     journal: Journal
     send: Callable[[bytes], None]
     controller: Callable[[], Controller]
     on_change: Callable[[], None]
     program: Running | None = None
     orphan: str = ""
+
+    def keep_latch(self) -> None:
+        """Write soon whether a stop is latched, and the newest number."""
+        self.latch.keep(self.authority.stop, self.authority.last_stop_id)
 
 
 class Stops:
@@ -108,7 +115,11 @@ class Stops:
             self._note("STOP", answer, by=by, source=source, reason=reason)
             return answer
         problem = self._send() if sent_s is None else ""
-        guarded.authority, latched = rules.stop(guarded.authority, by=by, reason=reason, now=now)
+        number = guarded.latch.next_number(guarded.authority.last_stop_id, now.wall_ns)
+        guarded.authority, latched = rules.stop(
+            guarded.authority, by=by, reason=reason, now=now, number=number
+        )
+        guarded.keep_latch()
         if not problem:
             guarded.authority = rules.stop_sent(guarded.authority, latched.id, sent_s or now.monotonic_s)
         text = f"stop request {latched.id} is on the controller's socket"

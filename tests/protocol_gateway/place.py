@@ -39,6 +39,7 @@ class Place:
                 authority=Authority(),
                 driver=UnitDriver(joints.types),
                 ledger=Ledger(self.log, journal),
+                latch=self.log.latch,
                 journal=journal,
                 send=self.send,
                 controller=self.controller,

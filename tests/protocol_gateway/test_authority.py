@@ -278,7 +278,7 @@ def test_an_id_names_one_command_and_its_values(kind, fields, words):
     verdict = admit(state, command(kind, 5, **fields), operator="li", now=at(0))
     if words:
         assert words in verdict.answer.text
-        assert not (verdict.repeat or verdict.counted or verdict.answer.accepted)
+        assert [verdict.repeat, verdict.counted, verdict.answer.accepted] == [False] * 3
     else:
         assert verdict.repeat
     late = command(C.MOVE_ABSOLUTE, 5, **MOVE)

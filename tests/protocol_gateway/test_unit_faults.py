@@ -60,23 +60,26 @@ def test_one_unit_of_another_joint_count_invalidates_the_positions_and_a_motion_
     mesh, tmp_path
 ):
     async def main():
-        async with bare_controller() as (port, say, heard), gateway(mesh, tmp_path, port, up=False) as plant:
-            async with repeated(say, lambda: STATE_5.format(0, "idle")):
-                await until(lambda: plant.controller.link == STATE.UP)
-                await plant.lease(A.ACQUIRE, ttl_s=5)
-                # One among all the others, as a controller's second program may send it.
-                say(STATE_6)
-                await until(lambda: plant.controller.link == STATE.SILENT)
-                text = await refusal(plant.command(C.MOVE_ABSOLUTE, joint_positions=[0.3, 0, 0, 0, 0]))
-                assert "sends 6 joint values, the description has 5" in text
-                assert "the description has 5" in await refusal(plant.command(C.HOME))
-                assert heard == b""
-                # No motion ran, so nothing is stopped; and what comes again for a while counts again.
-                await until(lambda: plant.controller.link == STATE.UP)
-                assert not plant.controller.HasField("stop")
-                await plant.lease(A.RENEW, ttl_s=5)
-                await plant.command(C.MOVE_ABSOLUTE, joint_positions=[0.3, 0, 0, 0, 0])
-                await until(lambda: b"ABSOLUTE.DEG" in heard)
+        async with (
+            bare_controller() as (port, say, heard),
+            gateway(mesh, tmp_path, port, up=False) as plant,
+            repeated(say, lambda: STATE_5.format(0, "idle")),
+        ):
+            await until(lambda: plant.controller.link == STATE.UP)
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            # One among all the others, as a controller's second program may send it.
+            say(STATE_6)
+            await until(lambda: plant.controller.link == STATE.SILENT)
+            text = await refusal(plant.command(C.MOVE_ABSOLUTE, joint_positions=[0.3, 0, 0, 0, 0]))
+            assert "sends 6 joint values, the description has 5" in text
+            assert "the description has 5" in await refusal(plant.command(C.HOME))
+            assert heard == b""
+            # No motion ran, so nothing is stopped; and what comes again for a while counts again.
+            await until(lambda: plant.controller.link == STATE.UP)
+            assert not plant.controller.HasField("stop")
+            await plant.lease(A.RENEW, ttl_s=5)
+            await plant.command(C.MOVE_ABSOLUTE, joint_positions=[0.3, 0, 0, 0, 0])
+            await until(lambda: b"ABSOLUTE.DEG" in heard)
 
     run(main())
 

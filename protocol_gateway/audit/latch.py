@@ -1,0 +1,264 @@
+"""The latched stop of one robot in a file of fixed size, so that a full disk takes it and a restart finds it.
+
+    slot 0, slot 1   a line of JSON each, with its SHA-256, filled up with blanks to 4096 bytes
+    a write          goes to the slot that does not hold the newest state, in place
+    a start          takes the newest whole slot; a damaged slot may have been newer, and held a stop
+
+Both slots are allocated and written when the gateway starts, so a later write needs no space. A thread of
+its own writes, another one syncs: a stop and its answer wait for neither. A write is in the kernel's hands
+before it is synced, so `kill -9` does not undo it.
+
+Stop numbers up to `reserved` may have been given out by a gateway that was killed before it wrote the
+newest: the next one counts on from there. One that ended by itself leaves no gap.
+"""
+
+import errno
+import json
+import os
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from protocol_gateway.authority.rules import Stop
+from protocol_gateway.texts import one_line
+
+SLOT_BYTES = 4096
+SLOTS = 2
+# Far more than are given out before the newest is written, also on a busy machine.
+RESERVED = 1000
+# A write that takes longer counts as failed until it is done.
+LONGEST_WRITE_S = 1.0
+_DIGEST = "sha256"
+_LONGEST_TEXT = 400  # characters, so that two of them fit into a slot however they are escaped
+
+
+@dataclass(frozen=True, kw_only=True)
+class LatchState:
+    """What the file holds.
+
+    Attributes:
+        last_stop_id: Number of the newest stop that is known.
+        reserved: Numbers up to this one may have been given out.
+    """
+
+    stop: Stop | None = None
+    last_stop_id: int = 0
+    reserved: int = 0
+
+
+class LatchFile:
+    """The latch file of one robot; its audit log's lock keeps other gateways away from it.
+
+    Attributes:
+        found: What was there when it was opened; None: nothing.
+        damage: What is wrong with it, in words; empty: nothing.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._file: int | None = None
+        self._allocated = False
+        self._lock = threading.Lock()
+        self._newest = LatchState()
+        self._written: LatchState | None = None
+        self._failure = ""
+        self._busy_since_s: float | None = None
+        self._syncing = False
+        self._writer = ThreadPoolExecutor(1, thread_name_prefix=f"latch-{path.stem}")
+        self._syncer = ThreadPoolExecutor(1, thread_name_prefix=f"latch-sync-{path.stem}")
+        self.found, self.damage, self._sequence, self._slot = _read(path)
+
+    @property
+    def problem(self) -> str:
+        """Why a stop would be forgotten by a restart now, in words; empty: it would not."""
+        if self._failure:
+            return self._failure
+        since_s = self._busy_since_s
+        if since_s is not None and time.monotonic() - since_s > LONGEST_WRITE_S:
+            return f"the latch file {self.path.name} takes longer than {LONGEST_WRITE_S:g} s to write"
+        return ""
+
+    def begin(self, stop: Stop | None, last_stop_id: int, *, given_out: int) -> None:
+        """Allocate the file and write both slots; `problem` says if that failed.
+
+        Args:
+            given_out: Numbers up to this one may have been, of stops that nothing is known of.
+        """
+        self._newest = LatchState(stop=stop, last_stop_id=last_stop_id, reserved=given_out + RESERVED)
+        self._try_to_write(self._newest)
+
+    def next_number(self, last_stop_id: int, wall_ns: int) -> int:
+        """Return the number of the next stop, which no restart gives out again.
+
+        Beyond what the disk knows to be reserved the number is the time in microseconds: a disk that takes
+        nothing must not hold up a stop.
+        """
+        number = last_stop_id + 1
+        reserved = 0 if self._written is None else self._written.reserved
+        return number if number <= reserved else max(number, wall_ns // 1000)
+
+    def keep(self, stop: Stop | None, last_stop_id: int) -> None:
+        """Write the latch soon, on the file's own thread; returns at once."""
+        reserved = last_stop_id + RESERVED
+        self._write_soon(LatchState(stop=stop, last_stop_id=last_stop_id, reserved=reserved))
+
+    def _write_soon(self, state: LatchState) -> None:
+        with self._lock:
+            self._newest = state
+            if self._busy_since_s is not None:
+                return
+            self._busy_since_s = time.monotonic()
+        self._writer.submit(self._write_newest)
+
+    def retry(self) -> None:
+        """Try again what could not be written; to be called now and then."""
+        if self._failure:
+            self._write_soon(replace(self._newest))
+
+    def close(self) -> None:
+        """Write that no number beyond those that are known was given out, and close the file."""
+        newest = self._newest
+        self._writer.submit(self._try_to_write, replace(newest, reserved=newest.reserved - RESERVED))
+        self._writer.shutdown()
+        self._syncer.shutdown()
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None
+
+    # ------------------------------------------------------- on the file's own threads
+
+    def _write_newest(self) -> None:
+        while True:
+            with self._lock:
+                state = self._newest
+                if state is self._written:
+                    self._busy_since_s = None
+                    return
+            self._try_to_write(state)
+            if self._failure:
+                with self._lock:
+                    self._busy_since_s = None
+                return
+
+    def _try_to_write(self, state: LatchState) -> None:
+        try:
+            if self._allocated:
+                self._write_slot(state)
+            else:
+                self._allocate(state)
+        except OSError as error:
+            done = "written" if self._allocated else "allocated"
+            self._failure = f"the latch file {self.path.name} cannot be {done} ({reason_of(error)})"
+            return
+        self._written, self._failure = state, ""
+        with self._lock:
+            if self._syncing:
+                return
+            self._syncing = True
+        self._syncer.submit(self._sync)
+
+    def _allocate(self, state: LatchState) -> None:
+        if self._file is None:
+            self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o640)
+        os.posix_fallocate(self._file, 0, SLOTS * SLOT_BYTES)
+        for _ in range(SLOTS):
+            # The older one first, and on disk before the newer one is touched.
+            self._write_slot(state)
+            os.fdatasync(self._file)
+        folder = os.open(self.path.parent, os.O_RDONLY | os.O_CLOEXEC)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+        self._allocated = True
+
+    def _write_slot(self, state: LatchState) -> None:
+        assert self._file is not None
+        slot = (self._slot + 1) % SLOTS
+        line = _line(state, self._sequence + 1)
+        if os.pwrite(self._file, line, slot * SLOT_BYTES) != SLOT_BYTES:
+            raise OSError(errno.EIO, "Half of it was written")
+        self._slot, self._sequence = slot, self._sequence + 1
+
+    def _sync(self) -> None:
+        while True:
+            synced = self._sequence
+            try:
+                if self._file is not None:
+                    os.fdatasync(self._file)
+            except OSError as error:
+                self._failure = f"the latch file {self.path.name} cannot be written ({reason_of(error)})"
+            with self._lock:
+                if self._sequence == synced or self._failure:
+                    self._syncing = False
+                    return
+
+
+def reason_of(error: Exception) -> str:
+    """Return why a disk took nothing, and what to do."""
+    if not isinstance(error, OSError):
+        return repr(error)
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    return f"{error.strerror}: {'make space on its disk' if full else 'see to its disk'}"
+
+
+def _line(state: LatchState, sequence: int) -> bytes:
+    row: dict[str, Any] = {"sequence": sequence, **asdict(state)}
+    if state.stop is not None:
+        # When it was sent is on a clock that begins anew with the machine.
+        stop = asdict(replace(state.stop, sent_s=None))
+        row["stop"] = {
+            name: one_line(value, _LONGEST_TEXT) if isinstance(value, str) else value
+            for name, value in stop.items()
+        }
+    digest = {_DIGEST: sha256(_json(row)).hexdigest()}
+    line = _json(digest | row)
+    assert len(line) < SLOT_BYTES
+    return line.ljust(SLOT_BYTES - 1) + b"\n"
+
+
+def _json(row: dict[str, Any]) -> bytes:
+    return json.dumps(row, ensure_ascii=False, separators=(",", ":"), sort_keys=True).encode()
+
+
+def _read(path: Path) -> tuple[LatchState | None, str, int, int]:
+    """The newest whole state, what is wrong in words, its sequence and its slot."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(SLOTS * SLOT_BYTES)
+    except FileNotFoundError:
+        return None, "", 0, SLOTS - 1
+    except OSError as error:
+        return None, f"its latch file {path.name} cannot be read ({error.strerror})", 0, SLOTS - 1
+    newest: tuple[int, int, LatchState] | None = None
+    damage = ""
+    for slot in range(SLOTS):
+        part = data[slot * SLOT_BYTES : (slot + 1) * SLOT_BYTES]
+        if not part.strip(b"\0"):
+            continue  # allocated, and never written
+        found = _parsed(part)
+        if found is None:
+            damage = f"its latch file {path.name} is damaged"
+        elif newest is None or found[0] > newest[0]:
+            newest = (found[0], slot, found[1])
+    if newest is None:
+        return None, damage, 0, SLOTS - 1
+    return newest[2], damage, newest[0], newest[1]
+
+
+def _parsed(part: bytes) -> tuple[int, LatchState] | None:
+    """A slot's sequence and state; None: it is not whole."""
+    try:
+        row = json.loads(part)
+        digest = row.pop(_DIGEST)
+        if len(part) != SLOT_BYTES or digest != sha256(_json(row)).hexdigest():
+            return None
+        stop = None if row["stop"] is None else Stop(**row["stop"])
+        state = LatchState(stop=stop, last_stop_id=row["last_stop_id"], reserved=row["reserved"])
+        return int(row["sequence"]), state
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        return None
