@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import math
 import time
 from collections import Counter
 from collections.abc import Awaitable, Callable
@@ -21,6 +22,8 @@ log = logging.getLogger(__name__)
 # How a refusal is encoded that may be asked again; behind the second: when [s].
 BUSY_TEXT = f"{TEXT};busy"
 QUOTA_TEXT = f"{TEXT};quota="
+# A parameter of the question: for how many seconds its asker waits. Zenoh does not tell the owner.
+WITHIN = "within"
 # Of a request that is asked over both links: what marks its two copies, and how many marks are known.
 MARK_BYTES = 8
 _MOST_MARKS = 256
@@ -39,12 +42,14 @@ class Request:
         message: Of the request's schema; None where it has none.
         chunk: What stood in the place of the row's first `*`: the operator, the view, the mesh.
         received_ns: When it came, before it waited for anything; ns since the Unix epoch.
+        within_s: For how long from then on its asker waits [s]; None: the question does not say.
     """
 
     key: keys.Key
     message: Message | None
     chunk: str
     received_ns: int = 0
+    within_s: float | None = None
 
     @property
     def asker(self) -> str:
@@ -200,7 +205,8 @@ class Answerer:
             if keys.has_wildcard(asked) and not self._row.wildcard:
                 raise RefusedError(f"{asked} has a wildcard: ask one {self._row.name} by its whole key")
             payload = query.payload.to_bytes() if query.payload is not None else b""
-            return Request(key, self._message(payload, encoding), chunk, received_ns)
+            message = self._message(payload, encoding)
+            return Request(key, message, chunk, received_ns, _within_s(query))
         except (RefusedError, MessageError) as error:
             self._on_refused(chunk, str(error))
             raise
@@ -225,6 +231,14 @@ class Answerer:
             return keys.parse_key(asked)
         last = self._own.topic.rsplit("/", 1)[-1]
         return self._own if not self._row.wildcard or asked.rsplit("/", 1)[-1] == last else None
+
+
+def _within_s(query: zenoh.Query) -> float | None:
+    try:
+        within_s = float(query.parameters.get(WITHIN) or "")
+    except ValueError:
+        return None
+    return within_s if math.isfinite(within_s) and within_s > 0 else None
 
 
 def _last_chunk(asked: str) -> str:

@@ -9,7 +9,7 @@ import zenoh
 from google.protobuf.message import Message
 
 from bus import keys, pieces, topics
-from bus.answering import BUSY_TEXT, MARK_BYTES, QUOTA_TEXT
+from bus.answering import BUSY_TEXT, MARK_BYTES, QUOTA_TEXT, WITHIN
 from bus.endpoints import ON_THE_SECOND_LINK, first_line, settle
 from bus.errors import (
     BrokenAnswerError,
@@ -114,7 +114,7 @@ def _get(
             loop.call_soon_threadsafe(finish)
 
     session.get(
-        pieces.selector(key),
+        f"{pieces.selector(key)};{WITHIN}={timeout_s:.3f}",
         zenoh.handlers.Callback(on_reply, on_end),
         payload=payload,
         encoding=PROTOBUF,

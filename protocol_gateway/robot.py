@@ -30,6 +30,7 @@ from protocol_gateway.control.control import Control
 from protocol_gateway.control.ledger import Ledger, entry_of
 from protocol_gateway.control.program import Programs
 from protocol_gateway.control.stops import Guarded
+from protocol_gateway.control.waits import date
 from protocol_gateway.core.codes import code_table
 from protocol_gateway.drivers.driver import Driver
 from protocol_gateway.drivers.registry import DRIVERS
@@ -283,6 +284,7 @@ class Robot:
         message = request.message
         assert isinstance(message, schema.CommandRequest)
         operator = self._operator(_COMMAND, request)
+        date(message, request)
         if message.command == schema.CommandRequest.RUN_PROGRAM:
             return await self._programs.run(message, operator=operator, source=MESH)
         return await self._control.command(message, operator=operator, source=MESH)

@@ -6,7 +6,7 @@
     RESET TRACE_ON TRACE_OFF    x     x
     SPEED                       x     x                                       1-100 %
     HOME                        x     x     x               not gone
-    RESUME                      x     x     x, idle         x          x
+    RESUME                      x     x     x, idle         x          x, or on hold
     RUN_PROGRAM                 x     x     x               x
     MOVE_ABSOLUTE MOVE_RELATIVE x     x     x               x          x      x
 
@@ -116,6 +116,9 @@ def _state_obstacle(request: CommandRequest, controller: Controller) -> _Obstacl
         return Why.OTHER, "nothing is on hold: there is no motion to resume"
     # A program may begin with homing; each of its steps is judged when its turn comes.
     if request.command in (_C.HOME, _C.RUN_PROGRAM) or status.homed:
+        return None
+    # What is on hold was judged when it began; it may be the way home.
+    if request.command == _C.RESUME and status.activity is Activity.HOLDING:
         return None
     if status.homed is False:
         return Why.OTHER, "the robot is not homed: home it first (HOME)"

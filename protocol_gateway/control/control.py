@@ -56,6 +56,7 @@ class _Attempt:
         counted: Their ids are the holder's, so the answer is kept for a repeat.
         step: The program that runs asks for them.
         begin: What is done in the place of sending a unit.
+        said: What the answer says of that.
     """
 
     requests: tuple[schema.CommandRequest, ...]
@@ -64,6 +65,7 @@ class _Attempt:
     counted: bool = False
     step: bool = False
     begin: Callable[[], None] | None = None
+    said: str = "it runs"
 
 
 class Control:
@@ -151,10 +153,24 @@ class Control:
             if verdict.repeat:
                 return verdict.answer
             problem = verdict.answer if not verdict.answer.accepted else None
-            if problem is None and refused:
+            if refused:
                 problem = Answer(False, refused)
             attempt = _Attempt(tuple(requests), entries, arrived_s, counted=verdict.counted, begin=begin)
+            if holds and problem is None:
+                attempt = self._cancel_what_has_not_begun(attempt)
             return await self._do(attempt, problem)
+
+    def _cancel_what_has_not_begun(self, hold: _Attempt) -> _Attempt:
+        """Let HOLD cancel the programs that are being checked; where nothing moves, it is only that.
+
+        A HOLD that is sent to an arm at rest leaves it holding nothing, and it then refuses every motion.
+        """
+        cancelled = self._guarded.cancel_preparing("HOLD came while it was being checked: not started")
+        lease = self.authority.lease
+        rests = self.authority.moving is False and (lease is None or lease.motion is None)
+        if not cancelled or not rests or self._guarded.program is not None:
+            return hold
+        return replace(hold, begin=lambda: None, said="the program was not started, and nothing is on hold")
 
     async def step(self, request: schema.CommandRequest, *, operator: str) -> Answer:
         """Do a step of the program that the holder runs: all is judged but its id."""
@@ -230,7 +246,7 @@ class Control:
                 controller = after(request, controller, self._joints)
             text = f"{names} {'is' if len(attempt.requests) == 1 else 'are'} on the controller's socket"
         else:
-            text = f"{names}: it runs"
+            text = f"{names}: {attempt.said}"
         if finding.warning and (finding.serious or not attempt.step):
             self._journal.say(_S.WARNING, finding.code, f"{names}: {finding.warning}")
         if finding.warning:

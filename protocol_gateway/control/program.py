@@ -1,6 +1,7 @@
 """A program of the holder's, run step by step: each step is a command like any other, judged and checked.
 
     RUN_PROGRAM   read and checked whole (worker process) -> judge -> audit on disk -> it runs
+                  HOLD or a stop before that: not started; its asker gives up before: not started
     each step     judge -> check against where everything is now -> audit on disk -> controller's socket
                   -> wait until the robot stands at the step's target
 
@@ -39,8 +40,10 @@ _STATE = schema.ProgramState
 _LOOK_S = 0.02
 # A robot that is where its step goes already may still begin to move: homing looks for its marks.
 _BEGINS_WITHIN_S = 0.3
-# Who asked has been told by then that nobody answers.
+# However long its asker waits.
 WITHIN_S = 25.0
+# What the answer takes to its asker: a refusal is to be there before it gives up.
+_ANSWER_S = 0.1
 
 log = logging.getLogger(__name__)
 
@@ -82,20 +85,25 @@ class Programs:
         Raises:
             RefusedError: With what, why and what next; the robot has not moved.
         """
+        cancelled: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+        try:
+            return await self._begin(request, cancelled, operator=operator, source=source)
+        finally:
+            self._guarded.preparing.discard(cancelled)
+
+    async def _begin(
+        self, request: schema.CommandRequest, cancelled: asyncio.Future[str], *, operator: str, source: str
+    ) -> schema.CommandAnswer:
         verdict = self._control.admit([request], operator)
         name = one_line(request.program_name, LONGEST).strip() or "unnamed"
         # What was refused stays so, though its reason may be gone a moment later: nothing was planned.
         refused, warning, begin = "" if verdict.answer.accepted else verdict.answer.text, "", None
         if verdict.answer.accepted and not verdict.repeat:
-            # It came in time; what planning takes is not the way's delay.
-            request.ClearField("not_after")
+            self._guarded.preparing.add(cancelled)
             try:
-                async with asyncio.timeout(WITHIN_S):
-                    refused, warning, begin = await self._prepared(request, name, operator)
+                refused, warning, begin = await self._in_time(request, cancelled, name, operator)
             except CheckError as error:
                 refused = f"Not run: {error}."
-            except TimeoutError:
-                refused = f"Not run: it takes longer than {WITHIN_S:g} s to plan; nobody would wait for it."
         answer = await self._control.attempt(
             [request], operator=operator, source=source, begin=begin, refused=refused
         )
@@ -103,6 +111,34 @@ class Programs:
             raise RefusedError(answer.text)
         mind = f"; mind: {warning}" if warning else ""
         return schema.CommandAnswer(accepted=True, text=answer.text + mind)
+
+    async def _in_time(
+        self, request: schema.CommandRequest, cancelled: asyncio.Future[str], name: str, operator: str
+    ) -> tuple[str, str, Callable[[], None]]:
+        """As `_prepared`, unless its asker gives up, or HOLD or a stop comes before.
+
+        Raises:
+            CheckError: If it cannot be checked, in time or at all.
+        """
+        waits_s = WITHIN_S
+        if request.HasField("not_after"):
+            waits_s = (request.not_after.ToNanoseconds() - time.time_ns()) * 1e-9 - _ANSWER_S
+        prepared = asyncio.ensure_future(self._prepared(request, name, operator))
+        try:
+            within_s = max(0.0, min(waits_s, WITHIN_S))
+            await asyncio.wait((prepared, cancelled), timeout=within_s, return_when=asyncio.FIRST_COMPLETED)
+            if cancelled.done():
+                raise CheckError(cancelled.result())
+            if prepared.done():
+                return prepared.result()
+        finally:
+            prepared.cancel()
+            await asyncio.gather(prepared, return_exceptions=True)
+        if waits_s < WITHIN_S:
+            raise CheckError(
+                "it was not checked before its asker gives up: wait longer (not_after), ask again"
+            )
+        raise CheckError(f"it takes longer than {WITHIN_S:g} s to plan; nobody would wait for it")
 
     async def _prepared(
         self, request: schema.CommandRequest, name: str, operator: str

@@ -9,9 +9,10 @@
 Nothing here waits, for a lock, a queue or a disk.
 """
 
+import asyncio
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.latch import LatchFile
@@ -77,6 +78,8 @@ class Guarded:
         controller: What is known of the controller now.
         on_change: Told when lease or stop changed.
         program: What runs step by step under the lease; None: nothing does.
+        preparing: Of each program that is being checked, or written down, before it begins: to be told why it
+            must not.
         orphan: Whose motion may still run from before a gateway was killed; empty: nobody's.
     """
 
@@ -89,7 +92,15 @@ class Guarded:
     controller: Callable[[], Controller]
     on_change: Callable[[], None]
     program: Running | None = None
+    preparing: set[asyncio.Future[str]] = field(default_factory=set)
     orphan: str = ""
+
+    def cancel_preparing(self, why: str) -> bool:
+        """Let no program begin that has not yet; whether there was one."""
+        for each in self.preparing:
+            if not each.done():
+                each.set_result(why)
+        return bool(self.preparing)
 
     def keep_latch(self) -> None:
         """Write soon whether a stop is latched, and the newest number."""
@@ -120,6 +131,7 @@ class Stops:
             guarded.authority, by=by, reason=reason, now=now, number=number
         )
         guarded.keep_latch()
+        guarded.cancel_preparing(f"stopped by {by}: {latched.reason}")
         if not problem:
             guarded.authority = rules.stop_sent(guarded.authority, latched.id, sent_s or now.monotonic_s)
         text = f"stop request {latched.id} is on the controller's socket"

@@ -69,7 +69,9 @@ async def _send(name: str, words: list[str], router: str, operator: str) -> tupl
                 request.lease = own.lease
                 request.id = 1
                 # By the gateway's clock: what is held up on the way must not move an arm later.
-                request.not_after.FromNanoseconds(own.now_ns + _LATEST_NS)
+                runs = request.command == _Command.RUN_PROGRAM
+                waits_ns = round(_PROGRAM_S * 1e9) if runs else _LATEST_NS
+                request.not_after.FromNanoseconds(own.now_ns + waits_ns)
                 if request.command == _Command.RESET:
                     request.stop_id = await _latched_stop(session, robot)
                 accepted, text = await _to_its_end(session, robot, operator, request, own.renewing)

@@ -1,17 +1,24 @@
 """Programs that the gateway runs step by step: real gateway, real worker process, simulated controller."""
 
 import asyncio
+import contextlib
+import json
+import os
+import signal
 from math import radians
+from pathlib import Path
 
 import pytest
 from google.protobuf.timestamp_pb2 import Timestamp
 
+from bus.answering import Request
 from bus.schemas import robomesh_pb2 as schema
+from protocol_gateway.control.waits import date
 from tests.conftest import run
 from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
 from tests.protocol_gateway.test_checked_motion import POST, alone, checked, standing
 
-RUN = schema.ProgramState
+RUN, REFUSED = schema.ProgramState, schema.AuditEntry.REFUSED
 GOOD = """home
 speed 100
 move_joints -40 90 -90 0 0   # away from the post
@@ -213,18 +220,149 @@ def test_a_program_that_is_given_up_on_hold_between_two_motions_goes_on_no_more(
     run(main(), timeout_s=60)
 
 
-def test_what_planning_takes_is_no_delay_on_the_way(mesh, tmp_path):
+@contextlib.contextmanager
+def slow_check():
+    """The processes that plan are stopped, so that a check takes as long as the test likes."""
+    workers = children()
+    for each in workers:
+        os.kill(each, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        for each in workers:
+            os.kill(each, signal.SIGCONT)
+
+
+def children():
+    """Processes that this one has begun."""
+    return [
+        int(number)
+        for thread in Path("/proc/self/task").iterdir()
+        for number in (thread / "children").read_text().split()
+    ]
+
+
+async def planned(plant):
+    """The process that plans is there: it has planned something."""
+    assert "no statement that does anything" in await refusal(start(plant, "# nothing\n"))
+
+
+def not_run(plant):
+    return [each for each in plant.seen["audit"] if each.request == "RUN_PROGRAM" and each.outcome == REFUSED]
+
+
+async def plain_run(plant, timeout_s, **fields):
+    """A plain Zenoh client asks for a program, in JSON, and waits no longer than it says: its answers."""
+    plant.id += 1
+    payload = json.dumps(
+        {"lease": plant.secret, "id": plant.id, "command": "RUN_PROGRAM", "program": "home\n", **fields}
+    )
+    get, key = plant.session.zenoh_session.get, plant.key("command/li")
+    return await asyncio.to_thread(lambda: list(get(key, payload=payload, timeout=timeout_s)))
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_a_program_whose_asker_gave_up_while_it_was_checked_never_runs(mesh, tmp_path, told):
     async def main():
         async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
             lease = await plant.lease(A.ACQUIRE, ttl_s=5)
-            soon = Timestamp()
-            soon.FromNanoseconds(lease.now.ToNanoseconds() + 1_000_000_000)
-            # The process that plans has still to begin: over a second.
-            await start(plant, "home\n", not_after=soon)
+            await planned(plant)
+            lease = await plant.lease(A.RENEW, ttl_s=5)
+            with slow_check():
+                if told:
+                    until_ns = lease.now.ToNanoseconds() + 1_000_000_000
+                    not_after = Timestamp(seconds=until_ns // 10**9, nanos=until_ns % 10**9)
+                    words = await refusal(start(plant, "home\n", not_after=not_after))
+                    assert words.startswith(
+                        "Not run: it was not checked before its asker gives up: wait longer"
+                    )
+                else:
+                    # Zenoh's own words for nobody's answer, if anything; the gateway's come later.
+                    replies = await plain_run(plant, 0.5)
+                    assert not [each for each in replies if each.ok is not None]
+                    await until(lambda: len(not_run(plant)) == 2)
+            await plant.lease(A.RENEW, ttl_s=5)
+            # What the process that plans had begun is over when this is planned.
+            await planned(plant)
+            assert "before its asker gives up" in not_run(plant)[1].text
+            assert plant.controller.counters.units_sent == 0
+            assert states(plant)[-1].outcome == RUN.OUTCOME_UNSPECIFIED
+            # Who waits is served.
+            await start(plant, "home\n")
             await ended(plant, RUN.DONE)
-            late = Timestamp()
-            late.FromNanoseconds(lease.now.ToNanoseconds())
-            assert "after its not_after" in await refusal(start(plant, "home\n", not_after=late))
+
+    run(main(), timeout_s=90)
+
+
+def test_a_question_says_until_when_its_asker_waits_and_not_after_wins_where_it_is_earlier():
+    second = 10**9
+
+    def dated(not_after_s=None, within_s=None, kind=C.RUN_PROGRAM):
+        command = schema.CommandRequest(command=kind)
+        if not_after_s is not None:
+            command.not_after.FromNanoseconds(round(not_after_s * second))
+        date(command, Request(None, command, "li", received_ns=100 * second, within_s=within_s))
+        return command.not_after.ToNanoseconds() / second if command.HasField("not_after") else None
+
+    assert dated() == 102.0
+    assert dated(kind=C.HOME) is None
+    assert dated(within_s=60.0) == 160.0
+    assert dated(within_s=60.0, not_after_s=130.0) == 130.0
+    assert dated(within_s=3.0, not_after_s=130.0) == 103.0
+    assert dated(not_after_s=130.0) == 130.0
+    assert dated(within_s=1e300) > 1e6
+
+
+def test_a_hold_cancels_a_program_that_is_being_checked_and_leaves_nothing_on_hold(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            await planned(plant)
+            with slow_check():
+                asked = asyncio.create_task(refusal(start(plant, "home\n")))
+                await until(lambda: plant.id == 2)
+                await plant.lease(A.RENEW, ttl_s=5)
+                await asyncio.sleep(0.3)  # it is with the gateway by then, or HOLD finds nothing to cancel
+                answer = await plant.command(C.HOLD)
+                assert answer.text == "HOLD: the program was not started, and nothing is on hold"
+                assert await asked == "Not run: HOLD came while it was being checked: not started."
+            await plant.lease(A.RENEW, ttl_s=5)
+            await planned(plant)
+            assert plant.controller.counters.units_sent == 0
+            assert plant.controller.activity == STATE.IDLE
+            # Nothing is in the way of what comes next, of a robot that is not homed.
+            await start(plant, "home\n")
+            await ended(plant, RUN.DONE)
+
+    run(main(), timeout_s=90)
+
+
+def test_a_stop_ends_a_program_that_is_being_checked_at_once(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            await planned(plant)
+            with slow_check():
+                asked = asyncio.create_task(refusal(start(plant, "home\n")))
+                await until(lambda: plant.id == 2)
+                await asyncio.sleep(0.3)
+                await plant.stop(by="wang", reason="fire")
+                assert "wang" in await asked
+
+    run(main(), timeout_s=90)
+
+
+def test_a_homing_on_hold_goes_on_with_resume(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            await plant.command(C.HOME)
+            await until(lambda: plant.controller.activity == STATE.HOMING)
+            await plant.command(C.HOLD)
+            await until(lambda: plant.controller.activity == STATE.HOLDING)
+            await plant.lease(A.RENEW, ttl_s=5)
+            await plant.command(C.RESUME)
+            await until(lambda: plant.controller.homed == STATE.YES)
 
     run(main(), timeout_s=60)
 

@@ -20,8 +20,7 @@ export interface CommandValues {
 
 const VALID_MS = 1000;
 const ANSWERED_S = 2;
-// A program is checked before it is answered, and whoever runs it waits for that.
-const PROGRAM_VALID_MS = 5000;
+// A program is checked before it is answered, and does not begin once nobody waits for the answer.
 const CHECKED_S = 30;
 /** What stands before a warning in the gateway's answer. */
 const MIND = "; mind: ";
@@ -50,7 +49,7 @@ export async function command(
   }
   tell({ kind: "busy", text: t("sending", { what }) });
   const [validMs, withinS] =
-    name === Command.RUN_PROGRAM ? [PROGRAM_VALID_MS, CHECKED_S] : [VALID_MS, ANSWERED_S];
+    name === Command.RUN_PROGRAM ? [CHECKED_S * 1000, CHECKED_S] : [VALID_MS, ANSWERED_S];
   const request = {
     lease: mine.lease,
     id: ++lastId,

@@ -92,6 +92,8 @@ const SENTENCES: readonly (readonly [english: string, chinese: string])[] = [
   ["{one} comes within {distance} mm of {other}, nearer than its {text} distance of {limit} mm", "{one} 距 {other} 仅 {distance} mm，小于{text}距离 {limit} mm"],
   ["stop", "停止"],
   ["warning", "警告"],
+  ["HOLD came while it was being checked: not started", "检查期间收到保持命令：未开始"],
+  ["it was not checked before its asker gives up: wait longer (not_after), ask again", "未在请求者的等待时间内完成检查：请延长等待（not_after）后重新发送"],
   ["it takes longer than {seconds} s to plan; nobody would wait for it", "规划超过 {seconds} 秒，不再等待"],
   ["and {count} more", "另有 {count} 处"],
   ["program {name} is done", "程序 {name} 已完成"],

@@ -1,0 +1,261 @@
+"""The latch file: what a gateway that was killed on a full disk remembers of its stops."""
+
+import asyncio
+import json
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from protocol_gateway.audit.latch import RESERVED, SLOT_BYTES, LatchFile
+from protocol_gateway.audit.log import AuditLog, read_entries
+from protocol_gateway.audit.restart import LATCH_UNKNOWN
+from protocol_gateway.authority.rules import Stop
+from protocol_gateway.errors import AuditError
+from tests.conftest import run
+from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
+from tests.soak import latch_kills
+
+HOUSE = Path(__file__).resolve().parents[2]
+NOW_NS = 1_800_000_000_000_000_000
+
+
+def stop(number, reason="fire"):
+    return Stop(id=number, by="wang", reason=reason, since_ns=NOW_NS)
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "arm.latch"
+
+
+def killed(path, *states, begin=(None, 0)):
+    """A latch file as a gateway leaves it that was killed."""
+    latch = LatchFile(path)
+    latch.begin(*begin, given_out=begin[1])
+    for state in states:
+        latch.keep(*state)
+        settle(latch)
+    latch._writer.shutdown()
+    latch._syncer.shutdown()
+    os.close(latch._file)
+    return path.read_bytes()
+
+
+def settle(latch):
+    latch._writer.submit(lambda: None).result(timeout=30.0)
+
+
+def test_the_newest_of_two_slots_counts_and_the_file_never_grows(path):
+    for last in range(1, 6):
+        data = killed(path, *[(stop(number), number) for number in range(1, last + 1)])
+        assert len(data) == 2 * SLOT_BYTES
+        found = LatchFile(path).found
+        assert (found.stop.id, found.last_stop_id, found.reserved) == (last, last, last + RESERVED)
+        path.unlink()
+
+
+def test_what_is_reset_is_not_latched_any_more(path):
+    killed(path, (stop(1), 1), (None, 1))
+    assert LatchFile(path).found.stop is None
+
+
+def test_a_number_is_never_given_out_twice_whether_the_gateway_was_killed_or_not(path):
+    killed(path, (stop(1), 1))
+    given = RESERVED + 1  # what a killed gateway may have given out, and not written
+    latch = LatchFile(path)
+    latch.begin(latch.found.stop, latch.found.last_stop_id, given_out=latch.found.reserved)
+    assert latch.next_number(given, NOW_NS) == given + 1
+    latch.close()
+    assert LatchFile(path).found.reserved == given  # this one ended by itself, and gave out none
+
+
+def test_a_number_that_no_disk_reserves_is_the_time(path, monkeypatch):
+    latch = LatchFile(path)
+    assert latch.next_number(7, NOW_NS) == NOW_NS // 1000
+    assert latch.next_number(NOW_NS // 1000, NOW_NS) == NOW_NS // 1000 + 1
+    latch.begin(None, 7, given_out=7)
+    assert latch.next_number(7, NOW_NS) == 8
+    assert latch.next_number(7 + RESERVED, NOW_NS) == NOW_NS // 1000
+    latch.close()
+
+
+@pytest.mark.parametrize("slot", [0, 1])
+@pytest.mark.parametrize("place", [0, 40, 100, 2000, SLOT_BYTES - 1])
+def test_a_damaged_slot_may_have_held_a_stop(path, slot, place):
+    data = bytearray(killed(path, (stop(1), 1), (None, 1)))
+    data[slot * SLOT_BYTES + place] ^= 1
+    path.write_bytes(data)
+    assert LatchFile(path).damage == "its latch file arm.latch is damaged"
+
+
+@pytest.mark.parametrize("data", [b"", b"\0" * 2 * SLOT_BYTES])
+def test_a_file_that_was_allocated_and_never_written_says_nothing(path, data):
+    path.write_bytes(data)
+    latch = LatchFile(path)
+    assert (latch.found, latch.damage) == (None, "")
+
+
+@pytest.mark.parametrize("data", [b"x", b"{}\n", b"[" * 9000, b"\xff" * 8192, b'{"sha256":1}' + b" " * 4084])
+def test_whatever_the_file_holds_it_is_read_or_called_damaged(path, data):
+    path.write_bytes(data)
+    assert LatchFile(path).damage
+
+
+def test_the_longest_texts_fit_into_a_slot(path):
+    killed(path, (Stop(id=2**62, by="\U0010ffff" * 900, reason='"\\' * 900, since_ns=NOW_NS), 2**62))
+    assert LatchFile(path).found.stop.id == 2**62
+
+
+def test_a_disk_that_hangs_holds_up_no_stop_and_is_said(path, monkeypatch):
+    latch = LatchFile(path)
+    latch.begin(None, 0, given_out=0)
+    goes_on, pwrite = threading.Event(), os.pwrite
+
+    def hang(*arguments):
+        goes_on.wait()
+        return pwrite(*arguments)
+
+    monkeypatch.setattr(os, "pwrite", hang)
+    try:
+        latch.keep(stop(1), 1)
+        latch.keep(stop(2), 2)  # returns, although the first is still being written
+        monkeypatch.setattr("protocol_gateway.audit.latch.LONGEST_WRITE_S", -1.0)
+        assert latch.problem == "the latch file arm.latch takes longer than -1 s to write"
+    finally:
+        goes_on.set()
+    settle(latch)
+    assert latch.problem == ""
+    assert LatchFile(path).found.stop.id == 2
+    latch.close()
+
+
+def test_a_sync_that_hangs_keeps_no_newer_stop_from_the_file(path, monkeypatch):
+    latch = LatchFile(path)
+    latch.begin(None, 0, given_out=0)
+    goes_on = threading.Event()
+    monkeypatch.setattr(os, "fdatasync", lambda file: goes_on.wait())
+    try:
+        for number in (1, 2, 3):
+            latch.keep(stop(number), number)
+            settle(latch)
+            assert LatchFile(path).found.stop.id == number
+    finally:
+        goes_on.set()
+    latch.close()
+
+
+def test_a_stop_that_only_the_latch_file_knows_is_remembered_and_written_down(tmp_path):
+    log = tmp_path / "arm.jsonl"
+
+    async def life(*, latched=None, kill=False):
+        audit = AuditLog(log)
+        if latched is not None:
+            audit.latch.keep(latched, latched.id)
+            settle(audit.latch)
+        found = audit.memory, audit.mended
+        if kill:
+            audit.latch.close = lambda: None
+        await audit.close()
+        return found
+
+    async def main():
+        await life(latched=stop(1, "dog"), kill=True)
+        memory, mended = await life()
+        assert (memory.stop.id, memory.stop.by, memory.stop.reason) == (1, "wang", "dog")
+        assert memory.last_stop_id == 1 + RESERVED
+        assert mended == ""
+        (entry,) = read_entries(log)
+        assert (entry.request, entry.operator, entry.values["stop_id"]) == ("STOP", "wang", "1")
+        assert entry.text == "the gateway was killed before it wrote the entry of stop 1"
+        memory, _ = await life()
+        assert memory.stop.id == 1
+        assert len(list(read_entries(log))) == 1
+
+    run(main())
+
+
+def test_a_damaged_latch_file_latches_a_stop_once(tmp_path):
+    async def life():
+        audit = AuditLog(tmp_path / "arm.jsonl")
+        found = audit.memory, audit.mended
+        await audit.close()
+        return found
+
+    async def main():
+        await life()
+        path = tmp_path / "arm.latch"
+        path.write_bytes(path.read_bytes()[:-1])
+        memory, mended = await life()
+        assert memory.stop.reason == LATCH_UNKNOWN
+        assert mended == "its latch file arm.latch is damaged"
+        number = memory.stop.id
+        memory, mended = await life()
+        assert (memory.stop.id, mended) == (number, "")
+
+    run(main())
+
+
+def test_where_it_cannot_be_allocated_motion_is_refused_with_the_reason_and_stop_works(mesh, tmp_path):
+    async def main():
+        latch = tmp_path / "hall" / "arm.latch"
+        latch.mkdir(parents=True)  # nobody can write a file there
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            await plant.lease(A.ACQUIRE, ttl_s=5)
+            assert await refusal(plant.command(C.HOME)) == (
+                "Not sent: the latch file arm.latch cannot be allocated (Is a directory: see to its disk), "
+                "so a restart would forget a stop."
+            )
+            await plant.command(C.TRACE_ON)  # moves nothing
+            first = await plant.stop(by="wang")
+            second = await plant.stop(by="zhao")
+            assert first.sent
+            assert second.stop_id > first.stop_id > 10**15  # no disk reserved a small one
+            await until(lambda: plant.events("audit.failed"))
+            await until(lambda: plant.controller.activity == STATE.STOPPED)
+            latch.rmdir()
+            await until(lambda: plant.events("audit.mended"))
+            await plant.lease(A.RENEW, ttl_s=5)
+            await plant.command(C.RESET, stop_id=second.stop_id)
+            await until(lambda: plant.controller.activity == STATE.IDLE)
+            await plant.command(C.HOME)
+        assert LatchFile(latch).found.stop is None
+
+    run(main())
+
+
+def test_a_log_that_is_open_elsewhere_leaves_the_latch_file_alone(tmp_path):
+    async def main():
+        audit = AuditLog(tmp_path / "arm.jsonl")
+        audit.latch.keep(stop(3), 3)
+        settle(audit.latch)
+        before = (tmp_path / "arm.latch").read_bytes()
+        with pytest.raises(AuditError, match="open in another gateway"):
+            AuditLog(tmp_path / "arm.jsonl")
+        assert (tmp_path / "arm.latch").read_bytes() == before
+        await audit.close()
+
+    run(main())
+
+
+def test_a_stop_on_a_full_disk_is_latched_after_kill_9(tmp_path):
+    if not latch_kills.may_mount():
+        pytest.skip("no small disk can be mounted here: unshare and a tmpfs are not allowed")
+
+    async def main():
+        command = (sys.executable, "-m", "tests.soak.latch_kills", "--times", "2", "--json")
+        process = await asyncio.create_subprocess_exec(*command, cwd=HOUSE, stdout=subprocess.PIPE)
+        try:
+            out, _ = await process.communicate()
+        finally:
+            if process.returncode is None:
+                process.terminate()
+                await process.wait()
+        return json.loads(out)
+
+    report = run(main(), timeout_s=170.0)
+    assert report["problems"] == []
+    assert report["kills"] == report["latched"] == report["not_in_log"] == 2
