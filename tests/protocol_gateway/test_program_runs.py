@@ -362,7 +362,10 @@ def test_a_homing_on_hold_goes_on_with_resume(mesh, tmp_path):
             await until(lambda: plant.controller.activity == STATE.HOLDING)
             await plant.lease(A.RENEW, ttl_s=5)
             await plant.command(C.RESUME)
-            await until(lambda: plant.controller.homed == STATE.YES)
+            async with asyncio.timeout(50):
+                while plant.controller.homed != STATE.YES:
+                    await plant.lease(A.RENEW, ttl_s=5)
+                    await asyncio.sleep(0.2)
 
     run(main(), timeout_s=60)
 
