@@ -16,6 +16,7 @@ from bus.errors import KeyNameError
 from bus.schemas.robomesh_pb2 import Description
 from mcap_files.errors import RecordingError
 from mcap_files.reading import RecordingFile
+from mcap_files.times import PublisherTimes
 from mcap_files.values import has_values, unit_of, values_of
 
 POINTS, MOST_POINTS = 1000, 10_000
@@ -214,8 +215,9 @@ def _cut(file: RecordingFile, topic: str, key: str, pieces: _Pieces) -> _Pieces:
     start_ns, end_ns, count = pieces.start_ns, pieces.end_ns, pieces.count
     values = _Values(file, key)
     scale = count / max(end_ns - start_ns + 1, 1)
+    times = PublisherTimes()
     for message in file.messages([key], start_ns=start_ns, end_ns=end_ns + 1):
-        piece = min(int((message.received_ns - start_ns) * scale), count - 1)
+        piece = min(max(int((times.of(message) - start_ns) * scale), 0), count - 1)
         for name, value in values.of(message.data):
             if isfinite(value):
                 pieces.take(f"{topic}/{name}", piece, value)

@@ -1,6 +1,6 @@
 """Joints and tool as a table: a row a recorded state, SI, units in the header.
 
-Knows messages only, no files: whoever has them in order of time makes the table.
+Knows messages only, no files: the caller gives them in the order of their receipt.
 """
 
 from collections.abc import Iterable
@@ -9,9 +9,12 @@ from datetime import UTC, datetime
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from bus.schemas import robomesh_pb2 as schema
+from mcap_files.times import PublisherTimes, Recorded
 
 # The tool's place comes less often than the joints'; older than this it is left out.
 _TOOL_FOR_NS = 250_000_000
+# A clock that was set back must not hold the tool's states back for longer.
+_TOOL_WAITS_NS = 1_000_000_000
 _TOOL = ("tool x [m]", "tool y [m]", "tool z [m]", "tool speed [m/s]", "clearance [m]")
 
 
@@ -21,45 +24,55 @@ class Table:
     Args:
         joints: Their names, in the table's order.
         prismatic: Those that slide: their unit is the metre.
-        start_ns: From which the second column counts, ns since the Unix epoch.
+        start_ns: From which the column `t [s]` counts, ns since the Unix epoch.
     """
 
     def __init__(self, joints: Iterable[str], prismatic: Iterable[str], *, start_ns: int) -> None:
         self._joints, self._start_ns = tuple(joints), start_ns
+        self._times = PublisherTimes()
         self._tool: tuple[int, list[str]] = (0, [""] * len(_TOOL))
         sliding = frozenset(prismatic)
         units = ["m" if joint in sliding else "rad" for joint in self._joints]
         named = list(zip(self._joints, units, strict=True))
         self.header = [
             "time",
+            "received",
+            "sequence",
             "t [s]",
             *(f"{joint} [{unit}]" for joint, unit in named),
             *(f"{joint} velocity [{unit}/s]" for joint, unit in named),
             *_TOOL,
         ]
 
-    def take_tool(self, state: schema.KinematicState, time_ns: int) -> None:
-        """What the rows from here on say of the tool."""
+    def take_tool(self, state: schema.KinematicState, recorded: Recorded) -> None:
+        """Take what the rows from here on say of the tool."""
         pose = [""] * 3
         if len(state.tool_to_base) == 16:
             pose = [repr(state.tool_to_base[index]) for index in (3, 7, 11)]
         v = state.linear_velocity
         speed = repr((v.x**2 + v.y**2 + v.z**2) ** 0.5) if state.HasField("linear_velocity") else ""
         clearance = repr(state.clearance.distance) if state.HasField("clearance") else ""
-        self._tool = time_ns, [*pose, speed, clearance]
+        self._tool = recorded.source_ns, [*pose, speed, clearance]
 
-    def row(self, state: JointStates, time_ns: int) -> list[str]:
-        """One recorded state; what it does not tell is empty."""
+    def row(self, state: JointStates, recorded: Recorded) -> list[str]:
+        """Return the row of a recorded state; what it does not tell is empty."""
         joints = {joint.name: joint for joint in state.joints}
         told = [joints.get(name) for name in self._joints]
         when, tool = self._tool
         return [
-            _text(time_ns),
-            f"{(time_ns - self._start_ns) * 1e-9:.6f}",
+            _text(recorded.source_ns),
+            _text(recorded.received_ns),
+            str(recorded.sequence),
+            f"{(self._times.of(recorded) - self._start_ns) * 1e-9:.9f}",
             *("" if joint is None else repr(joint.position) for joint in told),
             *(repr(joint.velocity) if joint and joint.HasField("velocity") else "" for joint in told),
-            *(tool if time_ns - when <= _TOOL_FOR_NS else [""] * len(tool)),
+            *(tool if abs(recorded.source_ns - when) <= _TOOL_FOR_NS else [""] * len(tool)),
         ]
+
+
+def is_due(tool: Recorded, state: Recorded) -> bool:
+    """Return whether the row of a state, and those after it, say this of the tool."""
+    return tool.source_ns <= state.source_ns or tool.received_ns + _TOOL_WAITS_NS < state.received_ns
 
 
 def table_of(first: JointStates, description: schema.Description | None, *, start_ns: int) -> Table:
@@ -71,4 +84,4 @@ def table_of(first: JointStates, description: schema.Description | None, *, star
 
 def _text(time_ns: int) -> str:
     second, rest = divmod(time_ns, 1_000_000_000)
-    return f"{datetime.fromtimestamp(second, tz=UTC):%Y-%m-%dT%H:%M:%S}.{rest // 1000:06d}Z"
+    return f"{datetime.fromtimestamp(second, tz=UTC):%Y-%m-%dT%H:%M:%S}.{rest:09d}Z"

@@ -28,7 +28,7 @@ from bus.errors import BusError, BusyError, KeyNameError, NoAnswerError, QuotaEr
 from bus.keys import WHOLE_SITE, robot_key
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
-from mcap_files.table import Table, table_of
+from mcap_files.table import Table, is_due, table_of
 from services.console.errors import RecordingChangedError
 from services.console.streamed import Streamed
 
@@ -49,6 +49,15 @@ class _Where(NamedTuple):
 
     site: str
     asker: str
+
+
+class _Recorded(NamedTuple):
+    """As `mcap_files.times.Recorded`."""
+
+    topic: str
+    received_ns: int
+    source_ns: int
+    sequence: int
 
 
 class Recordings:
@@ -171,32 +180,27 @@ class Recordings:
         tools = self._messages(where, info.file, topics["kinematics"]) if "kinematics" in topics else None
         tool = None if tools is None else await anext(tools, None)
         table: Table | None = None
-        before: list[str] = []
         text = io.StringIO()
         writer = csv.writer(text)
-        async for time_ns, data in self._messages(where, info.file, topics["joints"]):
+        async for message, data in self._messages(where, info.file, topics["joints"]):
             state = _decoded(JointStates, data)
             if state is None:
                 continue
             if table is None:
                 table = table_of(state, description, start_ns=info.start.ToNanoseconds())
                 writer.writerow(table.header)
-            while tools is not None and tool is not None and tool[0] <= time_ns:
+            while tools is not None and tool is not None and is_due(tool[0], message):
                 if (kinematics := _decoded(schema.KinematicState, tool[1])) is not None:
                     table.take_tool(kinematics, tool[0])
                 tool = await anext(tools, None)
-            row = table.row(state, time_ns)
-            if row == before:
-                continue  # what stood there at the beginning, and was published again
-            before = row
-            writer.writerow(row)
+            writer.writerow(table.row(state, message))
             if text.tell() > _PIECE // 8:
                 yield text.getvalue().encode()
                 text.seek(0)
                 text.truncate()
         yield text.getvalue().encode()
 
-    async def _messages(self, where: _Where, name: str, topic: str) -> AsyncIterator[tuple[int, bytes]]:
+    async def _messages(self, where: _Where, name: str, topic: str) -> AsyncIterator[tuple[_Recorded, bytes]]:
         """All of a topic; as many as there may be of one time."""
         asked = schema.RangeRequest(file=name, topic=topic, most=_ROWS)
         while True:
@@ -204,7 +208,8 @@ class Recordings:
             assert isinstance(answer, schema.RecordedMessages)
             times = [message.received.ToNanoseconds() for message in answer.messages]
             for time_ns, message in zip(times, answer.messages, strict=True):
-                yield time_ns, message.data
+                source_ns = message.source.ToNanoseconds()
+                yield _Recorded(topic, time_ns, source_ns, message.sequence), message.data
             if not answer.more:
                 return
             last = times[-1]

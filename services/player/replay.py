@@ -228,9 +228,10 @@ class Replay:
             coming, self._horizon_ns = await asyncio.to_thread(self._tape.take, until_ns, speed=speed)
             if self._jump.is_set():
                 return  # gone elsewhere meanwhile
-            self._waiting.extend(coming)
+            # What came late on its way belongs before what came sooner.
+            self._waiting = deque(sorted((*self._waiting, *coming), key=lambda played: played.at_ns))
         now_ns = self._at_ns() + round(_TOGETHER_S * speed * 1e9)
-        while self._waiting and self._waiting[0].received_ns <= now_ns:
+        while self._waiting and self._waiting[0].at_ns <= now_ns:
             self._put(self._waiting.popleft())
         now = time.monotonic()
         if self._clock.at_end(now) and not self._waiting and self._horizon_ns >= self._tape.end_ns:
@@ -259,14 +260,14 @@ class Replay:
             row = topics.topic(shown.played.topic)
             if row.stale_after_s is None or row.history is History.KEY_FRAME:
                 continue
-            fresh = at_ns - shown.played.received_ns <= row.stale_after_s * 1e9
+            fresh = at_ns - shown.played.at_ns <= row.stale_after_s * 1e9
             if fresh and now - shown.put_s >= row.stale_after_s / 2:
                 self._put(shown.played)
 
     def _sleep_s(self) -> float:
         if not self._clock.playing or not self._waiting:
             return _LONGEST_SLEEP_S
-        left_s = (self._waiting[0].received_ns - self._at_ns()) * 1e-9 / self._clock.speed
+        left_s = (self._waiting[0].at_ns - self._at_ns()) * 1e-9 / self._clock.speed
         return min(max(left_s, 0.0), _LONGEST_SLEEP_S)
 
     async def _tell(self) -> None:

@@ -14,6 +14,7 @@ from bus.publisher import LIST_LENGTH
 from bus.schemas import robomesh_pb2 as schema
 from bus.topics import History
 from mcap_files.reading import RecordedMessage, RecordingFile
+from mcap_files.times import PublisherTimes
 from mcap_files.video import is_key_frame
 from services.player.errors import ReplayError
 from services.player.renamed import Names, renamed
@@ -28,10 +29,14 @@ _MOST_FRAMES = 300
 
 
 class Played(NamedTuple):
-    """A message that is ready to be published."""
+    """A message that is ready to be published.
+
+    Attributes:
+        at_ns: When it was so by its publisher's clock, on the recording's time axis.
+    """
 
     topic: str
-    received_ns: int
+    at_ns: int
     source_ns: int
     payload: bytes
     key_frame: bool
@@ -69,6 +74,7 @@ class Tape:
         self._coming: Iterator[RecordedMessage] = iter(())
         self._taken: dict[str, int] = {}
         self._held: RecordedMessage | None = None
+        self._times = PublisherTimes()
         self.names = Names(self.of_site, self.of_robot, self.of_site, self.of_robot)
         self.replay = schema.Description.Replay()
 
@@ -89,12 +95,13 @@ class Tape:
         """
         scene = Scene()
         plain = []
+        self._times = PublisherTimes()
         for key, topic in self._keys.items():
             history = topics.topic(topic).history
             if history is History.LAST_100:
-                scene.lists[topic] = [*self._played(self.file.last(key, at_ns, LIST_LENGTH))]
+                scene.lists[topic] = [*self._stood(self.file.last(key, at_ns, LIST_LENGTH))]
             elif history is History.KEY_FRAME:
-                scene.newest += self._played(self._since_key_frame(key, at_ns))
+                scene.newest += self._stood(self._since_key_frame(key, at_ns))
             else:
                 plain.append(key)
         newest = self.file.state_at(plain, at_ns)
@@ -102,18 +109,18 @@ class Tape:
             if key not in newest and self._keys[key] == "description":
                 # What a robot is explains what came before it was told.
                 newest[key] = next(self.file.messages([key]))
-        scene.newest += self._played(sorted(newest.values()))
+        scene.newest += self._stood(sorted(newest.values()))
         self._coming = self.file.messages([*self._keys], start_ns=at_ns + 1)
         self._taken, self._held = {}, None
         return scene
 
     def take(self, until_ns: int, *, speed: float) -> tuple[list[Played], int]:
-        """What came next until a time, thinned to the topics' rates, and how far that goes.
+        """Return what came next until a time, thinned to the topics' rates, and how far that goes.
 
         Raises:
             RecordingError: If the file is damaged there.
         """
-        taken: list[RecordedMessage] = []
+        taken: list[tuple[int, RecordedMessage]] = []
         room, reached_ns = _MOST_BYTES, until_ns
         for _ in range(_MOST_LOOKED_AT):
             message = self._held or next(self._coming, None)
@@ -124,14 +131,19 @@ class Tape:
                 self._held = message
                 return [*self._played(taken)], until_ns
             reached_ns = message.received_ns
-            if self._is_due(message, speed):
-                taken.append(message)
+            at_ns = self._at_ns(message)
+            if self._is_due(message, at_ns, speed):
+                taken.append((at_ns, message))
                 room -= len(message.data)
             if len(taken) >= _MOST_AT_ONCE or room < 0:
                 break
         return [*self._played(taken)], reached_ns
 
-    def _is_due(self, message: RecordedMessage, speed: float) -> bool:
+    def _at_ns(self, message: RecordedMessage) -> int:
+        # Nothing is played behind the end, whatever its publisher's clock said.
+        return min(self._times.of(message), self.end_ns)
+
+    def _is_due(self, message: RecordedMessage, at_ns: int, speed: float) -> bool:
         row = topics.topic(self._keys[message.topic])
         if speed <= 1.0 or row.history is History.LAST_100:
             return True
@@ -140,9 +152,9 @@ class Tape:
         gap_ns = 1e9 * speed / (row.rate_hz or _ON_CHANGE_HZ)
         before = self._taken.get(message.topic)
         # A little early is in time: what comes at just that rate must not lose every second one.
-        if before is not None and message.received_ns - before < 0.9 * gap_ns:
+        if before is not None and at_ns - before < 0.9 * gap_ns:
             return False
-        self._taken[message.topic] = message.received_ns
+        self._taken[message.topic] = at_ns
         return True
 
     def _since_key_frame(self, key: str, at_ns: int) -> list[RecordedMessage]:
@@ -152,8 +164,11 @@ class Tape:
         coming = self.file.messages([key], start_ns=first.received_ns, end_ns=at_ns + 1)
         return [message for message, _ in zip(coming, range(_MOST_FRAMES), strict=False)]
 
-    def _played(self, messages: list[RecordedMessage]) -> Iterator[Played]:
-        for message in messages:
+    def _stood(self, messages: list[RecordedMessage]) -> Iterator[Played]:
+        return self._played([(self._at_ns(message), message) for message in messages])
+
+    def _played(self, messages: list[tuple[int, RecordedMessage]]) -> Iterator[Played]:
+        for at_ns, message in messages:
             topic = self._keys[message.topic]
             try:
                 payload = renamed(topic, message.data, self.names, self.replay)
@@ -162,7 +177,7 @@ class Tape:
             is_video = topics.topic(topic).history is History.KEY_FRAME
             yield Played(
                 self.names.topic(topic),
-                message.received_ns,
+                at_ns,
                 message.source_ns,
                 payload,
                 is_video and is_key_frame(payload),

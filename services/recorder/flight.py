@@ -219,7 +219,7 @@ class FlightRecorder:
     def _full(self, part: Part) -> bool:
         most = self._files.settings.split.mib * MIB / _SEGMENTS
         longest_s = max(self._flight.minutes * 60 / _SEGMENTS, _SHORTEST_S)
-        return part.age_s >= longest_s or part.capture.size >= most
+        return part.age_s >= longest_s or part.capture.size >= most or part.clock_was_set()
 
     def _long(self, now: float) -> bool:
         return now - self._since > self._files.settings.split.minutes * 60

@@ -134,13 +134,13 @@ class _Tap:
         if self.row.history is History.LAST_100 or self._timeless:
             self.ask()
 
-    def sweep(self, now_ns: int, sinks: Iterable[Sink]) -> int:
+    def sweep(self, sinks: Iterable[Sink]) -> int:
         """Hand over what has come; how much."""
         held = time.monotonic() < self._held_until  # first: what ends it comes behind the answer
         while self._answers:
             answer = self._answers.popleft()
             try:
-                for key, header, payload, received_ns in self._read_answer(answer, now_ns):
+                for key, header, payload, received_ns in self._read_answer(answer):
                     self._give(key, header, payload, received_ns, sinks)
             except (MessageError, ValueError) as error:  # a time that no timestamp can be
                 log.warning("%s: left out of the recording: %s", self.key_expr, error)
@@ -158,7 +158,9 @@ class _Tap:
             except MessageError:
                 continue
             if self._is_new(key, header):
-                self._give(key, header, sample.payload.to_bytes(), now_ns, sinks)
+                # Read behind the ring: what is taken had been published before.
+                received_ns = time.monotonic_ns()
+                self._give(key, header, sample.payload.to_bytes(), received_ns, sinks)
         return taken
 
     def close(self) -> None:
@@ -207,13 +209,13 @@ class _Tap:
             return True
         return False
 
-    def _read_answer(self, sample: zenoh.Sample, now_ns: int) -> list[tuple[str, Header, bytes, int]]:
+    def _read_answer(self, sample: zenoh.Sample) -> list[tuple[str, Header, bytes, int]]:
         """What of an answer is new, oldest first.
 
         Raises:
             MessageError: If it cannot be read.
         """
-        key = str(sample.key_expr)
+        key, now_ns = str(sample.key_expr), time.monotonic_ns()
         if sample.attachment is None or has_wildcard(key):
             return []
         header = unpack(sample.attachment.to_bytes())
@@ -260,8 +262,7 @@ class RobotIntake:
         """Hand over what has come."""
         if not self._sinks:
             return
-        now_ns = time.monotonic_ns()
-        taken = sum(tap.sweep(now_ns, self._takers[name]) for name, tap in self._taps.items())
+        taken = sum(tap.sweep(self._takers[name]) for name, tap in self._taps.items())
         if taken:
             for sink in self._sinks:
                 sink.swept()

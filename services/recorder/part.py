@@ -7,6 +7,7 @@ from collections.abc import Callable
 from bus.header import Header
 from bus.schemas import robomesh_pb2 as schema
 from bus.topics import TOPICS, Topic
+from bus.wall_clock import WallClock
 from mcap_files.capture import Capture
 from services.recorder.disk import Disk, Taken, takes
 
@@ -18,10 +19,11 @@ class Part:
     """A capture as a sink of the intake.
 
     Args:
+        begun_ns: The monotonic clock's time at the capture's start.
         saw: Told of every publication, on the intake's thread.
     """
 
-    def __init__(self, capture: Capture, disk: Disk, saw: Saw | None = None) -> None:
+    def __init__(self, capture: Capture, disk: Disk, saw: Saw | None = None, *, begun_ns: int) -> None:
         self.capture = capture
         # Publications that came and that the disk could not take, by key.
         self.given_up: Counter[str] = Counter()
@@ -29,7 +31,8 @@ class Part:
         self.lost: Counter[str] = Counter()
         self._disk, self._saw = disk, saw
         # The clock may be set while it is recorded: within a file time goes on as it did at its beginning.
-        self._begun_ns = time.monotonic_ns()
+        self._begun_ns = begun_ns
+        self._wall_clock, self._clock_was_set = WallClock(), False
 
     @property
     def age_s(self) -> float:
@@ -46,11 +49,19 @@ class Part:
         if self._disk.taken is not Taken.ALL and not takes(self._disk.taken, row):
             self.given_up[key] += 1
         else:
-            # What was told before is part of what was so when it began.
-            since_ns = max(received_ns - self._begun_ns, 0)
-            self.capture.add(key, row, header, payload, received_ns=self.capture.start_ns + since_ns)
+            self.capture.add(key, row, header, payload, received_ns=self.log_time_ns(received_ns))
         if self._saw is not None:
             self._saw(row, payload)
+
+    def log_time_ns(self, received_ns: int) -> int:
+        """Return the file's time of a time of the monotonic clock, ns since the Unix epoch."""
+        # What was told before is part of what was so when it began.
+        return self.capture.start_ns + max(received_ns - self._begun_ns, 0)
+
+    def clock_was_set(self) -> bool:
+        """Return whether the machine's clock was set since the file was begun."""
+        self._clock_was_set = self._wall_clock.was_set() or self._clock_was_set
+        return self._clock_was_set
 
     def swept(self) -> None:
         """It may be written."""

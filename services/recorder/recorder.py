@@ -173,7 +173,8 @@ class _Robot:
         if known.description.urdf:
             text = for_viewers(known)
             with self.recorder.intake.lock:
-                part.capture.add_text("/robot_description", text, known.header, received_ns=now_ns)
+                log_time_ns = part.log_time_ns(time.monotonic_ns())
+                part.capture.add_text("/robot_description", text, known.header, received_ns=log_time_ns)
                 part.capture.hand_over()
 
     async def _picture(self, part: Part) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 from bus.errors import KeyNameError, RefusedError
 from bus.keys import check_chunk
 from bus.schemas import robomesh_pb2 as schema
+from bus.wall_clock import WallClock
 from mcap_files.capture import Capture
 from mcap_files.errors import CaptureError
 from mcap_files.names import SUFFIX
@@ -69,8 +70,11 @@ class Files:
             CaptureError: If it cannot be created.
         """
         whole = {"site": self.settings.site, "robot": self.robot, **about}
-        capture = await asyncio.to_thread(Capture, path, whole, start_ns=time.time_ns())
-        part = Part(capture, self.disk, saw)
+        # Both clocks at one moment: what comes between two moments would move every message.
+        begun_ns = time.monotonic_ns()
+        start_ns = WallClock().latest_ns(begun_ns)
+        capture = await asyncio.to_thread(Capture, path, whole, start_ns=start_ns)
+        part = Part(capture, self.disk, saw, begun_ns=begun_ns)
         if self.settings.site_file:
             data = self.settings.site_file.encode()
             capture.attach("site.toml", "application/toml", data, time_ns=capture.start_ns)
@@ -172,12 +176,13 @@ class RobotRecorder:
             return self.last
 
     async def tick(self) -> None:
-        """Begin the next file when this one is long or large enough."""
+        """Begin the next file when this one is long or large enough, or the machine's clock was set."""
         async with self._lock:
             if (part := self.part) is None:
                 return
             split, capture = self._settings.split, part.capture
-            if part.age_s < split.minutes * 60 and capture.size < split.mib * MIB:
+            full = part.age_s >= split.minutes * 60 or capture.size >= split.mib * MIB
+            if not (full or part.clock_was_set()):
                 return
             number = int(capture.about.get("part", "1"))
             about = {**capture.about, "part": str(number + 1)}

@@ -182,7 +182,7 @@ def test_a_clock_that_is_set_while_it_is_recorded_moves_no_message(tmp_path):
     about = {"site": "site", "robot": "arm", "name": "trial", "started_by": "request"}
     capture = Capture(path, about, start_ns=START_NS)  # whatever the clock says now
     begun_ns = time.monotonic_ns()
-    part = Part(capture, SimpleNamespace(taken=Taken.ALL))
+    part = Part(capture, SimpleNamespace(taken=Taken.ALL), begun_ns=begun_ns)
     for number, at_ns in enumerate((-5_000_000_000, 0, 1_000_000_000, 2_000_000_000)):
         part.take(JOINTS, topic("joints"), Header(7, number, 0), b"", begun_ns + at_ns)
     capture.finish({})

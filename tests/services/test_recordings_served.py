@@ -246,11 +246,12 @@ def test_values_as_csv_equal_the_files_numbers(http, folder, monkeypatch):
     monkeypatch.setattr("services.console.recordings._ROWS", 7)  # many answers
     answer = http.get("/recordings/site/tool.mcap/values.csv")
     header, *rows = csv.reader(io.StringIO(answer.text))
-    assert header[:3] == ["time", "t [s]", "waist [rad]"]
-    assert [float(row[2]) for row in rows] == [number / 7 for number in range(100)]
+    assert header[:5] == ["time", "received", "sequence", "t [s]", "waist [rad]"]
+    assert [float(row[4]) for row in rows] == [number / 7 for number in range(100)]
     tool_x = header.index("tool x [m]")
     assert [row[tool_x] for row in rows] == [""] * 10 + ["0.5"] * 26 + [""] * 64
-    assert rows[1][:2] == ["2023-11-14T22:13:20.010000Z", "0.010000"]
+    published, received = "2023-11-14T22:13:20.009999000Z", "2023-11-14T22:13:20.010000000Z"
+    assert rows[1][:4] == [published, received, "10", "0.009999000"]
 
 
 def test_values_of_a_clock_that_stood_still_are_all_there_and_nonsense_is_left_out(http, folder, monkeypatch):
@@ -263,7 +264,8 @@ def test_values_of_a_clock_that_stood_still_are_all_there_and_nonsense_is_left_o
     monkeypatch.setattr("services.console.recordings._ROWS", 7)
     answer = http.get("/recordings/site/still.mcap/values.csv")
     _, *rows = csv.reader(io.StringIO(answer.text))
-    assert [float(row[2]) for row in rows] == list(range(50))
+    # A row a state: equal times and values make no two states one.
+    assert [float(row[4]) for row in rows] == [number for number in range(50) for _ in range(2)]
 
 
 def test_a_thumbnail_is_a_picture_that_need_not_be_sent_twice(http, folder):

@@ -10,6 +10,7 @@ from bus.schemas import robomesh_pb2 as schema
 from mcap_files.names import ABOUT
 from mcap_files.reading import RecordingFile
 from mcap_files.series import MOST_VALUES, Series, SeriesReader, known_values
+from mcap_files.times import PublisherTimes
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.output import progress
 from services.command_line.recordings.span import Span, decoded, topics_of
@@ -159,11 +160,11 @@ def _title(file: RecordingFile) -> str:
 def _events(file: RecordingFile, span: Span) -> list[_Mark]:
     """What happened; of many the worst."""
     topics = [key for name, key in topics_of(file).items() if name.split("/")[0] == "events"]
-    marks = []
+    marks, times = [], PublisherTimes()
     for message in file.messages(topics, start_ns=span.start_ns, end_ns=span.end_ns + 1):
         event = decoded(schema.Event, message.data)
         if event is not None and event.severity in _MARKS:
-            at_s = (message.received_ns - file.layout.start_ns) * 1e-9
+            at_s = (times.of(message) - file.layout.start_ns) * 1e-9
             marks.append(_Mark(event.severity, at_s, event.code))
     return sorted(marks, key=lambda mark: -mark.severity)[:_MOST_EVENTS]
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
 from mcap_files.reading import RecordingFile
+from mcap_files.times import PublisherTimes
 from mcap_files.video import is_key_frame
 from renderer.mp4 import FragmentedMp4
 from services.command_line.recordings.errors import ExportError
@@ -22,13 +23,13 @@ def write_recorded(file: RecordingFile, span: Span, target: Path, view: str) -> 
     topic = needed(file, f"video/{view}")
     first = file.newest(topic, span.start_ns, is_key_frame)
     start_ns = span.start_ns if first is None else first.received_ns
-    mp4 = FragmentedMp4()
+    mp4, times = FragmentedMp4(), PublisherTimes()
     with target.open("wb") as stream, progress("video") as tell:
         for message in file.messages([topic], start_ns=start_ns, end_ns=span.end_ns + 1):
             picture = decoded(CompressedVideo, message.data)
             if picture is None:
                 continue
-            stream.write(mp4.add(picture.data, message.received_ns))
+            stream.write(mp4.add(picture.data, times.of(message)))
             tell(span.share(message.received_ns))
     if not mp4.pictures:
         raise ExportError(f"{file.path.name}: no picture of {view!r} in that time")

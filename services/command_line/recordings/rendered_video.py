@@ -10,6 +10,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from bus.schemas import robomesh_pb2 as schema
 from mcap_files.errors import RecordingError
 from mcap_files.reading import RecordedMessage, RecordingFile
+from mcap_files.times import PublisherTimes
 from renderer.cache import cache_folder, stored_glb
 from renderer.composing import Known, composed
 from renderer.encoder import open_encoder
@@ -125,9 +126,9 @@ def _pictures(file: RecordingFile, span: Span, state: RobotState, fps: float) ->
     topics = topics_of(file)
     needed(file, "joints")
     names = {topics[name]: name for name in ("joints", "controller", "kinematics") if name in topics}
-    received: dict[str, int] = {}
+    times, was_so = PublisherTimes(), dict[str, int]()
 
-    def take(message: RecordedMessage) -> None:
+    def take(at_ns: int, message: RecordedMessage) -> None:
         name = names[message.topic]
         if name == "joints":
             if (joints := decoded(JointStates, message.data)) is None:
@@ -144,21 +145,20 @@ def _pictures(file: RecordingFile, span: Span, state: RobotState, fps: float) ->
             if (kinematics := decoded(schema.KinematicState, message.data)) is None:
                 return
             state.take_kinematics(kinematics, {state.name: state})
-        received[name] = message.received_ns
+        was_so[name] = at_ns
 
     for message in file.state_at([*names], span.start_ns).values():
-        take(message)
-    coming = file.messages([*names], start_ns=span.start_ns + 1, end_ns=span.end_ns + 1)
+        take(times.of(message), message)
+    following = file.messages([*names], start_ns=span.start_ns + 1, end_ns=span.end_ns + 1)
+    coming = ((times.of(message), message) for message in following)
     held = next(coming, None)
     count = max(math.floor((span.end_ns - span.start_ns) * 1e-9 * fps) + 1, 1)
     for number in range(count):
         time_ns = span.start_ns + round(number / fps * 1e9)
-        while held is not None and held.received_ns <= time_ns:
-            take(held)
+        while held is not None and held[0] <= time_ns:
+            take(*held)
             held = next(coming, None)
-        age = {
-            name: (time_ns - received[name]) * 1e-9 if name in received else None for name in names.values()
-        }
+        age = {name: (time_ns - was_so[name]) * 1e-9 if name in was_so else None for name in names.values()}
         yield (
             time_ns,
             Ages(

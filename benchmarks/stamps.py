@@ -1,0 +1,180 @@
+"""Shared stamps, frames without their joint state, and log times before publish times.
+
+    ./dev run python benchmarks/stamps.py MINUTES [--robots 4] [--burners 2] [--json]
+
+`robomesh up` with simulated robots at 100 Hz beside processes that use all the CPU they get. One robot is
+recorded all the time, and a monitor takes the joints and frames of all of them. At the end:
+
+- shared: joint states whose stamp is not after the one before, of one publisher identity (reach: 0)
+- unmatched: frames whose stamp no joint state has, of those that came while joints did (reach: 0)
+- inversions: recorded messages whose log time is before their publish time (reach: 0)
+- rows, states: of the recording's CSV, and of its joints channel; repeated: equal times in it (reach: 0)
+
+Two identities of one publisher are two clocks (ARCHITECTURE.md): how many there were is told.
+"""
+
+import argparse
+import asyncio
+import contextlib
+import csv
+import json
+import multiprocessing
+import subprocess
+import sys
+import tempfile
+import time
+from collections import defaultdict
+from collections.abc import Iterator
+from datetime import datetime
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from mcap.reader import make_reader
+
+if __name__ == "__main__":
+    # A program beside this one has a room's name: what is imported is looked for from the root.
+    sys.path[0] = str(Path(__file__).parents[1])
+
+from benchmarks.soak import ROBOMESH, SITE, Ports, site_file, up
+from bus.schemas.robomesh_pb2 import RecorderRequest, Recording
+from bus.session import Session, SessionSettings, open_session
+from tests.conftest import free_port
+
+RECORDED = "arm-0"
+CLOSED_WITHIN_S = 60.0
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("minutes", type=float)
+    parser.add_argument("--robots", type=int, default=4)
+    parser.add_argument("--burners", type=int, default=2)
+    parser.add_argument("--json", action="store_true", help="one line of JSON")
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        ports = Ports(free_port(), free_port())
+        with up(site_file(folder, arguments.robots, ports)), burning(arguments.burners):
+            seen, file = asyncio.run(watch(ports, arguments.minutes * 60.0))
+            path = folder / "recordings" / RECORDED / file
+            closed(path)
+            result: dict[str, Any] = {"minutes": arguments.minutes, "robots": arguments.robots}
+            result |= {"burners": arguments.burners, **seen.result(), **recorded(path)}
+            result |= table(path, folder / "out.csv")
+    if arguments.json:
+        print(json.dumps(result))
+    else:
+        for key, value in result.items():
+            print(f"{key:>12} {value}")
+
+
+@contextlib.contextmanager
+def burning(count: int) -> Iterator[None]:
+    """Processes that use all the CPU they get."""
+    processes = [multiprocessing.Process(target=burn, daemon=True) for _ in range(count)]
+    for process in processes:
+        process.start()
+    try:
+        yield
+    finally:
+        for process in processes:
+            process.kill()
+            process.join()
+
+
+def burn() -> None:
+    while True:
+        sum(range(100_000))
+
+
+class Seen:
+    """Stamps of joints and frames, by robot and publisher identity, in the order in which they came."""
+
+    def __init__(self) -> None:
+        self.joints: dict[tuple[str, int], list[int]] = defaultdict(list)
+        self.frames: dict[str, list[int]] = defaultdict(list)
+
+    def result(self) -> dict[str, Any]:
+        spans = (later - earlier for stamps in self.joints.values() for earlier, later in pairwise(stamps))
+        stamps_of: dict[str, set[int]] = defaultdict(set)
+        for (robot, _), stamps in self.joints.items():
+            stamps_of[robot].update(stamps)
+        first = {robot: min(stamps) for robot, stamps in stamps_of.items()}
+        frames = [
+            stamp in stamps_of[robot]
+            for robot, stamps in self.frames.items()
+            for stamp in stamps
+            if robot in first and stamp >= first[robot]
+        ]
+        return {
+            "joints": sum(map(len, self.joints.values())),
+            "identities": len(self.joints),
+            "shared": sum(span <= 0 for span in spans),
+            "frames": len(frames),
+            "unmatched": frames.count(False),
+        }
+
+
+async def watch(ports: Ports, seconds: float) -> tuple[Seen, str]:
+    """Watch and record for so long; what was seen, and the recording's file."""
+    seen = Seen()
+    async with open_session(SessionSettings(connect=(ports.router,))) as session:
+        asked = RecorderRequest(action=RecorderRequest.TRACE_ON, name="stamps")
+        key = f"robomesh/{SITE}/{RECORDED}/recorder/request"
+        begun: Any = await session.ask(key, asked, timeout_s=60.0)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                await asyncio.gather(take(session, "joints", seen), take(session, "frames", seen))
+        asked.action = RecorderRequest.TRACE_OFF
+        ended: Any = await session.ask(key, asked, timeout_s=60.0)
+        assert isinstance(ended, Recording)
+        return seen, str(begun.file)
+
+
+async def take(session: Session, topic: str, seen: Seen) -> None:
+    subscription = session.subscribe(f"robomesh/{SITE}/*/{topic}", newest=5000, history=False)
+    async for sample in subscription:
+        robot, header = sample.parsed.robot, sample.header
+        if topic == "joints":
+            seen.joints[robot, header.publisher].append(header.source_time_ns)
+        else:
+            seen.frames[robot].append(header.source_time_ns)
+
+
+def closed(path: Path) -> None:
+    """Wait until the recording is closed and indexed."""
+    end_s = time.monotonic() + CLOSED_WITHIN_S
+    while time.monotonic() < end_s:
+        with path.open("rb") as stream, contextlib.suppress(Exception):
+            summary = make_reader(stream).get_summary()
+            if summary is not None and summary.chunk_indexes:
+                return
+        time.sleep(0.5)
+    sys.exit(f"{path}: it was not closed within {CLOSED_WITHIN_S:g} s")
+
+
+def recorded(path: Path) -> dict[str, Any]:
+    """Log times against publish times, by the MCAP project's own reader."""
+    messages = states = inversions = 0
+    least_ns = sys.maxsize
+    with path.open("rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages():
+            messages += 1
+            states += channel.topic.endswith("/joints")
+            inversions += message.log_time < message.publish_time
+            least_ns = min(least_ns, message.log_time - message.publish_time)
+    return {"messages": messages, "inversions": inversions, "least_ms": least_ns * 1e-6, "states": states}
+
+
+def table(path: Path, out: Path) -> dict[str, Any]:
+    """The rows of the recording's CSV, and how many of its times repeat one."""
+    subprocess.run([*ROBOMESH, "recordings", "export", str(path), str(out)], check=True, capture_output=True)
+    with out.open(newline="") as stream:
+        times = [row["time"] for row in csv.DictReader(stream)]
+    assert all(datetime.fromisoformat(time_text) for time_text in times)
+    return {"rows": len(times), "repeated": len(times) - len(set(times))}
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,104 @@
+"""A recording's log time is never before its publish time, however busy the machine is."""
+
+import asyncio
+import time
+
+from mcap.reader import make_reader
+
+from bus.header import Header, pack
+from bus.session import open_session
+from bus.wall_clock import WallClock
+from mcap_files.capture import Capture
+from services.recorder import intake
+from services.recorder import robot as recorder_robot
+from tests.conftest import run
+from tests.services.recording import put_states, recording_site, trace_off, trace_on, until, until_indexed
+
+JOINTS = "robomesh/site/arm/joints"
+
+
+def messages_of(path):
+    with path.open("rb") as stream:
+        return [message for _, _, message in make_reader(stream).iter_messages()]
+
+
+def test_what_comes_while_the_recorder_is_busy_came_after_it_was_published(mesh):
+    class Slow:
+        def __init__(self):
+            self.times = []
+
+        def take(self, key, row, header, payload, received_ns):
+            self.times.append((header.source_time_ns, received_ns))
+            time.sleep(0.02)
+
+        def swept(self):
+            pass
+
+    async def main():
+        async with open_session(mesh) as own, open_session(mesh) as other:
+            taking, sink, wall_clock = intake.Intake(own.zenoh_session, "site"), Slow(), WallClock()
+            try:
+                with taking.lock:
+                    taking.robot("arm").attach(sink, frozenset({"joints"}))
+                number = 0
+                while len(sink.times) < 50:
+                    number += 1
+                    header = Header(7, number, time.time_ns())
+                    other.zenoh_session.put(JOINTS, b"", attachment=pack(header))
+                    await asyncio.sleep(0.005)
+            finally:
+                taking.close()
+            wall_clock.was_set()
+            return [wall_clock.latest_ns(received_ns) - source_ns for source_ns, received_ns in sink.times]
+
+    assert min(run(main(), timeout_s=60)) >= 0
+
+
+def test_a_file_that_takes_time_to_be_made_moves_no_message_into_the_past(mesh, tmp_path, monkeypatch):
+    class SlowCapture(Capture):
+        def __init__(self, *args, **kwargs):
+            super().__init__(*args, **kwargs)
+            time.sleep(0.2)
+
+    monkeypatch.setattr(recorder_robot, "Capture", SlowCapture)
+
+    async def main():
+        async with recording_site(mesh, tmp_path, flight=None) as session:
+            joints = session.declare_publisher("site", "arm", "joints")
+            answer = await trace_on(session, name="trial")
+            await until(lambda: joints.watched)
+            await put_states(joints, range(50))
+            await trace_off(session)
+            path = tmp_path / "arm" / answer.file
+            await until_indexed(path)
+            return path
+
+    messages = messages_of(run(main(), timeout_s=60))
+    assert len(messages) >= 45
+    assert min(message.log_time - message.publish_time for message in messages) >= 0
+
+
+def test_a_clock_that_is_set_forward_begins_the_next_file(mesh, tmp_path, monkeypatch):
+    async def main():
+        async with recording_site(mesh, tmp_path, flight=None) as session:
+            joints = session.declare_publisher("site", "arm", "joints")
+            first = await trace_on(session, name="trial")
+            await until(lambda: joints.watched)
+            await put_states(joints, range(20))
+            real = time.time_ns
+            monkeypatch.setattr(time, "time_ns", lambda: real() + 3600 * 10**9)
+            set_ns, paths = time.time_ns(), []
+            while len(paths) < 2:
+                await put_states(joints, range(5))
+                paths = sorted((tmp_path / "arm").glob("*_trial*.mcap"), key=lambda path: path.stat().st_ino)
+            await put_states(joints, range(20))
+            await trace_off(session)
+            (second,) = (path for path in paths if path.name != first.file)
+            await until_indexed(second)
+            return second, set_ns
+
+    second, set_ns = run(main(), timeout_s=60)
+    assert ".part2" in second.name
+    messages = [message for message in messages_of(second) if message.publish_time >= set_ns]
+    assert len(messages) >= 20
+    assert min(message.log_time - message.publish_time for message in messages) >= 0
