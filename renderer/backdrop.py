@@ -29,7 +29,13 @@ class Backdrops:
         self._kept: dict[tuple[object, ...], moderngl.Framebuffer] = {}
 
     def of(
-        self, camera: Camera, site_to_clip: FloatArray, *, center: FloatArray, radius: float, floor: float
+        self,
+        camera: Camera,
+        site_to_clip: FloatArray,
+        *,
+        center: FloatArray,
+        radius: float,
+        floor: float | None,
     ) -> moderngl.Framebuffer:
         """The backdrop of a camera, drawn when it is first asked for.
 
@@ -37,14 +43,15 @@ class Backdrops:
             site_to_clip: (4, 4) of the camera.
             center: (3,) of the arm's room, in the site's frame [m].
             radius: Of the room [m].
-            floor: Its height [m].
+            floor: Its height [m]; None: there is none.
         """
         key = (site_to_clip.tobytes(), floor)
         backdrop = self._kept.pop(key, None)
         if backdrop is None:
             # A camera on a link has a new one with each picture: it must not cost the others theirs.
             backdrop = self._take_place()
-            self._draw(backdrop, camera, site_to_clip, np.array([*center[:2], floor]), radius)
+            middle = None if floor is None else np.array([*center[:2], floor])
+            self._draw(backdrop, camera, site_to_clip, middle, radius)
         self._kept[key] = backdrop
         return backdrop
 
@@ -58,11 +65,19 @@ class Backdrops:
         target: moderngl.Framebuffer,
         camera: Camera,
         site_to_clip: FloatArray,
-        middle: FloatArray,
+        middle: FloatArray | None,
         radius: float,
     ) -> None:
         """Seen edge-on, the floor is a line on squared paper."""
         forward = camera.forward
+        target.use()
+        self._context.enable_only(moderngl.BLEND)
+        self._context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
+        # Looked at from above, there is no horizon to shade towards.
+        set_uniforms(self._programs.backdrop, level=1.0 - abs(float(forward[2])) ** 4)
+        self._gradient.render(vertices=3)
+        if middle is None:
+            return
         edge_on = camera.orthographic and abs(forward[2]) < EDGE_ON
         extent, square = _EXTENT * radius, square_m(radius)
         coarse = _SQUARES_PER_LARGE * square
@@ -72,12 +87,6 @@ class Backdrops:
         origin, u, v = floor, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
         if edge_on:
             origin, u, v = floor + forward * 3.5 * radius, np.cross(forward, up), up
-        target.use()
-        self._context.enable_only(moderngl.BLEND)
-        self._context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
-        # Looked at from above, there is no horizon to shade towards.
-        set_uniforms(self._programs.backdrop, level=1.0 - abs(float(forward[2])) ** 4)
-        self._gradient.render(vertices=3)
         set_uniforms(
             self._programs.plane,
             site_to_clip=columns(site_to_clip),

@@ -40,6 +40,8 @@ _SEEN_THROUGH = 0.16
 # A fence a mile off must not take the depth's steps from the arm: over the arm's room.
 _FARTHEST = 6.0
 _MOST_RIBBON_BYTES = 1 << 20
+# Where no floor returns light or shades what is near it.
+_NO_FLOOR = -1e6
 # How far faces stand behind where they are (factor, units), and a ghost's behind a body's.
 _BACK = ((1.0, 2.0), (3.0, 12.0))
 
@@ -150,7 +152,7 @@ class Drawing:
         )
         self.context.copy_framebuffer(self._final, backdrop)
         solid = [pair for pair in moving + fixtures if pair[0].finish is not Finish.GHOST]
-        if abs(camera.forward[2]) > EDGE_ON or not camera.orthographic:
+        if scene.floor is not None and (abs(camera.forward[2]) > EDGE_ON or not camera.orthographic):
             self._shadow.cast(solid, center=center, radius=radius, floor=scene.floor)
             self._final.use()
             self._shadow.lay(matrix, center=center, radius=radius, floor=scene.floor)
@@ -188,7 +190,7 @@ class Drawing:
             eye=tuple(camera.eye),
             forward=tuple(camera.forward),
             orthographic=float(camera.orthographic),
-            floor_height=scene.floor,
+            floor_height=_NO_FLOOR if scene.floor is None else scene.floor,
             near_floor=0.18 * scene.radius,
             key=tuple(key),
         )

@@ -31,6 +31,7 @@ class Look:
         room: (n, 3) points that hold all that it may reach, in its base frame [m].
         center: (3,) of the room, in the site's frame [m].
         radius: Of the room [m].
+        floor: Height of the floor of its cell, in the site's frame [m]; None: there is none.
     """
 
     description: Description
@@ -41,6 +42,7 @@ class Look:
     room: FloatArray
     center: FloatArray
     radius: float
+    floor: float | None
 
     @property
     def square_m(self) -> float:
@@ -82,7 +84,16 @@ def look_of(description: Description) -> Look:
         room=room,
         center=base_to_site[:3, :3] @ center + base_to_site[:3, 3],
         radius=float(np.linalg.norm(room - center, axis=1).max()),
+        floor=floor_of(description),
     )
+
+
+def floor_of(description: Description) -> float | None:
+    """Height of the floor of a robot's cell, in the site's frame [m]; None: there is none."""
+    if not description.HasField("floor"):
+        # An older sender tells of none: the robot stands on it.
+        return description.base_to_site[11] if len(description.base_to_site) == 16 else 0.0
+    return description.floor.height if description.floor.HasField("height") else None
 
 
 def mesh_name(body: Description.Link | Description.Fixture) -> str:

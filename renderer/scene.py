@@ -61,7 +61,7 @@ class Scene:
         radius: Its radius.
         others: What moves too, and no close-up is of: other robots of the cell, a ghost.
         fixtures: What stands around.
-        floor: Height of the floor.
+        floor: Height of the floor; None: there is none.
         lines: Trails, paths, axes.
     """
 
@@ -70,7 +70,7 @@ class Scene:
     radius: float
     others: tuple[Part, ...] = ()
     fixtures: tuple[Part, ...] = ()
-    floor: float = 0.0
+    floor: float | None = 0.0
     lines: tuple[Line, ...] = ()
 
 

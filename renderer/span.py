@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from bus.schemas.robomesh_pb2 import Clearance, Description
 from renderer.cameras import Camera, pixels
 from renderer.overlay import AMBER, FAINT, INK, Color, Picture, write_label
+from robots.cells import FLOOR
 
 FloatArray = NDArray[np.float64]
 
@@ -44,9 +45,11 @@ def span_of(clearance: Clearance, descriptions: Sequence[Description]) -> Span:
         descriptions: Of the robots at its ends; the largest of their distances counts.
     """
     color = FAINT
-    if clearance.distance < max((each.warning_distance for each in descriptions), default=0.0):
+    of_floor = clearance.second.endswith(f"/{FLOOR}")
+    told = [each.floor if of_floor else each for each in descriptions]
+    if clearance.distance < max((each.warning_distance for each in told), default=0.0):
         color = AMBER
-    stop = max((each.stop_distance for each in descriptions), default=0.0)
+    stop = max((each.stop_distance for each in told), default=0.0)
     if clearance.distance < stop or clearance.distance == 0.0:
         color = RED
     ends = [(point.x, point.y, point.z) for point in (clearance.first_point, clearance.second_point)]

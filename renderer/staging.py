@@ -72,7 +72,7 @@ def scene_of(
         fixtures=_grey(look.fixtures) if robot.stale else look.fixtures,
         center=look.center,
         radius=look.radius,
-        floor=float(look.base_to_site[2, 3]),
+        floor=look.floor,
         lines=tuple(lines),
     )
 

@@ -13,6 +13,8 @@ from robots.tree import Shape
 # How near an arm may come to what stands around it, unless a site says otherwise.
 WARNING_M = 0.05
 STOP_M = 0.01
+# The floor in a pair of two that touch; for its blank no fixture has that name.
+FLOOR = "the floor"
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +56,37 @@ class CellRobot:
     stop_m: float = STOP_M
 
 
+@dataclass(frozen=True)
+class Floor:
+    """All that is below a height; what is fixed to the base of a robot may reach into it.
+
+    Attributes:
+        height_m: In the site's frame; None: the height of the lowest base in the cell.
+        warning_m, stop_m: Distances to it. Without a warning distance only contact counts, only in checks.
+    """
+
+    height_m: float | None = None
+    warning_m: float = 0.0
+    stop_m: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class CellDescription:
-    """What a cell is made of; it can be pickled."""
+    """What a cell is made of; it can be pickled.
+
+    Attributes:
+        floor: None: the cell has none.
+    """
 
     robots: tuple[CellRobot, ...]
     fixtures: tuple[Fixture, ...] = ()
+    floor: Floor | None = Floor()
+
+    @property
+    def floor_m(self) -> float | None:
+        """Height of the floor in the site's frame; None: there is none."""
+        if self.floor is None:
+            return None
+        if self.floor.height_m is not None:
+            return self.floor.height_m
+        return min((float(robot.base_to_site[2, 3]) for robot in self.robots), default=0.0)

@@ -35,7 +35,7 @@ from services.errors import ListenError, SiteFileError
 from services.listen import cannot_both_listen, check_page_reach, check_reach, same_address, split_address
 from services.site_console import Console
 from services.site_console import beside as console_beside
-from services.site_fixtures import Clearance, Fixture, fixture_problem, name_problem
+from services.site_fixtures import Clearance, Fixture, Floor, fixture_problem, name_problem
 from services.site_legacy import LegacyClients
 from services.site_part import Quiet
 from services.site_pictures import ALWAYS_RENDERED, Recorder, Renderer
@@ -62,6 +62,8 @@ class Robot(BaseModel):
     accept_unknown: tuple[Literal["mode", "homed"], ...] = ()
     check: Literal["require", "warn", "off"] = "warn"
     clearance: Clearance = Clearance()
+    # None: its cell has none (`floor = false`). What one robot of a cell gives counts for all of it.
+    floor: Floor | None = Floor()
     # Whether somebody tried the stop unit on this controller; without that nothing is ever sent to it.
     stop_proven: StrictBool | None = None
     stale_after_s: Annotated[float, Field(gt=0.05, le=60)] = 1.0
@@ -85,6 +87,19 @@ class Robot(BaseModel):
         if protocol not in DRIVERS:
             raise ValueError(f"should be {' or '.join(map(repr, DRIVERS))}")
         return protocol
+
+    @field_validator("floor", mode="before")
+    @classmethod
+    def _floor(cls, floor: Any) -> Any:
+        if floor is False:
+            return None
+        if isinstance(floor, dict | Floor):
+            return floor
+        if isinstance(floor, bool) or not isinstance(floor, int | float):
+            raise ValueError(
+                "should be its height in mm, false, or a table as { height = -250.0, warning = 50.0 }"
+            )
+        return {"height": floor}
 
     @field_validator("codes", mode="before")
     @classmethod
@@ -180,6 +195,13 @@ class Site(RoutedSite):
     def _cells(self) -> "Site":
         if problem := name_problem(self.fixture, {robot.name: robot.cell for robot in self.robot}):
             raise ValueError(problem)
+        for robot, other in combinations(self.robot, 2):
+            both = all("floor" in each.model_fields_set for each in (robot, other))
+            if both and robot.cell and robot.cell == other.cell and robot.floor != other.floor:
+                raise ValueError(
+                    f"robots {robot.name} and {other.name} give different floors, and their cell "
+                    f"{robot.cell!r} has one: give it once"
+                )
         return self
 
     @model_validator(mode="after")

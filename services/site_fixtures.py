@@ -45,6 +45,28 @@ class Clearance(BaseModel):
         return self
 
 
+class Floor(BaseModel):
+    """The floor below a cell [mm]: `floor = -250.0`, or a table with distances to it.
+
+    Attributes:
+        height: In the site's frame; None: the height of the lowest base in the cell.
+        warning, stop: How near an arm may come to it; without them only contact counts.
+    """
+
+    model_config = Quiet
+    height: Annotated[float, Field(strict=True, ge=-100_000, le=100_000)] | None = None
+    warning: Distance = 0.0
+    stop: Distance = 0.0
+
+    @model_validator(mode="after")
+    def _order(self) -> "Floor":
+        if self.stop > self.warning:
+            raise ValueError(
+                f"stop = {self.stop:g} is more than warning = {self.warning:g}: a warning comes first"
+            )
+        return self
+
+
 class Fixture(BaseModel):
     """Something that stands in a cell and does not move: one shape, its middle at the pose.
 

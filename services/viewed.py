@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from bus.schemas.robomesh_pb2 import Description
+from renderer.look import floor_of
 from robots.urdf.viewers import Fixture, Viewed
 
 
@@ -32,4 +33,5 @@ def viewed(site: str, robot: str, description: Description, uri: Callable[[str],
         tuple(description.base_to_site),
         lambda link: uri(mesh) if (mesh := mesh_of.get(link)) else None,
         tuple(fixtures),
+        floor_of(description),
     )

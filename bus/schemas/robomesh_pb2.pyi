@@ -551,7 +551,16 @@ class EventList(_message.Message):
     def __init__(self, events: _Optional[_Iterable[_Union[Event, _Mapping]]] = ...) -> None: ...
 
 class Description(_message.Message):
-    __slots__ = ("name", "title", "provenance", "robot_toml", "urdf", "joints", "links", "frames", "views", "constraints", "base_to_site", "cell", "simulated", "fixtures", "warning_distance", "stop_distance", "replay", "stale_after_s")
+    __slots__ = ("name", "title", "provenance", "robot_toml", "urdf", "joints", "links", "frames", "views", "constraints", "base_to_site", "cell", "simulated", "fixtures", "warning_distance", "stop_distance", "replay", "stale_after_s", "floor")
+    class Floor(_message.Message):
+        __slots__ = ("height", "warning_distance", "stop_distance")
+        HEIGHT_FIELD_NUMBER: _ClassVar[int]
+        WARNING_DISTANCE_FIELD_NUMBER: _ClassVar[int]
+        STOP_DISTANCE_FIELD_NUMBER: _ClassVar[int]
+        height: float
+        warning_distance: float
+        stop_distance: float
+        def __init__(self, height: _Optional[float] = ..., warning_distance: _Optional[float] = ..., stop_distance: _Optional[float] = ...) -> None: ...
     class Replay(_message.Message):
         __slots__ = ("id", "site", "robot", "file", "start")
         ID_FIELD_NUMBER: _ClassVar[int]
@@ -654,6 +663,7 @@ class Description(_message.Message):
     STOP_DISTANCE_FIELD_NUMBER: _ClassVar[int]
     REPLAY_FIELD_NUMBER: _ClassVar[int]
     STALE_AFTER_S_FIELD_NUMBER: _ClassVar[int]
+    FLOOR_FIELD_NUMBER: _ClassVar[int]
     name: str
     title: str
     provenance: str
@@ -672,7 +682,8 @@ class Description(_message.Message):
     stop_distance: float
     replay: Description.Replay
     stale_after_s: float
-    def __init__(self, name: _Optional[str] = ..., title: _Optional[str] = ..., provenance: _Optional[str] = ..., robot_toml: _Optional[str] = ..., urdf: _Optional[str] = ..., joints: _Optional[_Iterable[_Union[Description.Joint, _Mapping]]] = ..., links: _Optional[_Iterable[_Union[Description.Link, _Mapping]]] = ..., frames: _Optional[_Iterable[_Union[Description.NamedFrame, _Mapping]]] = ..., views: _Optional[_Iterable[_Union[View, _Mapping]]] = ..., constraints: _Optional[_Iterable[_Union[Description.Constraint, _Mapping]]] = ..., base_to_site: _Optional[_Iterable[float]] = ..., cell: _Optional[str] = ..., simulated: _Optional[bool] = ..., fixtures: _Optional[_Iterable[_Union[Description.Fixture, _Mapping]]] = ..., warning_distance: _Optional[float] = ..., stop_distance: _Optional[float] = ..., replay: _Optional[_Union[Description.Replay, _Mapping]] = ..., stale_after_s: _Optional[float] = ...) -> None: ...
+    floor: Description.Floor
+    def __init__(self, name: _Optional[str] = ..., title: _Optional[str] = ..., provenance: _Optional[str] = ..., robot_toml: _Optional[str] = ..., urdf: _Optional[str] = ..., joints: _Optional[_Iterable[_Union[Description.Joint, _Mapping]]] = ..., links: _Optional[_Iterable[_Union[Description.Link, _Mapping]]] = ..., frames: _Optional[_Iterable[_Union[Description.NamedFrame, _Mapping]]] = ..., views: _Optional[_Iterable[_Union[View, _Mapping]]] = ..., constraints: _Optional[_Iterable[_Union[Description.Constraint, _Mapping]]] = ..., base_to_site: _Optional[_Iterable[float]] = ..., cell: _Optional[str] = ..., simulated: _Optional[bool] = ..., fixtures: _Optional[_Iterable[_Union[Description.Fixture, _Mapping]]] = ..., warning_distance: _Optional[float] = ..., stop_distance: _Optional[float] = ..., replay: _Optional[_Union[Description.Replay, _Mapping]] = ..., stale_after_s: _Optional[float] = ..., floor: _Optional[_Union[Description.Floor, _Mapping]] = ...) -> None: ...
 
 class View(_message.Message):
     __slots__ = ("name", "eye", "target", "up", "projection", "mount", "field_of_view", "height")
@@ -794,7 +805,7 @@ class CheckRequest(_message.Message):
     def __init__(self, program: _Optional[str] = ..., start: _Optional[_Iterable[float]] = ..., exact: _Optional[bool] = ..., path: _Optional[bool] = ...) -> None: ...
 
 class CheckAnswer(_message.Message):
-    __slots__ = ("ok", "duration_s", "violations", "interpolation", "notes", "path")
+    __slots__ = ("ok", "duration_s", "violations", "interpolation", "notes", "path", "alone")
     class Violation(_message.Message):
         __slots__ = ("line", "time_s", "kind", "pair", "points", "text", "until_s", "distance", "refuses")
         LINE_FIELD_NUMBER: _ClassVar[int]
@@ -835,13 +846,15 @@ class CheckAnswer(_message.Message):
     INTERPOLATION_FIELD_NUMBER: _ClassVar[int]
     NOTES_FIELD_NUMBER: _ClassVar[int]
     PATH_FIELD_NUMBER: _ClassVar[int]
+    ALONE_FIELD_NUMBER: _ClassVar[int]
     ok: bool
     duration_s: float
     violations: _containers.RepeatedCompositeFieldContainer[CheckAnswer.Violation]
     interpolation: str
     notes: _containers.RepeatedScalarFieldContainer[str]
     path: CheckAnswer.Path
-    def __init__(self, ok: _Optional[bool] = ..., duration_s: _Optional[float] = ..., violations: _Optional[_Iterable[_Union[CheckAnswer.Violation, _Mapping]]] = ..., interpolation: _Optional[str] = ..., notes: _Optional[_Iterable[str]] = ..., path: _Optional[_Union[CheckAnswer.Path, _Mapping]] = ...) -> None: ...
+    alone: bool
+    def __init__(self, ok: _Optional[bool] = ..., duration_s: _Optional[float] = ..., violations: _Optional[_Iterable[_Union[CheckAnswer.Violation, _Mapping]]] = ..., interpolation: _Optional[str] = ..., notes: _Optional[_Iterable[str]] = ..., path: _Optional[_Union[CheckAnswer.Path, _Mapping]] = ..., alone: _Optional[bool] = ...) -> None: ...
 
 class VideoFrames(_message.Message):
     __slots__ = ("publisher", "frames")

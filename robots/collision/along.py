@@ -13,9 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.cells import FLOOR, Floor
 from robots.collision.between import Placed, touching_share
 from robots.collision.bodies import TOUCH_M, Body
 from robots.collision.cell import Arm, Cell
+from robots.collision.floor import Heights, heights_along
 from robots.collision.nearest import Gauge
 from robots.collision.obstacles import joined_boxes, least_distances
 from robots.collision.path import placements_along, travelled
@@ -32,10 +34,10 @@ class Encounter:
     """Two that come near each other along a path.
 
     Attributes:
-        pair: Each "<robot>/<link>" or "<fixture>"; the arm's own first.
+        pair: Each "<robot>/<link>", "<fixture>" or FLOOR; the arm's own first.
         own: Both are links of the arm.
         samples: (k,) numbers of the path's samples at which they are near, ascending.
-        distances: (k,) [m]; 0 where they touch.
+        distances: (k,) [m]; 0 where they touch; below the floor negative: so far below.
         points: (k, 2, 3) where they are nearest, on each, in the site's frame [m].
     """
 
@@ -68,7 +70,7 @@ def near_along(
     within_m: float,
     far: bool = True,
 ) -> Along:
-    """What an arm comes near to along a path: fixtures, other robots, links of its own.
+    """What an arm comes near to along a path: fixtures, other robots, the floor, links of its own.
 
     Between two samples it may be nearer by half of what it moves there; where it may even touch, and moves
     no more than SAMPLE_M (else a path begins anew there), that is looked for, and told of the second sample.
@@ -78,7 +80,8 @@ def near_along(
         positions: (m, n) samples of the path, m at least 1 [rad] or [m].
         others: Straight joint path (k, n) of each other robot of the cell that counts, from where it is to
             where it has been told to go (k = 1: it stands); the arm is checked against all of it, whenever.
-        within_m: From this distance on two are near; links of its own only when they touch.
+        within_m: From this distance on two are near; links of its own only when they touch, the floor from
+            its own warning distance on.
         far: Whether clearances beyond that are asked for, too; else they may be told as infinite, sooner.
     """
     arm = cell.arms[robot]
@@ -97,7 +100,30 @@ def near_along(
         clearances[sample], near = around.measured(gauge, at, come[sample])
         for each in (*near, *own.measured(gauge, at, sample)):
             found.setdefault(each.pair, {})[sample] = each
-    return Along(clearances, tuple(_encounter(arm, samples) for samples in found.values()))
+    encounters = [_encounter(arm, samples) for samples in found.values()]
+    if cell.floor is not None:
+        heights = heights_along(cell.floor, arm, positions, places, come)
+        encounters += _floored(cell.floor, arm, heights)
+        if cell.floor.warning_m > 0.0:
+            lowest = heights.heights.min(axis=1, initial=np.inf)
+            clearances = np.minimum(clearances, np.maximum(lowest, 0.0))
+    return Along(clearances, tuple(encounters))
+
+
+def _floored(floor: Floor, arm: Arm, found: Heights) -> Iterator[Encounter]:
+    """The links that come near the floor or below it."""
+    names = [arm.names[number] for number in found.bodies.tolist()]
+    for name in dict.fromkeys(names):
+        columns = [column for column, each in enumerate(names) if each == name]
+        heights = found.heights[:, columns]
+        lowest = heights.argmin(axis=1)
+        least = heights.min(axis=1)
+        near = np.flatnonzero((least <= 0.0) | (least < floor.warning_m))
+        if len(near):
+            points = found.points[near, np.array(columns)[lowest[near]]]
+            below = points.copy()
+            below[:, 2] = floor.height_m
+            yield Encounter((name, FLOOR), False, near, least[near], np.stack([points, below], axis=1))
 
 
 def _encounter(arm: Arm, samples: Mapping[int, "_Near"]) -> Encounter:

@@ -13,7 +13,7 @@ from robots.joints import FloatArray
 # Between two looks nobody comes farther than this, where the two may touch.
 FINEST_M = 1e-4
 # Over so short a way, what goes round is longer than straight by no more than this.
-_ROUND = 1.01
+ROUND = 1.01
 
 
 class Placed:
@@ -28,7 +28,7 @@ class Placed:
     def __init__(self, placements: FloatArray, before: FloatArray, steps: FloatArray) -> None:
         self.steps = steps
         # Where somebody comes farther, a path begins anew: nobody goes from there to here.
-        self.joined = bool(steps.max(initial=0.0) <= SAMPLE_M * _ROUND)
+        self.joined = bool(steps.max(initial=0.0) <= SAMPLE_M * ROUND)
         self._placements, self._before = placements, before
         self._transforms: dict[int, Any] = {}
 
@@ -69,7 +69,7 @@ def touching_share(measure: Callable[[float], float], before_m: float, after_m: 
         first, last, before_m, after_m = left.pop()
         way = (last - first) * way_m
         # Who is some way off at both ends, and comes no farther than both together, does not get there.
-        if before_m + after_m > way * _ROUND or way < FINEST_M:
+        if before_m + after_m > way * ROUND or way < FINEST_M:
             continue
         middle = (first + last) / 2
         distance = measure(middle)

@@ -37,6 +37,7 @@ class Body:
         center, half: (3,) of the box about it, along the axes of its frame.
         balls: (k, 3) centres of balls that cover the box.
         radius: Of each ball.
+        corners: (n, 3) of its hull.
     """
 
     geometry: Any
@@ -44,6 +45,7 @@ class Body:
     half: FloatArray
     balls: FloatArray
     radius: float
+    corners: FloatArray
 
 
 def hull_bodies(shapes: Sequence[Shape]) -> tuple[Body, ...]:
@@ -85,8 +87,8 @@ def exact_bodies(shapes: Sequence[Shape]) -> tuple[Body, ...]:
 
 def hull_body(points: FloatArray) -> Body:
     """The convex hull of (n, 3) points, n at least 1."""
-    points = _with_volume(points)
-    return _body(_convex(points), points)
+    hull = _convex(_with_volume(points))
+    return _body(hull, np.array(hull.points()))
 
 
 def _convex(points: FloatArray) -> Any:
@@ -132,7 +134,7 @@ def _body(geometry: Any, points: FloatArray) -> Body:
     part[longest] /= count
     balls = np.tile(center, (count, 1))
     balls[:, longest] += -half[longest] + part[longest] * (2 * np.arange(count) + 1)
-    return Body(geometry, center, half, balls, float(np.linalg.norm(part)))
+    return Body(geometry, center, half, balls, float(np.linalg.norm(part)), points)
 
 
 def _solid(mesh: Mesh) -> tuple[FloatArray, IndexArray]:

@@ -4,14 +4,14 @@
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.cells import CellDescription, CellRobot, Fixture
+from robots.cells import FLOOR, CellDescription, CellRobot, Fixture, Floor
 from robots.collision.bodies import Body, exact_bodies, hull_bodies, piece_bodies
 from robots.collision.obstacles import Balls, Obstacles, balls_of, joined
 from robots.collision.own import OwnPairs, own_pairs
@@ -59,11 +59,13 @@ class Cell:
     Attributes:
         arms: By name.
         fixtures: What stands around them.
+        floor: With its height; None: there is none.
         ignored: Link and fixture that may touch, as `Nearest` names them.
     """
 
     arms: Mapping[str, Arm]
     fixtures: Obstacles
+    floor: Floor | None
     ignored: frozenset[tuple[str, str]]
 
 
@@ -82,6 +84,7 @@ def build_cell(description: CellDescription, *, exact: bool = False) -> Cell:
     return Cell(
         arms,
         joined([_standing(fixture, links) for fixture in description.fixtures]),
+        description.floor and replace(description.floor, height_m=description.floor_m),
         frozenset((link, fixture.name) for fixture in description.fixtures for link in fixture.ignore),
     )
 
@@ -162,7 +165,9 @@ def missing_meshes(cell: Cell, robot: str) -> tuple[str, ...]:
 def distances(cell: Cell, pair: tuple[str, str]) -> tuple[float, float]:
     """Warning and stop distance of two that stand apart, as `Nearest` names them [m].
 
-    For two robots the larger of both counts.
+    For two robots the larger of both counts; the floor has its own.
     """
+    if FLOOR in pair:
+        return (cell.floor.warning_m, cell.floor.stop_m) if cell.floor is not None else (0.0, 0.0)
     arms = [arm for name in pair if (arm := cell.arms.get(name.partition("/")[0])) and "/" in name]
     return max(arm.warning_m for arm in arms), max(arm.stop_m for arm in arms)

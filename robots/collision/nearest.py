@@ -8,8 +8,10 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.cells import FLOOR
 from robots.collision.bodies import TOUCH_M, Body, transform
 from robots.collision.cell import Arm, Cell
+from robots.collision.floor import heights_above
 from robots.collision.obstacles import Obstacles, boxes_of, joined, least_distances
 from robots.collision.own import nearest_pair, touching_pairs
 from robots.joints import FloatArray
@@ -21,7 +23,7 @@ class Nearest:
     """Two that are near each other.
 
     Attributes:
-        pair: Each "<robot>/<link>" or "<fixture>".
+        pair: Each "<robot>/<link>", "<fixture>" or FLOOR.
         distance_m: 0 where they touch.
         points: (3,) on each, in the site's frame [m]: where they touch, or are nearest.
     """
@@ -143,6 +145,8 @@ def outside_nearest(
 ) -> tuple[Nearest, ...]:
     """What an arm is near to: fixtures, and links of other robots; one a pair, nearest first.
 
+    The floor is among them where it has a warning distance.
+
     What does not move is not checked against what does not move either: base links and fixtures.
 
     Args:
@@ -157,7 +161,8 @@ def outside_nearest(
     gauge = Gauge()
     reach = np.inf if within_m is None else within_m
     pairs = np.argwhere((least <= reach) & np.isfinite(least)).tolist()
-    found = one_a_pair([gauge.nearest(at, one, around, other) for one, other in pairs])
+    met = [gauge.nearest(at, one, around, other) for one, other in pairs]
+    found = one_a_pair([*met, *_above_floor(cell, robot, at)])
     return tuple(each for each in found if each.distance_m <= reach)
 
 
@@ -171,7 +176,7 @@ def outside_clearance(
     """
     at, around, least = _surveyed(cell, robot, positions, others)
     gauge = Gauge()
-    found: Nearest | None = None
+    found = min(_above_floor(cell, robot, at), key=lambda each: each.distance_m, default=None)
     for number in least.argsort(axis=None).tolist():
         one, other = divmod(number, len(around))
         if least[one, other] >= (np.inf if found is None else found.distance_m):
@@ -180,6 +185,21 @@ def outside_clearance(
         if found is None or measured.distance_m < found.distance_m:
             found = measured
     return found
+
+
+def _above_floor(cell: Cell, robot: str, at: Obstacles) -> list[Nearest]:
+    """How far the moving bodies of an arm are above the floor; nothing without a warning distance to it."""
+    if cell.floor is None or cell.floor.warning_m <= 0.0:
+        return []
+    found = heights_above(cell.floor, cell.arms[robot], at.placements[None])
+    below = found.points[0].copy()
+    below[:, 2] = cell.floor.height_m
+    return [
+        Nearest((at.names[body], FLOOR), max(float(height), 0.0), (point, foot))
+        for body, height, point, foot in zip(
+            found.bodies.tolist(), found.heights[0], found.points[0], below, strict=True
+        )
+    ]
 
 
 def _surveyed(

@@ -5,7 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from robots.cells import FLOOR
 from robots.collision import Cell, unshaped
+from robots.collision.floor import floor_advice
 from robots.errors import ProgramError
 from robots.inverse import InverseSolver, build_solver
 from robots.joints import FloatArray, Joints, as_positions, violations
@@ -101,14 +103,16 @@ def check_plan(
         checker.take(step, stretch)
     ends = [replace(each, time_s=checker.time_s, until_s=checker.time_s) for each in plan.violations]
     found = (*_start_violations(arm.joints, start), *checker.limits, *checker.runs.violations())
-    notes = (*_cover_notes(cell, robot, others), *_untold(checker.runs), *plan.notes)
-    return _result(
+    notes = (*_cover_notes(cell, robot, others), *_floor_notes(cell, found))
+    notes = (*notes, *_untold(checker.runs), *plan.notes)
+    result = _result(
         checker.time_s,
         (*sorted(found, key=lambda each: each.time_s), *ends),
         plan.steps,
         notes,
         checker.path,
     )
+    return replace(result, alone=cell.floor is None and not len(cell.fixtures) and not ways)
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,8 +254,17 @@ def _cover_notes(cell: Cell, robot: str, others: Mapping[str, FloatArray]) -> tu
         if name != robot and name not in others
     ]
     if not len(cell.fixtures) and len(cell.arms) == 1:
-        notes.append("nothing stands around the arm: its cell has no fixture and no other robot")
+        what = "nothing stands" if cell.floor is None else "only the floor is"
+        also = ", no floor" if cell.floor is None else ""
+        notes.append(f"{what} around the arm: its cell has no fixture{also} and no other robot")
     return tuple(notes)
+
+
+def _floor_notes(cell: Cell, found: Sequence[Violation]) -> tuple[str, ...]:
+    heights = [each.points[0, 2] for each in found if FLOOR in each.pair]
+    if not heights or cell.floor is None:
+        return ()
+    return (floor_advice(cell.floor, min(heights)),)
 
 
 def _untold(runs: Runs) -> tuple[str, ...]:

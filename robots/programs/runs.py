@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from robots.cells import FLOOR
 from robots.joints import FloatArray
 from robots.programs.steps import Violation, ViolationKind
 
@@ -78,7 +79,9 @@ class Runs:
             limit: What it should have been.
             within: So many samples on it is still the same violation.
         """
-        if pair and self._retreating(pair, sample, value) and kind is ViolationKind.CLEARANCE:
+        # How far two are in each other is not known, but how far one is below the floor: it may come up.
+        measured = kind is ViolationKind.CLEARANCE or FLOOR in pair
+        if pair and self._retreating(pair, sample, value) and measured:
             return
         key = (line, kind, pair)
         other = ViolationKind.COLLISION if kind is ViolationKind.CLEARANCE else ViolationKind.CLEARANCE
@@ -129,7 +132,7 @@ class Runs:
                 kind=run.kind,
                 pair=run.pair,
                 points=run.points,
-                distance_m=run.value if run.pair else None,
+                distance_m=max(run.value, 0.0) if run.pair else None,
                 text=_text(run),
                 refuses=run.stops,
             )
@@ -139,6 +142,8 @@ class Runs:
 
 def _text(run: _Run) -> str:
     match run.kind:
+        case ViolationKind.COLLISION if FLOOR in run.pair:
+            return f"{run.pair[0]} goes {-run.value * 1000:.1f} mm below the floor"
         case ViolationKind.COLLISION:
             return f"{run.pair[0]} touches {run.pair[1]}"
         case ViolationKind.CLEARANCE:

@@ -136,6 +136,7 @@ class CheckResult:
         duration_s: Of the motions, of homing's rest and of the waits.
         interpolation: How the controller is assumed to move, in words.
         notes: What the check could not cover, in words.
+        alone: Only the arm itself was checked: around it are no floor, no fixture and no other robot.
     """
 
     ok: bool
@@ -145,6 +146,7 @@ class CheckResult:
     interpolation: str
     notes: tuple[str, ...]
     path: SampledPath
+    alone: bool = False
 
     @property
     def refused(self) -> bool:

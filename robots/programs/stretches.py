@@ -36,7 +36,7 @@ class Finding:
     Attributes:
         kind: COLLISION, CLEARANCE or SINGULARITY.
         pair: That it is about; empty for none.
-        value: What tells how bad it is, the smaller the worse: a distance [m], a margin.
+        value: How bad it is, the smaller the worse: a distance [m], negative below the floor, or a margin.
         limit: What it should not be below.
         points: (k, 3) in the site's frame [m].
         stops: Whether the motion is refused for it.
@@ -176,7 +176,7 @@ class Looker:
         samples, all_distances = encounter.samples.tolist(), encounter.distances.tolist()
         for index, distance, points in zip(samples, all_distances, encounter.points, strict=True):
             if distance <= 0.0:
-                yield index, Finding(ViolationKind.COLLISION, encounter.pair, 0.0, 0.0, points)
+                yield index, Finding(ViolationKind.COLLISION, encounter.pair, distance, 0.0, points)
             elif distance < warning:
                 stops = distance < stop
                 limit = stop if stops else warning

@@ -12,6 +12,9 @@ MeshUri = Callable[[str], str | None]
 
 # What the frames of several sites hang in.
 WORLD = "robomesh"
+# How far a floor goes beyond the robots that stand on it, and how thick it is drawn [m].
+_FLOOR_M = 1.6
+_PLATE_M = 0.004
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,7 @@ class Viewed:
         base_to_site: 16, by rows.
         mesh_uri: Where a link's mesh is, by the link's name; None: it has none.
         fixtures: Of its cell; the other robots of it have the same.
+        floor_m: Height of its cell's floor, in the site's frame; None: it has none.
     """
 
     site: str
@@ -45,6 +49,7 @@ class Viewed:
     base_to_site: Sequence[float]
     mesh_uri: MeshUri
     fixtures: tuple[Fixture, ...] = ()
+    floor_m: float | None = None
 
 
 def prefixed(urdf: str, prefix: str, mesh_uri: MeshUri, *, joints: bool = False) -> Xml.Element:
@@ -98,6 +103,7 @@ def together(robots: Iterable[Viewed], *, plain_joints: bool) -> str:
     for (site, name), fixture in sorted(fixtures.items(), key=lambda each: each[0]):
         _show(Xml.SubElement(whole, "link", name=f"{site}/{name}"), fixture.uri)
         _fixed(whole, site, f"{site}/{name}", fixture.pose)
+    _add_floors(whole, known)
     for robot in known:
         prefix = f"{robot.site}/{robot.robot}/"
         try:
@@ -110,6 +116,43 @@ def together(robots: Iterable[Viewed], *, plain_joints: bool) -> str:
             if link.get("name") not in children:
                 _fixed(whole, robot.site, link.get("name", ""), robot.base_to_site)
     return Xml.tostring(whole, encoding="unicode")
+
+
+def _add_floors(whole: Xml.Element, robots: Sequence[Viewed]) -> None:
+    """One plate a site and height, below all robots whose floor it is; its upper side is the floor."""
+    floors: dict[tuple[str, float], list[Sequence[float]]] = {}
+    for robot in robots:
+        if robot.floor_m is not None and len(robot.base_to_site) == 16:
+            floors.setdefault((robot.site, robot.floor_m), []).append(robot.base_to_site)
+    for number, ((site, height), bases) in enumerate(sorted(floors.items())):
+        # No fixture's name has a full stop.
+        name = f"{site}/floor.{number}"
+        x, y = ([base[column] for base in bases] for column in (3, 7))
+        link = Xml.SubElement(whole, "link", name=name)
+        visual = Xml.SubElement(link, "visual")
+        size = f"{max(x) - min(x) + 2 * _FLOOR_M:.9g} {max(y) - min(y) + 2 * _FLOOR_M:.9g} {_PLATE_M:.9g}"
+        Xml.SubElement(Xml.SubElement(visual, "geometry"), "box", size=size)
+        Xml.SubElement(Xml.SubElement(visual, "material", name="floor"), "color", rgba="0.55 0.58 0.6 1")
+        middle = (max(x) + min(x)) / 2, (max(y) + min(y)) / 2, height - _PLATE_M / 2
+        pose = [
+            1.0,
+            0.0,
+            0.0,
+            middle[0],
+            0.0,
+            1.0,
+            0.0,
+            middle[1],
+            0.0,
+            0.0,
+            1.0,
+            middle[2],
+            0.0,
+            0.0,
+            0.0,
+            1.0,
+        ]
+        _fixed(whole, site, name, pose)
 
 
 def _show(link: Xml.Element, uri: str | None) -> None:

@@ -183,6 +183,7 @@ def _result_json(result: CheckResult, notes: list[str]) -> dict[str, Any]:
         "violations": [_violation_json(each) for each in result.violations],
         "interpolation": result.interpolation,
         "notes": notes,
+        "alone": result.alone,
     }
 
 
@@ -222,7 +223,8 @@ def _print_result(file: str, result: CheckResult, notes: list[str]) -> None:
         print(f"{file}: {len(errors)} error{'' if len(errors) == 1 else 's'} in the text")
         return
     count = len(result.violations)
-    found = f"{count} violation{'' if count == 1 else 's'}" if count else "nothing wrong"
+    fine = "nothing wrong, but only the arm itself was checked" if result.alone else "nothing wrong"
+    found = f"{count} violation{'' if count == 1 else 's'}" if count else fine
     print(f"{file}: {number(round(result.duration_s, 2))} s, {found}")
     print(f"assumed of the controller: {result.interpolation}")
 

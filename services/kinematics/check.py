@@ -46,6 +46,7 @@ def answer_of(result: CheckResult, *, path: bool) -> schema.CheckAnswer:
         duration_s=result.duration_s,
         interpolation=result.interpolation,
         notes=result.notes,
+        alone=result.alone,
     )
     for each in result.violations:
         violation = answer.violations.add(

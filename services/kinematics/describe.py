@@ -85,6 +85,12 @@ def add_surroundings(
             fixture_to_site=each.fixture.fixture_to_site.ravel().tolist(),
             color=color_text(color) if color is not None else "",
         )
+    message.floor.SetInParent()
+    height_m = cell.floor_m
+    if cell.floor is not None and height_m is not None:
+        message.floor.height = height_m
+        message.floor.warning_distance = cell.floor.warning_m
+        message.floor.stop_distance = cell.floor.stop_m
     if len(cell.robots) > 1 or fixtures:
         message.warning_distance, message.stop_distance = robot.warning_m, robot.stop_m
 

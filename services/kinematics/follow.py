@@ -24,6 +24,7 @@ from services.kinematics.conditions import (
     own_conditions,
     singularity_conditions,
 )
+from services.kinematics.floor import floor_event
 from services.kinematics.place import Near, Place
 from services.kinematics.states import (
     add_near,
@@ -85,6 +86,7 @@ async def follow(session: Session, arm: Followed, place: Place, built: asyncio.T
     alarms = Alarms()
     before: tuple[int, FloatArray] | None = None
     misfit = _Misfit(arm)
+    floor_told = False
     async for sample in session.subscribe(robot_key(arm.site, arm.name, "joints")):
         time_ns, dated_by = sample.header.source_time_ns, sample.header.publisher
         frames_due, kinematics_due = frames_pace.due(time_ns), kinematics_pace.due(time_ns)
@@ -123,7 +125,13 @@ async def follow(session: Session, arm: Followed, place: Place, built: asyncio.T
         before = time_ns, positions
         state, near = _state(arm, place, built, positions, velocities, message.timestamp)
         kinematics.put(state, source_time_ns=time_ns, dated_by=dated_by)
-        for event in alarms.judge(_conditions(arm, built, positions, state, near), sample.received):
+        found = alarms.judge(_conditions(arm, built, positions, state, near), sample.received)
+        if built.done() and not floor_told:
+            floor_told = True
+            poses = {"at home": arm.model.joints.home, "where it is now": positions}
+            if (listed := floor_event(built.result(), arm.name, poses)) is not None:
+                found.append(listed)
+        for event in found:
             event.timestamp.CopyFrom(message.timestamp)
             events.put(event, source_time_ns=time_ns, dated_by=dated_by)
             log.log(_LEVELS[event.severity], "%s: %s", arm.path, event.text)

@@ -90,7 +90,8 @@ def _outside(
     cell: Cell, robot: str, positions: FloatArray, others: Mapping[str, FloatArray], *, was_close: bool
 ) -> tuple[Nearest | None, tuple[Nearest, ...]]:
     """What is nearest, and all that is close, by one survey where nothing has changed in that."""
-    far = far_from(max(arm.warning_m for arm in cell.arms.values()))
+    floor = [cell.floor.warning_m] if cell.floor is not None else []
+    far = far_from(max([*floor, *(arm.warning_m for arm in cell.arms.values())]))
     close = outside_nearest(cell, robot, positions, others, within_m=far) if was_close else ()
     if close:
         return close[0], close

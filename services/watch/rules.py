@@ -106,6 +106,9 @@ RULES: Mapping[str, Rule] = MappingProxyType(
         "kinematics.not_counted": Rule(
             MEDIUM, "Nobody knows where that robot is: clearance leaves it out.", each="robot"
         ),
+        "kinematics.floor": Rule(
+            LOW, "Measure where the floor is; write it into the site file as told.", (), 5 * _MINUTE_S
+        ),
         # The recorder.
         "recorder.gives_up": Rule(HIGH, _DISK),
         "recorder.disk_slow": Rule(MEDIUM, "The disk cannot keep up: find out what else uses it."),

@@ -108,7 +108,7 @@ def test_links_of_the_arm_itself_are_kept_apart_too(alone: Cell) -> None:
     assert touch.kind is ViolationKind.COLLISION
     assert set(touch.pair) == {"arm/base", "arm/elbow"}
     assert np.isinf(result.path.clearances).all()
-    assert result.notes == ("nothing stands around the arm: its cell has no fixture and no other robot",)
+    assert result.notes == ("only the floor is around the arm: its cell has no fixture and no other robot",)
 
 
 def test_each_pass_is_one_violation_of_its_own(shelf: Cell) -> None:

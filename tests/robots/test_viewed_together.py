@@ -1,5 +1,6 @@
 """Robots of a mesh as one URDF: read back by Pinocchio, each stands where its site has it."""
 
+from dataclasses import replace
 from xml.etree import ElementTree as Xml
 
 import numpy as np
@@ -53,6 +54,25 @@ def test_several_sites_hang_in_one_root_and_one_site_is_the_root_itself():
     assert roots(together([here], plain_joints=True)) == ["here"]
     assert roots(together([here, there], plain_joints=False)) == [WORLD]
     assert pinocchio.buildModelFromXML(together([here, there], plain_joints=False)).nq == 10
+
+
+def test_the_upper_side_of_a_floors_plate_is_where_the_floor_is():
+    high, low = POSES["upright"], pinocchio.SE3.Identity()
+    robots = [
+        replace(viewed("hall", robot, pose), floor_m=floor_m)
+        for robot, pose, floor_m in (("pt600", high, -0.25), ("puma560", low, -0.25), ("pt500", low, None))
+    ]
+    text = together(robots, plain_joints=False)
+    (box,) = Xml.fromstring(text).findall("link[@name='hall/floor.0']/visual/geometry/box")
+    size = [float(each) for each in box.get("size").split()]
+    whole = pinocchio.buildModelFromXML(text)
+    data = whole.createData()
+    pinocchio.framesForwardKinematics(whole, data, pinocchio.neutral(whole))
+    middle = data.oMf[whole.getFrameId("hall/floor.0")].translation
+    assert middle[2] + size[2] / 2 == pytest.approx(-0.25)
+    # Both robots stand on it, with room around.
+    for pose in (high, low):
+        assert (np.abs(pose.translation[:2] - middle[:2]) + 1.5 < np.array(size[:2]) / 2).all()
 
 
 def test_plain_joints_keep_their_names_and_the_meshes_are_those_of_the_mesh():

@@ -47,7 +47,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_program_with_nothing_wrong_is_told_so_for_people(folder: Path, capsys) -> None:
     assert run(["program", "check", "good", "--robot", "pt600"]) == 0
     out = capsys.readouterr().out.splitlines()
-    assert out[0] == "note: nothing stands around the arm: its cell has no fixture and no other robot"
+    assert out[0] == "note: only the floor is around the arm: its cell has no fixture and no other robot"
     assert out[1].startswith("good: ")
     assert out[1].endswith(" s, nothing wrong")
     assert out[2].startswith("assumed of the controller: joint moves: straight between the joint positions")
@@ -66,7 +66,7 @@ def test_a_collision_in_a_sites_cell_is_a_line_with_time_pair_and_status_1(folde
 def test_json_is_one_object_of_the_contract(folder: Path, capsys) -> None:
     assert run(["program", "check", "bad", "--robot", "one", "--site", "site.toml", "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
-    assert set(found) == {"ok", "duration_s", "violations", "interpolation", "notes"}
+    assert set(found) == {"ok", "duration_s", "violations", "interpolation", "notes", "alone"}
     assert found["ok"] is False
     touch = next(each for each in found["violations"] if each["kind"] == "collision")
     assert set(touch) >= {"line", "time_s", "kind", "pair", "points", "text"}

@@ -1,11 +1,13 @@
 """Cells of a site file: what stands in them, how motions are checked, and what is said of a wrong one."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from robots import description
+from robots.cells import CellDescription, Floor
 from robots.collision import build_cell, distances, outside_clearance, unshaped
 from robots.glb import link_mesh
 from robots.meshes.mesh import bounds
@@ -109,6 +111,45 @@ def test_what_is_wrong_with_a_cell_is_named_with_what_would_be_right(tmp_path, t
         load(tmp_path, text)
     assert words in str(raised.value)
     assert str(tmp_path / "site.toml") in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "floor"),
+    [
+        ("", Floor()),
+        ("floor = -250.0", Floor(-0.25)),
+        ("floor = -250", Floor(-0.25)),
+        ("floor = false", None),
+        ("floor = { height = 10.0, warning = 50.0, stop = 20.0 }", Floor(0.01, 0.05, 0.02)),
+        ("floor = { warning = 50.0 }", Floor(None, 0.05, 0.0)),
+    ],
+)
+def test_a_site_file_gives_the_height_of_the_floor_or_that_there_is_none(tmp_path, text, floor):
+    assert cells_of(load(tmp_path, ROBOT + text))["arm"].floor == floor
+    # What one robot of a cell gives counts for all of it, whichever comes first.
+    mate = '[[robot]]\nname = "mate"\nmodel = "pt500"\ncell = "a"\npose = { xyz = [0.0, 0.0, -300.0] }\n'
+    for both in (f"{IN_A}{text}\n{mate}", f"{mate}{IN_A}{text}\n"):
+        cells = cells_of(load(tmp_path, both))
+        assert cells["arm"].floor == cells["mate"].floor == floor
+    assert CellDescription(cells["arm"].robots).floor_m == -0.3
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (f"{ROBOT}floor = true", "height in mm, false, or a table"),
+        (f'{ROBOT}floor = "low"', "height in mm, false, or a table"),
+        (f"{ROBOT}floor = {{ warning = 5.0, stop = 10.0 }}", "stop = 10 is more than warning = 5"),
+        (f"{ROBOT}floor = nan", "robot.arm.floor"),
+        (
+            f'{IN_A}floor = 0.0\n[[robot]]\nname = "mate"\nmodel = "pt500"\ncell = "a"\nfloor = false\n',
+            "robots arm and mate give different floors, and their cell 'a' has one: give it once",
+        ),
+    ],
+)
+def test_what_is_wrong_with_a_floor_is_named(tmp_path, text, words):
+    with pytest.raises(SiteFileError, match=re.escape(words)):
+        load(tmp_path, text)
 
 
 def test_a_robot_without_shapes_cannot_require_checks(tmp_path):

@@ -2,10 +2,19 @@
 
 import { fixed } from "./format";
 import { DescriptionSchema } from "./gen/robomesh_pb";
-import type { Clearance } from "./gen/robomesh_pb";
+import type { Clearance, Description } from "./gen/robomesh_pb";
 import type { Level } from "./robot-state";
 import { t } from "./texts";
 import { useTopic } from "./topics";
+
+/** The floor in a pair of two that are near each other; the contract's word. */
+const FLOOR = "the floor";
+
+/** Height of the floor of a robot's cell, in the site's frame [m]; null: there is none. */
+export function floorOf({ floor, baseToSite }: Description): number | null {
+  // An older sender tells of none: the robot stands on it.
+  return floor ? (floor.height ?? null) : (baseToSite[11] ?? 0);
+}
 
 /** How much a robot's distance to fixtures and other robots asks to be looked at: of two robots, the larger counts. */
 export function useClearanceLevel(robotKey: string, clearance: Clearance | undefined): Level {
@@ -13,8 +22,9 @@ export function useClearanceLevel(robotKey: string, clearance: Clearance | undef
   const ownKey = `${robotKey}/description`;
   const own = useTopic(DescriptionSchema, ownKey)?.message;
   const other = useTopic(DescriptionSchema, link ? `robomesh/${site}/${robot}/description` : ownKey)?.message;
+  const [ownOf, otherOf] = clearance?.second.endsWith(`/${FLOOR}`) ? [own?.floor, undefined] : [own, other];
   const within = (of: "stopDistance" | "warningDistance") =>
-    clearance !== undefined && clearance.distance < Math.max(own?.[of] ?? 0, other?.[of] ?? 0);
+    clearance !== undefined && clearance.distance < Math.max(ownOf?.[of] ?? 0, otherOf?.[of] ?? 0);
   if (clearance && (clearance.distance <= 0 || within("stopDistance"))) return "alarm";
   return within("warningDistance") ? "warning" : "normal";
 }
@@ -29,6 +39,7 @@ export function pairText({ first, second }: Clearance, robotKey: string): string
   const [, site = "", robot = ""] = robotKey.split("/");
   const name = (frame: string) => {
     const chunks = frame.split("/").slice(frame.startsWith(`${site}/`) ? 1 : 0);
+    if (chunks[0] === FLOOR) return t("floor");
     return (chunks.length > 1 && chunks[0] === robot ? chunks.slice(1) : chunks).join(" ");
   };
   return `${name(first)} – ${name(second)}`;

@@ -5,6 +5,7 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { create } from "@bufbuild/protobuf";
 import { ViewSchema, View_Projection } from "./gen/robomesh_pb";
 import type { Description, View } from "./gen/robomesh_pb";
+import { floorOf } from "./clearance";
 import { Arm, loadOrSay, meshUrl } from "./scene-arm";
 import type { Failed } from "./scene-arm";
 import { Gap, Path, Trail } from "./scene-lines";
@@ -48,6 +49,7 @@ export class RobotScene {
   private readonly path = new Path();
   private readonly gap: Gap;
   private base = new THREE.Matrix4();
+  private floorAt: number | null = null; // in the site's frame [m]
   private colours = palette();
   private red: ReadonlySet<string> = new Set();
   private dirty = true;
@@ -90,10 +92,14 @@ export class RobotScene {
     this.scene.background = new THREE.Color(colours.background);
     const old = this.scene.getObjectByName("floor");
     if (old) this.scene.remove(old);
-    const made = floor(colours);
-    made.name = "floor";
-    made.applyMatrix4(this.base);
-    this.scene.add(made);
+    if (this.floorAt !== null) {
+      const made = floor(colours);
+      made.name = "floor";
+      // Level in the site's frame, however the robot stands on it.
+      made.position.setFromMatrixPosition(this.base).setZ(this.floorAt);
+      this.scene.add(made);
+    }
+    this.canvas.dataset["floor"] = String(this.floorAt);
     this.trail.line.material.color.set(colours.accent);
     this.path.line.material.color.set(colours.accent);
     this.setRed(this.red);
@@ -111,6 +117,7 @@ export class RobotScene {
   /** Loads the models of the arm and of what stands around it. */
   async load(description: Description, failed: Failed): Promise<void> {
     if (description.baseToSite.length === 16) this.base.fromArray(description.baseToSite).transpose();
+    this.floorAt = floorOf(description);
     this.path.line.matrix.copy(this.base);
     this.setColours();
     for (const frame of description.frames) {

@@ -244,6 +244,7 @@ const TEXTS = {
   own_clearance: ["Own links", "自身连杆"],
   singularity: ["To singularity", "距奇异"],
   touching: ["they touch", "接触"],
+  floor: ["the floor", "地面"],
   nothing_around: ["nothing around", "周围无物体"],
   not_counted: ["Not counted, as nobody knows where they are now: {robots}", "未计入（当前位置未知）：{robots}"],
   manipulability: ["Manipulability", "可操作度"],

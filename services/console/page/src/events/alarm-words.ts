@@ -36,6 +36,7 @@ const CHINESE: Record<string, readonly [title: string, advice: string]> = {
   "kinematics.clearance.stop": ["间距过小", "距离过近：请移开。"],
   "kinematics.collision": ["发生接触", "两者已接触：运动之前请现场查看。"],
   "kinematics.not_counted": ["有机器人位置未知", "该机器人位置未知，间距计算未计入。"],
+  "kinematics.floor": ["机器人低于地面", "请确认地面高度，并按文本所示写入站点文件。"],
   "recorder.gives_up": ["录制停止", "请清理录制文件夹，或移至更大的磁盘。"],
   "recorder.disk_slow": ["磁盘过慢", "磁盘跟不上，请查明还有谁在使用。"],
   "recorder.space": ["录制空间不足", "请清理录制文件夹，或移至更大的磁盘。"],

@@ -2,6 +2,7 @@
 
 import * as THREE from "three";
 import { effect } from "@preact/signals";
+import { floorOf } from "../clearance";
 import type { Description } from "../gen/robomesh_pb";
 import { drawsInSoftware } from "../scene";
 import { palette } from "../scene-surroundings";
@@ -33,6 +34,7 @@ export class TilePicture {
     readonly canvas: HTMLCanvasElement,
     readonly rig: Rig,
     private readonly smooth: boolean,
+    readonly floor: THREE.Matrix4 | null,
   ) {}
 
   /** Takes joint positions [rad] or [m] that arrived at a time of the page's clock [ms]. */
@@ -63,6 +65,16 @@ export class TilePicture {
   }
 }
 
+/** Places a level disc on the floor of a robot's cell, in its base frame; null: there is none. */
+function floorInBase(description: Description): THREE.Matrix4 | null {
+  const height = floorOf(description);
+  if (height === null) return null;
+  const base = new THREE.Matrix4();
+  if (description.baseToSite.length === 16) base.fromArray(description.baseToSite).transpose();
+  const { x, y } = new THREE.Vector3().setFromMatrixPosition(base);
+  return base.invert().multiply(new THREE.Matrix4().makeTranslation(x, y, height));
+}
+
 class Pictures {
   private readonly software = drawsInSoftware();
   private readonly renderer = new THREE.WebGLRenderer({ antialias: !this.software, alpha: false });
@@ -80,6 +92,7 @@ class Pictures {
 
   constructor() {
     this.camera.up.set(0, 0, 1);
+    this.floor.matrixAutoUpdate = false;
     this.renderer.setPixelRatio(1);
     this.renderer.setScissorTest(true);
     const key = new THREE.DirectionalLight("#fff8ee", 2.2);
@@ -108,7 +121,7 @@ class Pictures {
 
   add(canvas: HTMLCanvasElement, prefix: string, description: Description): TilePicture {
     const rig = rigOf(prefix, description, () => this.drawAll());
-    const tile = new TilePicture(canvas, rig, !this.software);
+    const tile = new TilePicture(canvas, rig, !this.software, floorInBase(description));
     this.tiles.add(tile);
     this.request ||= requestAnimationFrame(this.frame);
     return tile;
@@ -144,7 +157,7 @@ class Pictures {
     this.fit(tiles);
     const { width, height, renderer } = this;
     tiles.forEach((tile, i) => {
-      this.look(tile.rig, tile.canvas.width / tile.canvas.height);
+      this.look(tile, tile.canvas.width / tile.canvas.height);
       tile.rig.pose(tile.at(at));
       tile.rig.setStale(tile.stale);
       this.scene.add(tile.rig.group);
@@ -184,13 +197,14 @@ class Pictures {
     this.renderer.setSize(width * COLUMNS, height * Math.ceil(MOST_AT_ONCE / COLUMNS), false);
   }
 
-  private look({ bounds }: Rig, aspect: number): void {
+  private look({ rig: { bounds }, floor }: TilePicture, aspect: number): void {
     const distance = bounds.radius / Math.sin(THREE.MathUtils.degToRad(FIELD_OF_VIEW / 2));
     this.camera.aspect = aspect;
     this.camera.position.copy(bounds.center).addScaledVector(LOOK_FROM, distance);
     this.camera.lookAt(bounds.center);
     this.camera.updateProjectionMatrix();
-    this.floor.scale.setScalar(bounds.radius * 0.8);
+    this.floor.visible = floor !== null;
+    if (floor) this.floor.matrix.copy(floor).scale(new THREE.Vector3().setScalar(bounds.radius * 0.8));
   }
 }
 

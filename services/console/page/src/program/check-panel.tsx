@@ -60,13 +60,13 @@ function Verdict({ moved }: { moved: boolean }) {
   const errors = errorsOf(answer).length;
   const count = answer.violations.length;
   const refused = answer.violations.some((each) => each.refuses);
-  const level = refused ? "alarm" : count ? "warning" : "normal";
+  const level = refused ? "alarm" : count || answer.alone ? "warning" : "normal";
   const duration = seconds(answer.durationS);
   const words = errors
     ? p(errors === 1 ? "verdict_error" : "verdict_errors", { count: errors })
     : refused
       ? p(count === 1 ? "verdict_one" : "verdict_many", { count, duration })
-      : p(count ? "verdict_warns" : "verdict_ok", { count, duration });
+      : p(count ? "verdict_warns" : answer.alone ? "verdict_alone" : "verdict_ok", { count, duration });
   return (
     <p class={`verdict ${level} ${busy ? "busy" : ""}`} role="status" data-ok={!refused} data-busy={busy}>
       <span class={`shape ${level}`} aria-hidden="true" />

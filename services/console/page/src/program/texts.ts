@@ -38,6 +38,7 @@ const TEXTS = {
   checked_at: ["from where the robot was at {time}", "以 {time} 的机器人位置为起点"],
   moved_since: ["from where the robot was; it has moved since: check again", "以当时位置为起点；机器人已移动，请重新检查"],
   verdict_ok: ["Nothing in the way. Takes {duration}.", "无冲突，耗时 {duration}。"],
+  verdict_alone: ["Only the arm itself was checked: no floor, no fixture. Takes {duration}.", "仅检查了机器人自身：无地面、无固定物，耗时 {duration}。"],
   verdict_warns: ["Can run, with {count} to look at. Takes {duration}.", "可以运行，有 {count} 处需注意，耗时 {duration}。"],
   verdict_one: ["1 violation. Takes {duration}.", "1 处违规，耗时 {duration}。"],
   verdict_many: ["{count} violations. Takes {duration}.", "{count} 处违规，耗时 {duration}。"],

@@ -1,0 +1,40 @@
+"""An arm that is below its floor at the start: listed once, with the line of the site file to write."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from bus.schemas.robomesh_pb2 import Event
+from robots.collision import Cell
+from robots.collision.floor import floor_advice, heights_above
+from robots.collision.path import placements_along
+from robots.joints import FloatArray
+
+
+def floor_event(cell: Cell, robot: str, poses: Mapping[str, FloatArray]) -> Event | None:
+    """An event that lists the poses in which an arm is below the floor; None: it is in none of them.
+
+    Args:
+        poses: (n,) joint positions [rad] or [m], each by its words: "at home".
+    """
+    if cell.floor is None or not poses:
+        return None
+    arm = cell.arms[robot]
+    found = heights_above(cell.floor, arm, placements_along(arm, np.array([*poses.values()])))
+    said, lowest = [], 0.0
+    for words, heights in zip(poses, found.heights, strict=True):
+        if len(heights) and heights.min() <= 0.0:
+            link = arm.names[int(found.bodies[heights.argmin()])]
+            said.append(f"{words} {link} is {-heights.min() * 1000:.0f} mm below the floor")
+            lowest = min(lowest, float(heights.min()))
+    if not said:
+        return None
+    assert cell.floor.height_m is not None
+    height_m = cell.floor.height_m
+    return Event(
+        severity=Event.Severity.WARNING,
+        code="kinematics.floor",
+        source="kinematics",
+        text=f"{' and '.join(said)}: {floor_advice(cell.floor, height_m + lowest)}",
+        values={"floor_m": f"{height_m:.6g}", "lowest_m": f"{height_m + lowest:.6g}"},
+    )

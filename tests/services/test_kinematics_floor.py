@@ -1,0 +1,46 @@
+"""What the kinematics service tells of the floor: in a robot's description, and of arms that are below it."""
+
+import numpy as np
+import pytest
+
+from bus.schemas import robomesh_pb2 as schema
+from renderer.look import floor_of
+from robots.cells import CellDescription, CellRobot, Floor
+from robots.collision import build_cell
+from services.kinematics.describe import add_surroundings
+from services.kinematics.floor import floor_event
+from services.watch.rules import RULES
+from tests.robots.boxes import placed
+
+ROBOT = CellRobot("arm", "pt600", placed(0.0, 0.0, 0.4))
+
+
+@pytest.mark.parametrize(
+    ("floor", "height"), [(Floor(), 0.4), (Floor(0.0), 0.0), (Floor(-0.25, 0.05, 0.01), -0.25), (None, None)]
+)
+def test_a_description_tells_where_the_floor_is_and_whether_there_is_one(floor, height):
+    message = schema.Description(base_to_site=ROBOT.base_to_site.ravel().tolist())
+    assert floor_of(message) == 0.4  # an older sender's: where it stands
+    add_surroundings(message, ROBOT, CellDescription((ROBOT,), floor=floor), ())
+    sent = schema.Description.FromString(message.SerializeToString())
+    assert sent.HasField("floor")
+    assert floor_of(sent) == height
+    if floor is not None:
+        assert (sent.floor.warning_distance, sent.floor.stop_distance) == (floor.warning_m, floor.stop_m)
+
+
+def test_an_arm_that_is_below_the_floor_is_listed_with_the_line_to_write():
+    cell = build_cell(CellDescription((ROBOT,)))
+    home = cell.arms["arm"].joints.home
+    low = np.radians([0.0, 0.0, -60.0, 0.0, 0.0])
+    assert floor_event(cell, "arm", {"at home": home}) is None
+    event = floor_event(cell, "arm", {"at home": home, "where it is now": low})
+    assert "at home" not in event.text
+    assert event.text.startswith("where it is now arm/")
+    assert "mm below the floor: if the floor is lower than 400 mm, write floor = 360.0" in event.text
+    assert "floor = false" in event.text
+    assert event.code in RULES
+    # With that line it is not listed any more.
+    for floor in (Floor(0.36), None):
+        cell = build_cell(CellDescription((ROBOT,), floor=floor))
+        assert floor_event(cell, "arm", {"at home": home, "where it is now": low}) is None
