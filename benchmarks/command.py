@@ -3,13 +3,16 @@
 A real router and gateway, each its own process, and a controller of this program's that notes when
 the stop unit is in its hands. All times are this machine's monotonic clock, so all must run here.
 
-    ./dev run python benchmarks/command.py [--dead-man 100] [--race 10000] [--stops 300] [--json]
+    ./dev run python benchmarks/command.py [--dead-man 100] [--race 10000] [--stops 300]
+        [--beside 120] [--json]
 
 dead man   an operator's process commands a long motion and is killed with -9, once with a session
            that the mesh sees die, once without one, so that only the lease's end tells.
            Reach: within the lease's time + 50 ms, always.
 race       two operators, each with a session of its own, ask for control at the same moment, again and
            again. Reach: never two holders.
+beside     stops beside burners and floods, to both robots of a gateway, without keys and with them
+           (`stops_beside.py`). Reach: p95 beside a flood at most three times the p95 beside two burners.
 stops      requests of all kinds come as fast as the mesh takes them, 10,000 on their way at any time;
            another session asks for stops. Reach: p99 on the controller's socket under 20 ms.
 """
@@ -21,6 +24,7 @@ import json
 import multiprocessing
 import random
 import socket
+import sys
 import tempfile
 import threading
 import time
@@ -29,8 +33,13 @@ from pathlib import Path
 from typing import Any
 
 import zenoh
-from latency import free_port, process, service, summary, until_connectable
 
+if __name__ == "__main__":
+    # A program beside this one has a room's name: what is imported is looked for from the root.
+    sys.path[0] = str(Path(__file__).parents[1])
+
+from benchmarks.latency import free_port, process, service, summary, until_connectable
+from benchmarks.stops_beside import stops_beside
 from bus.errors import BusError, RefusedError
 from bus.messages import PROTOBUF
 from bus.schemas import robomesh_pb2 as schema
@@ -336,6 +345,7 @@ def main() -> None:
     parser.add_argument("--dead-man", type=int, default=100)
     parser.add_argument("--race", type=int, default=10_000)
     parser.add_argument("--stops", type=int, default=300)
+    parser.add_argument("--beside", type=int, default=120)
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     with bench_site() as (endpoint, controller):
@@ -344,6 +354,11 @@ def main() -> None:
             "dead_man_by_lease_ms": dead_man(endpoint, controller, arguments.dead_man, with_session=False),
             "race": asyncio.run(race(endpoint, arguments.race)),
             "stops_ms": stops_under_flood(endpoint, controller, arguments.stops) if arguments.stops else None,
+        }
+    if arguments.beside:
+        result |= {
+            f"stops_beside_{'keys' if keys else 'no_keys'}": stops_beside(arguments.beside, with_keys=keys)
+            for keys in (False, True)
         }
     if arguments.json:
         print(json.dumps(result))

@@ -3,17 +3,20 @@
 import asyncio
 import logging
 import math
+import threading
 import time
-from collections import Counter
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from functools import partial
 from threading import Lock
+from typing import Any
 
 import zenoh
 from google.protobuf.message import Message
 
 from bus import keys, pieces, topics
 from bus.errors import MessageError, QuotaError, RefusedError
+from bus.intake import RING, Queue, RateLimit, Turns, begin_now, read
 from bus.latencies import Latencies
 from bus.messages import JSON, PROTOBUF, TEXT, decode_request, encode, is_json
 
@@ -30,6 +33,10 @@ _MOST_MARKS = 256
 # Of one owner's row so many have no answer yet, and so many of them are one asker's.
 _MOST = 256
 _MOST_OF_ONE = 16
+# Who asks while too many wait is told so, so many at once and so many a second.
+_BUSY_BURST = 1024
+_BUSY_PER_S = 250.0
+_ANYBODY = "*"
 _OCTETS = "application/octet-stream"
 _BUSY = "too many requests wait for this owner already: ask again, and less often"
 
@@ -85,6 +92,7 @@ class Answerer:
         name: str,
         handler: Handler,
         *,
+        turns: Turns,
         on_refused: OnRefused = lambda chunk, text: None,
     ) -> None:
         self._row = topics.request(name)
@@ -96,14 +104,28 @@ class Answerer:
         self._begun: dict[bytes, asyncio.Future[Message | bytes]] = {}
         self._long = pieces.LongAnswers(in_name=self._row.in_name)
         # By the last chunk that was asked, so by asker where the row has a place for one.
-        self._unanswered = Counter[str]()
+        self._unanswered: dict[str, int] = {}
+        self._waiting = 0
         self._most_of_one = _MOST_OF_ONE if "*" in name else _MOST
-        self._counting = Lock()  # Zenoh's thread counts up, the loop's down
+        self._counting = Lock()  # the reading thread counts up, the loop's down
+        self._turns = turns
+        self._queue = Queue(limited=bool(self._row.own_link))
+        self._busy_answers = RateLimit(per_s=_BUSY_PER_S, burst=_BUSY_BURST)
         self.turned_away = self.over_quota = 0
         self.latencies = Latencies()
         self._closed = False
         # `*` in the row is the asker's: one chunk.
-        self._queryable = session.declare_queryable(keys.robot_key(site, robot, name), self._hand_over)
+        key = keys.robot_key(site, robot, name)
+        self._queryable: zenoh.Queryable[Any]
+        if self._row.unread:
+            # Straight from Zenoh's thread: a stop changes threads once.
+            at_once = zenoh.handlers.Callback(self._hand_over_at_once, indirect=False)
+            self._queryable = session.declare_queryable(key, at_once)
+        else:
+            ring: zenoh.handlers.RingChannel[zenoh.Query] = zenoh.handlers.RingChannel(RING)
+            self._queryable = session.declare_queryable(key, ring)
+            reading = (self._queryable.handler, self._hand_over)
+            threading.Thread(target=read, args=reading, name=f"read {key}", daemon=True).start()
 
     @property
     def closed(self) -> bool:
@@ -120,42 +142,68 @@ class Answerer:
             task.cancel()
 
     @property
+    def waiting(self) -> int:
+        """How many requests have no answer yet."""
+        return self._waiting
+
+    @property
     def name(self) -> str:
         """Of its row."""
         return self._row.name
 
+    def _hand_over_at_once(self, query: zenoh.Query) -> None:
+        """Start on the event loop, whatever waits: a stop is a stop."""
+        if not self._loop.is_closed():
+            self._count(_ANYBODY, 1)
+            self._loop.call_soon_threadsafe(self._start, query, _ANYBODY, time.time_ns())
+
     def _hand_over(self, query: zenoh.Query) -> None:
+        """Start on the event loop in its turn, or say that too many wait."""
         if self._long.reply_piece(query):
             return
         received_ns = time.time_ns()
         asker = _last_chunk(str(query.key_expr))
-        with self._counting:
-            busy = self._unanswered.total() >= _MOST or self._unanswered[asker] >= self._most_of_one
-            if not busy or self._row.unread:  # a stop is a stop
-                self._unanswered[asker] += 1
-            else:
-                self.turned_away += 1
-        if busy and not self._row.unread:
-            with query:
+        if self._waiting >= _MOST or self._unanswered.get(asker, 0) >= self._most_of_one:
+            self._turn_away(query)
+        else:
+            self._count(asker, 1)
+            self._turns.add(self._queue, partial(self._start, query, asker, received_ns))
+
+    def _turn_away(self, query: zenoh.Query) -> None:
+        self.turned_away += 1
+        with query:
+            # To answer costs more than to read; Zenoh says to those who are left out that nothing came.
+            if self._busy_answers.take(time.monotonic()):
                 query.reply_err(_BUSY.encode(), encoding=BUSY_TEXT)
-        elif not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._start, query, asker, received_ns)
+
+    def _count(self, asker: str, more: int) -> None:
+        with self._counting:
+            self._waiting += more
+            count = self._unanswered.get(asker, 0) + more
+            if count:
+                self._unanswered[asker] = count
+            else:
+                del self._unanswered[asker]
 
     def _start(self, query: zenoh.Query, asker: str, received_ns: int) -> None:
         if self._closed:  # it came in the last moment: nothing is done for it any more
             query.drop()
             return
-        task = self._loop.create_task(self._answer(query, received_ns))
+        work = self._answer(query, received_ns)
+        task = begin_now(self._loop, work) if self._row.unread else self._loop.create_task(work)
+        if task is None:
+            self._end(asker, received_ns)
+            return
         self._tasks.add(task)
         task.add_done_callback(lambda task: self._done(task, asker, received_ns))
 
     def _done(self, task: asyncio.Task[None], asker: str, received_ns: int) -> None:
         self._tasks.discard(task)
+        self._end(asker, received_ns)
+
+    def _end(self, asker: str, received_ns: int) -> None:
         self.latencies.add((time.time_ns() - received_ns) * 1e-9)
-        with self._counting:
-            self._unanswered[asker] -= 1
-            if not self._unanswered[asker]:
-                del self._unanswered[asker]
+        self._count(asker, -1)
 
     async def _answer(self, query: zenoh.Query, received_ns: int) -> None:
         asked = str(query.key_expr)
@@ -192,12 +240,22 @@ class Answerer:
         mark = query.attachment.to_bytes() if query.attachment is not None else b""
         if not self._row.both_links or len(mark) != MARK_BYTES:
             return await self._handler(request)
-        begun = self._begun.get(mark)
-        if begun is None:
-            begun = self._begun[mark] = asyncio.ensure_future(self._handler(request))
-            if len(self._begun) > _MOST_MARKS:
-                del self._begun[next(iter(self._begun))]
-        return await begun
+        if (begun := self._begun.get(mark)) is not None:
+            return await asyncio.shield(begun)
+        begun = self._begun[mark] = self._loop.create_future()
+        if len(self._begun) > _MOST_MARKS:
+            del self._begun[next(iter(self._begun))]
+        try:
+            answer = await self._handler(request)
+        except asyncio.CancelledError:
+            begun.cancel()
+            raise
+        except Exception as error:
+            begun.set_exception(error)
+            begun.exception()  # the other copy may have been lost
+            raise
+        begun.set_result(answer)
+        return answer
 
     def _read(self, key: keys.Key, query: zenoh.Query, encoding: str, received_ns: int) -> Request:
         asked, chunk = str(query.key_expr), _chunk(self._row.name, key.topic)

@@ -15,6 +15,7 @@ from google.protobuf.message import Message
 from bus import access, answering, asking, keys, presence, refused, topics
 from bus.endpoints import DEFAULT_ROUTER, Tls, client_config, first_line
 from bus.errors import BrokenAnswerError, NoAnswerError, NoRightError, SessionError
+from bus.intake import Turns
 from bus.publisher import OnGet, Publisher
 from bus.subscription import Subscription
 from bus.tally import Measure, Tally
@@ -58,8 +59,10 @@ class Session:
     _keeping: threading.Lock = field(default_factory=threading.Lock)
     _tokens: list[zenoh.LivelinessToken] = field(default_factory=list)
     _refresher: asyncio.Task[None] | None = None
-    # A second connection, for what nothing may delay.
-    _apart: zenoh.Session | None = None
+    # In which all that it answers begins.
+    _turns: Turns | None = None
+    # Further connections, by the names that rows of the table give them.
+    _apart: dict[str, zenoh.Session] = field(default_factory=dict)
 
     @property
     def connected(self) -> bool:
@@ -159,8 +162,13 @@ class Session:
             SessionError: If it is answered over a link of its own, and the router has just gone.
         """
         self._check("declare_queryable", keys.robot_key(site, robot, name))
-        over = self._link_apart() if topics.request(name).own_link else self.zenoh_session
-        answerer = answering.Answerer(over, site, robot, name, handler, on_refused=on_refused)
+        link = topics.request(name).own_link
+        over = self._link_apart(link) if link else self.zenoh_session
+        if self._turns is None:
+            self._turns = Turns()
+        answerer = answering.Answerer(
+            over, site, robot, name, handler, turns=self._turns, on_refused=on_refused
+        )
         self._keep(answerer)
         return answerer
 
@@ -216,14 +224,14 @@ class Session:
                     self._ended.add(each)
             self._declared = [each for each in self._declared if not each.closed] + [declared]
 
-    def _link_apart(self) -> zenoh.Session:
-        """What comes over it waits behind nothing: what floods the other link is not in it."""
-        if self._apart is None:
+    def _link_apart(self, name: str) -> zenoh.Session:
+        """What comes over it waits behind nothing: what floods another link is not in it."""
+        if name not in self._apart:
             try:
-                self._apart = zenoh.open(self.config)
+                self._apart[name] = zenoh.open(self.config)
             except zenoh.ZError as error:
                 raise SessionError(f"the router has gone: {first_line(error)}") from None
-        return self._apart
+        return self._apart[name]
 
     async def _refresh(self) -> None:
         async for who, alive in self.watch_presence():
@@ -241,8 +249,8 @@ class Session:
             declared.close()
         # Closing waits for Zenoh's threads, which may wait for the loop.
         await asyncio.to_thread(self.zenoh_session.close)
-        if self._apart is not None:
-            await asyncio.to_thread(self._apart.close)
+        for apart in self._apart.values():
+            await asyncio.to_thread(apart.close)
 
 
 @asynccontextmanager

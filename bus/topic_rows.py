@@ -83,7 +83,8 @@ class Request:
         answer: Schema of the answer; None: plain bytes.
         wildcard: May be asked on a key with a wildcard.
         unread: A payload that cannot be read counts as an empty one: a stop is a stop.
-        own_link: Its owner takes it over a connection of its own, where nothing else can be before it.
+        own_link: Its owner takes it over the connection of this name, where nothing else can be before it,
+            and begins it at a limited rate; empty: over the one for everything.
         both_links: Asked over both links of each session at once: what one of them loses or keeps, the other
             does not. Its owner does it once.
         in_name: The last chunk is the name of who asks: the router lets a certificate use its own only.
@@ -97,6 +98,6 @@ class Request:
     askers: frozenset[Role]
     wildcard: bool = False
     unread: bool = False
-    own_link: bool = False
+    own_link: str = ""
     both_links: bool = False
     in_name: bool = False

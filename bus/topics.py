@@ -211,7 +211,7 @@ _REQUESTS = (
         askers=EVERYONE,
         wildcard=True,
         unread=True,
-        own_link=True,
+        own_link="stop",
         both_links=True,
     ),
     Request(
@@ -221,6 +221,7 @@ _REQUESTS = (
         priority=Priority.REAL_TIME,
         owners=_GATEWAY_OR_REPLAY,
         askers=_COMMANDERS,
+        own_link="requests",
         in_name=True,
     ),
     Request(
@@ -230,6 +231,7 @@ _REQUESTS = (
         priority=Priority.REAL_TIME,
         owners=_GATEWAY_OR_REPLAY,
         askers=_COMMANDERS,
+        own_link="requests",
         in_name=True,
     ),
     Request(
