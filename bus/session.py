@@ -162,8 +162,7 @@ class Session:
             SessionError: If it is answered over a link of its own, and the router has just gone.
         """
         self._check("declare_queryable", keys.robot_key(site, robot, name))
-        link = topics.request(name).own_link
-        over = self._link_apart(link) if link else self.zenoh_session
+        over = self.connection(topics.request(name).own_link)
         if self._turns is None:
             self._turns = Turns()
         answerer = answering.Answerer(
@@ -224,8 +223,16 @@ class Session:
                     self._ended.add(each)
             self._declared = [each for each in self._declared if not each.closed] + [declared]
 
-    def _link_apart(self, name: str) -> zenoh.Session:
-        """What comes over it waits behind nothing: what floods another link is not in it."""
+    def connection(self, name: str) -> zenoh.Session:
+        """The connection of a name (`own_link` of the table); empty: the one for everything.
+
+        What comes over one waits behind nothing that floods another.
+
+        Raises:
+            SessionError: If it has to be opened, and the router has just gone.
+        """
+        if not name:
+            return self.zenoh_session
         if name not in self._apart:
             try:
                 self._apart[name] = zenoh.open(self.config)

@@ -179,18 +179,19 @@ def test_a_stop_is_not_reset_while_the_robot_moves_on(tmp_path):
 
 def test_a_stop_comes_over_a_connection_of_its_own(mesh, tmp_path):
     async def main():
-        blocked, go_on = threading.Event(), threading.Event()
+        held, go_on = set(), threading.Event()
 
         def block(_):
-            blocked.set()
+            held.add(threading.get_ident())
             go_on.wait(20.0)
 
         async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
-            # On the thread that reads the connection, and with the priority of a request.
+            # On the threads that read the other connections, and with the priority of a request.
             handler = zenoh.handlers.Callback(block, indirect=False)
-            subscriber = plant.own.zenoh_session.declare_subscriber("block", handler)
+            others = ("", "requests")
+            subscribers = [plant.own.connection(each).declare_subscriber("block", handler) for each in others]
             try:
-                while not blocked.is_set():
+                while len(held) < len(others):
                     plant.session.zenoh_session.put("block", b"", priority=zenoh.Priority.REAL_TIME)
                     await asyncio.sleep(0.01)
                 ask = schema.LeaseRequest(action=A.ACQUIRE)
@@ -199,6 +200,7 @@ def test_a_stop_comes_over_a_connection_of_its_own(mesh, tmp_path):
                 assert (await plant.stop()).sent
             finally:
                 go_on.set()
-            subscriber.undeclare()
+            for subscriber in subscribers:
+                subscriber.undeclare()
 
     run(main())
