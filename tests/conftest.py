@@ -1,4 +1,4 @@
-"""What all tests share: a router of their own, sessions, the files that came with the issue."""
+"""What all tests share: a router of their own, sessions, the files that came with the issue, `--quick`."""
 
 import asyncio
 import contextlib
@@ -6,7 +6,9 @@ import fcntl
 import os
 import random
 import socket
+import sys
 import tempfile
+from collections import Counter
 from collections.abc import Coroutine, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
@@ -85,3 +87,71 @@ def shared() -> Path:
     if not SHARED.is_dir():
         pytest.skip("the reference files (../shared) are not beside this checkout")
     return SHARED
+
+
+# ------------------------------------------------------------------------ --quick
+
+# What `--quick` leaves out, in words, by marker or fixture; the first that fits counts.
+LEFT_OUT = {
+    "browser": "drive the page in a browser",
+    "processes": "start a whole site of processes",
+    "slow": "start processes, or take more than a second",
+    "router": "exchange messages over a router",
+}
+_left_out: Counter[str] = Counter()
+_in_test = False
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--quick", action="store_true", help="run only what needs no browser and no process")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if config.getoption("--quick"):
+        sys.addaudithook(_no_process)
+
+
+def _no_process(event: str, arguments: object) -> None:
+    """Refuse a process that a quick test starts."""
+    if _in_test and event in ("subprocess.Popen", "os.fork", "os.posix_spawn"):
+        raise AssertionError("a test of --quick starts a process: mark it `slow`")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call() -> Iterator[None]:
+    global _in_test
+    _in_test = True
+    try:
+        return (yield)
+    finally:
+        _in_test = False
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if not config.getoption("--quick"):
+        return
+    kept, dropped = [], []
+    for item in items:
+        has = {mark.name for mark in item.iter_markers()} | set(getattr(item, "fixturenames", ()))
+        if why := next((why for why in LEFT_OUT if why in has), None):
+            _left_out[why] += 1
+            dropped.append(item)
+        else:
+            kept.append(item)
+    items[:] = kept
+    config.hook.pytest_deselected(items=dropped)
+    if hasattr(config, "workeroutput"):
+        config.workeroutput["left_out"] = dict(_left_out)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:
+    # Every worker has collected the same.
+    _left_out.update(Counter(getattr(node, "workeroutput", {}).get("left_out", {})) - _left_out)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    if config.getoption("--quick"):
+        words = ", ".join(f"{count} that {LEFT_OUT[why]}" for why, count in _left_out.items())
+        terminalreporter.write_line(f"--quick left out {_left_out.total()} tests: {words or 'none'}")

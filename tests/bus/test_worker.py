@@ -27,6 +27,7 @@ def run(coroutine):
     return asyncio.run(coroutine)
 
 
+@pytest.mark.slow
 def test_a_worker_answers_in_a_process_of_its_own_and_keeps_it():
     async def main():
         async with running() as worker:
@@ -38,6 +39,7 @@ def test_a_worker_answers_in_a_process_of_its_own_and_keeps_it():
     run(main())
 
 
+@pytest.mark.slow
 def test_what_the_handler_raises_is_raised_and_the_process_goes_on():
     async def main():
         async with running() as worker:
@@ -51,6 +53,7 @@ def test_what_the_handler_raises_is_raised_and_the_process_goes_on():
     run(main())
 
 
+@pytest.mark.slow
 def test_a_worker_that_cannot_begin_says_why():
     async def main():
         async with running("wrong") as worker:
@@ -62,6 +65,7 @@ def test_a_worker_that_cannot_begin_says_why():
     run(main())
 
 
+@pytest.mark.slow
 def test_what_takes_too_long_is_ended_and_the_next_question_is_answered_by_another_process():
     async def main():
         async with running() as worker:
@@ -76,6 +80,7 @@ def test_what_takes_too_long_is_ended_and_the_next_question_is_answered_by_anoth
     run(main())
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_over_a_question_is_told_of_and_started_anew():
     async def main():
         async with running() as worker:
@@ -86,6 +91,7 @@ def test_a_worker_that_dies_over_a_question_is_told_of_and_started_anew():
     run(main())
 
 
+@pytest.mark.slow
 def test_the_answer_to_somebody_who_is_gone_is_not_given_to_the_next():
     async def main():
         async with running() as worker:
@@ -100,6 +106,7 @@ def test_the_answer_to_somebody_who_is_gone_is_not_given_to_the_next():
     run(main())
 
 
+@pytest.mark.slow
 def test_questions_wait_for_each_other_and_waiting_counts():
     async def main():
         async with running() as worker:
@@ -113,6 +120,7 @@ def test_questions_wait_for_each_other_and_waiting_counts():
     run(main())
 
 
+@pytest.mark.slow
 def test_a_worker_ends_with_its_owner_in_the_middle_of_a_question_too():
     owner = (
         "import asyncio\n"

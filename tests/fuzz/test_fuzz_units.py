@@ -23,6 +23,7 @@ def fuzzer() -> ModuleType:
     return module
 
 
+@pytest.mark.slow
 def test_changed_units_move_nothing_but_what_a_strict_reading_gives(fuzzer: ModuleType) -> None:
     done, finding = fuzzer.fuzz(30_000, seed=3)
     assert finding is None, finding

@@ -201,6 +201,7 @@ asyncio.run(main())
 """
 
 
+@pytest.mark.slow
 def test_what_was_said_to_be_written_is_there_after_kill_nine(tmp_path):
     path = tmp_path / "arm.jsonl"
     writer = subprocess.Popen(

@@ -190,6 +190,7 @@ asyncio.run(main())
 
 @pytest.mark.parametrize("when", ["before", "after"])
 @pytest.mark.parametrize("call", ["fsync", "link", "rename"])
+@pytest.mark.slow
 def test_a_rotation_that_was_killed_leaves_a_whole_log_and_its_latched_stop(tmp_path, call, when):
     live = tmp_path / "arm.jsonl"
     write(live, *STOPPED, rotate_bytes=1 << 20)

@@ -201,6 +201,7 @@ def test_people_read_degrees_and_millimetres_and_how_often_and_programs_si(mesh,
         ((), "none.jsonl: cannot be read: No such file or directory"),
     ],
 )
+@pytest.mark.slow
 def test_a_list_that_cannot_be_meant_is_refused_in_one_line(tmp_path, arguments, words):
     done = robomesh("audit", "list", str(tmp_path / "none.jsonl"), *arguments)
     assert (done.returncode, done.stdout) == (2, "")

@@ -71,6 +71,7 @@ def test_robots_of_a_cell_share_a_process_and_who_is_alone_needs_none_of_his_own
     assert checkers["a0"] not in {checkers[f"l{n}"] for n in range(len(pairs))}
 
 
+@pytest.mark.slow
 def test_what_nobody_waits_for_any_more_is_not_begun(tmp_path, monkeypatch):
     async def main():
         checker = Checker({"arm": alone("arm", bar_arm(tmp_path))}, at_once=True)
@@ -100,6 +101,7 @@ def test_what_nobody_waits_for_any_more_is_not_begun(tmp_path, monkeypatch):
     run(main(), timeout_s=90)
 
 
+@pytest.mark.slow
 def test_an_error_that_nobody_foresaw_is_said_in_words_and_ends_nothing(tmp_path):
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, np.nan]])
     faces = np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3]])
@@ -173,6 +175,7 @@ def test_a_mates_long_program_is_gone_through_only_where_it_is_near(tmp_path):
     assert cell(1.66)(swinging).refusals == ()
 
 
+@pytest.mark.slow
 def test_the_gateways_own_process_holds_neither_coal_nor_pinocchio():
     code = "import sys, protocol_gateway.gateway; print({'coal', 'pinocchio'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

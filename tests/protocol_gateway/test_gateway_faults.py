@@ -7,6 +7,7 @@ import signal
 import sys
 from pathlib import Path
 
+import pytest
 import zenoh
 
 from bus.endpoints import router_config
@@ -82,6 +83,7 @@ def test_a_stop_while_the_link_is_down_is_latched_and_sent_when_it_is_back(mesh,
     run(main())
 
 
+@pytest.mark.slow
 def test_without_its_router_the_gateway_still_stops_a_motion_whose_operator_is_gone(tmp_path):
     async def main():
         endpoint = f"tcp/127.0.0.1:{free_port()}"

@@ -243,6 +243,7 @@ def test_a_log_that_is_open_elsewhere_leaves_the_latch_file_alone(tmp_path):
     run(main())
 
 
+@pytest.mark.slow
 def test_a_stop_on_a_full_disk_is_latched_after_kill_9(tmp_path):
     if not latch_kills.may_mount():
         pytest.skip("no small disk can be mounted here: unshare and a tmpfs are not allowed")

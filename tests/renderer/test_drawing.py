@@ -53,6 +53,7 @@ def pixel_at(picture, camera, point):
 
 
 @pytest.mark.parametrize("camera", [FREE, TOP, FRONT])
+@pytest.mark.slow
 def test_a_red_cube_is_red_where_the_camera_looks(drawing, camera):
     picture = drawing.draw(scene(Part("red", at(0, 0, 0.2))), camera)
     assert picture.shape == (180, 320, 3)
@@ -101,6 +102,7 @@ def test_a_body_casts_its_shadow_on_the_floor_below_it(drawing):
     assert dark[90, 4] == 0
 
 
+@pytest.mark.slow
 def test_edges_are_smooth_with_samples_and_stepped_without(drawing):
     rough = Drawing(context_or_skip(), SIZE, samples=0)
     rough.add("ball", prepared(ball(0.15, color=RED)))
@@ -127,6 +129,7 @@ def test_a_mesh_that_was_forgotten_or_never_came_is_not_drawn(drawing):
     assert not is_red(picture[90, 160])
 
 
+@pytest.mark.slow
 def test_a_device_that_there_is_none_of_is_refused_in_one_line():
     context_or_skip().release()
     with pytest.raises(NoOpenGLError, match=r"EGL device 99 cannot be used .*count from 0") as caught:
@@ -172,6 +175,7 @@ def test_a_camera_inside_a_body_draws_without_harm_and_says_where_it_is(drawing)
     assert drawing.draw(there, inside).std() > 0
 
 
+@pytest.mark.slow
 def test_full_shading_casts_a_body_shadow_on_another():
     lit = Drawing(context_or_skip(), SIZE, shading="full")
     try:
@@ -188,6 +192,7 @@ def test_full_shading_casts_a_body_shadow_on_another():
         lit.close()
 
 
+@pytest.mark.slow
 def test_a_shading_that_there_is_none_of_is_refused():
     with pytest.raises(ValueError, match="'dim' is not a valid Shading"):
         Drawing(context_or_skip(), SIZE, shading="dim")

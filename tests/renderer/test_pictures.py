@@ -34,6 +34,7 @@ def like_stored(picture, name):
 
 
 @pytest.mark.parametrize("name", STORED)
+@pytest.mark.slow
 def test_a_picture_is_as_the_stored_one(name, folder):
     assert like_stored(STORED[name](folder), name)
 
@@ -48,15 +49,18 @@ def with_a_red_forearm(scene):
 
 
 @pytest.mark.parametrize("change", [without_its_flange, with_a_red_forearm])
+@pytest.mark.slow
 def test_a_picture_without_a_link_or_with_another_colour_is_told_from_it(change, folder):
     assert not like_stored(free(folder, change=change), "free")
 
 
+@pytest.mark.slow
 def test_a_lamp_that_is_off_is_told_from_it(folder, monkeypatch):
     monkeypatch.setattr(drawing, "KEY", (0.0, 0.0, -1.0))
     assert not like_stored(free(folder), "free")
 
 
+@pytest.mark.slow
 def test_a_shadow_that_is_missing_is_told_from_it(folder, monkeypatch):
     monkeypatch.setattr(FloorShadow, "lay", lambda *_, **__: None)
     assert not like_stored(free(folder), "free")

@@ -133,6 +133,7 @@ def test_unit_is_the_drawings(tmp_path: Path, units: int, unit_m: float | None) 
     assert read(tmp_path, drawing).unit_m == unit_m
 
 
+@pytest.mark.slow
 def test_blocks_of_blocks_that_make_millions_are_refused(tmp_path: Path, drawing: Any) -> None:
     drawing.blocks.new("b0").add_3dface(SQUARE)
     for level in range(1, 8):
@@ -176,6 +177,7 @@ def test_wrong_file_is_told(tmp_path: Path, content: bytes) -> None:
         read_dxf(path)
 
 
+@pytest.mark.slow
 def test_nothing_is_written_to_the_users_home(tmp_path: Path, drawing: Any) -> None:
     drawing.modelspace().add_circle((0, 0), 5)
     path = tmp_path / "drawing.dxf"

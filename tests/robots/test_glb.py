@@ -192,6 +192,7 @@ def test_mesh_that_is_made_has_another_glb_when_anything_of_it_changes(
     assert glb(part) != glb(replace(part, **change))
 
 
+@pytest.mark.slow
 def test_librarys_meshes_need_no_trimesh(tmp_path: Path) -> None:
     code = (
         "import sys; from robots.description import load; from robots.glb import link_meshes; "

@@ -69,6 +69,7 @@ def test_wrong_count_is_an_error(positions: list[float]) -> None:
         violations(joints_of(load("pt600")), positions)
 
 
+@pytest.mark.slow
 def test_joints_need_neither_pinocchio_nor_trimesh() -> None:
     code = (
         "import sys; from robots.description import load; from robots.joints import joints_of; "

@@ -252,6 +252,7 @@ for number in itertools.cycle([1, 2]):
 """
 
 
+@pytest.mark.slow
 def test_a_kill_at_any_instant_leaves_one_whole_robot(tmp_path):
     save(tmp_path, 1)
     seen = set()
@@ -288,6 +289,7 @@ def small_disk(tmp_path):
     subprocess.run(["umount", str(folder)], check=True)
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_told_in_words_and_the_old_robot_stays(small_disk):
     save(small_disk, 1)
     with pytest.raises(SaveError, match="arm: not saved, No space left on device"):

@@ -117,6 +117,7 @@ def _listed(values: list[float]) -> str:
 
 
 @pytest.mark.parametrize(("unit", "unit_m"), [(MILLIMETRE, 0.001), (METRE, 1.0)])
+@pytest.mark.slow
 def test_box_has_the_files_own_unit_axes_and_colour(tmp_path: Path, unit: str, unit_m: float) -> None:
     path = tmp_path / "box.step"
     path.write_text(step_box((10, 20, 30), unit=unit, color=(1.0, 0.5, 0.25)))
@@ -127,6 +128,7 @@ def test_box_has_the_files_own_unit_axes_and_colour(tmp_path: Path, unit: str, u
     assert (mesh.unit_m, mesh.up, mesh.warnings) == (unit_m, "z", ())
 
 
+@pytest.mark.slow
 def test_triangles_face_outwards(tmp_path: Path) -> None:
     path = tmp_path / "box.stp"
     path.write_text(step_box((1, 2, 3)))
@@ -143,6 +145,7 @@ def test_triangles_face_outwards(tmp_path: Path) -> None:
         (step_box((1, 2, 3))[:3000].encode(), "unexpected end of file"),
     ],
 )
+@pytest.mark.slow
 def test_broken_file_is_told(tmp_path: Path, content: bytes, expected: str) -> None:
     path = tmp_path / "broken.step"
     path.write_bytes(content)
@@ -152,6 +155,7 @@ def test_broken_file_is_told(tmp_path: Path, content: bytes, expected: str) -> N
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_file_that_runs_without_end_is_stopped(tmp_path: Path) -> None:
     path = tmp_path / "endless.step"
     # Open CASCADE hangs on a length that is no number.

@@ -22,6 +22,7 @@ ROBOMESH = (sys.executable, "-m", "services.command_line.main")
         (("simulate", "--listen", "127.0.0.1:0"), ""),
     ],
 )
+@pytest.mark.slow
 def test_a_command_ends_quietly_when_its_reader_has_gone(arguments, lines):
     reader, writer = os.pipe()
     os.close(reader)
@@ -41,6 +42,7 @@ def test_a_command_ends_quietly_when_its_reader_has_gone(arguments, lines):
     assert (result.stderr, result.returncode) == ("", 0)
 
 
+@pytest.mark.slow
 def test_a_site_goes_on_when_nobody_takes_its_log():
     program = (
         "from services.command_line import up\n"

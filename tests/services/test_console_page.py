@@ -60,12 +60,14 @@ def test_the_lock_file_holds_no_address():
     assert "://" not in (build_page.PAGE / "package-lock.json").read_text()
 
 
+@pytest.mark.slow
 def test_a_current_page_is_not_built_again():
     build_page.build()
     done = subprocess.run([sys.executable, build_page.__file__], capture_output=True, text=True, check=True)
     assert done.stdout == ""
 
 
+@pytest.mark.slow
 def test_the_built_page_asks_nothing_of_anybody_else():
     build_page.build()
     html = (build_page.DIST / "index.html").read_text()

@@ -35,6 +35,7 @@ def converted(page, name, content, **others):
 
 
 @pytest.mark.parametrize("ending", ["stl", "obj", "ply", "glb", "dae"])
+@pytest.mark.slow
 def test_a_box_of_any_format_is_converted(page, ending):
     content = trimesh.creation.box((2.0, 4.0, 6.0)).export(file_type=ending)
     answer = converted(page, f"box.{ending}", content.encode() if isinstance(content, str) else content)
@@ -45,6 +46,7 @@ def test_a_box_of_any_format_is_converted(page, ending):
     assert np.allclose(glb.extents, [2.0, 4.0, 6.0])
 
 
+@pytest.mark.slow
 def test_a_dxf_is_converted(page):
     drawing = ezdxf.new()
     drawing.modelspace().add_3dface([(0, 0, 0), (100, 0, 0), (0, 200, 0)])
@@ -54,18 +56,21 @@ def test_a_dxf_is_converted(page):
     assert (found["triangles"], found["max"]) == (1, [100, 200, 0])
 
 
+@pytest.mark.slow
 def test_a_step_file_is_converted_in_the_confined_worker(page):
     found = converted(page, "box.step", step_box((10, 20, 30)).encode()).json
     assert found["triangles"] == 12
     assert np.allclose(found["max"], [10, 20, 30])
 
 
+@pytest.mark.slow
 def test_a_broken_step_file_is_told(page):
     answer = converted(page, "part.step", b"ISO-10303-21;\nHEADER;\nnonsense")
     assert answer.status == 422
     assert answer.text.startswith("part.step: is no STEP that can be read")
 
 
+@pytest.mark.slow
 def test_scale_and_axis_are_guessed_with_a_reason(page):
     box = trimesh.creation.box((200.0, 100.0, 50.0)).export(file_type="stl")
     found = converted(page, "a.stl", box).json
@@ -75,6 +80,7 @@ def test_scale_and_axis_are_guessed_with_a_reason(page):
     assert found["scale"] == 1.0
 
 
+@pytest.mark.slow
 def test_missing_files_are_asked_for_by_name(page):
     outer = b'#VRML V2.0 utf8\nInline { url "part.wrl" }\nShape { geometry Box { } }\n'
     found = converted(page, "a.wrl", outer).json
@@ -86,12 +92,14 @@ def test_missing_files_are_asked_for_by_name(page):
     assert converted(page, "c.obj", obj).json["missing"] == ["paint.mtl"]
 
 
+@pytest.mark.slow
 def test_igs_is_refused_in_words_that_name_step(page):
     answer = converted(page, "a.igs", b"S      1\n")
     assert answer.status == 422
     assert "STEP" in answer.text
 
 
+@pytest.mark.slow
 def test_pairs_of_links_are_sampled(page):
     found = page.post("/collisions", page.draft()).json
     kinds = {frozenset(pair["links"]): pair["kind"] for pair in found["pairs"]}
@@ -101,6 +109,7 @@ def test_pairs_of_links_are_sampled(page):
     assert kinds[frozenset(("base", "forearm"))] == "sometimes"
 
 
+@pytest.mark.slow
 def test_pairs_are_not_judged_where_a_constraint_leaves_only_home(page):
     draft = page.draft()
     waist, shoulder = draft["description"]["joint"][:2]
@@ -114,6 +123,7 @@ def test_pairs_are_not_judged_where_a_constraint_leaves_only_home(page):
     assert answer.text == "the constraints leave 1 positions to try: too few to say which links never touch"
 
 
+@pytest.mark.slow
 def test_a_urdf_becomes_rows_that_put_every_link_where_it_was(page):
     draft = page.draft("puma560")
     description = load("puma560")
@@ -150,6 +160,7 @@ DEF ARM Humanoid { name "arm" humanoidBody [
 """
 
 
+@pytest.mark.slow
 def test_an_openhrp_file_gives_joints_axes_and_limits(page):
     answer = page.post("/import", {"file": "arm.wrl", "files": {"arm.wrl": page.upload(OPENHRP)}})
     assert answer.status == 200, answer.text
@@ -168,6 +179,7 @@ def test_an_openhrp_file_gives_joints_axes_and_limits(page):
         (b'<robot name="r"/>', "link"),
     ],
 )
+@pytest.mark.slow
 def test_a_wrong_urdf_is_told_in_words(page, text, words):
     answer = page.post("/import", {"file": "a.urdf", "files": {"a.urdf": page.upload(text)}})
     assert answer.status == 422
@@ -175,6 +187,7 @@ def test_a_wrong_urdf_is_told_in_words(page, text, words):
     assert str(page.folder) not in answer.text
 
 
+@pytest.mark.slow
 def test_no_urdf_shows_a_file_of_the_servers(page):
     secret = page.folder / "secret.stl"
     secret.write_bytes(trimesh.creation.box((1, 1, 1)).export(file_type="stl"))
@@ -191,6 +204,7 @@ def test_no_urdf_shows_a_file_of_the_servers(page):
         assert answer.json["missing"] == [address]
 
 
+@pytest.mark.slow
 def test_a_saved_robot_by_urdf_is_listed_and_opened_as_rows(page):
     robot = page.folder / "robots" / "by-urdf"
     robot.mkdir(parents=True)
@@ -215,6 +229,7 @@ def unzipped(page, content):
     return page.post("/unzip", {"file": "a.zip", "files": {"a.zip": page.upload(content)}})
 
 
+@pytest.mark.slow
 def test_a_downloaded_zip_opens_as_the_draft_that_it_was(page):
     draft = page.get("/robots/pt500").json
     draft["description"]["name"] = "mine"
@@ -239,12 +254,14 @@ def test_a_downloaded_zip_opens_as_the_draft_that_it_was(page):
     ],
     ids=["empty", "cut", "up", "root", "many", "bomb"],
 )
+@pytest.mark.slow
 def test_a_wrong_zip_is_refused_in_words(page, content, words):
     answer = unzipped(page, content)
     assert answer.status == 422
     assert words in answer.text
 
 
+@pytest.mark.slow
 def test_a_zip_whose_entry_is_larger_than_it_says_is_refused(page):
     content = bytearray(archive({"a.wrl": b"x" * 5000}))
     at = content.rindex(b"PK\x01\x02") + 24  # the stated size, in the directory
@@ -254,6 +271,7 @@ def test_a_zip_whose_entry_is_larger_than_it_says_is_refused(page):
     assert "is no zip archive that can be read" in answer.text
 
 
+@pytest.mark.slow
 def test_a_robot_toml_in_a_dropped_folder_that_names_a_urdf_becomes_rows(page):
     urdf = to_urdf(load("puma560"), mesh_uri=lambda link: f"{link}.stl").encode()
     files = {

@@ -82,12 +82,14 @@ def test_a_file_is_kept_by_its_content(page):
 
 
 @pytest.mark.parametrize("name", ["", "/etc/passwd", "../a.wrl", "a/../../b", "a%00b", "a%5cb"])
+@pytest.mark.slow
 def test_a_file_whose_name_leads_elsewhere_is_refused(page, name):
     assert page.post(f"/files?name={name}", b"x").status == 422
     sha = page.upload(b"x")
     assert page.post("/mesh", {"file": name, "files": {name: sha}}).status == 422
 
 
+@pytest.mark.slow
 def test_a_mesh_is_converted_in_its_own_units(page):
     answer = page.post("/mesh", {"file": "m/a.wrl", "files": {"m/a.wrl": page.upload(TRIANGLE)}}).json
     assert (answer["triangles"], answer["min"], answer["max"]) == (1, [0, 0, 0], [2, 3, 0])
@@ -96,12 +98,14 @@ def test_a_mesh_is_converted_in_its_own_units(page):
     assert hashlib.sha256(glb.body).hexdigest() == answer["glb"]
 
 
+@pytest.mark.slow
 def test_an_inlined_file_is_found_beside_the_other(page):
     outer = b'#VRML V2.0 utf8\nInline { url "parts/in ner.wrl" }\n'
     files = {"m/a.wrl": page.upload(outer), "m/parts/in ner.wrl": page.upload(TRIANGLE)}
     assert page.post("/mesh", {"file": "m/a.wrl", "files": files}).json["triangles"] == 1
 
 
+@pytest.mark.slow
 def test_a_broken_mesh_is_told_with_its_place_and_without_the_servers_folders(page):
     broken = page.post("/mesh", {"file": "a.wrl", "files": {"a.wrl": page.upload(TRIANGLE[:-9])}})
     assert broken.status == 422
@@ -110,6 +114,7 @@ def test_a_broken_mesh_is_told_with_its_place_and_without_the_servers_folders(pa
 
 
 @pytest.mark.parametrize("address", ["{}/secret.wrl", "../../../secret.wrl", "file://{}/secret.wrl"])
+@pytest.mark.slow
 def test_no_mesh_shows_a_file_of_the_servers(page, address):
     (page.folder / "secret.wrl").write_bytes(TRIANGLE)
     text = f'#VRML V2.0 utf8\nInline {{ url "{address.format(page.folder)}" }}\n'
@@ -117,6 +122,7 @@ def test_no_mesh_shows_a_file_of_the_servers(page, address):
     assert answer.status == 422 or answer.json["triangles"] == 0
 
 
+@pytest.mark.slow
 def test_no_description_names_a_file_of_the_servers(page):
     (page.folder / "secret.wrl").write_bytes(TRIANGLE)
     draft = page.draft()
@@ -127,6 +133,7 @@ def test_no_description_names_a_file_of_the_servers(page):
         assert page.post("/save", draft).status == 422
 
 
+@pytest.mark.slow
 def test_a_right_draft_has_no_problems_and_its_tool_is_where_the_arm_ends(page):
     draft = page.draft()
     answer = page.post("/check", draft | {"joints": [0.0, 90.0, 0.0, 0.0, 0.0]}).json
@@ -136,6 +143,7 @@ def test_a_right_draft_has_no_problems_and_its_tool_is_where_the_arm_ends(page):
     assert list(answer["links"]) == ["base", "column", "upper_arm", "forearm", "wrist", "flange"]
 
 
+@pytest.mark.slow
 def test_problems_are_told_with_their_places_and_the_links_are_still_shown(page):
     draft = page.draft() | {"files": {}}
     draft["description"] = draft["description"] | {"base": {}}
@@ -149,6 +157,7 @@ def test_problems_are_told_with_their_places_and_the_links_are_still_shown(page)
 
 
 @pytest.mark.parametrize("joints", [[1.0], [0, 0, 0, 0, None], "home", [0, 0, 0, 0, 1e999]])
+@pytest.mark.slow
 def test_joints_of_another_robot_are_refused(page, joints):
     answer = page.post("/check", page.draft() | {"joints": joints})
     assert answer.status == 422
@@ -175,6 +184,7 @@ def test_a_wrong_request_is_refused_in_words(page, body, status, words):
     assert answer.headers["Content-Type"].startswith("text/plain")
 
 
+@pytest.mark.slow
 def test_a_draft_is_saved_replaced_when_told_so_and_opened_again(page):
     draft = page.draft(name="saved")
     saved = page.post("/save", draft).json
@@ -193,6 +203,7 @@ def test_a_draft_is_saved_replaced_when_told_so_and_opened_again(page):
     ]
 
 
+@pytest.mark.slow
 def test_who_saves_what_another_has_changed_is_asked(page):
     first = page.draft(name="shared")
     assert page.post("/save", first).status == 200
@@ -213,6 +224,7 @@ def test_who_saves_what_another_has_changed_is_asked(page):
     assert page.post("/save", other | {"overwrite": True}).status == 200
 
 
+@pytest.mark.slow
 def test_what_was_put_into_a_robots_folder_since_it_was_opened_is_not_lost(page):
     page.post("/save", page.draft(name="visited"))
     opened = page.get("/robots/visited").json
@@ -224,6 +236,7 @@ def test_what_was_put_into_a_robots_folder_since_it_was_opened_is_not_lost(page)
     assert (folder / "README.md").read_text() == "weeks of work"
 
 
+@pytest.mark.slow
 def test_two_that_save_over_the_same_at_once_do_not_both_win(page):
     page.post("/save", page.draft(name="raced"))
     opened = page.get("/robots/raced").json
@@ -243,6 +256,7 @@ def test_two_that_save_over_the_same_at_once_do_not_both_win(page):
     ],
     ids=["garbage", "junk", "empty"],
 )
+@pytest.mark.slow
 def test_a_draft_whose_mesh_cannot_be_drawn_is_not_saved(page, file, content):
     draft = page.draft(name="unreadable")
     draft["files"][file] = page.upload(content)
@@ -257,6 +271,7 @@ def test_a_draft_whose_mesh_cannot_be_drawn_is_not_saved(page, file, content):
 
 
 @pytest.mark.parametrize("value", ["1979-05-27", "nan", "[1.0, -inf]", "9" * 400])
+@pytest.mark.slow
 def test_a_saved_robot_that_holds_no_robots_value_is_told_in_words(page, value):
     robot = page.folder / "robots" / "dated"
     robot.mkdir(parents=True, exist_ok=True)
@@ -290,6 +305,7 @@ def test_a_draft_of_one_file_under_many_names_is_not_grown(page):
     assert answer.text == "251 files of 502 MB: 500 MB at most"
 
 
+@pytest.mark.slow
 def test_a_wrong_draft_is_not_saved_and_its_problems_come_with_their_places(page):
     draft = page.draft(name="wrong")
     draft["description"]["joint"][0]["home"] = 500
@@ -299,6 +315,7 @@ def test_a_wrong_draft_is_not_saved_and_its_problems_come_with_their_places(page
     assert not (page.folder / "robots" / "wrong").exists()
 
 
+@pytest.mark.slow
 def test_a_library_robots_name_is_not_taken(page):
     answer = page.post("/save", page.draft(name="pt500"))
     assert answer.status == 422
@@ -313,6 +330,7 @@ def test_a_draft_comes_as_one_zip(page):
         assert "mine/meshes/base.wrl" in zipped.namelist()
 
 
+@pytest.mark.slow
 def test_half_a_character_is_refused_in_words(page):
     draft = page.draft()
     draft["description"]["title"] = "\ud800"
@@ -320,6 +338,7 @@ def test_half_a_character_is_refused_in_words(page):
     assert "half a character" in page.post("/zip", draft).text
 
 
+@pytest.mark.slow
 def test_starting_writes_down_what_the_supervisor_follows(page):
     page.post("/save", page.draft(name="runner"))
     assert page.post("/start", {"name": "runner"}).json == {"site": "s", "robot": "runner"}
@@ -332,6 +351,7 @@ def test_starting_writes_down_what_the_supervisor_follows(page):
     assert "was not started" in page.post("/stop", {"name": "runner"}).text
 
 
+@pytest.mark.slow
 def test_a_robot_of_the_sites_own_name_is_not_started(page):
     page.post("/save", page.draft(name="arm"))
     answer = page.post("/start", {"name": "arm"})
@@ -339,6 +359,7 @@ def test_a_robot_of_the_sites_own_name_is_not_started(page):
     assert "has a robot arm already" in answer.text
 
 
+@pytest.mark.slow
 def test_a_robot_whose_mesh_cannot_be_read_is_not_started(page):
     assert page.post("/save", page.draft(name="torn")).status == 200
     (page.folder / "robots" / "torn" / "meshes" / "base.wrl").write_bytes(TRIANGLE[:-9])

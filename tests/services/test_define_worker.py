@@ -144,6 +144,7 @@ def test_what_nobody_waits_for_any_more_is_not_done(tmp_path):
     run(main())
 
 
+@pytest.mark.slow
 def test_a_cancelled_request_leaves_no_answer_for_the_next(tmp_path):
     kept = store.open_store(tmp_path / "store")
     folder = store.lay_out(kept, {"a.wrl": store.put(kept, POINTS % b"0 0 0")})

@@ -4,6 +4,8 @@ import asyncio
 import json
 from pathlib import Path
 
+import pytest
+
 from bus.schemas import robomesh_pb2 as schema
 from services.command_line.monitor import link_words
 from services.simulator.fault_requests import Mesh
@@ -45,6 +47,7 @@ def test_faults_are_begun_ended_and_listed_from_the_command_line(mesh, router):
     run(main(), timeout_s=60.0)
 
 
+@pytest.mark.slow
 def test_a_simulator_for_a_robot_without_a_site_is_refused_in_one_line():
     done = robomesh("simulate", "--for", "arm", "--listen", "127.0.0.1:0")
     assert (done.returncode, done.stderr) == (

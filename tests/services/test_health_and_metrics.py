@@ -250,6 +250,7 @@ def test_every_alarm_says_what_to_do():
     [("0.0.0.0:9100", "others can reach"), ("nonsense", "HOST:PORT is right")],
     ids=["beyond loopback", "no address"],
 )
+@pytest.mark.slow
 def test_metrics_stay_on_this_machine_unless_the_site_says_otherwise(given, said):
     result = robomesh("watch", "--metrics", given)
     assert result.returncode == 2

@@ -399,6 +399,7 @@ def test_a_link_to_a_site_that_did_not_let_us_in_says_how_to_get_there(site, con
         _ = load(site).links
 
 
+@pytest.mark.slow
 def test_doctor_tries_every_certificate_and_finds_what_a_router_does_otherwise(site, capsys):
     keys("init", str(site))
     keys("issue", "mo", "--role", "monitor")

@@ -50,6 +50,7 @@ def test_more_services_than_ports_are_refused():
         with_metrics(ALL, ("127.0.0.1", 65530))
 
 
+@pytest.mark.slow
 def test_up_refuses_metrics_that_others_could_read_before_anything_starts():
     result = robomesh("up", "--metrics", "0.0.0.0:9101")
     assert result.returncode == 2

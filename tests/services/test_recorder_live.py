@@ -149,6 +149,7 @@ def test_below_the_mark_video_is_given_up_counted_and_told(mesh, tmp_path):
     assert topics[VIDEO] == (0, 1)
 
 
+@pytest.mark.slow
 def test_events_of_an_outage_are_in_the_file_and_counted_back(tmp_path):
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     mesh = SessionSettings(connect=(endpoint,), wait_s=10.0)

@@ -84,6 +84,7 @@ def test_a_table_has_a_row_a_state_whatever_else_was_recorded(tmp_path):
     ]
 
 
+@pytest.mark.slow
 def test_video_is_rendered_afresh_from_the_joints(moving, tmp_path):
     out = tmp_path / "out.mp4"
     size = "x".join(map(str, SIZE))
@@ -150,6 +151,7 @@ def test_more_values_than_a_plot_takes_are_drawn_as_far_as_they_go(tmp_path):
         (["none/out.csv"], "cannot be written: No such file or directory"),
     ],
 )
+@pytest.mark.slow
 def test_what_cannot_be_exported_gets_one_line_and_leaves_no_file(moving, tmp_path, capsys, arguments, words):
     name, *options = arguments
     assert run(["recordings", "export", str(moving), str(tmp_path / name), *options]) == 2

@@ -98,6 +98,7 @@ def messages(path, topic):
         return [(m, decoded) for _, _, m, decoded in reader.iter_decoded_messages(topics=[topic])]
 
 
+@pytest.mark.slow
 def test_plain_readers_find_every_message_once_and_in_time(recorded):
     path, _ = recorded
     joints = messages(path, "robomesh/site/arm/joints")

@@ -191,6 +191,7 @@ def test_show_gives_the_rows_of_a_urdf_in_si(arm: Path, capsys: pytest.CaptureFi
     assert [frame["link"] for frame in shown["frames"]] == ["hand"]
 
 
+@pytest.mark.slow
 def test_four_views_are_one_picture(tmp_path: Path) -> None:
     context_or_skip().release()
     assert run(["robot", "show", "pt600", "--png", str(tmp_path / "four.png")]) == 0

@@ -158,6 +158,7 @@ def test_a_place_that_a_client_leaves_is_free():
     run(main())
 
 
+@pytest.mark.slow
 def test_a_client_that_does_not_read_delays_nobody_gets_the_newest_state_and_is_closed():
     async def main():
         async with simulator(rate_hz=1000.0) as port, client(port) as quick:

@@ -27,6 +27,7 @@ def test_lines_of_any_length_and_any_bytes_end_nobody():
     assert len(lines[1]) == 2000
 
 
+@pytest.mark.slow
 def test_a_needed_program_that_cannot_start_ends_all_and_another_does_not():
     async def never():
         await asyncio.Event().wait()
@@ -53,6 +54,7 @@ def test_a_needed_program_that_cannot_start_ends_all_and_another_does_not():
     run(without_it())
 
 
+@pytest.mark.slow
 def test_what_is_wanted_comes_what_is_not_any_more_goes_and_the_rest_stays():
     wanted, log = {}, []
 
@@ -95,6 +97,7 @@ def test_what_is_wanted_comes_what_is_not_any_more_goes_and_the_rest_stays():
     run(main())
 
 
+@pytest.mark.slow
 def test_a_held_terminal_holds_no_service():
     # Nobody reads the pipe: what does not fit is dropped.
     program = (
@@ -116,6 +119,7 @@ def test_a_held_terminal_holds_no_service():
         process.communicate()
 
 
+@pytest.mark.slow
 def test_a_spare_takes_the_place_of_what_was_killed(tmp_path, monkeypatch):
     monkeypatch.setattr(supervisor, "_SPARE_AFTER_S", 0.1)
     site = tmp_path / "site.toml"
@@ -146,6 +150,7 @@ def test_a_spare_takes_the_place_of_what_was_killed(tmp_path, monkeypatch):
     assert not pids()
 
 
+@pytest.mark.slow
 def test_a_machine_that_has_no_process_left_for_a_moment_ends_nobody(monkeypatch):
     start, failures, log = supervisor._start, [], []
 
