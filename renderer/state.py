@@ -214,7 +214,7 @@ def overlay_of(state: RobotState, look: Look, view: str, *, age: float) -> Overl
         state=_state_words(state.controller),
         rows=tuple(_row(joint, state.positions[joint.name]) for joint in _told(description, state)),
         marks=_marks(description),
-        scale=f"{look.square_m * 1e3:g} mm",
+        scale="" if look.floor is None else f"{look.square_m * 1e3:g} mm",
         stale=_stale_words(state, age),
     )
 

@@ -97,6 +97,17 @@ def test_required_what_collides_is_refused_and_the_arm_has_not_moved(mesh, tmp_p
     run(main(), timeout_s=90)
 
 
+def test_required_a_motion_below_the_floor_is_refused(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port, check="require", cell=alone()) as plant:
+            await checked(plant)
+            text = await refusal(move(plant, [0, 0, radians(-60), 0, 0]))
+            assert "mm below the floor" in text
+            await move(plant, AWAY)
+
+    run(main(), timeout_s=120)
+
+
 def test_warned_what_collides_is_made_and_said(mesh, tmp_path):
     async def main():
         async with (

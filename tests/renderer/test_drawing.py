@@ -102,6 +102,20 @@ def test_a_body_casts_its_shadow_on_the_floor_below_it(drawing):
     assert dark[90, 4] == 0
 
 
+def test_the_floor_is_drawn_at_its_height_and_not_at_all_where_there_is_none(drawing):
+    def seen(floor):
+        return drawing.draw(replace(scene(), floor=floor), FREE).astype(int)
+
+    none = seen(None)
+    # Without a floor only the backdrop is there: the same from left to right.
+    assert np.ptp(none, axis=1).max() <= 3
+    assert np.ptp(seen(0.0), axis=1).max() > 10
+    # Seen from 1 m up, a floor that is lower begins lower in the picture, from one horizon on.
+    assert np.abs(seen(-0.25) - seen(0.0)).max() > 10
+    body = scene(Part("red", at(0, 0, 0.2)))
+    assert is_red(drawing.draw(replace(body, floor=None), FREE)[90, 160])
+
+
 @pytest.mark.slow
 def test_edges_are_smooth_with_samples_and_stepped_without(drawing):
     rough = Drawing(context_or_skip(), SIZE, samples=0)

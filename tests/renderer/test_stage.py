@@ -27,6 +27,23 @@ def look():
     return look_of(message)
 
 
+def test_the_floor_of_a_picture_is_the_one_that_is_checked():
+    message, _ = described("pt600")
+    message.ClearField("floor")
+    message.base_to_site[:] = np.eye(4).ravel()
+    message.base_to_site[11] = 0.4
+
+    def floor():
+        seen = look_of(message)
+        return scene_of(Placed(seen, placements_at(seen, {}))).floor
+
+    assert floor() == 0.4  # an older sender's: where the robot stands
+    message.floor.height = -0.25
+    assert floor() == -0.25
+    message.floor.ClearField("height")
+    assert floor() is None
+
+
 def test_each_robot_is_stale_for_itself_and_fixtures_with_the_one_that_is_looked_at(look):
     placed = placements_at(look, {})
     scene = scene_of(Placed(look, placed), Placed(look, placed, stale=True))
