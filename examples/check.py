@@ -13,6 +13,8 @@ from pathlib import Path
 from bus.schemas.robomesh_pb2 import CheckRequest
 from bus.session import SessionSettings, open_session
 
+if len(sys.argv) < 2:
+    sys.exit("usage: ./dev run python examples/check.py FILE.program [ROBOT] [ROUTER]")
 PROGRAM = Path(sys.argv[1]).read_text()
 ROBOT = sys.argv[2] if len(sys.argv) > 2 else "demo/pt600"
 ROUTER = sys.argv[3] if len(sys.argv) > 3 else "tcp/127.0.0.1:7447"

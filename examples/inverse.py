@@ -13,7 +13,10 @@ from math import degrees
 from bus.schemas.robomesh_pb2 import Description, InverseRequest
 from bus.session import SessionSettings, open_session
 
-X, Y, Z = (float(word) / 1000 for word in sys.argv[1:4])
+try:
+    X, Y, Z = (float(word) / 1000 for word in sys.argv[1:4])
+except ValueError:
+    sys.exit("usage: ./dev run python examples/inverse.py X Y Z [ROBOT] [ROUTER]      mm: 300 0 500")
 ROBOT = sys.argv[4] if len(sys.argv) > 4 else "demo/pt600"
 ROUTER = sys.argv[5] if len(sys.argv) > 5 else "tcp/127.0.0.1:7447"
 

@@ -1,7 +1,10 @@
 """A description for people and programs: what it says and what follows from it, in SI."""
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from robots.dh import dh_form
 from robots.errors import DescriptionError
@@ -95,12 +98,33 @@ def _mesh_name(shape: Shape) -> str:
 
 
 def mesh_summary(mesh: Mesh) -> dict[str, Any]:
-    """Triangles, bounds, materials and warnings of a mesh file, in its own units and axes."""
+    """Triangles, bounds, materials, colours and warnings of a mesh file, in its own units and axes.
+
+    Colours are sRGB as #rrggbb, or #rrggbbaa where they are not opaque; those by vertex are counted.
+    """
     low, high = bounds(mesh)
     return {
         "triangles": mesh.triangle_count,
         "min": low.tolist(),
         "max": high.tolist(),
         "materials": sorted({part.material.name for part in mesh.parts}),
+        "colors": _colors(mesh),
         "warnings": list(mesh.warnings),
     }
+
+
+def _colors(mesh: Mesh) -> list[str]:
+    """Every colour that the parts have, the one of most triangles first."""
+    triangles: Counter[str] = Counter()
+    for part in mesh.parts:
+        if part.colors is None:
+            named = _color(*part.material.diffuse, 1.0 - part.material.transparency)
+        else:
+            named = f"{len(np.unique(part.colors, axis=0))} by vertex"
+        triangles[named] += len(part.triangles)
+    return [named for named, _ in triangles.most_common()]
+
+
+def _color(*rgba: float) -> str:
+    text = "".join(f"{round(255 * value):02x}" for value in rgba)
+    return f"#{text.removesuffix('ff') if len(text) == 8 else text}"

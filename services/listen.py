@@ -62,12 +62,18 @@ def reachable(endpoint: str) -> str:
     return f"{protocol}/{host}:{port}{question}{options}"
 
 
-def check_reach(what: str, host: str, *, secured: bool, insecure: bool) -> str | None:
+_IN_THE_SITE_FILE = "give it tls = { ca, certificate, key }, listen on 127.0.0.1, or write insecure = true"
+
+
+def check_reach(
+    what: str, host: str, *, secured: bool, insecure: bool, remedy: str = _IN_THE_SITE_FILE
+) -> str | None:
     """The warning that listening there deserves; None where it needs none.
 
     Args:
         secured: TLS guards it.
-        insecure: The site file takes the risk in so many words.
+        insecure: The site file (or an option) takes the risk in so many words.
+        remedy: What to do where it may not.
 
     Raises:
         ListenError: If it is beyond loopback, not secured, and nobody took the risk.
@@ -75,10 +81,7 @@ def check_reach(what: str, host: str, *, secured: bool, insecure: bool) -> str |
     if is_loopback(host) or secured:
         return None
     if not insecure:
-        raise ListenError(
-            f"{what} would listen on {host}, which others can reach, without TLS: give it "
-            "tls = { ca, certificate, key }, listen on 127.0.0.1, or write insecure = true"
-        )
+        raise ListenError(f"{what} would listen on {host}, which others can reach, without TLS: {remedy}")
     return f"{what} listens on {host} without TLS (insecure = true): anybody who can reach it can use it"
 
 

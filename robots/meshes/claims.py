@@ -14,10 +14,15 @@ from typing import Any
 from urllib.parse import unquote
 
 from robots.errors import MeshError
+from robots.meshes.rewritten import check_instances, counted_from_first, plain_text, utf8_xml
 
 # A robot's link is far below; a console that reads what people upload must not drown.
 MAX_BYTES = 1 << 30
 MAX_VALUES = 100_000_000
+# Points and corners of triangles that nodes draw, each as often as they do.
+MAX_DRAWN = 30_000_000
+# Each is a mesh of its own to trimesh, milliseconds each.
+_MOST_MATERIALS = 2000
 _JSON_CHUNK = 0x4E4F534A
 OWN_MARK = "robomesh"
 
@@ -32,6 +37,7 @@ class Claims:
         linear: Its colours are linear light, not sRGB.
         missing: Files that it names and that are not there (or may not be read); materials only.
         files: Files that it names, there or not, in its folder or below.
+        rewritten: What is read in its place, where the libraries cannot read it as it is.
     """
 
     unit_m: float | None = None
@@ -42,6 +48,7 @@ class Claims:
     missing: tuple[str, ...] = ()
     files: tuple[Path, ...] = ()
     warnings: tuple[str, ...] = ()
+    rewritten: bytes | None = None
 
 
 def claims_of(path: Path, kind: str) -> Claims:
@@ -117,7 +124,8 @@ def _obj(path: Path, data: bytes) -> Claims:
     textures: dict[str, str] = {}
     missing: list[str] = []
     files: list[Path] = []
-    text = data.decode("utf-8", errors="replace")
+    text = plain_text(data)
+    rewritten = counted_from_first(path, text)
     for found in re.findall(r"(?m)^[ \t]*mtllib[ \t]+(.+?)[ \t\r]*$", text)[:100]:
         library = _below(path, found)
         files += [library] if library is not None else []
@@ -126,7 +134,11 @@ def _obj(path: Path, data: bytes) -> Claims:
         else:
             missing.append(found)
             warnings.append(f"materials: no file {found!r} beside this one; drawn grey")
-    _check_obj_numbers(path, text)
+    _check_obj_numbers(path, rewritten)
+    names = set(re.findall(r"(?m)^[ \t]*usemtl[ \t]+(.+?)[ \t\r]*$", rewritten))
+    if len(names) > _MOST_MATERIALS:
+        rewritten = re.sub(r"(?m)^[ \t]*usemtl[ \t].*$", "", rewritten)
+        warnings.append(f"{len(names)} materials; above {_MOST_MATERIALS} none is taken: drawn grey")
     left_out = len(re.findall(r"(?m)^[ \t]*[lp][ \t]", text))
     if left_out:
         warnings.append(f"{left_out} lines or points are left out")
@@ -135,6 +147,7 @@ def _obj(path: Path, data: bytes) -> Claims:
         files=(*files, *_textures_below(path, textures)),
         missing=tuple(missing),
         warnings=tuple(warnings),
+        rewritten=None if rewritten.encode() == data else rewritten.encode(),
     )
 
 
@@ -176,6 +189,7 @@ def _mtl_textures(library: Path) -> dict[str, str]:
 
 
 def _dae(path: Path, data: bytes) -> Claims:
+    given, data = data, utf8_xml(data)
     if b"<!ENTITY" in data or b"<!DOCTYPE" in data:
         raise MeshError(path, "holds a DOCTYPE: a COLLADA file has none, and it can hide a bomb")
     if b"COLLADA" not in data[:4096]:
@@ -186,10 +200,14 @@ def _dae(path: Path, data: bytes) -> Claims:
         unit_m = float(unit.group(1)) if unit else 1.0
     except ValueError:
         unit_m = 1.0
+    check_instances(path, data)
     letter = axis.group(1).decode().lower() if axis else "y"
     warnings = ("its upward axis is x: turn it by hand",) if letter == "x" else ()
     return Claims(
-        unit_m=unit_m if 0 < unit_m < 1e6 else 1.0, up="z" if letter == "x" else letter, warnings=warnings
+        unit_m=unit_m if 0 < unit_m < 1e6 else 1.0,
+        up="z" if letter == "x" else letter,
+        warnings=warnings,
+        rewritten=None if data == given else data,
     )
 
 
@@ -234,6 +252,7 @@ def _gltf_claims(path: Path, document: dict[str, Any]) -> Claims:
     if bare > MAX_VALUES // 100:
         raise MeshError(path, f"accessors of {bare} values that are nowhere in the file")
     _no_circle(path, [node for node in _list(document, "nodes") if isinstance(node, dict)])
+    _check_drawn(path, document)
     asset = document.get("asset")
     extras = asset.get("extras") if isinstance(asset, dict) else None
     own = isinstance(extras, dict) and OWN_MARK in extras
@@ -275,6 +294,29 @@ def _no_circle(path: Path, nodes: list[dict[str, Any]]) -> None:
             number, seen = parents[number], seen + 1
             if seen > min(1000, len(nodes)):
                 raise MeshError(path, f"node {start} is nested deeper than 1000, or in a circle")
+
+
+def _check_drawn(path: Path, document: dict[str, Any]) -> None:
+    """Refuse a small file of many nodes and primitives that all draw the same values."""
+
+    def count(number: object) -> int:
+        accessors = _list(document, "accessors")
+        known = (
+            isinstance(number, int) and 0 <= number < len(accessors) and isinstance(accessors[number], dict)
+        )
+        return int(accessors[number].get("count", 0)) if known else 0  # type: ignore[call-overload]
+
+    sizes = []
+    for mesh in _list(document, "meshes"):
+        primitives = _list(mesh, "primitives") if isinstance(mesh, dict) else []
+        shapes = [shape for shape in primitives if isinstance(shape, dict)]
+        attributes = [shape.get("attributes") for shape in shapes]
+        points = [count(each.get("POSITION")) for each in attributes if isinstance(each, dict)]
+        sizes.append(sum(points) + sum(count(shape.get("indices")) for shape in shapes))
+    meshes = [node.get("mesh") for node in _list(document, "nodes") if isinstance(node, dict)]
+    drawn = sum(sizes[each] for each in meshes if isinstance(each, int) and 0 <= each < len(sizes))
+    if drawn > MAX_DRAWN:
+        raise MeshError(path, f"draws {drawn} points and corners; up to {MAX_DRAWN} are read")
 
 
 def _gltf_base_colors(document: dict[str, Any]) -> dict[str, tuple[float, ...]]:

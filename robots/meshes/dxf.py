@@ -30,6 +30,7 @@ from robots.meshes.polygons import Effort, ears
 MAX_ENTITIES = 1_000_000
 MAX_COPIES = 20_000  # of blocks: each takes ezdxf near a millisecond
 MAX_DEPTH = 32
+_MOST_BROKEN = 20  # that are named
 _CREASE = np.radians(30)
 _BYBLOCK, _BYLAYER = 0, 256
 _CURVES = {"LINE", "LWPOLYLINE", "POLYLINE", "CIRCLE", "ARC", "ELLIPSE", "SPLINE"}
@@ -59,6 +60,7 @@ class _Found:
     lines: dict[_Look, list[FloatArray]] = field(default_factory=dict)
     points: dict[_Look, list[FloatArray]] = field(default_factory=dict)
     left_out: Counter[str] = field(default_factory=Counter)
+    broken: dict[str, str] = field(default_factory=dict)
     entities: int = 0
     copies: int = 0
 
@@ -75,7 +77,8 @@ def read_dxf(path: Path) -> Mesh:
         found = _Found()
         for entity in drawing.modelspace():
             _walk(path, drawing, entity, _Look(), found, 0)
-        effort = Effort(sum(len(polygon) for polygons in found.polygons.values() for polygon in polygons))
+        effort = Effort()
+        effort.grant(sum(len(polygon) for polygons in found.polygons.values() for polygon in polygons))
         parts = [_part(look, polygons, effort) for look, polygons in found.polygons.items()]
         wires = [_lines(look, runs) for look, runs in found.lines.items()]
         wires += [_points(look, points) for look, points in found.points.items()]
@@ -93,6 +96,7 @@ def read_dxf(path: Path) -> Mesh:
         if not np.isfinite(shape.vertices).all():
             raise MeshError(path, f"layer {shape.name!r} has a point that is not finite")
     warnings += _left_out(found.left_out)
+    warnings += [f"{what} left out: {reason}" for what, reason in found.broken.items()]
     if effort.spent:
         warnings.append("concave faces take too much work to cut; some are drawn beyond their outline")
     if not shapes:
@@ -153,6 +157,18 @@ def _walk(path: Path, drawing: Any, entity: Any, above: _Look, found: _Found, de
         raise MeshError(path, f"draws more than {MAX_ENTITIES} entities, blocks unfolded")
     if depth > MAX_DEPTH:
         raise MeshError(path, f"INSERT {entity.dxf.name!r} is nested deeper than {MAX_DEPTH}, or in a circle")
+    try:
+        _draw(path, drawing, entity, above, found, depth)
+    except (MeshError, MemoryError, RecursionError):
+        raise
+    # ezdxf raises whatever its code runs into: one broken entity is no reason to refuse the others.
+    except Exception as error:
+        if len(found.broken) < _MOST_BROKEN:
+            reason = next(iter(str(error).splitlines()), "")[:200] or type(error).__name__
+            found.broken[f"{entity.dxftype()} {entity.dxf.handle}"] = f"it is broken: {reason}"
+
+
+def _draw(path: Path, drawing: Any, entity: Any, above: _Look, found: _Found, depth: int) -> None:
     kind = entity.dxftype()
     look = _look(drawing, entity, above)
     if kind == "INSERT":

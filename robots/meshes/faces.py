@@ -81,10 +81,14 @@ def kept_faces(faces: Faces, kept: NDArray[np.bool_]) -> Faces:
     )
 
 
-def surface(faces: Faces) -> Surface:
-    """The triangles of faces; those of less than three corners are left out."""
+def surface(faces: Faces, effort: Effort) -> Surface:
+    """The triangles of faces; those of less than three corners are left out.
+
+    Args:
+        effort: What may go into concave faces of the whole file, less after it.
+    """
     faces = kept_faces(faces, faces.sizes >= 3)
-    triangles, rough = _triangles(faces)
+    triangles, rough = _triangles(faces, effort)
     normals = _generated(faces) if faces.normals is None else faces.normals
     colors = faces.colors
     # Flat facets share no vertex; else the corners of one point, normal and colour are one.
@@ -114,7 +118,7 @@ def _generated(faces: Faces) -> Table:
     return Table(by_corner, np.arange(len(owners)))
 
 
-def _triangles(faces: Faces) -> tuple[IndexArray, bool]:
+def _triangles(faces: Faces, effort: Effort) -> tuple[IndexArray, bool]:
     """(t, 3) corners of the triangles, and whether some are rough."""
     if not len(faces.sizes):
         return np.zeros((0, 3), dtype=np.int64), False
@@ -124,12 +128,12 @@ def _triangles(faces: Faces) -> tuple[IndexArray, bool]:
     many = np.flatnonzero(bent_inwards(faces.points, faces.corners, faces.sizes) & (faces.sizes > 3))
     starts = starts_of(faces.sizes)
     first = starts_of(faces.sizes - 2)
-    effort = Effort(int(faces.sizes[many].sum()))
+    effort.grant(int(faces.sizes[many].sum()))
     for face in many.tolist():
         start, size = int(starts[face]), int(faces.sizes[face])
         cut = ears(faces.points[faces.corners[start : start + size]], effort)
         triangles[first[face] : first[face] + size - 2] = start + cut
-    return triangles, effort.spent
+    return triangles, len(many) > 0 and effort.spent
 
 
 def _joined(faces: Faces, normals: Table, triangles: IndexArray) -> tuple[IndexArray, IndexArray]:

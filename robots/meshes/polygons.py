@@ -12,16 +12,22 @@ from robots.meshes.mesh import FloatArray, IndexArray
 # Looking for an ear costs about as much as ordering so many corners; looking at one closely, as so many.
 _TRY = 1000
 _LOOK = 50
-# A corner needs a try or two. Some seconds' work is the most, however many corners there are.
-_TRIES_A_CORNER = 32
-_MOST_WORK = 200_000_000
+# Going past a corner that bends inwards.
+_STEP = 10
+# A corner needs a try or two. Beyond that some seconds' work is the most, however many faces a file has.
+_A_CORNER = 3 * _TRY
+_BEYOND = 150_000_000
 
 
 class Effort:
-    """The work that polygons of so many corners in all are worth; when it is spent, they are cut anyhow."""
+    """The work that the polygons of one file are worth; when it is spent, the rest is cut anyhow."""
 
-    def __init__(self, corners: int) -> None:
-        self.left = min(_TRIES_A_CORNER * _TRY * corners, _MOST_WORK)
+    def __init__(self) -> None:
+        self.left = _BEYOND
+
+    def grant(self, corners: int) -> None:
+        """Allow what polygons of so many corners need where they are not made to be slow."""
+        self.left += _A_CORNER * corners
 
     @property
     def spent(self) -> bool:
@@ -126,10 +132,11 @@ class _Clipping:
         found = []
         corner, missed, left = 0, 0, len(self.x)
         while left > 3:
-            if missed < left and (self.inward[corner] or not self.is_ear(corner)):
+            if missed < left and not self.effort.spent and (self.inward[corner] or not self.is_ear(corner)):
+                self.effort.left -= _STEP
                 corner, missed = self.after[corner], missed + 1
                 continue
-            # None is clean (it crosses itself, or is flat): any corner will do.
+            # None is clean (it crosses itself, or is flat), or the work is spent: any corner will do.
             before, after = self.before[corner], self.after[corner]
             found.append((before, corner, after))
             self.after[before], self.before[after] = after, before
@@ -137,7 +144,7 @@ class _Clipping:
                 if self.inward[neighbour] and (neighbour == corner or self.turn(neighbour) > 0):
                     self.inward[neighbour] = False
                     self.gone += 1
-            if self.gone > len(self.order) // 2:
+            if self.gone > len(self.order) // 2 and not self.effort.spent:
                 self.sort(self.order)
             # The next ear is likely beside this one (an arm is eaten from its end); on either side in turn,
             # or all would hang on one corner, long and thin.
@@ -155,8 +162,6 @@ class _Clipping:
 
     def is_ear(self, corner: int) -> bool:
         a, b, c = self.before[corner], corner, self.after[corner]
-        if self.effort.spent:
-            return True
         tips = self.flat[[a, b, c]]
         low, high = tips.min(axis=0), tips.max(axis=0)
         # The corners in the ear's bounding box that bend inwards.

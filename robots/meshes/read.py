@@ -9,6 +9,7 @@ from typing import Any
 from robots.errors import MeshError
 from robots.meshes.dxf import read_dxf
 from robots.meshes.mesh import Mesh
+from robots.meshes.rewritten import plain_text
 from robots.meshes.step import read_step
 from robots.meshes.three_ds.read import read_3ds
 from robots.meshes.trimesh_formats import read_trimesh
@@ -83,6 +84,7 @@ def _held(path: Path) -> str:
     for beginning, ending in _BEGINNINGS:
         if head.startswith(beginning):
             return ending
+    head = (head[:2] in (b"\xff\xfe", b"\xfe\xff") and plain_text(head).encode()) or head
     text = head.lstrip()
     if head[:2] == b"MM" and len(head) >= 6:
         return ".3ds" if path.suffix.lower() not in (".wrl", ".obj") or b"\0" in head else ""

@@ -8,6 +8,7 @@ stop it. So it runs in another, with limits.
 
 import re
 import resource
+import signal
 import subprocess
 import sys
 import tempfile
@@ -26,6 +27,12 @@ _DEVIATION_MM = 0.1
 _TURN = 0.35
 TIME_LIMIT_S = 120.0
 _MEMORY_LIMIT = 6 << 30
+# It asks for memory in pieces: a failure so near to the limit is for want of it.
+_NEAR = 0.9
+_OUT_OF_MEMORY = 77
+# Without memory C++ aborts, or reads where there is none.
+_NO_MEMORY = re.compile(rb"MemoryError|bad_alloc|Cannot allocate memory|failed to map segment")
+_ENDED_BY_MEMORY = {_OUT_OF_MEMORY, -signal.SIGABRT}
 _PREFIXES = {"MILLI": 1e-3, "CENTI": 1e-2, "DECI": 1e-1, "MICRO": 1e-6, "$": 1.0, "KILO": 1e3}
 _INCHES = {"INCH": 0.0254, "FOOT": 0.3048}
 
@@ -51,6 +58,8 @@ def read_step(path: Path, *, time_limit_s: float = TIME_LIMIT_S) -> Mesh:
             )
         except subprocess.TimeoutExpired as error:
             raise MeshError(path, f"took Open CASCADE over {time_limit_s:.0f} s; it may be broken") from error
+        if done.returncode in _ENDED_BY_MEMORY or _NO_MEMORY.search(done.stderr):
+            raise MeshError(path, f"needs more than {_MEMORY_LIMIT / 1024**3:g} GB of memory to read")
         if done.returncode or not glb.is_file():
             raise MeshError(path, f"is no STEP that can be read: {_said(done.stdout + done.stderr)}")
         mesh = read_trimesh(glb)
@@ -90,10 +99,26 @@ def main() -> None:
     import cascadio
 
     source, made = sys.argv[1:]
-    status = cascadio.step_to_glb(
-        source, made, tol_linear=_DEVIATION_MM, tol_angular=_TURN, use_parallel=False, merge_primitives=False
-    )
-    sys.exit(1 if status else 0)
+    try:
+        status = cascadio.step_to_glb(
+            source,
+            made,
+            tol_linear=_DEVIATION_MM,
+            tol_angular=_TURN,
+            use_parallel=False,
+            merge_primitives=False,
+        )
+    except MemoryError:
+        sys.exit(_OUT_OF_MEMORY)
+    if status and not _has_memory():
+        status = _OUT_OF_MEMORY
+    sys.exit(status if status in (0, _OUT_OF_MEMORY) else 1)
+
+
+def _has_memory() -> bool:
+    """Return whether Open CASCADE, which says only that it failed, came nowhere near the limit."""
+    most = int(Path("/proc/self/status").read_text().split("VmPeak:")[1].split()[0]) * 1024
+    return most < _NEAR * _MEMORY_LIMIT
 
 
 if __name__ == "__main__":

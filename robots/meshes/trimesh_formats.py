@@ -5,6 +5,7 @@ stay the file's. Normals that a file does not give are smooth up to 30 degrees.
 """
 
 import importlib
+import io
 import logging
 import warnings as warnings_module
 from collections.abc import Iterator
@@ -76,8 +77,9 @@ def _drawn(path: Path, kind: str, claims: Claims) -> list[Part | Wire]:
         with np.errstate(all="ignore"), warnings_module.catch_warnings():
             warnings_module.simplefilter("ignore")  # its own arithmetic's, on nothing that is kept
             scene = trimesh.load_scene(
-                str(path),
+                str(path) if claims.rewritten is None else io.BytesIO(claims.rewritten),
                 file_type=kind,
+                resolver=trimesh.resolvers.FilePathResolver(str(path)) if claims.rewritten else None,
                 process=False,
                 maintain_order=True,
                 skip_materials=bool(claims.missing),

@@ -106,5 +106,5 @@ def _metrics(address: str) -> tuple[str, int] | None:
     if not address:
         return None
     host, port = split_address(address)
-    check_reach("metrics", host, secured=False, insecure=False)
+    check_reach("metrics", host, secured=False, insecure=False, remedy="listen on 127.0.0.1")
     return host, port

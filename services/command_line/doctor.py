@@ -1,10 +1,14 @@
 """`robomesh doctor`: what is missing on this machine, and how to mend it."""
 
+import asyncio
+import http.client
 import importlib.util
+import json
 import os
 import shutil
 import socket
 import sys
+import urllib.request
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -21,6 +25,8 @@ _ROLES = {
     "console": ("starlette", "uvicorn", "websockets"),
 }
 _FREE_BYTES = 1 << 30
+# For a site that runs here to say so.
+_ANSWER_S = 3.0
 
 
 @dataclass(frozen=True)
@@ -33,10 +39,18 @@ class Finding:
     mend: str = ""
 
 
-def run() -> None:
+def run(as_json: bool = False) -> None:
     """Print every finding; exit status 1 when something is missing."""
     findings = [finding for look in (_python, _roles, _open_gl, _page, _ports, _disk) for finding in look()]
-    for finding in findings:
+    if as_json:
+        rows = [
+            {"what": each.what, "ok": each.right, "text": each.text, "mend": each.mend} for each in findings
+        ]
+        print(json.dumps({"ok": all(each.right for each in findings), "findings": rows}))
+        findings_said: list[Finding] = []
+    else:
+        findings_said = findings
+    for finding in findings_said:
         print(f"{'ok     ' if finding.right else 'MISSING'}  {finding.what}: {finding.text}")
         if not finding.right:
             print(f"         {finding.mend}")
@@ -93,10 +107,35 @@ def _ports() -> list[Finding]:
         with socket.socket() as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             free = _succeeds(lambda probe=probe, port=port: probe.bind(("127.0.0.1", port)))  # type: ignore[misc]
-        text = f"127.0.0.1:{port} is free" if free else f"127.0.0.1:{port} is taken"
-        mend = "a site may be running already (robomesh list); or name another port in the site file"
-        findings.append(Finding(what, free, text, mend))
+        ours = not free and (_is_router(port) if port == 7447 else _is_console(port))
+        state = "is free" if free else "is a running site's" if ours else "is taken by another program"
+        mend = "end that program, or name another port in the site file"
+        findings.append(Finding(what, free or ours, f"127.0.0.1:{port} {state}", mend))
     return findings
+
+
+def _is_router(port: int) -> bool:
+    """Return whether a Zenoh router answers there, by TCP or, with this person's keys, by TLS."""
+    from bus.errors import BusError
+    from services.command_line import find
+
+    async def answers() -> bool:
+        async with asyncio.timeout(_ANSWER_S), find.attached(f"tcp/127.0.0.1:{port}"):
+            return True
+
+    try:
+        return find.run(answers())
+    except (BusError, TimeoutError):
+        return False
+
+
+def _is_console(port: int) -> bool:
+    """Return whether a console's page answers there."""
+    try:
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/health", timeout=_ANSWER_S) as answer:
+            return isinstance(json.loads(answer.read(100_000)), dict)
+    except (OSError, ValueError, http.client.HTTPException):
+        return False
 
 
 def _disk() -> list[Finding]:

@@ -21,7 +21,7 @@ _EXAMPLE = '{"pose": [[1, 0, 0, 0.3], ...], "task": "6d", "near": [...], "all": 
 _NUMBERS = "X Y Z in mm, and with ROLL PITCH YAW in degrees the tool's pose; or - for JSON requests"
 
 
-def inverse(robot: str, words: Sequence[str], task: str, all_solutions: bool) -> None:
+def inverse(robot: str, words: Sequence[str], task: str, all_solutions: bool, as_json: bool) -> None:
     """Answer a pose in degrees and millimetres, or JSON lines in SI; exit status 1: one has no solution."""
     asked = None if not task else _task(task)
     numbers = None if list(words) == ["-"] else _numbers(words)
@@ -37,7 +37,10 @@ def inverse(robot: str, words: Sequence[str], task: str, all_solutions: bool) ->
     elif asked not in (None, Task.POSITION_3D):
         raise RequestError(f"--task {asked} takes six numbers: X Y Z in mm, ROLL PITCH YAW in degrees")
     result = solve(solver, pose, task=asked or Task.POSITION_3D, all_solutions=all_solutions)
-    _print_result(solver, result)
+    if as_json:
+        print_json(_values(result))
+    else:
+        _print_result(solver, result)
     if not len(result.solutions):
         raise typer.Exit(1)
 
@@ -92,17 +95,19 @@ def _answer_lines(solver: InverseSolver, task: Task | None, all_solutions: bool)
             print_json({"error": str(error)})
             continue
         failed = failed or not len(result.solutions)
-        print_json(
-            {
-                "solutions": result.solutions.tolist(),
-                "residual_m": result.residual_m,
-                "residual_rad": result.residual_rad,
-                "reason": result.reason,
-                "analytic": result.analytic,
-            }
-        )
+        print_json(_values(result))
     if failed:
         raise typer.Exit(1)
+
+
+def _values(result: InverseResult) -> dict[str, Any]:
+    return {
+        "solutions": result.solutions.tolist(),
+        "residual_m": result.residual_m,
+        "residual_rad": result.residual_rad,
+        "reason": result.reason,
+        "analytic": result.analytic,
+    }
 
 
 def _is_number(value: object) -> bool:

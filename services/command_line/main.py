@@ -202,7 +202,7 @@ def doctor(
         return check.run(keys_folder(folder, quiet=as_json), addresses(routers), as_json)
     from services.command_line import doctor as command
 
-    command.run()
+    command.run(as_json)
     return None
 
 
@@ -213,6 +213,7 @@ def doctor(
 def fk(
     requests: Annotated[str, typer.Argument(metavar="-", help="JSON requests on standard input.")] = "-",
     robot: Annotated[str, typer.Option(metavar="R")] = "pt600",
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI units: always so here.")] = True,
 ) -> None:
     """Forward kinematics: {"joints": [..]} a line in, {"tool", "links"} a line out."""
     from services.command_line import robots
@@ -234,11 +235,12 @@ def ik(
         str, typer.Option(metavar="6d|5d|3d", help="The whole pose, position and tool axis, or position.")
     ] = "",
     all_: Annotated[bool, typer.Option("--all", help="All solutions, not the nearest to home.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Inverse kinematics: joint positions; JSON: {"pose", "task", "near", "all", "seed"} a line in."""
     from services.command_line import inverse
 
-    inverse.inverse(robot, pose, task, all_)
+    inverse.inverse(robot, pose, task, all_, as_json)
 
 
 # --------------------------------------------------------------------- the end

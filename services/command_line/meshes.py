@@ -22,6 +22,7 @@ from services.errors import ServiceError
 
 # Smaller files are read before a person looks.
 _LARGE_BYTES = 2_000_000
+_MOST_COLORS = 20
 
 
 class ConversionError(ServiceError):
@@ -30,7 +31,7 @@ class ConversionError(ServiceError):
 
 def info(file: Path, as_json: bool) -> None:
     """Print what a mesh file holds."""
-    mesh = read_mesh(file, _progress(file))
+    mesh = read_mesh(file, _progress(file), within=file.absolute().parent)
     summary = mesh_summary(mesh)
     if as_json:
         print_json(summary)
@@ -39,6 +40,9 @@ def info(file: Path, as_json: bool) -> None:
     print(f"  from {_triple(summary['min'])} to {_triple(summary['max'])}, in the file's own units")
     print(f"  {guess(mesh).sentence}")
     print(f"  materials: {', '.join(filter(None, summary['materials'])) or 'none named'}")
+    listed = summary["colors"][:_MOST_COLORS]
+    more = len(summary["colors"]) - len(listed)
+    print(f"  colors: {', '.join(listed) or 'none'}{f' and {more} more' if more else ''}")
     for warning in summary["warnings"]:
         print(f"  warning: {warning}")
 
@@ -54,7 +58,7 @@ def convert(source: Path, target: Path, scale: float | None, up: str | None) -> 
         raise ConversionError(f"--scale {scale}: a number above 0 is right")
     if target.exists() and source.exists() and target.samefile(source):
         raise ConversionError(f"{target}: is the file that is to be converted; name another")
-    mesh = read_mesh(source, _progress(source))
+    mesh = read_mesh(source, _progress(source), within=source.absolute().parent)
     for warning in mesh.warnings:
         _say(f"{source.name}: {warning}")
     if not mesh.parts and not mesh.wires:

@@ -59,7 +59,10 @@ async def serve(settings: Settings, *, ready: Callable[[str], None] | None = Non
         DescriptionError: If there is no such robot.
     """
     host, port = split_address(settings.listen)
-    if warning := check_reach("the simulator", host, secured=False, insecure=settings.insecure):
+    remedy = "listen on 127.0.0.1, or take the risk with --insecure: the controllers' old protocol has no TLS"
+    if warning := check_reach(
+        "the simulator", host, secured=False, insecure=settings.insecure, remedy=remedy
+    ):
         logger.warning("%s", warning)
     faults = Faults(settings.faults)
     server = _server(settings, faults)

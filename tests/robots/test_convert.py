@@ -120,6 +120,7 @@ def test_info_prints_the_agreed_json(box: Path, capsys: pytest.CaptureFixture[st
         "min": [-50.0, -100.0, -150.0],
         "max": [50.0, 100.0, 150.0],
         "materials": ["glass"],
+        "colors": ["#33669980"],
         "warnings": [],
     }
 

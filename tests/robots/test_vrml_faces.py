@@ -248,7 +248,7 @@ def test_concave_face_is_cut_inside_itself(
     # In a plane that is parallel to no axis.
     x, y = np.array([2, -1, 2]) / 3, np.array([2, 2, -1]) / 3
     points = flat[:, :1] * x + flat[:, 1:] * y + [10, 20, 30]
-    triangles = ears(points, Effort(len(points)))
+    triangles = ears(points, Effort())
     assert len(triangles) == len(outline) - 2
     a, b, c = (points[triangles[:, corner]] for corner in range(3))
     sign = -1 if clockwise else 1
@@ -259,8 +259,8 @@ def test_concave_face_is_cut_inside_itself(
 
 def test_face_without_area_still_gives_its_triangles() -> None:
     flat = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0], [1.5, 0, 0]])
-    assert len(ears(flat, Effort(5))) == 3
-    assert len(ears(np.zeros((6, 3)), Effort(6))) == 4
+    assert len(ears(flat, Effort())) == 3
+    assert len(ears(np.zeros((6, 3)), Effort())) == 4
 
 
 def test_concave_face_is_cut_only_when_it_says_so(draw: Draw) -> None:
@@ -306,7 +306,8 @@ def test_large_concave_face_is_cut_inside_itself_without_much_ado(outline: np.nd
     # The area of a polygon by Gauss's formula.
     x, y = outline[:, 0], outline[:, 1]
     expected = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2
-    effort = Effort(len(outline))
+    effort = Effort()
+    effort.grant(len(outline))
     given = effort.left
     triangles = ears(outline, effort)
     a, b, c = (outline[triangles[:, corner]] for corner in range(3))
@@ -319,7 +320,8 @@ def test_large_concave_face_is_cut_inside_itself_without_much_ado(outline: np.nd
 def test_face_that_takes_too_much_work_is_cut_anyhow_and_told(
     draw: Draw, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(polygons, "_TRIES_A_CORNER", 0)
+    monkeypatch.setattr(polygons, "_A_CORNER", 0)
+    monkeypatch.setattr(polygons, "_BEYOND", -1)
     points = "coord Coordinate { point [ 2 1 0, 1 1 0, 1 2 0, 0 2 0, 0 0 0, 2 0 0 ] }"
     mesh = draw(
         f"Shape {{ geometry IndexedFaceSet {{ convex FALSE {points} coordIndex [ 0 1 2 3 4 5 -1 ] }} }}"
@@ -327,6 +329,44 @@ def test_face_that_takes_too_much_work_is_cut_anyhow_and_told(
     assert mesh.triangle_count == 4
     (warning,) = mesh.warnings
     assert warning.startswith("line 2, column 18: IndexedFaceSet: concave faces take too much work")
+
+
+def test_many_slow_faces_of_one_file_share_one_allowance(draw: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
+    outline = comb(500)
+    shape = face_set_text(outline)
+    monkeypatch.setattr(polygons, "_A_CORNER", 0)
+    # As much as one of them needs.
+    effort = Effort()
+    ears(outline, effort)
+    monkeypatch.setattr(polygons, "_BEYOND", int(1.5 * (polygons._BEYOND - effort.left)))
+    mesh = draw(shape * 4)
+    assert mesh.triangle_count == 4 * (len(outline) - 2)
+    assert len([warning for warning in mesh.warnings if "too much work" in warning]) == 3
+
+
+def test_work_that_is_spent_leaves_little_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    outline = comb(16_000)
+    monkeypatch.setattr(polygons, "_A_CORNER", 0)
+    monkeypatch.setattr(polygons, "_BEYOND", -1)
+    looks = 0
+
+    def looked(*_: object) -> bool:
+        nonlocal looks
+        looks += 1
+        return True
+
+    monkeypatch.setattr(polygons._Clipping, "is_ear", looked)
+    assert len(ears(outline, Effort())) == len(outline) - 2
+    assert looks == 0
+
+
+def face_set_text(outline: np.ndarray) -> str:
+    points = ", ".join(" ".join(map(str, point)) for point in outline.tolist())
+    numbers = " ".join(map(str, range(len(outline))))
+    return (
+        f"Shape {{ geometry IndexedFaceSet {{ convex FALSE coord Coordinate {{ point [ {points} ] }} "
+        f"coordIndex [ {numbers} -1 ] }} }}\n"
+    )
 
 
 # Any faces
@@ -355,7 +395,8 @@ def test_any_faces_keep_their_corners_normals_and_colors(
             ccw=ccw,
             convex=convex,
             crease=crease,
-        )
+        ),
+        Effort(),
     )
     assert len(found.triangles) == sum(max(len(face) - 2, 0) for face in faces)
     assert found.colors is not None

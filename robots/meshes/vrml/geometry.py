@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from robots.meshes.faces import Faces, Surface, Table, kept_faces, surface
 from robots.meshes.mesh import FloatArray, IndexArray, unit
 from robots.meshes.normals import creased
+from robots.meshes.polygons import Effort
 from robots.meshes.solids import ball, box, turned
 from robots.meshes.vrml.extrusion import extrusion
 from robots.meshes.vrml.parser import Node
@@ -21,7 +22,7 @@ from robots.meshes.vrml.values import flag, indices, number, numbers, rows
 SEGMENTS = 32
 
 
-def _indexed_face_set(node: Node) -> Surface:
+def _indexed_face_set(node: Node, effort: Effort) -> Surface:
     points = rows(node_of(node, "coord"), "point", 3)
     listed = indices(node, "coordIndex")
     placed, sizes = runs(listed)
@@ -45,7 +46,7 @@ def _indexed_face_set(node: Node) -> Surface:
             f"{len(points) - 1}: {np.count_nonzero(~kept)} faces are left out"
         )
         faces = kept_faces(faces, kept)
-    return surface(faces)
+    return surface(faces, effort)
 
 
 def runs(listed: IndexArray) -> tuple[IndexArray, IndexArray]:
@@ -97,7 +98,7 @@ def checked(node: Node, name: str, values: FloatArray, chosen: IndexArray) -> Ta
     return Table(values, chosen)
 
 
-def _elevation_grid(node: Node) -> Surface:
+def _elevation_grid(node: Node, effort: Effort) -> Surface:
     """Heights above a grid in x and z; each square of it is a face (6.17)."""
     columns, lines = int(number(node, "xDimension", 0)), int(number(node, "zDimension", 0))
     heights = numbers(node, "height", [])
@@ -130,31 +131,32 @@ def _elevation_grid(node: Node) -> Surface:
             ccw=flag(node, "ccw", True),
             solid=flag(node, "solid", True),
             crease=number(node, "creaseAngle", 0.0),
-        )
+        ),
+        effort,
     )
 
 
-def _extrusion(node: Node) -> Surface:
-    return surface(extrusion(node))
+def _extrusion(node: Node, effort: Effort) -> Surface:
+    return surface(extrusion(node), effort)
 
 
-def _box(node: Node) -> Surface:
+def _box(node: Node, _: Effort) -> Surface:
     x, y, z = numbers(node, "size", [2.0, 2.0, 2.0], 3) / 2
     return _stretched(_unit_box(), node, x, y, z)
 
 
-def _sphere(node: Node) -> Surface:
+def _sphere(node: Node, _: Effort) -> Surface:
     radius = number(node, "radius", 1.0)
     return _stretched(_unit_ball(), node, radius, radius, radius)
 
 
-def _cylinder(node: Node) -> Surface:
+def _cylinder(node: Node, _: Effort) -> Surface:
     radius, height = number(node, "radius", 1.0), number(node, "height", 2.0)
     kept = tuple(flag(node, name, True) for name in ("bottom", "side", "top"))
     return _stretched(_unit_turned(1.0, kept), node, radius, height / 2, radius)
 
 
-def _cone(node: Node) -> Surface:
+def _cone(node: Node, _: Effort) -> Surface:
     radius, height = number(node, "bottomRadius", 1.0), number(node, "height", 2.0)
     kept = (flag(node, "bottom", True), flag(node, "side", True), False)
     return _stretched(_unit_turned(0.0, kept), node, radius, height / 2, radius)
@@ -205,7 +207,7 @@ def _unit_turned(top_radius: float, kept: tuple[bool, ...]) -> Surface:
     return Surface(np.concatenate(vertices), np.concatenate(normals), faces)
 
 
-GEOMETRY: Mapping[str, Callable[[Node], Surface]] = {
+GEOMETRY: Mapping[str, Callable[[Node, Effort], Surface]] = {
     "Box": _box,
     "Cone": _cone,
     "Cylinder": _cylinder,

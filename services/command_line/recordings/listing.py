@@ -203,7 +203,7 @@ def summary(recording: schema.Recording) -> str:
     return (
         f"{recording.name}{part}: {recording.duration.ToNanoseconds() * 1e-9:.1f} s, "
         f"{recording.bytes / 1e6:.2f} MB, {f'{lost} messages lost' if lost else 'nothing lost'}, "
-        f"{recording.site}/{recording.file}"
+        f"file {recording.file} in the folder of {recording.site}'s recorder"
     )
 
 

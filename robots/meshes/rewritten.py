@@ -1,0 +1,144 @@
+"""Text of OBJ and COLLADA files as trimesh can read it, and what it would draw of their instances."""
+
+import codecs
+import re
+import xml.etree.ElementTree as Xml
+from collections.abc import Iterator
+from pathlib import Path
+
+from robots.errors import MeshError
+
+# Nodes that draw something, each as often as it is instanced; and numbers of their faces.
+_MOST_INSTANCES = 20_000
+_MOST_NUMBERS = 50_000_000
+_MOST_NESTED = 100
+
+_UTF16 = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
+_NEGATIVE_FACE = re.compile(r"(?m)^[ \t]*[fF][ \t][^\n]*-")
+_COUNTED = re.compile(r"[ \t]*(v|vt|vn|f)[ \t]")
+
+
+def plain_text(data: bytes) -> str:
+    """Decode text: UTF-16 with or without its mark, else UTF-8, with a replacement for what is neither."""
+    for mark, encoding in _UTF16.items():
+        if data.startswith(mark):
+            return data[len(mark) :].decode(encoding, errors="replace")
+    # Of ASCII in UTF-16, every other byte is zero.
+    head = data[:64]
+    for encoding, zeros, letters in (
+        ("utf-16-le", head[1::2], head[::2]),
+        ("utf-16-be", head[::2], head[1::2]),
+    ):
+        if len(head) > 3 and not any(zeros) and all(letters):
+            return data.decode(encoding, errors="replace")
+    return data.removeprefix(codecs.BOM_UTF8).decode("utf-8", errors="replace")
+
+
+def utf8_xml(data: bytes) -> bytes:
+    """Recode an XML document that is UTF-16 as UTF-8."""
+    text = plain_text(data)
+    if data.removeprefix(codecs.BOM_UTF8)[:64] == text[:64].encode():
+        return data
+    return re.sub(r"^\s*<\?xml[^>]*\?>", "", text).encode()
+
+
+def counted_from_first(path: Path, text: str) -> str:
+    """Replace the numbers of an OBJ's faces that count backwards (-1: the last vertex so far).
+
+    Raises:
+        MeshError: If one counts back beyond the first.
+    """
+    if not _NEGATIVE_FACE.search(text):
+        return text
+    counts = {"v": 0, "vt": 0, "vn": 0}
+    lines = text.replace("\\\n", " ").replace("\\\r\n", " ").splitlines()
+    for number, line in enumerate(lines):
+        found = _COUNTED.match(line)
+        if found is None:
+            continue
+        if found[1] in counts:
+            counts[found[1]] += 1
+        elif "-" in line:
+            words = line.partition("#")[0].split()
+            lines[number] = " ".join(["f", *(_corner(path, number + 1, word, counts) for word in words[1:])])
+    return "\n".join(lines) + "\n"
+
+
+def _corner(path: Path, line: int, word: str, counts: dict[str, int]) -> str:
+    numbers = []
+    for text, count in zip(word.split("/"), counts.values(), strict=False):
+        if text.startswith("-") and text[1:].isdecimal():
+            forward = count + 1 + int(text[:20])
+            if forward < 1:
+                raise MeshError(path, f"a face of vertex {text[:20]}, of {count}", place=f"line {line}")
+            text = str(forward)
+        numbers.append(text)
+    return "/".join(numbers)
+
+
+def check_instances(path: Path, data: bytes) -> None:
+    """Refuse a COLLADA file whose nodes instance each other to more than can be drawn.
+
+    Raises:
+        MeshError: If it draws too much, nodes hold themselves, or it is not XML.
+    """
+    try:
+        root = Xml.fromstring(data)
+    except (Xml.ParseError, ValueError, LookupError) as error:
+        raise MeshError(path, f"is no DAE that can be read: {error}") from None
+    sizes: dict[str, int] = {}
+    nodes: dict[str, Xml.Element] = {}
+    for element in root.iter():
+        match _name(element):
+            case "geometry":
+                sizes[element.get("id", "")] = sum(
+                    len(each.text or "") // 2 + 1 for each in element.iter() if _name(each) in ("p", "h")
+                )
+            case "node":
+                nodes.setdefault(element.get("id", ""), element)
+    drawn = _Drawn(path, sizes, nodes)
+    for element in root.iter():
+        if _name(element) == "visual_scene":
+            instances, numbers = drawn.of(element, 0)
+            if instances > _MOST_INSTANCES or numbers > _MOST_NUMBERS:
+                raise MeshError(
+                    path,
+                    f"draws {instances} instances of {numbers} numbers; up to {_MOST_INSTANCES} and "
+                    f"{_MOST_NUMBERS} are read",
+                )
+
+
+class _Drawn:
+    """How many geometries, and numbers of their faces, an element draws; each node is counted once."""
+
+    def __init__(self, path: Path, sizes: dict[str, int], nodes: dict[str, Xml.Element]) -> None:
+        self.path = path
+        self.sizes = sizes
+        self.nodes = nodes
+        self.known: dict[str, tuple[int, int]] = {}
+
+    def of(self, element: Xml.Element, depth: int) -> tuple[int, int]:
+        if depth > _MOST_NESTED:
+            raise MeshError(self.path, f"nodes are nested deeper than {_MOST_NESTED}, or hold themselves")
+        instances = numbers = 0
+        for more, of_them in self._children(element, depth):
+            instances += more
+            numbers += of_them
+        return instances, numbers
+
+    def _children(self, element: Xml.Element, depth: int) -> Iterator[tuple[int, int]]:
+        for child in element:
+            address = child.get("url", "").removeprefix("#")
+            match _name(child):
+                case "instance_geometry" | "instance_controller":
+                    yield 1, self.sizes.get(address, 0)
+                case "node":
+                    yield self.of(child, depth + 1)
+                case "instance_node" if address in self.nodes:
+                    if address not in self.known:
+                        self.known[address] = self.of(self.nodes[address], depth + 1)
+                    yield self.known[address]
+
+
+def _name(element: Xml.Element) -> str:
+    return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""

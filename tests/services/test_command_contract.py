@@ -1,0 +1,147 @@
+"""Every command of the contract's table takes what the table says."""
+
+import json
+import re
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import pytest
+from typer.main import get_command
+
+from services.command_line import main
+from services.command_line.main import app, run
+from tests.conftest import SHARED, free_port
+
+ROOT = Path(__file__).resolve().parents[2]
+# Command: the options that the contract names, and whether it prints data.
+CONTRACT = {
+    "up": (),
+    **dict.fromkeys(
+        ("router", "gateway", "kinematics", "recorder", "renderer", "console"), ("--site", "--connect")
+    ),
+    "simulate": ("--robot", "--listen", "--rate", "--max-clients", "--demo", "--fault"),
+    "list": ("--json",),
+    "monitor": ("--json",),
+    "send": ("--json",),
+    "robot check": ("--json",),
+    "robot show": ("--json",),
+    "robot import": (),
+    "robot export": (),
+    "mesh info": ("--json",),
+    "mesh convert": (),
+    "fk": ("--robot", "--json"),
+    "ik": ("--robot", "--json"),
+    "program check": ("--robot", "--site", "--json"),
+    "record": ("--json",),
+    "recordings list": ("--json",),
+    "recordings info": ("--json",),
+    "recordings recover": (),
+    "recordings export": (),
+    "recordings play": (),
+    "audit verify": ("--head", "--json"),
+    "keys init": (),
+    "doctor": ("--security", "--json"),
+    "snapshot": (),
+}  # fmt: skip
+
+
+def command(words: str) -> click.Command:
+    found = get_command(app)
+    for word in words.split():
+        found = found.commands[word]
+    return found
+
+
+@pytest.mark.parametrize("words", CONTRACT)
+def test_command_takes_what_the_contract_says(words: str) -> None:
+    options = {option for each in command(words).params for option in each.opts}
+    # A router attaches to nobody: it takes its links from the site file.
+    missing = set(CONTRACT[words]) - options - ({"--connect"} if words == "router" else set())
+    assert not missing
+
+
+def test_table_names_every_command_of_the_contract() -> None:
+    document = SHARED / "design.md"
+    if not document.is_file():
+        pytest.skip("the contract is not here")
+    table = document.read_text().split("## The command line")[1].split("\n\n")[2]
+    rows = [row.split("|")[1] for row in table.splitlines()[2:] if row.startswith("|")]
+    named = {word for row in rows for word in re.findall(r"`([a-z]+)", row)}
+    assert named - {words.split()[0] for words in CONTRACT} == set()
+
+
+def test_fk_and_ik_answer_json_lines_with_the_option_and_without(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import io
+
+    for words in (["fk", "-"], ["fk", "-", "--json"], ["fk", "--json", "-"]):
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b'{"joints": [0, 0, 0, 0, 0]}\n')))
+        assert run(words) == 0
+        found = json.loads(capsys.readouterr().out)
+    pose = json.dumps({"pose": found["tool"], "task": "5d"}).encode() + b"\n"
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(pose)))
+    assert run(["ik", "-", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["solutions"]
+    assert run(["ik", "300", "0", "500", "--json"]) == 0
+    assert set(json.loads(capsys.readouterr().out)) >= {"solutions", "residual_m", "residual_rad", "reason"}
+
+
+@pytest.mark.parametrize("example", ["check.py", "inverse.py"])
+def test_example_without_arguments_says_how_it_is_called(example: str) -> None:
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "examples" / example)],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=ROOT,
+    )
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"usage: ./dev run python examples/{example} ")
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_simulator_beyond_loopback_names_its_own_option(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["simulate", "--listen", f"0.0.0.0:{free_port()}"]) == 2
+    error = capsys.readouterr().err
+    assert "--insecure" in error
+    assert "tls = {" not in error
+
+
+def test_command_that_is_interrupted_while_it_loads_ends_with_130_and_no_traceback() -> None:
+    script = (
+        "import os, signal, sys\n"
+        "class Finder:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == 'services.command_line.main':\n"
+        "            os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Finder())\n"
+        "from services.command_line.start import main\n"
+        "main()\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, "list"], capture_output=True, text=True, check=False, cwd=ROOT
+    )
+    assert (done.returncode, done.stderr, done.stdout) == (130, "", "")
+
+
+def test_entry_leaves_ctrl_c_to_the_command_that_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    from services.command_line import start
+
+    before = signal.getsignal(signal.SIGINT)
+    monkeypatch.setattr(main, "main", lambda: None)
+    start.main()
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_doctor_tells_a_running_site_from_another_program(router: str) -> None:
+    from services.command_line import doctor
+
+    assert doctor._is_router(int(router.rpartition(":")[2]))
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        assert not doctor._is_console(other.getsockname()[1])
+    assert not doctor._is_router(free_port())
