@@ -29,6 +29,8 @@ from protocol_gateway.drivers.driver import (
 
 _MS = 1_000_000
 _S = 1_000_000_000
+# 300 years: no clock says more, and nanoseconds of much more are no number.
+_LONGEST_TIME_S = 1e10
 # Arrivals further apart than this leave room for something held back.
 _GAP_S = 0.25
 # A live stream without pauses must not be taken for a burst for longer.
@@ -307,7 +309,7 @@ def _moments(events: Sequence[ControllerEvent]) -> tuple[list[int | None], list[
 
 
 def _ns(seconds: float | None) -> int | None:
-    return None if seconds is None else round(seconds * 1e9)
+    return None if seconds is None or abs(seconds) > _LONGEST_TIME_S else round(seconds * 1e9)
 
 
 def _end_of_run(times_ns: Sequence[int | None], begin: int, before_ns: int | None) -> int:

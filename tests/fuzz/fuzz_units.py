@@ -27,7 +27,7 @@ from protocol_gateway.drivers.driver import JointsReceived
 from protocol_gateway.drivers.unit import UnitDriver
 from protocol_gateway.journal import Journal
 from protocol_gateway.legacy.requests import asks_for_more, asks_to_stop, requests_of
-from protocol_gateway.link.dating import Received
+from protocol_gateway.link.dating import Dating, Received
 from protocol_gateway.telemetry import Telemetry
 from robots.description import load
 from robots.joints import joints_of
@@ -136,6 +136,7 @@ class Gateway:
         self._driver = UnitDriver(JOINTS.types, codes)
         self._client = UnitStream(code_table(codes))
         self._now_s = 0.0
+        self._dating = Dating()
         journal = Journal(Sink(), "arm", monotonic_s=lambda: self._now_s)  # type: ignore[arg-type]
         self._telemetry = Telemetry(
             JOINTS,
@@ -153,8 +154,11 @@ class Gateway:
         """What was wrong with how the link's side took it; empty if nothing."""
         self._now_s += 0.01
         events = [event for piece in pieces for event in self._driver.receive(piece)]
-        for event in events:
-            self._telemetry.on_event(event, Received(self._now_s, int(self._now_s * 1e9)))
+        now = Received(self._now_s, int(self._now_s * 1e9))
+        for event, received in zip(events, self._dating.dates(events, now), strict=True):
+            if received.wall_ns > now.wall_ns:
+                return f"{event} is stamped {received.wall_ns - now.wall_ns} ns after its receipt"
+            self._telemetry.on_event(event, received)
         read = [event.positions for event in events if isinstance(event, JointsReceived)]
         right = [
             tuple(value * scale for value, scale in zip(values, SCALES, strict=True))

@@ -136,6 +136,16 @@ def test_a_new_connection_believes_no_clock_of_the_one_before():
     assert date(dating, 1.0 + 0.5, at(end_s + 2.0)) == Received(end_s + 2.0, round((end_s + 2.0) * 1e9), 1)
 
 
+@pytest.mark.parametrize("nonsense_s", [1e305, -1e305, 1e11, 5e-324])
+def test_a_time_that_no_clock_says_ends_nothing(nonsense_s):
+    dating = Dating()
+    end_s = fresh(dating)
+    for number in range(1, 50):
+        time_s = nonsense_s if number % 7 == 3 else 1.0 + number * 0.01
+        now = at(end_s + number * 0.01)
+        assert 0 <= now.wall_ns - date(dating, time_s, now).wall_ns < 20 * MS
+
+
 @pytest.mark.parametrize("ppm", [-5000, -200, 0, 200, 5000])
 def test_a_clock_that_drifts_is_followed_in_one_identity(ppm):
     dating = Dating()
