@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 from bus.health import Served, present
 from bus.session import Session, SessionSettings, open_session
+from bus.texts import for_terminal
 
 AnySettings = TypeVar("AnySettings")
 
@@ -84,7 +85,7 @@ class _Stderr(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         with contextlib.suppress(queue.Full):
-            self.lines.put_nowait(self.format(record))
+            self.lines.put_nowait(for_terminal(self.format(record)))
 
     def _write(self) -> None:
         while True:

@@ -11,11 +11,14 @@ from typing import Any, NamedTuple, TypeVar
 from bus.errors import SessionError
 from bus.keys import WHOLE_SITE
 from bus.session import Session, open_session
+from bus.texts import DIRECTION
 from services.command_line.alarm_lists import gone_sites, lists
 from services.command_line.attaching import attachment, own_identity
 from services.errors import ServiceError
 
 T = TypeVar("T")
+
+_ESCAPED = {ord(each): f"\\u{ord(each):04x}" for each in DIRECTION}
 
 
 class Robot(NamedTuple):
@@ -74,8 +77,9 @@ async def find(session: Session, text: str) -> Robot:
 
 
 def print_json(value: Any) -> None:
-    """One line of JSON."""
-    print(json.dumps(value, ensure_ascii=False, allow_nan=False), flush=True)
+    """Print one line of JSON; control characters of direction are escaped, so that they act nowhere."""
+    line = json.dumps(value, ensure_ascii=False, allow_nan=False)
+    print(line.translate(_ESCAPED), flush=True)
 
 
 def own_name() -> str:

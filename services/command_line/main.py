@@ -23,6 +23,7 @@ from services.command_line.kept import audit_app, recordings_app
 from services.command_line.keys import keys_app
 from services.command_line.keys_folder import KeysFolder, keys_folder
 from services.command_line.options import Connect, Height, Json, Robot, Width
+from services.command_line.output import show_directions
 from services.command_line.programs import program_app
 
 app = typer.Typer(
@@ -248,6 +249,7 @@ def ik(
 
 def main() -> None:
     """The program."""
+    show_directions()
     status = run(sys.argv[1:])
     try:
         # What waits yet is said now: the interpreter's own end would tell who cannot hear it.

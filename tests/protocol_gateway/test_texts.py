@@ -14,7 +14,7 @@ from protocol_gateway.texts import one_line
         ("somebody in the cell", "somebody in the cell"),
         ("有人在里面", "有人在里面"),
         ("a\nERROR forged\r\tb", "a ERROR forged  b"),
-        ("\x1b[2J\x00\u202e\u200b\u2028", " [2J    "),
+        ("\x1b[2J\x00\u202e\u200b\u2028", " [2J <U+202E>  "),
         ("r" * 200, "r" * 200),
         ("r" * 201, "r" * 199 + "…"),
     ],

@@ -1,6 +1,7 @@
 // Every word of the page, in English and Chinese. `{name}` is filled in.
 
 import { signal } from "@preact/signals";
+import { isolated } from "./foreign-text";
 
 const TEXTS = {
   fleet: ["Fleet", "机群"],
@@ -324,7 +325,10 @@ export function t(name: TextName, values: Record<string, string | number> = {}):
 
 /** One of a pair of texts, English and Chinese, filled in. */
 export function inLanguage(pair: readonly [string, string], values: Record<string, string | number>): string {
-  return pair[language.value === "zh" ? 1 : 0].replace(/\{(\w+)\}/g, (whole, key: string) => String(values[key] ?? whole));
+  return pair[language.value === "zh" ? 1 : 0].replace(/\{(\w+)\}/g, (whole, key: string) => {
+    const value = values[key];
+    return value === undefined ? whole : isolated(String(value));
+  });
 }
 
 /** A text by a name made at run time, or what stands in for it. */

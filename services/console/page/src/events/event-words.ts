@@ -3,11 +3,13 @@
 
 import { Event_Severity as Severity } from "../gen/robomesh_pb";
 import type { Event } from "../gen/robomesh_pb";
+import { isolated } from "../foreign-text";
 import { language } from "../texts";
 import { alarmTitle } from "./alarm-words";
 
 // What nobody has to act on; a code that may be an alarm's too stands here as it is when it is none.
 const CHINESE: Record<string, string> = {
+  "mesh.key_ignored": "已忽略不符合网络命名规则的键：{key}。",
   "link.up": "与控制器的连接正常。",
   "link.silent": "已连接控制器，尚未收到数据。",
   "link.flooding_ended": "控制器数据不再过载。",
@@ -77,7 +79,7 @@ function filled(sentence: string, values: Record<string, string>): string | null
   const text = sentence.replace(/\{(\w+)\}/g, (_, name: string) => {
     const value = values[name];
     all &&= value !== undefined;
-    return VALUES[`${name}:${value}`] ?? value ?? "";
+    return VALUES[`${name}:${value}`] ?? isolated(value ?? "");
   });
   return all ? text : null;
 }
