@@ -15,7 +15,8 @@ import zenoh
 from google.protobuf.message import Message
 
 from bus import keys, pieces, topics
-from bus.errors import MessageError, QuotaError, RefusedError
+from bus.errors import KeyNameError, MessageError, QuotaError, RefusedError
+from bus.ignored import REQUEST, Ignored
 from bus.intake import RING, Queue, RateLimit, Turns, begin_now, read
 from bus.latencies import Latencies
 from bus.messages import JSON, PROTOBUF, TEXT, decode_request, encode, is_json
@@ -77,6 +78,7 @@ class Answerer:
 
     Args:
         on_refused: Told of what cannot be read, or meant: no handler sees it.
+        ignored: Counts requests on keys that fit no key of the contract.
 
     Attributes:
         turned_away: How many were told that too many wait.
@@ -94,7 +96,9 @@ class Answerer:
         *,
         turns: Turns,
         on_refused: OnRefused = lambda chunk, text: None,
+        ignored: Ignored,
     ) -> None:
+        self._ignored = ignored
         self._row = topics.request(name)
         self._own = keys.Key(site, robot, name)
         self._handler = handler
@@ -219,7 +223,7 @@ class Answerer:
                 self.over_quota += 1
                 query.reply_err(str(error).encode(), encoding=f"{QUOTA_TEXT}{error.again_s:.3f}")
                 return
-            except (RefusedError, MessageError) as error:
+            except (RefusedError, MessageError, KeyNameError) as error:
                 query.reply_err(str(error).encode(), encoding=TEXT)
                 return
             except Exception:
@@ -260,12 +264,15 @@ class Answerer:
     def _read(self, key: keys.Key, query: zenoh.Query, encoding: str, received_ns: int) -> Request:
         asked, chunk = str(query.key_expr), _chunk(self._row.name, key.topic)
         try:
-            if keys.has_wildcard(asked) and not self._row.wildcard:
-                raise RefusedError(f"{asked} has a wildcard: ask one {self._row.name} by its whole key")
+            if keys.has_wildcard(asked):
+                if not self._row.wildcard:
+                    raise RefusedError(f"{asked} has a wildcard: ask one {self._row.name} by its whole key")
+            elif self._ignored.key(REQUEST, asked) is None:
+                keys.parse_key(asked)  # says why
             payload = query.payload.to_bytes() if query.payload is not None else b""
             message = self._message(payload, encoding)
             return Request(key, message, chunk, received_ns, _within_s(query))
-        except (RefusedError, MessageError) as error:
+        except (RefusedError, MessageError, KeyNameError) as error:
             self._on_refused(chunk, str(error))
             raise
 
@@ -286,7 +293,7 @@ class Answerer:
         `robomesh/**` asks for everybody's last values: it must not stop a robot.
         """
         if not keys.has_wildcard(asked):
-            return keys.parse_key(asked)
+            return keys.parse_expression(asked)
         last = self._own.topic.rsplit("/", 1)[-1]
         return self._own if not self._row.wildcard or asked.rsplit("/", 1)[-1] == last else None
 

@@ -49,7 +49,7 @@ async def ask_all(
         silent_s: How long nothing more of a long answer may come [s]; None: as long.
     """
     loop = asyncio.get_running_loop()
-    row = topics.request(keys.parse_key(key).topic)
+    row = topics.request(keys.parse_expression(key).topic)
     if row.priority in ON_THE_SECOND_LINK:
         # In a thread, which keeps no order: never before a command.
         await asyncio.to_thread(settle, session, row.priority)
@@ -199,7 +199,7 @@ def decode_answer(key: str, payload: bytes) -> Message:
     Raises:
         MessageError: If the bytes are not that message.
     """
-    schema = topics.request(keys.parse_key(key).topic).answer
+    schema = topics.request(keys.parse_expression(key).topic).answer
     if schema is None:
         raise MessageError(f"{key} answers with plain bytes")
     return decode(schema, payload)

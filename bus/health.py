@@ -141,6 +141,8 @@ class _Health:
             turned_away=tally.turned_away.total(),
             robots=sorted({robot for _, robot in self._served.present_for} - {WHOLE_SITE}),
             zenoh_id=self._zenoh_id(),
+            ignored=self._session.ignored.count,
+            ignored_examples=tuple(self._session.ignored.examples),
         )
         health.timestamp.GetCurrentTime()
         health.started.FromNanoseconds(round(started_s * 1e9))

@@ -10,11 +10,15 @@ import re
 from typing import NamedTuple
 
 from bus.errors import KeyNameError
+from bus.texts import one_line
 
 ROOT = "robomesh"
 WHOLE_SITE = "-"
 # A recording played back is a robot named replay-<id>.
 REPLAY = "replay-"
+
+# Characters of a site's or robot's name, and of any other chunk of a key.
+LONGEST_NAME, LONGEST_CHUNK = 64, 200
 
 _NAME = re.compile(r"[a-z0-9][a-z0-9_-]*")
 # Operators and views come from people and certificates: what a key chunk can hold.
@@ -45,12 +49,13 @@ def check_name(name: str, what: str = "name") -> str:
     """The name itself, when a site or robot may have it.
 
     Raises:
-        KeyNameError: If it is not lower-case letters, digits, `_` and `-`, beginning with a letter or digit.
+        KeyNameError: If it is not at most 64 lower-case letters, digits, `_` and `-`, beginning with a
+            letter or digit.
     """
-    if not _NAME.fullmatch(name):
+    if len(name) > LONGEST_NAME or not _NAME.fullmatch(name):
         raise KeyNameError(
-            f"{what} {name!r} cannot be used: lower-case letters, digits, '_' and '-', "
-            "beginning with a letter or digit"
+            f"{what} {one_line(name, LONGEST_NAME)!r} cannot be used: lower-case letters, digits, '_' and "
+            f"'-', beginning with a letter or digit, at most {LONGEST_NAME}"
         )
     return name
 
@@ -61,10 +66,10 @@ def check_chunk(name: str, what: str = "operator") -> str:
     Raises:
         KeyNameError: If it cannot.
     """
-    if not _CHUNK.fullmatch(name):
+    if len(name) > LONGEST_CHUNK or not _CHUNK.fullmatch(name):
         raise KeyNameError(
-            f"{what} {name!r} cannot be used: letters, digits, '_', '.' and '-', "
-            "beginning with a letter or digit"
+            f"{what} {one_line(name, LONGEST_NAME)!r} cannot be used: letters, digits, '_', '.' and '-', "
+            f"beginning with a letter or digit, at most {LONGEST_CHUNK}"
         )
     return name
 
@@ -87,14 +92,30 @@ def every_robot(topic: str) -> str:
 
 
 def parse_key(key: str) -> Key:
-    """Site, robot and topic of a key.
+    """Return site, robot and topic of a key that fits the contract; no key expression does.
 
     Raises:
-        KeyNameError: If it is not a key of the mesh.
+        KeyNameError: If it is not a key of the mesh, or a chunk of it cannot be used.
     """
-    root, *rest = key.split("/", 3)
+    parsed = parse_expression(key)
+    robot_key(*parsed)
+    for chunk in parsed.topic.split("/"):
+        check_chunk(chunk, "chunk")
+    return parsed
+
+
+def parse_expression(key_expr: str) -> Key:
+    """Return site, robot and topic of a key or key expression of our own; each may have a wildcard.
+
+    What others send goes through `parse_key`, which checks every chunk.
+
+    Raises:
+        KeyNameError: If it does not have these three parts.
+    """
+    root, *rest = key_expr.split("/", 3)
     if root != ROOT or len(rest) != 3 or not all(rest):
-        raise KeyNameError(f"{key!r} is not a key of the mesh: robomesh/<site>/<robot>/<topic>")
+        shown = one_line(key_expr, LONGEST_CHUNK)
+        raise KeyNameError(f"{shown!r} is not a key of the mesh: robomesh/<site>/<robot>/<topic>")
     return Key(*rest)
 
 
@@ -112,7 +133,13 @@ def is_replay(key: str) -> bool:
 
 
 def presence_key(site: str, robot: str, service: str, identity: str) -> str:
-    """The key of a liveliness token."""
+    """Return the key of a liveliness token; `*` as the identity for every token of the service.
+
+    Raises:
+        KeyNameError: If a part of it cannot be used.
+    """
+    if identity != "*":
+        check_chunk(identity, "id")
     return f"{robot_key(site, robot, 'alive')}/{check_chunk(service, 'service')}/{identity}"
 
 
@@ -120,11 +147,9 @@ def parse_presence_key(key: str) -> PresenceKey:
     """Site, robot, service and id of a liveliness token's key.
 
     Raises:
-        KeyNameError: If it is not one, or stands for many.
+        KeyNameError: If it is not one, a chunk of it cannot be used, or it stands for many.
     """
     site, robot, topic = parse_key(key)
-    if has_wildcard(key):
-        raise KeyNameError(f"{key!r} has a wildcard: nobody is present everywhere")
     match topic.split("/"):
         case ["alive", service, identity]:
             return PresenceKey(site, robot, service, identity)

@@ -8,6 +8,7 @@ from google.protobuf.message import Message
 from bus import keys
 from bus.endpoints import settle
 from bus.errors import MessageError
+from bus.ignored import REPLY
 from bus.messages import decode
 from bus.session import Session
 from bus.topics import topic
@@ -20,15 +21,15 @@ async def last_values(session: Session, key_expr: str, *, timeout_s: float = 1.5
         key_expr: Of one topic, as in `robomesh/*/-/alarms`.
         timeout_s: For those who are announced and do not answer; else it returns with the last answer.
     """
-    row = topic(keys.parse_key(key_expr).topic)
+    row = topic(keys.parse_expression(key_expr).topic)
     schema = row.history_schema or row.schema
     loop = asyncio.get_running_loop()
     done: asyncio.Future[None] = loop.create_future()
     found: dict[str, bytes] = {}
 
     def on_reply(reply: zenoh.Reply) -> None:
-        if reply.ok is not None and not keys.has_wildcard(str(reply.ok.key_expr)):
-            found[str(reply.ok.key_expr)] = reply.ok.payload.to_bytes()
+        if reply.ok is not None and session.ignored.key(REPLY, key := str(reply.ok.key_expr)) is not None:
+            found[key] = reply.ok.payload.to_bytes()
 
     def finish() -> None:
         if not done.done():

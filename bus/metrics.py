@@ -27,7 +27,7 @@ _COUNTS = {
     "received": "Messages received",
     "lost": "Messages that never arrived: gaps in their publisher's numbers",
     "skipped": "Messages that arrived and that the service was too slow to take",
-    "malformed": "Messages without a right attachment, or on a key for many, left out",
+    "malformed": "Messages without a right attachment, left out",
 }
 # Of what has gone for good, such as an ended replay, nothing is told any more.
 _LONGEST_AGE_S = 3600.0
@@ -53,6 +53,11 @@ class SessionMetrics(Collector):
             for topic, count in sorted(getattr(tally, name).items()):
                 counter.add_metric([topic], count)
             yield counter
+        yield CounterMetricFamily(
+            "robomesh_ignored",
+            "Tokens, publications, replies and requests on keys that fit no key of the contract",
+            value=self._session.ignored.count,
+        )
         yield self._ages()
         away = CounterMetricFamily(
             "robomesh_turned_away", "Requests that found no place, by request", labels=["request"]

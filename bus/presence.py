@@ -1,13 +1,13 @@
 """Presence: who is alive, told by Zenoh's liveliness."""
 
 import asyncio
-import contextlib
+import secrets
 from collections.abc import AsyncIterator
 
 import zenoh
 
 from bus import keys
-from bus.errors import KeyNameError
+from bus.ignored import Ignored
 
 _TIMEOUT_S = 2.0
 EVERYBODY = f"{keys.ROOT}/*/*/alive/*/*"
@@ -19,16 +19,31 @@ MONITOR = "monitor"
 SILENT = (OPERATOR, MONITOR)
 
 
-async def present(session: zenoh.Session, key_expr: str = EVERYBODY) -> list[keys.PresenceKey]:
-    """Who is alive now, sorted."""
+def session_of(name: str) -> str:
+    """Return a new id for the presence of a session; with certificates its owner alone may declare it.
+
+    Args:
+        name: In whose name the session asks.
+    """
+    return f"{name}.{secrets.token_hex(8)}"
+
+
+async def present(
+    session: zenoh.Session, key_expr: str = EVERYBODY, *, ignored: Ignored | None = None
+) -> list[keys.PresenceKey]:
+    """Return who is alive now, sorted.
+
+    Args:
+        ignored: Counts tokens that fit no presence key; None: they are left out uncounted.
+    """
+    seen = Ignored() if ignored is None else ignored
     loop = asyncio.get_running_loop()
     done = asyncio.Event()
     found: set[keys.PresenceKey] = set()
 
     def on_reply(reply: zenoh.Reply) -> None:
-        if reply.ok is not None:
-            with contextlib.suppress(KeyNameError):
-                found.add(keys.parse_presence_key(str(reply.ok.key_expr)))
+        if reply.ok is not None and (key := seen.presence(str(reply.ok.key_expr))) is not None:
+            found.add(key)
 
     def on_end() -> None:
         if not loop.is_closed():
@@ -42,16 +57,15 @@ async def present(session: zenoh.Session, key_expr: str = EVERYBODY) -> list[key
 class PresenceWatch:
     """Who comes alive and who goes, as an asynchronous iterator; who is there already comes first."""
 
-    def __init__(self, session: zenoh.Session, key_expr: str = EVERYBODY) -> None:
+    def __init__(self, session: zenoh.Session, key_expr: str, ignored: Ignored) -> None:
         loop = asyncio.get_running_loop()
         self._closed = False
         self._changes: asyncio.Queue[tuple[keys.PresenceKey, bool] | None] = asyncio.Queue()
         present: set[keys.PresenceKey] = set()
 
         def on_change(sample: zenoh.Sample) -> None:
-            try:
-                key = keys.parse_presence_key(str(sample.key_expr))
-            except KeyNameError:
+            key = ignored.presence(str(sample.key_expr))
+            if key is None:
                 return
             alive = sample.kind == zenoh.SampleKind.PUT
             if alive == (key in present):

@@ -15,6 +15,7 @@ from google.protobuf.message import Message
 from bus import access, answering, asking, keys, presence, refused, topics
 from bus.endpoints import DEFAULT_ROUTER, Tls, client_config, first_line
 from bus.errors import BrokenAnswerError, NoAnswerError, NoRightError, SessionError
+from bus.ignored import REPLY, Ignored
 from bus.intake import Turns
 from bus.publisher import OnGet, Publisher
 from bus.subscription import Subscription
@@ -54,6 +55,8 @@ class Session:
     identity: str = field(default_factory=lambda: secrets.token_hex(4))
     # Numbers of the service's own, for who looks after it.
     measures: list[Measure] = field(default_factory=list)
+    # Keys that fit no key of the contract.
+    ignored: Ignored = field(default_factory=Ignored)
     _declared: list[_Declared] = field(default_factory=list)
     _ended: Tally = field(default_factory=Tally)
     _keeping: threading.Lock = field(default_factory=threading.Lock)
@@ -94,7 +97,9 @@ class Session:
             newest: How many samples wait for a slow consumer, in all; older ones are dropped.
             history: Begin with the last value, and ask for it again when a service comes back.
         """
-        subscription = Subscription(self.zenoh_session, key_expr, newest=newest, history=history)
+        subscription = Subscription(
+            self.zenoh_session, key_expr, newest=newest, history=history, ignored=self.ignored
+        )
         self._keep(subscription)
         if history and self._refresher is None:
             self._refresher = asyncio.create_task(self._refresh())
@@ -129,11 +134,13 @@ class Session:
         self._check("query", key)
         payload = b"" if request is None else request.SerializeToString()
         answers = await asking.ask_all(self.zenoh_session, key, payload, timeout_s=timeout_s)
-        return [asking.answer_of(*each) for each in answers]
+        # Of a refusal the key that was asked is known, and no owner's.
+        fits = (each for each in answers if each[0] == key or self.ignored.key(REPLY, each[0]) is not None)
+        return [asking.answer_of(*each) for each in fits]
 
     async def last(self, key: str, *, timeout_s: float = 2.0) -> Message | None:
         """The last value of a topic (its history message where it has one); None: nobody has one."""
-        subscription = Subscription(self.zenoh_session, key, newest=1, history=True)
+        subscription = Subscription(self.zenoh_session, key, newest=1, history=True, ignored=self.ignored)
         try:
             async with asyncio.timeout(timeout_s):
                 while True:
@@ -166,7 +173,14 @@ class Session:
         if self._turns is None:
             self._turns = Turns()
         answerer = answering.Answerer(
-            over, site, robot, name, handler, turns=self._turns, on_refused=on_refused
+            over,
+            site,
+            robot,
+            name,
+            handler,
+            turns=self._turns,
+            on_refused=on_refused,
+            ignored=self.ignored,
         )
         self._keep(answerer)
         return answerer
@@ -185,13 +199,13 @@ class Session:
 
     def watch_presence(self, key_expr: str = presence.EVERYBODY) -> presence.PresenceWatch:
         """Who comes alive and who goes; who is there already comes first."""
-        watch = presence.PresenceWatch(self.zenoh_session, key_expr)
+        watch = presence.PresenceWatch(self.zenoh_session, key_expr, self.ignored)
         self._keep(watch)
         return watch
 
     async def present(self) -> list[keys.PresenceKey]:
         """Who is alive now, everywhere, sorted."""
-        return await presence.present(self.zenoh_session)
+        return await presence.present(self.zenoh_session, ignored=self.ignored)
 
     def _check(self, act: access.Act, key: str) -> None:
         """Say at once, and in words, what the router would refuse in silence."""

@@ -20,6 +20,7 @@ from bus import keys
 from bus.endpoints import settle
 from bus.errors import MessageError
 from bus.header import Header, unpack
+from bus.ignored import PUBLICATION, REPLY, Ignored
 from bus.lateness import Lateness
 from bus.messages import decode
 from bus.topics import History, Topic, topic
@@ -85,9 +86,12 @@ class Subscription:
     One consumer at a time. Its counters may be read at any time.
     """
 
-    def __init__(self, session: zenoh.Session, key_expr: str, *, newest: int, history: bool) -> None:
+    def __init__(
+        self, session: zenoh.Session, key_expr: str, *, newest: int, history: bool, ignored: Ignored
+    ) -> None:
         self.key_expr = key_expr
-        self.topic: Topic = topic(keys.parse_key(key_expr).topic)
+        self._ignored = ignored
+        self.topic: Topic = topic(keys.parse_expression(key_expr).topic)
         self._session = session
         self._loop = asyncio.get_running_loop()
         self._ready = asyncio.Event()
@@ -175,7 +179,7 @@ class Subscription:
 
     @property
     def malformed(self) -> int:
-        """Samples without a right attachment, or on a key for many, left out."""
+        """Samples without a right attachment, left out."""
         return self._malformed
 
     @property
@@ -189,7 +193,7 @@ class Subscription:
         What a publisher put while the link was down was lost in silence.
         """
         if self._history and self._asking is None and not self._closed:
-            wanted = keys.parse_key(self.key_expr)
+            wanted = keys.parse_expression(self.key_expr)
             if wanted.site in ("*", site) and wanted.robot in ("*", robot, keys.WHOLE_SITE):
                 self._asking = self._loop.call_later(_ASK_AGAIN_AFTER_S, self._ask_again)
 
@@ -256,7 +260,10 @@ class Subscription:
         """Keep a sample that is new (the lock is held); `asked_at`: it answers a question of then."""
         key = str(sample.key_expr)
         attachment = sample.attachment
-        if attachment is None or sample.kind != zenoh.SampleKind.PUT or keys.has_wildcard(key):
+        kind = PUBLICATION if asked_at is None else REPLY
+        if key not in self._seen and self._ignored.key(kind, key) is None:
+            return
+        if attachment is None or sample.kind != zenoh.SampleKind.PUT:
             self._malformed += 1
             return
         try:

@@ -58,7 +58,7 @@ class Feed:
     async def _ask_again(self) -> None:
         """Asks until there is a value: on a busy machine an answer can be lost, and what
         changes seldom, as a description does, would not be seen until it did."""
-        key = keys.parse_key(self._subscription.key_expr)
+        key = keys.parse_expression(self._subscription.key_expr)
         while True:
             await asyncio.sleep(_ASK_AGAIN_S)
             one_is_enough = "*" not in (key.site, key.robot)
@@ -140,7 +140,7 @@ def check_expression(expression: str) -> topics.Topic:
         WatchError: If it names no topic, or wildcards more than site and robot.
     """
     try:
-        key = keys.parse_key(expression)
+        key = keys.parse_expression(expression)
         for name, what in ((key.site, "site"), (key.robot, "robot")):
             if name not in ("*", keys.WHOLE_SITE):
                 keys.check_name(name, what)

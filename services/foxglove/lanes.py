@@ -9,7 +9,7 @@ from typing import Any
 import foxglove
 
 from bus.errors import BusError
-from bus.keys import parse_key
+from bus.keys import parse_expression
 from bus.schemas.robomesh_pb2 import KeyFrameRequest
 from bus.session import Session
 from bus.subscription import Subscription
@@ -45,7 +45,7 @@ class Lane:
         self._session = session
         self._keys = key_exprs
         self._as_shown = as_shown
-        self._row = topic(parse_key(key_exprs[0]).topic)
+        self._row = topic(parse_expression(key_exprs[0]).topic)
         kept = {History.LAST_100: 100, History.KEY_FRAME: 0}.get(self._row.history, 1)
         # What somebody gets who comes while others watch already.
         self._held: deque[Timed] = deque(maxlen=kept)

@@ -17,7 +17,8 @@ import zenoh.ext
 from bus.endpoints import settle
 from bus.errors import MessageError
 from bus.header import Header, unpack
-from bus.keys import has_wildcard, robot_key
+from bus.ignored import PUBLICATION, REPLY, Ignored
+from bus.keys import robot_key
 from bus.messages import decode
 from bus.schemas import robomesh_pb2 as schema
 from bus.topics import History, Topic, topic
@@ -84,8 +85,9 @@ class _Kept:
 class _Tap:
     """One topic of one robot."""
 
-    def __init__(self, session: zenoh.Session, key_expr: str) -> None:
+    def __init__(self, session: zenoh.Session, key_expr: str, ignored: Ignored) -> None:
         self.key_expr = key_expr
+        self._ignored = ignored
         self.row = topic(key_expr.split("/", 3)[3])
         # Every key's lost publications, and what a file of its own begins with.
         self.lost: Counter[str] = Counter()
@@ -151,7 +153,7 @@ class _Tap:
         while taken < _MOST_AT_ONCE and (sample := take()) is not None:
             taken += 1
             attachment, key = sample.attachment, str(sample.key_expr)
-            if attachment is None or sample.kind != zenoh.SampleKind.PUT or has_wildcard(key):
+            if attachment is None or sample.kind != zenoh.SampleKind.PUT or not self._fits(PUBLICATION, key):
                 continue
             try:
                 header = unpack(attachment.to_bytes())
@@ -180,6 +182,9 @@ class _Tap:
         if self._timeless or is_key_frame(payload):
             kept.begin()
         kept.add((header, payload, received_ns))
+
+    def _fits(self, kind: str, key: str) -> bool:
+        return key in self._seen or self._ignored.key(kind, key) is not None
 
     def _is_new(self, key: str, header: Header) -> bool:
         """Whether it has not come before; what is missing before it is counted."""
@@ -216,7 +221,7 @@ class _Tap:
             MessageError: If it cannot be read.
         """
         key, now_ns = str(sample.key_expr), time.monotonic_ns()
-        if sample.attachment is None or has_wildcard(key):
+        if sample.attachment is None or not self._fits(REPLY, key):
             return []
         header = unpack(sample.attachment.to_bytes())
         payload = sample.payload.to_bytes()
@@ -251,8 +256,8 @@ class _Tap:
 class RobotIntake:
     """A robot's topics, while anybody wants them."""
 
-    def __init__(self, session: zenoh.Session, site: str, robot: str) -> None:
-        self._session, self._site, self._robot = session, site, robot
+    def __init__(self, session: zenoh.Session, site: str, robot: str, ignored: Ignored) -> None:
+        self._session, self._site, self._robot, self._ignored = session, site, robot, ignored
         self._taps: dict[str, _Tap] = {}
         # With the names that each takes, and what was lost of those before.
         self._sinks: dict[Sink, tuple[frozenset[str], Counter[str]]] = {}
@@ -270,7 +275,7 @@ class RobotIntake:
     def attach(self, sink: Sink, names: frozenset[str]) -> None:
         """Give a sink every publication of these topics' names from now on, and what explains them."""
         for name in sorted(names - self._taps.keys()):
-            self._taps[name] = _Tap(self._session, robot_key(self._site, self._robot, name))
+            self._taps[name] = _Tap(self._session, robot_key(self._site, self._robot, name), self._ignored)
         for name in names:
             tap = self._taps[name]
             for key, kept in tap.kept.items():
@@ -312,8 +317,8 @@ class RobotIntake:
 class Intake:
     """All robots' topics, and the thread that empties their rings."""
 
-    def __init__(self, session: zenoh.Session, site: str) -> None:
-        self._session, self._site = session, site
+    def __init__(self, session: zenoh.Session, site: str, ignored: Ignored) -> None:
+        self._session, self._site, self._ignored = session, site, ignored
         # Held by whoever looks into the rings, or changes what is listened to.
         self.lock = threading.RLock()
         self._robots: dict[str, RobotIntake] = {}
@@ -326,7 +331,7 @@ class Intake:
         """A robot's topics; its methods are called with the lock held."""
         if name not in self._robots:
             with self.lock:
-                self._robots[name] = RobotIntake(self._session, self._site, name)
+                self._robots[name] = RobotIntake(self._session, self._site, name, self._ignored)
         return self._robots[name]
 
     def close(self) -> None:

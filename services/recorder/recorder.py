@@ -191,7 +191,7 @@ class _Recorder:
         self._loop = asyncio.get_running_loop()
         self._group = asyncio.TaskGroup()
         self._robots: dict[str, _Robot] = {}
-        self.intake = Intake(session.zenoh_session, settings.site)
+        self.intake = Intake(session.zenoh_session, settings.site, session.ignored)
         self.disk = Disk(settings.folder, settings.marks, self._on_failed)
         self.finisher = Finisher()
         self.notices = Notices(session, settings.site)

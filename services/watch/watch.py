@@ -4,17 +4,19 @@ import asyncio
 import contextlib
 import logging
 import time
-from collections.abc import Coroutine
+from collections.abc import Coroutine, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from bus.answering import Request
 from bus.clock import read_clock
 from bus.errors import MessageError, NoAnswerError, RefusedError
+from bus.ignored import PUBLICATION
 from bus.keys import REPLAY, ROOT, WHOLE_SITE, check_name
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
 from bus.subscription import Subscription
+from bus.texts import one_line
 from bus.topics import check_operator
 from services.watch.alarms import AlarmError
 from services.watch.book import Book
@@ -33,6 +35,8 @@ _ASKED_ELSEWHERE = ("router", "watch")
 # So long after everybody has settled nobody knows yet what is so: what stood before the start stands on.
 _KNOWN_AFTER_S = 2.0
 _NAMES_MOST = 200
+# Keys that fit no key of the contract: so many are events, the rest is counted in the services' health.
+_MOST_IGNORED, _LONGEST_IGNORED = 64, 200
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +76,7 @@ class _Watch:
         self._blind_until_s = self._unsettled_until_s = 0.0
         # Alarms whose teller has been replaced, and since when.
         self._orphans: dict[str, float] = {}
+        self._ignored: set[str] = set()
         self._zenoh_id = str(session.zenoh_session.info.zid())
         session.measure("alarms", "Alarms that are not over and seen", lambda: len(self._book.alarms.held))
         session.measure("processes", "Processes of the mesh", lambda: len(self._mesh.processes))
@@ -143,6 +148,12 @@ class _Watch:
                 log.warning("%s: %s", sample.key, error)
                 continue
             assert isinstance(health, schema.ServiceHealth)
+            if sample.parsed.topic != f"health/{health.service}.{health.id}":
+                # What it says of itself names keys that it is asked on.
+                self._session.ignored.note(PUBLICATION, f"{sample.key} of another process's name")
+                continue
+            if sample.parsed.site == self._site:
+                self._say_ignored(health.ignored_examples)
             # The last words of who has gone are no sign of life.
             if sample.live or health.id in self._mesh.present:
                 self._mesh.see(sample.parsed.site, health, sample.received)
@@ -179,6 +190,7 @@ class _Watch:
             now, now_s = time.time(), time.monotonic()
             if now_s - begun_s > self._settled_s + _KNOWN_AFTER_S:
                 before = {}
+            self._say_ignored(tuple(self._session.ignored.examples))
             self._forget_robots()
             self._mesh.forget_gone(now_s)
             if self._sees(now_s):
@@ -261,6 +273,15 @@ class _Watch:
     def _age_s(self, robot: str) -> float:
         age_s = self._controllers.age_s(f"{ROOT}/{self._site}/{robot}/controller")
         return 0.0 if age_s is None else age_s
+
+    def _say_ignored(self, examples: Iterable[str]) -> None:
+        """Make each key that a process has ignored one event, however many processes have."""
+        for example in examples:
+            shown = one_line(example, _LONGEST_IGNORED)
+            if shown not in self._ignored and len(self._ignored) < _MOST_IGNORED:
+                self._ignored.add(shown)
+                text = f"ignored: {shown}: it fits no key of the mesh; a program uses a wrong name"
+                self._say(schema.Event.WARNING, "mesh.key_ignored", text, {"key": shown})
 
     def _say(self, severity: schema.Event.Severity, code: str, text: str, values: dict[str, str]) -> None:
         event = schema.Event(severity=severity, code=code, text=text, source="watch", values=values)

@@ -46,7 +46,7 @@ def test_who_takes_a_robots_joints_is_given_no_video_and_misses_none_of_it(mesh)
             def put(key, number, data=b""):
                 other.zenoh_session.put(key, data, attachment=pack(Header(7, number, number)))
 
-            taking = intake.Intake(own.zenoh_session, "site")
+            taking = intake.Intake(own.zenoh_session, "site", own.ignored)
             states, all_of_it, later = Sink(), Sink(), Sink()
             try:
                 with taking.lock:
@@ -111,7 +111,7 @@ def test_a_list_with_a_time_that_is_none_is_left_out_and_what_follows_is_taken(m
                 query.reply(EVENTS, list_of, attachment=pack(Header(7, 1, 0)))
 
             queryable = other.zenoh_session.declare_queryable(EVENTS, tell)
-            taking, sink = intake.Intake(own.zenoh_session, "site"), Sink()
+            taking, sink = intake.Intake(own.zenoh_session, "site", own.ignored), Sink()
             try:
                 with taking.lock:
                     taking.robot("arm").attach(sink, frozenset({"events"}))
@@ -134,7 +134,7 @@ def test_a_sink_that_fails_at_a_message_ends_no_other_robots_recording(mesh, cap
 
     async def main():
         async with open_session(mesh) as own, open_session(mesh) as other:
-            taking, sink = intake.Intake(own.zenoh_session, "site"), Sink()
+            taking, sink = intake.Intake(own.zenoh_session, "site", own.ignored), Sink()
             try:
                 with taking.lock:
                     taking.robot("bad").attach(Failing(), frozenset({"joints"}))
@@ -201,7 +201,7 @@ def test_an_event_is_recorded_though_its_publishers_clock_is_behind_and_a_list_t
                 query.reply(EVENTS, list_of, attachment=pack(Header(7, 2, 0)))
 
             queryable = other.zenoh_session.declare_queryable(EVENTS, tell)
-            taking, sink = intake.Intake(own.zenoh_session, "site"), Sink()
+            taking, sink = intake.Intake(own.zenoh_session, "site", own.ignored), Sink()
             try:
                 with taking.lock:
                     robot = taking.robot("arm")

@@ -1,0 +1,298 @@
+"""Names that fit no key of the contract, from a plain client: every service ignores them, and goes on."""
+
+import asyncio
+import contextlib
+import json
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import zenoh
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from websockets.asyncio.client import connect
+
+import renderer.service
+from bus.endpoints import bundle, client_config, router_config
+from bus.errors import KeyNameError
+from bus.header import Header, pack
+from bus.health import Served, present
+from bus.keys import parse_key
+from bus.schemas import robomesh_pb2 as schema
+from bus.session import SessionSettings, open_session
+from bus.topics import REQUESTS, TOPICS, Role
+from protocol_gateway import gateway
+from renderer.errors import RendererError
+from services import foxglove, kinematics, player, recorder, ros2, watch
+from services.command_line.listing import _Around, _collect
+from services.console import console
+from services.keys import Folder, deeds
+from services.recorder.settings import Settings as RecorderSettings
+from services.router.router import read_access
+from tests.cells import arm_alone
+from tests.conftest import free_port
+from tests.renderer.bodies import context_or_skip
+
+SITE = "hall"
+WITHIN_S = 60.0
+
+
+@dataclass
+class Site:
+    """Every service of a site in one event loop, in a thread, and a plain client that keeps to nothing."""
+
+    loop: asyncio.AbstractEventLoop
+    services: dict
+    plain: zenoh.Session
+    observer: object
+    console: str = ""
+    foxglove: asyncio.Task | None = None
+
+    def call(self, coroutine):
+        return asyncio.run_coroutine_threadsafe(coroutine, self.loop).result(WITHIN_S)
+
+    async def everything_goes_on(self):
+        """Every service answers, and whoever comes now finds the site as it was."""
+        assert not self.foxglove.done(), self.foxglove
+        for name, (task, session) in self.services.items():
+            assert not task.done(), (name, task)
+            key = f"robomesh/{SITE}/-/clock/{session.identity}"
+            answer = await self.observer.ask(key, schema.ClockRequest(), timeout_s=WITHIN_S)
+            assert isinstance(answer, schema.ClockAnswer), name
+
+    async def greeting(self):
+        """What a page that is loaded now is told: the presence of which services."""
+        present = set()
+        async with (
+            asyncio.timeout(WITHIN_S),
+            connect(f"ws://{self.console}/mesh", origin=f"http://{self.console}") as socket,
+        ):
+            while not present >= set(self.services):
+                message = schema.ToPage.FromString(await socket.recv())
+                if message.HasField("presence"):
+                    present.add(message.presence.key.split("/")[4])
+        return present
+
+    async def listed(self):
+        return await _collect(self.observer, _Around())
+
+
+def site_settings(folder: Path) -> dict:
+    """Each service's coroutine and settings."""
+    robot = gateway.RobotSettings(name="arm", description="pt600", host="127.0.0.1", port=free_port())
+    return {
+        "gateway": (
+            gateway.serve,
+            gateway.Settings(site=SITE, audit_folder=folder / "audit", robots=(robot,)),
+        ),
+        "kinematics": (kinematics.serve, kinematics.Settings(site=SITE, robots=(arm_alone(simulated=True),))),
+        "recorder": (recorder.serve, RecorderSettings(site=SITE, robots=("arm",), folder=folder / "mcap")),
+        "player": (player.serve, player.Settings(site=SITE, folder=folder / "mcap")),
+        "watch": (watch.serve, watch.Settings(site=SITE, folder=folder / "watch")),
+        "renderer": (
+            renderer.service.serve,
+            renderer.service.Settings(site=SITE, size=(160, 90), folder=folder / "views"),
+        ),
+        "ros2": (ros2.serve, ros2.Settings(site=SITE, meshes=folder / "meshes")),
+    }
+
+
+@contextlib.asynccontextmanager
+async def services_of(folder: Path, mesh_of, site: Site):
+    """All services, present on the mesh."""
+    wanted = site_settings(folder)
+    try:
+        context_or_skip().release()
+    except (RendererError, pytest.skip.Exception):
+        del wanted["renderer"]
+    async with contextlib.AsyncExitStack() as stack:
+
+        async def begin(name, serve, *arguments, **more):
+            session = await stack.enter_async_context(open_session(mesh_of(name)))
+            served = Served(service=name, present_for=((SITE, "arm" if name == "gateway" else "-"),))
+            await stack.enter_async_context(present(session, served))
+            task = asyncio.create_task(serve(session, *arguments, **more))
+            stack.push_async_callback(asyncio.gather, task, return_exceptions=True)
+            stack.callback(task.cancel)
+            site.services[name] = task, session
+
+        for name, (serve, its_settings) in wanted.items():
+            await begin(name, serve, its_settings)
+        page = folder / "page"
+        page.mkdir()
+        (page / "index.html").write_text("<!doctype html><title>page</title>")
+        listening = asyncio.get_running_loop().create_future()
+        its_settings = console.Settings(site=SITE, listen="127.0.0.1:0", page=page)
+        await begin("console", console.serve, its_settings, on_ready=listening.set_result)
+        site.console = (await asyncio.wait_for(listening, WITHIN_S)).removeprefix("http://")
+        # The bridge to Foxglove is a program of a person's: it has a monitor's certificate.
+        session = await stack.enter_async_context(open_session(mesh_of("foxglove")))
+        its_settings = foxglove.Settings(listen="127.0.0.1:0", site=SITE)
+        task = asyncio.create_task(foxglove.serve(session, its_settings, on_ready=lambda _: None))
+        stack.push_async_callback(asyncio.gather, task, return_exceptions=True)
+        stack.callback(task.cancel)
+        site.foxglove = task
+        site.observer = await stack.enter_async_context(open_session(mesh_of("observer")))
+        yield
+
+
+@pytest.fixture(scope="module", params=["without keys", "with keys"])
+def site(request, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("site")
+    if request.param == "with keys":
+        keys = Folder(folder / "keys")
+        deeds.prepare(keys, SITE, robots=["arm"], border="open", routers=[])
+        deeds.issue(keys, "li", Role.OPERATOR)
+        deeds.issue(keys, "mo", Role.MONITOR)
+        endpoint = f"tls/127.0.0.1:{free_port()}"
+        router = zenoh.open(router_config((endpoint,), (), keys.tls_of("router"), read_access(keys.access)))
+        files = {"observer": keys.person("mo"), "foxglove": keys.person("mo"), "plain": keys.person("li")}
+
+        def tls_of(name):
+            return bundle(files.get(name) or keys.service(name))
+    else:
+        endpoint = f"tcp/127.0.0.1:{free_port()}"
+        router = zenoh.open(router_config((endpoint,)))
+
+        def tls_of(name):
+            return None
+
+    def mesh_of(name):
+        return SessionSettings(connect=(endpoint,), tls=tls_of(name), wait_s=20.0)
+
+    loop = asyncio.new_event_loop()
+    thread = threading.Thread(target=loop.run_forever)
+    thread.start()
+    config = client_config((endpoint,), tls_of("plain"))
+    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    plain = zenoh.open(config)
+    site = Site(loop, {}, plain, None)
+    running = services_of(folder, mesh_of, site)
+    try:
+        site.call(running.__aenter__())
+        try:
+            yield site
+        finally:
+            site.call(running.__aexit__(None, None, None))
+    finally:
+        loop.call_soon_threadsafe(loop.stop)
+        thread.join()
+        loop.close()
+        plain.close()
+        router.close()
+
+
+# ------------------------------------------------------------------------ keys
+
+# What Zenoh takes as a chunk: anything without these; hostile ones more often than Hypothesis finds them.
+_ODD = [
+    "EV IL",
+    "\u202egnp.mra",
+    "x" * 5000,
+    "ARM",
+    ".",
+    "..",
+    "-",
+    "é",
+    "a\nb",
+    "a\x1b[2J",
+    "@",
+    "_",
+    "*",
+    "**",
+    "$*a",
+]
+CHUNK = st.sampled_from([*_ODD, SITE, "arm"]) | st.text(min_size=1, max_size=12).filter(
+    lambda text: not set(text) & set("/#?$*")
+)
+NAMES = sorted({*TOPICS, *REQUESTS, "alive/gateway/*", "alive/operator/*", "alive/*/*", "health/*"})
+
+
+@st.composite
+def odd_keys(draw):
+    """A key of the mesh's form, of which at least one chunk fits nothing; else anything at all."""
+    name = "/".join(draw(CHUNK) if each == "*" else each for each in draw(st.sampled_from(NAMES)).split("/"))
+    key = f"robomesh/{draw(CHUNK)}/{draw(CHUNK)}/{name}"
+    try:
+        zenoh.KeyExpr(key)
+        parse_key(key)
+    except KeyNameError:
+        return key
+    except zenoh.ZError:
+        pass
+    return f"robomesh/{SITE}/EV IL/alive/gateway/x"
+
+
+def say(plain, key, payload):
+    """Everything that a plain client can do with a key; what takes part stays a moment."""
+    header = pack(Header(7, 1, time.time_ns()))
+    with contextlib.ExitStack() as held:
+
+        def reply(query):
+            with query, contextlib.suppress(zenoh.ZError):
+                query.reply(str(query.key_expr) if "*" not in str(query.key_expr) else key, payload)
+
+        held.callback(plain.liveliness().declare_token(key).undeclare)
+        held.callback(plain.declare_queryable(key, reply).undeclare)
+        plain.put(key, payload, attachment=header)
+        plain.put(key, payload)
+        list(plain.get(key, payload=payload, timeout=0.05))
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(odd_keys(), min_size=1, max_size=4), st.binary(max_size=20))
+def test_every_service_goes_on_whatever_keys_come(site, keys, payload):
+    for key in keys:
+        say(site.plain, key, payload)
+    site.call(site.everything_goes_on())
+
+
+def test_an_odd_token_is_ignored_counted_and_made_one_event(site):
+    before = {name: session.ignored.count for name, (_, session) in site.services.items()}
+    key = f"robomesh/{SITE}/EV IL/alive/operator/li.{SITE}.x"  # with keys it may declare no other
+    with contextlib.ExitStack() as held:
+
+        def declare():
+            held.callback(site.plain.liveliness().declare_token(key).undeclare)
+
+        events = site.call(events_of_the_watch(site, declare, key))
+        greeted, listed = site.call(site.greeting()), site.call(site.listed())
+    assert len(events) == 1
+    assert events[0].severity == schema.Event.WARNING
+    assert key in events[0].text
+    for name in ("console", "recorder", "player", "watch", "renderer"):
+        if name in site.services:
+            assert site.services[name][1].ignored.count > before[name], name
+    assert greeted >= {"gateway", "recorder", "watch"}
+    assert [(row["site"], row["robot"]) for row in listed["robots"]] == [(SITE, "arm")]
+    assert {row["service"] for row in listed["services"]} >= set(site.services)
+
+
+async def events_of_the_watch(site, do, key):
+    """What the watch says of a key, until it has looked at every process's health again."""
+    events, looks = [], 0
+    said = site.observer.subscribe(f"robomesh/{SITE}/-/events/watch", newest=1000, history=False)
+    beat = f"robomesh/{SITE}/-/health/watch.{site.services['watch'][1].identity}"
+    beats = site.observer.subscribe(beat, newest=10, history=False)
+
+    async def follow():
+        async for sample in said:
+            message = sample.message()
+            if message.code == "mesh.key_ignored" and key in message.values["key"]:
+                events.append(message)
+
+    following = asyncio.create_task(follow())
+    await asyncio.to_thread(do)
+    try:
+        async with asyncio.timeout(WITHIN_S):
+            async for _ in beats:
+                looks += bool(events)
+                if looks > 2:
+                    break
+    finally:
+        said.close()
+        beats.close()
+        await following
+    return events
