@@ -90,7 +90,9 @@ async def browse(address):
 async def get(address, path, *, method="GET", body=b"", **headers):
     """Status, headers and body of the answer to a request."""
     host, port = address.split(":")
-    reader, writer = await asyncio.open_connection(host, int(port))
+    # Of the loopback addresses, the one that is asked: so a test has clients at several.
+    source = (host, 0) if host.startswith("127.") else None
+    reader, writer = await asyncio.open_connection(host, int(port), local_addr=source)
     lines = {"Host": address, "Connection": "close", **headers}
     text = f"{method} {path} HTTP/1.1\r\n" + "".join(f"{k}: {v}\r\n" for k, v in lines.items()) + "\r\n"
     writer.write(text.encode() + body)

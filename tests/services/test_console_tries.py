@@ -1,8 +1,11 @@
 """Who tries passwords too often waits, and nobody else does."""
 
+import asyncio
 from unittest.mock import patch
 
-from services.console.accounts import passwords
+from argon2 import PasswordHasher
+
+from services.console.accounts import passwords, sign_in_queue
 from tests.conftest import run
 from tests.services.signing_in import PASSWORD, Client, guarded
 from tests.services.test_console import page
@@ -45,7 +48,7 @@ def test_tries_at_the_door_keep_nobody_inside_from_giving_the_password_again(mes
 def test_what_nobody_had_time_to_look_at_is_no_wrong_try(mesh, page, tmp_path):
     async def main():
         async with guarded(mesh, page, tmp_path) as (client, _, _):
-            with patch.object(passwords, "_MOST_WAITING", 0):
+            with patch.object(sign_in_queue, "MOST_OF_NAME", 0):
                 assert {(await client.sign_in("li"))[0] for _ in range(12)} == {503}
             assert (await client.sign_in("li"))[0] == 200
 
@@ -64,5 +67,22 @@ def test_who_names_another_address_each_time_is_the_same_stranger(mesh, page, tm
                 told.append(answer[0])
             assert told[:10] == [401] * 10
             assert 429 in told
+
+    run(main())
+
+
+def test_a_flood_of_tries_from_one_address_keeps_nobody_at_another_out(mesh, page, tmp_path):
+    """Every try takes a real argon2 hash; 127.0.0.2 is another address of the same machine."""
+
+    async def main():
+        async with guarded(mesh, page, tmp_path, listen="0.0.0.0:0", insecure=True) as (client, _, _):
+            port = client.address.rpartition(":")[2]
+            stranger, here = Client(f"127.0.0.2:{port}"), Client(f"127.0.0.1:{port}")
+            with patch.object(passwords, "_hasher", PasswordHasher):
+                flood = [asyncio.create_task(stranger.sign_in(f"nobody{n}", "wrong one")) for n in range(10)]
+                await asyncio.sleep(0)
+                tries = [await here.sign_in("li") for _ in range(2)]
+            assert [status for status, _, _ in tries] == [200, 200]
+            assert {(await each)[0] for each in flood} == {401}
 
     run(main())

@@ -55,6 +55,13 @@ class Attempts:
             tries.failed = 0 if all_of_them else tries.failed - 1
             tries.again_at = tries.last + self._wait_s(tries.failed)
 
+    def withdraw(self, who: str) -> None:
+        """Forget a try that was begun and never looked at."""
+        tries = self._tries.get(who)
+        if tries is not None:
+            tries.failed -= 1
+            tries.again_at = tries.last
+
     def _wait_s(self, failed: int) -> float:
         if failed < self._free:
             return 0.0
@@ -82,7 +89,7 @@ class SignInLimits:
         if session:
             return self._sessions.wait_s(session, now)
         names = self._names if known else self._unknown
-        return max(names.wait_s(name, now), self._addresses.wait_s(_net(address), now))
+        return max(names.wait_s(name, now), self._addresses.wait_s(network(address), now))
 
     def begin(self, name: str, address: str, now: float, *, known: bool, session: str = "") -> None:
         """Counts a try."""
@@ -90,7 +97,15 @@ class SignInLimits:
             self._sessions.begin(session, now)
         else:
             (self._names if known else self._unknown).begin(name, now)
-            self._addresses.begin(_net(address), now)
+            self._addresses.begin(network(address), now)
+
+    def withdraw(self, name: str, address: str, *, known: bool, session: str = "") -> None:
+        """Forget a try that was begun and never looked at, because too many waited."""
+        if session:
+            self._sessions.withdraw(session)
+        else:
+            (self._names if known else self._unknown).withdraw(name)
+            self._addresses.withdraw(network(address))
 
     def succeed(self, name: str, address: str, *, session: str = "") -> None:
         """The try was right; of the address no other is forgiven, for one account is no key to the rest."""
@@ -98,10 +113,10 @@ class SignInLimits:
             self._sessions.succeed(session, all_of_them=True)
         else:
             self._names.succeed(name, all_of_them=True)
-            self._addresses.succeed(_net(address), all_of_them=False)
+            self._addresses.succeed(network(address), all_of_them=False)
 
 
-def _net(address: str) -> str:
+def network(address: str) -> str:
     """An address, or for IPv6 the network that one household has."""
     try:
         parsed = ipaddress.ip_address(address.partition("%")[0])

@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from bus.schemas.robomesh_pb2 import Event
-from services.console.accounts.attempts import SignInLimits
+from services.console.accounts.attempts import SignInLimits, network
 from services.console.accounts.file import (
     Account,
     AccountRole,
@@ -22,7 +22,7 @@ from services.console.accounts.file import (
 )
 from services.console.accounts.passwords import Verifier, check_password
 from services.console.accounts.sessions import Sessions, SignedIn
-from services.console.errors import AccountsError
+from services.console.errors import AccountsError, SignInBusyError
 from services.errors import ServiceError
 
 log = logging.getLogger(__name__)
@@ -159,10 +159,13 @@ class Desk:
         if wait_s > 0:
             self._tell_refusal(name if known else "", address, f"has to wait {wait_s:.0f} s")
             raise SignInError("too many tries", wait_s)
-        self._verifier.check_free()  # what is not looked at is not counted
         self._limits.begin(name, address, now, known=known, session=session)
-        usable = account is not None and not account.disabled
-        right = await self._verifier.verify(account.hash if account and usable else None, password)
+        hashed = account.hash if account is not None and not account.disabled else None
+        try:
+            right = await self._verifier.verify(hashed, password, address=network(address), name=name)
+        except SignInBusyError:
+            self._limits.withdraw(name, address, known=known, session=session)
+            raise
         # The file may have changed meanwhile.
         if not right or account is None or self.sessions.accounts.get(name) != account:
             self._tell_refusal(name if known else "", address, "name or password wrong")
@@ -200,7 +203,9 @@ class Desk:
         check_account_name(name)
         hashed = ""
         if action in ("add", "password"):
-            hashed = await self._verifier.hash(check_password(password, name=name, site=self.site))
+            checked = check_password(password, name=name, site=self.site)
+            asker = {"address": network(by.address), "name": by.account.name}
+            hashed = await self._verifier.hash(checked, **asker)
         await asyncio.to_thread(
             change_account, self.path, action, name, role=role, hashed=hashed, by_page=True
         )

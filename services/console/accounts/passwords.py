@@ -1,28 +1,29 @@
 """Passwords: which are good enough, and how they are kept.
 
 Kept as argon2id (RFC 9106: 64 MiB, three passes, one lane). Verifying is as
-expensive for a name that nobody has, so that an answer's time tells no names; one at a time, and a few
-may wait, so that a flood of sign-ins takes neither memory nor the console's own time.
+expensive for a name that nobody has, so that an answer's time tells no names; one at a time, and so many
+may wait (`sign_in_queue.py`), so that a flood of sign-ins takes neither memory nor the console's own time.
 """
 
 import asyncio
 import re
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
-from typing import TypeVar
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Any, TypeVar
 
 from argon2 import PasswordHasher
 from argon2.exceptions import InvalidHashError, VerificationError
 
-from services.console.errors import AccountsError, SignInBusyError
+from services.console.accounts.sign_in_queue import SignInQueue, busy
+from services.console.errors import AccountsError
 
 Result = TypeVar("Result")
 
 SHORTEST = 10
 _LONGEST = 256
 _FEWEST_DIFFERENT = 5
-_MOST_WAITING = 8
 
 # What common passwords are made of, once digits, punctuation and the usual disguises are taken off.
 _COMMON_WORDS = """
@@ -96,46 +97,64 @@ def verify(hashed: str | None, password: str) -> bool:
     return hashed is not None
 
 
+@dataclass(eq=False)
+class _Job:
+    """What is done in the thread, and the future of its asker."""
+
+    work: Callable[[], Any]
+    done: asyncio.Future[Any]
+
+
 class Verifier:
-    """Hashes and verifies beside the event loop, one after another, a few waiting."""
+    """Hashes and verifies beside the event loop, one after another; addresses and names take turns."""
 
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="password")
-        self._waiting = 0
+        self._queue = SignInQueue[_Job]()
+        self._serving: asyncio.Task[None] | None = None
 
-    async def verify(self, hashed: str | None, password: str) -> bool:
-        """As `verify`.
-
-        Raises:
-            SignInBusyError: If too many wait.
-        """
-        return await self._do(verify, hashed, password)
-
-    async def hash(self, password: str) -> str:
-        """As `hash_password`.
+    async def verify(self, hashed: str | None, password: str, *, address: str, name: str) -> bool:
+        """As `verify`, when it is the turn of this address and this name.
 
         Raises:
             SignInBusyError: If too many wait.
         """
-        return await self._do(hash_password, password)
+        return await self._do(partial(verify, hashed, password), address, name)
 
-    def check_free(self) -> None:
-        """Whether another has a place now.
+    async def hash(self, password: str, *, address: str, name: str) -> str:
+        """As `hash_password`, when it is the turn of this address and this name.
 
         Raises:
             SignInBusyError: If too many wait.
         """
-        if self._waiting >= _MOST_WAITING:
-            raise SignInBusyError(f"{_MOST_WAITING} passwords are being looked at: try again in a moment")
+        return await self._do(partial(hash_password, password), address, name)
 
-    async def _do(self, work: Callable[..., Result], *values: str | None) -> Result:
-        self.check_free()
-        self._waiting += 1
-        try:
-            return await asyncio.get_running_loop().run_in_executor(self._thread, work, *values)
-        finally:
-            self._waiting -= 1
+    async def _do(self, work: Callable[[], Result], address: str, name: str) -> Result:
+        job = _Job(work, asyncio.get_running_loop().create_future())
+        displaced = self._queue.add(job, address=address, name=name)
+        if displaced is not None and not displaced.done.done():
+            displaced.done.set_exception(busy())
+        if self._serving is None or self._serving.done():
+            self._serving = asyncio.create_task(self._serve())
+        result: Result = await job.done
+        return result
+
+    async def _serve(self) -> None:
+        loop = asyncio.get_running_loop()
+        while (job := self._queue.take()) is not None:
+            if job.done.done():
+                continue  # its asker has gone
+            try:
+                result = await loop.run_in_executor(self._thread, job.work)
+            except Exception as error:
+                if not job.done.done():
+                    job.done.set_exception(error)
+                continue
+            if not job.done.done():
+                job.done.set_result(result)
 
     def close(self) -> None:
         """Ends the thread."""
+        if self._serving is not None:
+            self._serving.cancel()
         self._thread.shutdown(wait=False, cancel_futures=True)
