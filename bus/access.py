@@ -17,7 +17,7 @@ import zenoh
 from bus import keys
 from bus.errors import KeyNameError
 from bus.identity import Identity
-from bus.topics import REQUESTS, SERVICES, TOPICS, Request, Role, Topic
+from bus.topics import PEOPLE, REQUESTS, SERVICES, TOPICS, Request, Role, Topic
 
 Act = Literal[
     "put",
@@ -178,7 +178,9 @@ def _own(principal: Principal, site: str) -> Iterator[Rule]:
     yield Rule(acts=_LOOK, keys=(f"{keys.ROOT}/**/@adv/**",))
     yield Rule(acts=("query",), keys=tuple(_asked(role, _names_of(principal, site))))
     yield Rule(acts=_PRESENT, keys=(f"{keys.ROOT}/*/*/alive/*/*",))
-    yield Rule(acts=("liveliness_token",), keys=(*ours([f"alive/{role.value}/*"]), *_held(role)))
+    # People are present by their sessions alone.
+    present = () if role in PEOPLE else ours([f"alive/{role.value}/*"])
+    yield Rule(acts=("liveliness_token",), keys=(*present, *_held(role, _names_of(principal, site))))
     if role is Role.ROS2:
         yield from _ros()
 
@@ -235,12 +237,18 @@ def _asked_as(row: Request, names: str) -> str:
     return f"{row.name.rpartition('/')[0]}/{names}" if row.in_name else row.name
 
 
-def _held(role: Role) -> Iterator[str]:
-    """Tokens of sessions: an operator's at the robot, for its lease; anybody's at a site, for a replay."""
-    yield f"{keys.ROOT}/*/{keys.WHOLE_SITE}/alive/operator/*"
+def _held(role: Role, names: str) -> Iterator[str]:
+    """Tokens of sessions: an operator's at the robot, for its lease; anybody's at a site, for a replay.
+
+    Args:
+        names: In whose names, as a chunk: a token's id is <name>.<id>, and its owner alone may declare it.
+            Held up by another, a lease would outlive its holder's session.
+    """
+    owned = names if names == "*" else f"{names}.$*"
+    yield f"{keys.ROOT}/*/{keys.WHOLE_SITE}/alive/operator/{owned}"
     yield f"{keys.ROOT}/*/*/alive/monitor/*"
     if role in REQUESTS["lease/request/*"].askers:
-        yield f"{keys.ROOT}/*/*/alive/operator/*"
+        yield f"{keys.ROOT}/*/*/alive/operator/{owned}"
 
 
 def _everything(*, outwards: bool) -> Rule:
@@ -262,14 +270,16 @@ def _guest(principal: Principal, site: str, border: Border) -> Iterator[Rule]:
     yield Rule(acts=("query",), keys=tuple(asked))
     yield Rule(acts=_LOOK, keys=(f"{keys.ROOT}/**/@adv/**",))
     yield Rule(acts=_PRESENT, keys=(f"{keys.ROOT}/*/*/alive/*/*",))
-    yield Rule(acts=("liveliness_token",), keys=tuple(_held(Role.CONSOLE)))
+    held = dict.fromkeys(key for name in names for key in _held(Role.CONSOLE, name))
+    yield Rule(acts=("liveliness_token",), keys=tuple(held))
     yield Rule(acts=_LISTEN, keys=(f"{keys.ROOT}/**",) if border == "open" else tuple(_let_out(site)))
     ours = f"{keys.ROOT}/{site}"
     if hub:
         # It speaks for everybody else, never for us; and what is asked of us is not asked of it.
         yield Rule(acts=_PUBLISH, keys=(f"{ours}/**", f"{ours}/**/@adv/**"), allow=False)
         present = tuple(f"{ours}/*/alive/{role.value}/*" for role in Role if role in SERVICES)
-        yield Rule(acts=("liveliness_token",), keys=present, allow=False)
+        own_people = f"{keys.ROOT}/*/*/alive/operator/$*.{site}.$*"
+        yield Rule(acts=("liveliness_token",), keys=(*present, own_people), allow=False)
         named = tuple(f"{ours}/*/{_asked_as(row, '*')}" for row in REQUESTS.values())
         yield Rule(acts=("query",), keys=named, allow=False, outwards=True)
         own_names = tuple(f"{keys.ROOT}/*/*/{_asked_as(row, f'$*.{site}')}" for row in _in_names())
@@ -308,7 +318,7 @@ def refusal(principal: Principal, act: Act, key: str) -> str:
     """Why somebody may not do something on a key of the table, for people."""
     who = f"{principal.name} is {_a(principal.role)}"
     try:
-        site, robot, name = keys.parse_key(key)
+        site, robot, name = keys.parse_expression(key)
     except KeyNameError:
         return f"{who}: it may not use {key}"
     row = _row(name)

@@ -2,14 +2,13 @@
 
 import asyncio
 import contextlib
-import secrets
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
 from bus.errors import BusError, BusyError, NoAnswerError
 from bus.keys import robot_key
-from bus.presence import OPERATOR
+from bus.presence import OPERATOR, session_of
 from bus.schemas.robomesh_pb2 import LeaseAnswer, LeaseRequest
 from bus.session import Session
 
@@ -40,7 +39,7 @@ async def control(session: Session, site: str, robot: str, operator: str) -> Asy
         NoAnswerError: If there is no gateway.
     """
     key = robot_key(site, robot, f"lease/request/{operator}")
-    identity = secrets.token_hex(8)
+    identity = session_of(operator)
     token = session.declare_presence_of(site, robot, OPERATOR, identity)
     try:
         wanted = LeaseRequest(action=LeaseRequest.ACQUIRE, ttl_s=_TTL_S, session=identity)

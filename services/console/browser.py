@@ -69,7 +69,7 @@ class Browser:
         who: SignedIn | None = None,
         own_name: str = "",
     ) -> None:
-        self.operator = OperatorPresence(session)
+        self.operator = OperatorPresence(session, own_name)
         self.who, self.own_name = who, own_name
         # Who is nobody asks as this connection, as its page does.
         self._asker = own_name or self.operator.id

@@ -14,7 +14,7 @@ from google.protobuf.message import DecodeError
 
 from bus import keys
 from bus.errors import BusError, RefusedError
-from bus.presence import OPERATOR
+from bus.presence import OPERATOR, session_of
 from bus.schemas.robomesh_pb2 import LeaseRequest
 from bus.session import Session
 
@@ -29,12 +29,15 @@ _OPENS = "player/open"
 class OperatorPresence:
     """The presence of one page's operator: a token for each robot under control, one for replays.
 
+    Args:
+        own_name: The one operator that the page asks as; empty: any, without certificates.
+
     Attributes:
         id: Of the page's connection; the page puts it into its lease requests as `session`.
     """
 
-    def __init__(self, session: Session) -> None:
-        self.id = secrets.token_hex(8)
+    def __init__(self, session: Session, own_name: str = "") -> None:
+        self.id = session_of(own_name) if own_name else secrets.token_hex(8)
         self._session = session
         self._tokens: dict[tuple[str, str], zenoh.LivelinessToken] = {}
         self._held_at = -_HELD_S

@@ -309,11 +309,14 @@ def test_a_service_is_present_under_its_own_name_only_and_a_gateway_for_its_robo
     everybody, witness, gone, _ = mesh
     tokens, wanted = [], set()
     for who in (*everybody.values(), gone):
-        for robot, service in product((*ROBOTS, *VAGUE), Role):
-            token = key(robot, f"alive/{service.value}/{who.name}")
+        for robot, service, of in product((*ROBOTS, *VAGUE), Role, (who.name, "wang.here", "wang.there")):
+            by = who.name.replace(".", "-")
+            token = key(robot, f"alive/{service.value}/{of}.{by}")
             tokens.append(who.session.liveliness().declare_token(token))
-            own = service is who.role and speaks_for(who.name, who.role, robot)
-            held = service is Role.OPERATOR and who.role in REQUESTS["command/*"].askers
+            own = service is who.role and service not in PEOPLE and speaks_for(who.name, who.role, robot)
+            # A session's token is its operator's alone; a console holds those of the site's people.
+            owner = of == who.name or (who.role is Role.CONSOLE and of.endswith(f".{SITE}"))
+            held = service is Role.OPERATOR and who.role in REQUESTS["command/*"].askers and owner
             if who is not gone and (who.role is Role.ROUTER or own or held or service is Role.MONITOR):
                 wanted.add(token)
         who.settle()
@@ -361,6 +364,7 @@ def test_a_hub_is_present_for_any_site_but_ours(mesh):
     _, witness, _, guests = mesh
     sites, services = (SITE, OTHER_SITE), (Role.GATEWAY, Role.WATCH, Role.OPERATOR)
     named = [key(OWN_ROBOT, f"alive/{role.value}/0a", site) for site, role in product(sites, services)]
+    named += [key(OWN_ROBOT, f"alive/operator/li.{site}.0a") for site in sites]
     vague = [f"robomesh/*/{OWN_ROBOT}/alive/gateway/0a", f"robomesh/{SITE[:2]}$*/arm/alive/gateway/0b"]
     tokens = [guests[HUB].session.liveliness().declare_token(each) for each in (*named, *vague)]
     guests[HUB].settle()
@@ -368,10 +372,11 @@ def test_a_hub_is_present_for_any_site_but_ours(mesh):
     seen = {str(reply.ok.key_expr) for reply in replies if reply.ok is not None}
     assert {each for each in seen if each in named} == {
         key(OWN_ROBOT, "alive/operator/0a"),
+        key(OWN_ROBOT, f"alive/operator/li.{OTHER_SITE}.0a"),
         *(key(OWN_ROBOT, f"alive/{role.value}/0a", OTHER_SITE) for role in services),
     }
     for each in vague:  # a router cannot tell that it means ours too; whoever is told of it can
-        with pytest.raises(KeyNameError, match="has a wildcard"):
+        with pytest.raises(KeyNameError, match="cannot be used"):
             parse_presence_key(each)
     for each in tokens:
         each.undeclare()

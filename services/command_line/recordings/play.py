@@ -10,7 +10,7 @@ from pathlib import Path
 
 from bus.errors import BusError
 from bus.keys import WHOLE_SITE, robot_key
-from bus.presence import OPERATOR
+from bus.presence import OPERATOR, session_of
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
 from services.command_line import find
@@ -74,8 +74,8 @@ async def _of_site(
 ) -> AsyncIterator[tuple[str, schema.ReplayState]]:
     """Played by the site's player, for as long as this process is there."""
     site, newest = await found(session, what, closed=True)
-    asked.file, asked.session = newest.file, session.identity
-    token = session.declare_presence_of(site, WHOLE_SITE, OPERATOR, session.identity)
+    asked.file, asked.session = newest.file, session_of(session.own_name)
+    token = session.declare_presence_of(site, WHOLE_SITE, OPERATOR, asked.session)
     try:
         key = robot_key(site, WHOLE_SITE, "player/open")
         state = await session.ask(key, asked, timeout_s=_OPEN_WITHIN_S)
