@@ -1,8 +1,10 @@
 """`robomesh doctor --security`: every role against every key, tried on the live mesh.
 
-It is tried on keys of a robot that does not exist, of its replay, and by a wildcard that means it, with
-messages that nobody takes: what is published has no header, and answers are empty. Presence is not tried,
-because everybody would see that robot. What should be comes from the table, what is from the site's routers.
+It is tried on keys of a robot that does not exist, of its replay, by a wildcard that means it, and of
+another site; publishing and deleting on the site's real robots too. No service takes any of it: what is
+published has no header, and answers are empty. Where no such probe exists (presence, which everybody would
+see; stops, leases and commands of real robots; the routers' own `@/**`), the file of rules is compared with
+what principals.toml gives, and nothing is tried. What should be comes from the table.
 """
 
 import json
@@ -21,7 +23,8 @@ from bus.access import NOBODYS_ROBOT, Act, Principal
 from bus.endpoints import bundle, client_config, first_line
 from bus.keys import has_wildcard
 from bus.topics import Role, Topic
-from services.command_line.security_table import ROBOTS, ROWS, names, should, tried
+from services.command_line.security_rules import wrong_rules
+from services.command_line.security_table import ROBOTS, ROWS, names, should, tried, tried_on_real
 from services.keys import Folder, deeds
 from services.keys.errors import KeysError
 from services.keys.principals import Principals
@@ -30,6 +33,7 @@ _TIMEOUT_S = 10.0
 _QUIET_S = 0.3
 _WORDS: dict[Act, str] = {
     "put": "publish",
+    "delete": "delete",
     "declare_subscriber": "read",
     "declare_queryable": "answer",
     "query": "ask",
@@ -69,20 +73,26 @@ def run(keys: Folder, connect: tuple[str, ...], as_json: bool) -> int:
             Person(entry, opened.enter_context(_open(routers, file)))
             for entry, file in _with_files(keys, principals)
         ]
-        done = _try(people, principals.site)
+        robots = sorted({robot for each in principals.entries for robot in each.robots or ()})
+        trials = _trials(people, principals.site, robots)
+        done = _try(people, principals.site, trials)
+    rules = wrong_rules(keys, principals)
     roles = {person.principal.name: person.principal for person in people}
-    trials = _trials(people, principals.site)
     allowed = {trial for trial in trials if should(roles[trial.who], trial.act, trial.key)}
     wrong = sorted(done ^ allowed, key=lambda trial: (trial.who, trial.act, trial.key))
     if as_json:
         for trial in sorted(done | allowed, key=lambda trial: (trial.who, trial.act, trial.key)):
             row = {"who": trial.who, "act": _WORDS[trial.act], "key": trial.key}
             print(json.dumps(row | {"should": trial in allowed, "does": trial in done}))
-        return 1 if wrong else 0
+        for problem in rules:
+            print(json.dumps({"rules": problem}))
+        return 1 if wrong or rules else 0
     _print([*roles.values()], principals.site, done)
     for trial in wrong:
         does, should_ = ("can", "should not") if trial in done else ("cannot", "should")
         print(f"WRONG: {trial.who} {does} {_WORDS[trial.act]} {trial.key}, and {should_}")
+    for problem in rules:
+        print(f"WRONG: {keys.access}: {problem}")
     print(
         f"{len(trials)} acts of {len(people)} certificates tried: "
         + (f"{len(wrong)} wrong" if wrong else "all as the table says")
@@ -90,7 +100,11 @@ def run(keys: Folder, connect: tuple[str, ...], as_json: bool) -> int:
     absent = sorted({role.value for role in Role} - {each.role.value for each in roles.values()})
     if absent:
         print(f"not tried, without a certificate here: {', '.join(absent)}")
-    return 1 if wrong else 0
+    print(
+        "not tried, compared in the rules only: presence; stops, leases and commands of real robots; @/**: "
+        + (f"{len(rules)} wrong" if rules else "the rules are what principals.toml gives")
+    )
+    return 1 if wrong or rules else 0
 
 
 def _with_files(keys: Folder, principals: Principals) -> Iterable[tuple[Principal, Path]]:
@@ -116,22 +130,24 @@ def _open(routers: tuple[str, ...], file: Path) -> zenoh.Session:
 # -------------------------------------------------------------- what is tried
 
 
-def _trials(people: list[Person], site: str) -> set[Trial]:
+def _trials(people: list[Person], site: str, robots: Iterable[str]) -> set[Trial]:
     trials = set()
-    for person in people:
-        who = person.principal
-        for row, robot in product(ROWS, ROBOTS):
+    real = tuple(f"{site}/{robot}" for robot in robots)
+    for who, row in product((person.principal for person in people), ROWS):
+        for robot in ROBOTS:
             for name, act in product(names(row, who), tried(row, robot)):
                 trials.add(Trial(who.name, act, f"robomesh/{site}/{robot}/{name}"))
+        for where in (*real, f"{site}x/{NOBODYS_ROBOT}"):
+            for name, act in product(names(row, who), tried_on_real(row)):
+                trials.add(Trial(who.name, act, f"robomesh/{where}/{name}"))
     return trials
 
 
-def _try(people: list[Person], site: str) -> set[Trial]:
+def _try(people: list[Person], site: str, trials: set[Trial]) -> set[Trial]:
     """What went through."""
     witness = next((each for each in people if each.principal.role is Role.ROUTER), None)
     if witness is None:
         raise KeysError("the router's own certificate is needed to see what goes through: keys/router.pem")
-    trials = _trials(people, site)
     keys = {act: sorted({trial.key for trial in trials if trial.act == act}) for act in _WORDS}
     by_name = {each.principal.name: each for each in people}
     done: set[Trial] = set()
@@ -144,15 +160,19 @@ def _try(people: list[Person], site: str) -> set[Trial]:
     # Published: the witness hears it, with the name of who did.
     def hear(sample: zenoh.Sample) -> None:
         if sample.attachment is not None and (name := sample.attachment.to_string()) in by_name:
-            done.add(Trial(name, "put", str(sample.key_expr)))
+            act: Act = "delete" if sample.kind == zenoh.SampleKind.DELETE else "put"
+            done.add(Trial(name, act, str(sample.key_expr)))
 
     with ExitStack() as declared:
-        for robot in ROBOTS:
-            declared.enter_context(witness.session.declare_subscriber(f"robomesh/{site}/{robot}/**", hear))
+        # Whole keys: who listens to all of a robot makes its cameras draw.
+        for key in {*keys["put"], *keys["delete"]}:
+            declared.enter_context(witness.session.declare_subscriber(key, hear))
         _settle(witness, site)
         for person in people:
             for key in of(person, "put"):
                 person.session.put(key, b"", attachment=person.principal.name)
+            for key in of(person, "delete"):
+                person.session.delete(key, attachment=person.principal.name)
             _settle(person, site)
         time.sleep(_QUIET_S)
     done -= {trial for trial in done if trial not in trials}

@@ -6,7 +6,7 @@ Written apart from the rules' generator (`bus/access.py`), which it judges.
 from bus import topics
 from bus.access import NOBODYS_ROBOT, Act, Principal
 from bus.errors import UnknownTopicError
-from bus.keys import REPLAY, has_wildcard, parse_key
+from bus.keys import REPLAY, has_wildcard, parse_expression
 from bus.topics import REQUESTS, TOPICS, Request, Role, Topic
 
 ROWS: tuple[Topic | Request, ...] = (*TOPICS.values(), *REQUESTS.values())
@@ -28,20 +28,27 @@ def names(row: Topic | Request, who: Principal) -> list[str]:
     return [row.name.replace("*", NOBODYS_ROBOT)]
 
 
+def tried_on_real(row: Topic | Request) -> tuple[Act, ...]:
+    """Return what is tried on robots that there are: what no subscriber takes, for it has no header."""
+    return ("put", "delete") if isinstance(row, Topic) else ()
+
+
 def tried(row: Topic | Request, robot: str) -> tuple[Act, ...]:
     """What is tried on a row; by a wildcard only what would be said for robots of others."""
     if isinstance(row, Request):
         return ("declare_queryable",) if has_wildcard(robot) else ("query", "declare_queryable")
     if has_wildcard(robot):
         return ("put", "declare_queryable")
-    return ("put", "declare_subscriber", "declare_queryable")
+    return ("put", "delete", "declare_subscriber", "declare_queryable")
 
 
 def should(who: Principal, act: Act, key: str) -> bool:
     """Whether somebody may do that."""
-    _, robot, name = parse_key(key)
+    site, robot, name = parse_expression(key)
     if who.role is Role.ROUTER:
         return True  # it brings what it has let in
+    if act == "delete" or site != who.site:
+        return False
     if act == "query":
         row = topics.request(name)
         return who.role in row.askers and (not row.in_name or _own_name(who, name.rpartition("/")[2]))
@@ -49,7 +56,7 @@ def should(who: Principal, act: Act, key: str) -> bool:
         return who.role in topics.topic(name).subscribers
     speak = who.role in _speakers(name)
     if who.role is Role.GATEWAY:
-        return speak and robot == NOBODYS_ROBOT
+        return speak and robot in (NOBODYS_ROBOT, *(who.robots or ()))
     if who.role is Role.PLAYER:
         return speak and robot.startswith(REPLAY)
     return speak

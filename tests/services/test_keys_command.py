@@ -415,6 +415,18 @@ def test_doctor_tries_every_certificate_and_finds_what_a_router_does_otherwise(s
         assert right in spoiled
         spoiled = spoiled.replace(right, wrong)
     key = "robomesh/hall/matrix-probe"
+    by_hand = read_access(folder.access)["access_control"]
+    by_hand["rules"].append(
+        {
+            "id": "by-hand",
+            "permission": "allow",
+            "flows": ["ingress"],
+            "messages": ["put", "delete", "query"],
+            "key_exprs": ["robomesh/hall/arm/joints", "robomesh/hall/arm/lease/request/li.hall"],
+        }
+    )
+    by_hand["policies"].append({"subjects": ["mo.hall"], "rules": ["by-hand"]})
+    changed = dict(read_access(folder.access)) | {"access_control": by_hand}
     for text, status, found in (
         (rules, 0, ["certificates tried: all as the table says"]),
         (
@@ -425,6 +437,16 @@ def test_doctor_tries_every_certificate_and_finds_what_a_router_does_otherwise(s
                 f"WRONG: mo.hall can ask {key}/command/stop, and should not",
                 f"WRONG: gateway.hall can publish {key}$*/joints, and should not",
                 f"WRONG: started.hall can answer {key}$*/joints, and should not",
+            ],
+        ),
+        (
+            json.dumps(changed),
+            1,
+            [
+                "WRONG: mo.hall can publish robomesh/hall/arm/joints, and should not",
+                "WRONG: mo.hall can delete robomesh/hall/arm/joints, and should not",
+                # A lease that is asked for is given: nothing is tried, the rules tell.
+                "allow mo.hall ingress query robomesh/hall/arm/lease/request/li.hall: principals.toml gives",
             ],
         ),
     ):
