@@ -8,6 +8,7 @@ from playwright.sync_api import expect
 from bus.errors import RefusedError
 from bus.keys import WHOLE_SITE
 from bus.schemas import robomesh_pb2 as schema
+from bus.texts import DIRECTION
 from tests.browser.robot_page import button
 
 pytestmark = pytest.mark.browser
@@ -111,6 +112,22 @@ def test_the_audit_of_every_robot_is_there_and_its_logs_are_searched_when_asked(
     expect(refused).to_contain_text("已拒绝 wang OFFER: 无人控制，或控制权已结束：请先取得控制（ACQUIRE）")
     refused.click()
     expect(page.locator(".entry-details [lang=en]")).to_contain_text("nobody is in control, or the lease")
+
+
+def test_texts_of_others_change_the_order_of_nothing_beside_them(open_page, raised):
+    """What is said is of "Trojan Source" (CVE-2021-42574), and Hebrew, as another program may say it."""
+    page = open_page(EVENTS, drawn=False)
+    raised(
+        "recorder.note", 'if access_level != "user\u202e \u2066// Check if admin\u2069 \u2066" {', Event.INFO
+    )
+    raised("recorder.note", "stopped by \u05d4\u05d6\u05e8\u05d5\u05e2 3 at 10:15", Event.INFO)
+    trojan = page.locator(".journal-line").filter(has_text="access_level").first
+    expect(trojan.locator("bdi")).to_have_text(
+        'if access_level != "user<U+202E> <U+2066>// Check if admin<U+2069> <U+2066>" {'
+    )
+    assert not set(trojan.inner_text()) & set(DIRECTION)
+    hebrew = page.locator(".journal-line").filter(has_text="stopped by").first
+    expect(hebrew.locator("bdi")).to_have_text("stopped by \u05d4\u05d6\u05e8\u05d5\u05e2 3 at 10:15")
 
 
 def test_settings_shows_a_service_that_is_gone(open_page, plant, raised):
