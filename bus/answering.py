@@ -15,7 +15,7 @@ import zenoh
 from google.protobuf.message import Message
 
 from bus import keys, pieces, topics
-from bus.errors import KeyNameError, MessageError, QuotaError, RefusedError
+from bus.errors import BusyError, KeyNameError, MessageError, QuotaError, RefusedError
 from bus.ignored import REQUEST, Ignored
 from bus.intake import RING, Queue, RateLimit, Turns, begin_now, read
 from bus.latencies import Latencies
@@ -224,7 +224,8 @@ class Answerer:
                 query.reply_err(str(error).encode(), encoding=f"{QUOTA_TEXT}{error.again_s:.3f}")
                 return
             except (RefusedError, MessageError, KeyNameError) as error:
-                query.reply_err(str(error).encode(), encoding=TEXT)
+                encoding = BUSY_TEXT if isinstance(error, BusyError) else TEXT
+                query.reply_err(str(error).encode(), encoding=encoding)
                 return
             except Exception:
                 log.exception("%s: a request failed", key)

@@ -166,8 +166,8 @@ async def ask_bytes(session: zenoh.Session, key: str, payload: bytes, *, timeout
     deadline = loop.time() + timeout_s
     again: BusyError | QuotaError | BrokenAnswerError | None = None
     while (left_s := deadline - loop.time()) > 0:
-        # Zenoh answers at once that there is no owner.
-        again, again_s = None, _AGAIN_S
+        # Zenoh answers at once that there is no owner. One that was busy before is not said to be missing.
+        again_s = _AGAIN_S
         for _, answer, error in await ask_all(session, key, payload, timeout_s=left_s, silent_s=timeout_s):
             if isinstance(error, BusyError | BrokenAnswerError):
                 again = error

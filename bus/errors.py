@@ -6,7 +6,7 @@ BusError
 ├── MessageError            bytes or JSON that are not the message they should be
 ├── SessionError            a session that cannot be opened as it is configured
 ├── RefusedError            a request that its owner refused, with the reason
-│   ├── BusyError           a request that its owner has not begun: too many wait
+│   ├── BusyError           a request that its owner has not begun or finished: it is busy
 │   ├── QuotaError          more than one name may ask for; it may be asked again later
 │   └── NoRightError        what this end's certificate may not do: it was not even asked
 └── NoAnswerError           a request that nobody answered in time
@@ -42,7 +42,7 @@ class RefusedError(BusError):
 
 
 class BusyError(RefusedError):
-    """A request that its owner has not begun, because too many wait; it may be asked again."""
+    """A request that its owner has not begun, or not finished, because it is busy; it may be asked again."""
 
 
 class QuotaError(RefusedError):

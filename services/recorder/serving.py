@@ -1,12 +1,13 @@
 """Requests `recordings/*`, answered beside the recording, which never waits for them."""
 
+import asyncio
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 from google.protobuf.message import Message
 
 from bus.answering import Request
-from bus.errors import RefusedError
+from bus.errors import BusyError, RefusedError
 from bus.keys import WHOLE_SITE
 from bus.quotas import DEFAULT_QUOTAS, Quota, Quotas
 from bus.schemas import robomesh_pb2 as schema
@@ -21,6 +22,11 @@ _NICE = 5
 # Who asked has given up by then; a long recording's values are looked through once.
 _WITHIN_S = 20.0
 _SERIES_WITHIN_S = 120.0
+# A list that takes longer is answered with "busy", after this share of its asker's time at the latest.
+_PATIENCE_S = 4.0
+_SHARE = 0.8
+# An asker who was told "busy" asks again within this.
+_KEPT_S = 1.0
 
 
 class Serving:
@@ -46,14 +52,23 @@ class Serving:
     ) -> None:
         self._open_now, self._flight = open_now, flight
         self._quick, self._long = (Worker(_MODULE, folder, nice=_NICE) for _ in range(2))
+        self._under_way: dict[tuple[str, bytes], asyncio.Task[bytes]] = {}
         self._mebibytes = Quota("recordings_mib", a_minute=quotas.recordings_mib_a_minute)
         session.answer(site, WHOLE_SITE, "recordings/list", self._list)
         session.answer(site, WHOLE_SITE, "recordings/info", self._info)
         for name in ("range", "series", "piece"):
             session.answer(site, WHOLE_SITE, f"recordings/{name}/*", self._handler(name))
 
+    @property
+    def pid(self) -> int | None:
+        """The process that answers quick questions; None: it has not been asked yet."""
+        return self._quick.pid
+
     async def close(self) -> None:
         """End the processes."""
+        for task in self._under_way.values():
+            task.cancel()
+        await asyncio.gather(*self._under_way.values(), return_exceptions=True)
         await self._quick.close()
         await self._long.close()
 
@@ -73,8 +88,9 @@ class Serving:
 
         return answer
 
-    async def _list(self, _: Request) -> schema.RecordingList:
-        listed = schema.RecordingList.FromString(await self._ask("list", schema.RecordingQuery()))
+    async def _list(self, request: Request) -> schema.RecordingList:
+        answer = await self._in_time("list", schema.RecordingQuery(), request.within_s)
+        listed = schema.RecordingList.FromString(answer)
         open_now = self._open_now()
         known = {recording.file for recording in listed.recordings}
         rows = [open_now.get(recording.file, recording) for recording in listed.recordings]
@@ -87,7 +103,40 @@ class Serving:
         assert isinstance(asked, schema.RecordingQuery)
         if (open_now := self._open_now().get(asked.file)) is not None:
             return open_now
-        return schema.Recording.FromString(await self._ask("info", asked))
+        return schema.Recording.FromString(await self._in_time("info", asked, request.within_s))
+
+    async def _in_time(self, name: str, asked: Message, within_s: float | None) -> bytes:
+        """Return the worker's answer while its asker still waits.
+
+        What takes longer goes on, and is kept for a moment for the asker, who asks again.
+
+        Raises:
+            BusyError: If it takes longer.
+            RefusedError: Why there is none.
+        """
+        key = name, asked.SerializeToString()
+        if (task := self._under_way.get(key)) is None:
+            task = self._under_way[key] = asyncio.create_task(self._ask(name, asked))
+            task.add_done_callback(lambda task: self._keep(key, task))
+        patience_s = _PATIENCE_S if within_s is None else min(_PATIENCE_S, _SHARE * within_s)
+        try:
+            async with asyncio.timeout(patience_s):
+                return await asyncio.shield(task)
+        except TimeoutError:
+            text = f"the recorder is busy: its recordings/{name} is not ready yet; ask again"
+            raise BusyError(text) from None
+        finally:
+            if task.done():  # the next asker gets what is there then
+                self._forget(key, task)
+
+    def _keep(self, key: tuple[str, bytes], task: asyncio.Task[bytes]) -> None:
+        if not task.cancelled():
+            task.exception()  # its asker may have gone
+        asyncio.get_running_loop().call_later(_KEPT_S, self._forget, key, task)
+
+    def _forget(self, key: tuple[str, bytes], task: asyncio.Task[bytes]) -> None:
+        if self._under_way.get(key) is task:
+            del self._under_way[key]
 
     async def _ask(self, name: str, request: Message) -> bytes:
         """The worker's answer.

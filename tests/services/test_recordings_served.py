@@ -3,6 +3,8 @@
 import asyncio
 import csv
 import io
+import os
+import signal
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -43,6 +45,24 @@ async def served(mesh, folder, quotas=DEFAULT_QUOTAS, **open_now):
             yield asker
         finally:
             await serving.close()
+
+
+def test_a_recorder_whose_reader_is_held_up_says_that_it_is_busy_and_answers_later(mesh, folder):
+    async def main():
+        async with open_session(mesh) as own, open_session(mesh) as asker:
+            serving = Serving(own, "site", folder, open_now=dict, flight=lambda: True)
+            try:
+                assert (await asker.ask(f"{BASE}/list", timeout_s=50.0)).recordings
+                os.kill(serving.pid, signal.SIGSTOP)
+                for _ in range(2):
+                    with pytest.raises(BusyError, match="the recorder is busy: its recordings/list"):
+                        await asker.ask(f"{BASE}/list", timeout_s=0.5)
+                os.kill(serving.pid, signal.SIGCONT)
+                assert (await asker.ask(f"{BASE}/list", timeout_s=50.0)).recordings
+            finally:
+                await serving.close()
+
+    run(main())
 
 
 def test_recordings_are_listed_ranged_and_refused_over_the_mesh(mesh, folder):
