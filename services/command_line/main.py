@@ -25,6 +25,7 @@ from services.command_line.keys_folder import KeysFolder, keys_folder
 from services.command_line.options import Connect, Height, Json, Robot, Width
 from services.command_line.output import show_directions
 from services.command_line.programs import program_app
+from services.command_line.reading_limits import limit
 
 app = typer.Typer(
     name="robomesh",
@@ -250,6 +251,7 @@ def ik(
 def main() -> None:
     """The program."""
     show_directions()
+    limit(next(iter(sys.argv[1:]), ""))
     status = run(sys.argv[1:])
     try:
         # What waits yet is said now: the interpreter's own end would tell who cannot hear it.
@@ -272,6 +274,8 @@ def run(arguments: list[str]) -> int:
         )
     except (KeyboardInterrupt, typer.Abort):
         return 130
+    except MemoryError:
+        return _could_not("it takes more memory to read than there is, or than 6 GB")
     except SystemExit:
         # So typer and rich end a command whose reader has gone.
         _say_no_more()

@@ -1,0 +1,46 @@
+"""Commands that read strangers' files end in one line at their limits of memory and time."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def ended(script: str) -> tuple[int, str]:
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False, cwd=ROOT, timeout=60
+    )
+    return done.returncode, done.stderr
+
+
+def test_command_that_takes_too_long_is_ended_in_one_line() -> None:
+    script = (
+        "import time; from services.command_line.reading_limits import limit\n"
+        "limit('mesh', longest_s=0.2)\n"
+        "while True: sum(range(1000))\n"
+    )
+    assert ended(script) == (2, "robomesh: this took more than 0.2 s and was ended\n")
+
+
+def test_command_that_takes_too_much_memory_says_so_in_one_line() -> None:
+    script = (
+        "import sys; from services.command_line import main, meshes\n"
+        "meshes.info = lambda *_: bytearray(2 << 30)\n"
+        "main.limit = lambda command, given=main.limit: given(command, most_bytes=1 << 30)\n"
+        "sys.argv = ['robomesh', 'mesh', 'info', 'x.stl']\n"
+        "main.main()\n"
+    )
+    status, said = ended(script)
+    assert (status, len(said.splitlines())) == (2, 1)
+    assert "memory" in said
+
+
+def test_other_commands_are_not_limited() -> None:
+    script = (
+        "import resource, threading; from services.command_line.reading_limits import limit\n"
+        "before = resource.getrlimit(resource.RLIMIT_DATA)\n"
+        "limit('up'); limit('')\n"
+        "assert resource.getrlimit(resource.RLIMIT_DATA) == before and threading.active_count() == 1\n"
+    )
+    assert ended(script) == (0, "")
