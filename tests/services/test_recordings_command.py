@@ -51,7 +51,6 @@ def moving(tmp_path_factory):
     return path
 
 
-@pytest.mark.slow
 def test_a_table_holds_the_files_numbers(moving, tmp_path, capsys):
     out = tmp_path / "out.csv"
     assert run(["recordings", "export", str(moving), str(out), "--from", "0.5", "--to", "1", "--json"]) == 0
@@ -65,7 +64,6 @@ def test_a_table_holds_the_files_numbers(moving, tmp_path, capsys):
     assert at_s == pytest.approx([number / 100 - 1e-6 for number in range(50, 101)], abs=1e-8)
 
 
-@pytest.mark.slow
 def test_a_table_has_a_row_a_state_whatever_else_was_recorded(tmp_path):
     source, out = tmp_path / "trial.mcap", tmp_path / "out.csv"
     with Written(source) as file:
