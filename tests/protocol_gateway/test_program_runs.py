@@ -12,6 +12,7 @@ import pytest
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from bus.answering import Request
+from bus.errors import RefusedError
 from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.control.waits import date
 from tests.conftest import run
@@ -247,6 +248,14 @@ async def planned(plant):
     assert "no statement that does anything" in await refusal(start(plant, "# nothing\n"))
 
 
+async def in_control(plant):
+    """Renew control, or take it again where this machine was too busy to renew it in time."""
+    try:
+        return await plant.lease(A.RENEW, ttl_s=5)
+    except RefusedError:
+        return await plant.lease(A.ACQUIRE, ttl_s=5)
+
+
 def not_run(plant):
     return [each for each in plant.seen["audit"] if each.request == "RUN_PROGRAM" and each.outcome == REFUSED]
 
@@ -267,7 +276,7 @@ def test_a_program_whose_asker_gave_up_while_it_was_checked_never_runs(mesh, tmp
         async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
             lease = await plant.lease(A.ACQUIRE, ttl_s=5)
             await planned(plant)
-            lease = await plant.lease(A.RENEW, ttl_s=5)
+            lease = await in_control(plant)
             with slow_check():
                 if told:
                     until_ns = lease.now.ToNanoseconds() + 1_000_000_000
@@ -281,7 +290,7 @@ def test_a_program_whose_asker_gave_up_while_it_was_checked_never_runs(mesh, tmp
                     replies = await plain_run(plant, 0.5)
                     assert not [each for each in replies if each.ok is not None]
                     await until(lambda: len(not_run(plant)) == 2)
-            await plant.lease(A.RENEW, ttl_s=5)
+            await in_control(plant)
             # What the process that plans had begun is over when this is planned.
             await planned(plant)
             assert "before its asker gives up" in not_run(plant)[1].text
@@ -326,7 +335,7 @@ def test_a_hold_cancels_a_program_that_is_being_checked_and_leaves_nothing_on_ho
                 answer = await plant.command(C.HOLD)
                 assert answer.text == "HOLD: the program was not started, and nothing is on hold"
                 assert await asked == "Not run: HOLD came while it was being checked: not started."
-            await plant.lease(A.RENEW, ttl_s=5)
+            await in_control(plant)
             await planned(plant)
             assert plant.controller.counters.units_sent == 0
             assert plant.controller.activity == STATE.IDLE
