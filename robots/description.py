@@ -8,6 +8,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from robots.schema import DhDescription, JointType, Pose, RobotDescription, Urdf
 from robots.urdf.checks import urdf_problems
 from robots.urdf.files import files_of
 from robots.urdf.read import MOST_URDF_CHARACTERS, UrdfRobot, read_urdf
+from robots.urdf.srdf import ignored_beside
 
 __all__ = [
     "JointType",
@@ -189,7 +191,11 @@ def _urdf_robot(description: UrdfDescription, *, confined: bool) -> UrdfRobot:
         return UrdfRobot(found.name, found.tree, found.notes)
     packages = [folder / package for package in description.packages]
     resolve = files_of(urdf, packages, confined=folder if confined else None)
-    return read_urdf(_text(urdf, most=MOST_URDF_CHARACTERS), urdf, resolve=resolve)
+    robot = read_urdf(_text(urdf, most=MOST_URDF_CHARACTERS), urdf, resolve=resolve)
+    if confined and not urdf.resolve().is_relative_to(folder.resolve()):
+        return robot
+    ignored, note = ignored_beside(urdf, robot.name, robot.tree)
+    return replace(robot, ignored=tuple(ignored), notes=(*robot.notes, *([note] if note else [])))
 
 
 def _text(path: Path, *, most: int = MOST_CHARACTERS) -> str:

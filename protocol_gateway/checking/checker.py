@@ -7,7 +7,7 @@ import time
 from collections.abc import Collection, Mapping
 
 from bus.worker import Worker, WorkerError
-from protocol_gateway.checking.questions import Checked, CheckMotion, CheckProgram, Prepare
+from protocol_gateway.checking.questions import PENDING, Checked, CheckMotion, CheckProgram, Prepare
 from protocol_gateway.errors import CheckError
 from robots.cells import CellDescription
 from robots.errors import RobotError
@@ -21,6 +21,7 @@ PROGRAM_WITHIN_S = 25.0
 _HANGS_S = 10.0
 _PREPARED_WITHIN_S = 60.0
 _AGAIN_S = 5.0
+_PENDING_S = 1.0
 # For cells of several robots: beyond that, some share one.
 MOST_PROCESSES = 8
 _STARTING = "the check is still getting ready: try again in a few seconds"
@@ -47,6 +48,7 @@ class Checker:
         self._turn = asyncio.Lock()
         self._failed = ""
         self._process: int | None = None
+        self._pending: tuple[str, ...] = ()
 
     @property
     def pid(self) -> int | None:
@@ -70,7 +72,11 @@ class Checker:
                     if not self._failed:
                         self._problems = dict.fromkeys(self._robots, _STARTING)
                     self._process = await self._started()
-                await asyncio.sleep(0.1 if self._process is not None else _AGAIN_S)
+                elif self._pending:
+                    with contextlib.suppress(WorkerError):
+                        await self._prepare()
+                waits_s = 0.1 if not self._pending else _PENDING_S
+                await asyncio.sleep(waits_s if self._process is not None else _AGAIN_S)
         finally:
             await self._worker.close()
 
@@ -78,8 +84,8 @@ class Checker:
         try:
             await self._worker.start()
             process = self._worker.pid
-            for robot in self._robots:
-                self._problems[robot] = await self._prepared(robot)
+            self._pending = self._robots
+            await self._prepare()
         except Exception as error:
             why = _in_words(error)
             if why != self._failed:
@@ -90,6 +96,14 @@ class Checker:
         self._failed = ""
         return process
 
+    async def _prepare(self) -> None:
+        """Prepare the robots that are not ready; one whose links are being studied is asked for again."""
+        for robot in self._pending:
+            text = await self._prepared(robot)
+            if text != PENDING:
+                self._pending = tuple(each for each in self._pending if each != robot)
+                self._problems[robot] = text
+
     async def _prepared(self, robot: str) -> str:
         try:
             text: str = await self._worker.ask(Prepare(robot), timeout_s=_PREPARED_WITHIN_S)
@@ -97,7 +111,7 @@ class Checker:
             raise
         except Exception as error:
             text = _in_words(error)
-        if text:
+        if text and text != PENDING:
             log.warning("%s: its motions cannot be checked: %s", robot, text)
         return text
 

@@ -9,9 +9,16 @@ from robots.programs.steps import Step
 Positions: TypeAlias = tuple[float, ...]
 
 
+# The answer to Prepare while links of the cell are being studied: ask again.
+PENDING = "pending"
+
+
 @dataclass(frozen=True)
 class Prepare:
-    """Get a robot's cell ready: the shapes of all that stands there."""
+    """Get a robot's cell ready: the shapes of all that stands there.
+
+    The answer is why its motions cannot be checked, empty if they can, or PENDING.
+    """
 
     robot: str
 

@@ -6,8 +6,16 @@ from typing import Any
 import numpy as np
 
 from bus.worker import answer_all
-from protocol_gateway.checking.questions import Cells, Checked, CheckMotion, CheckProgram, Positions, Prepare
-from robots.collision import Cell, build_cell, missing_meshes, unshaped, unshaped_moving
+from protocol_gateway.checking.questions import (
+    PENDING,
+    Cells,
+    Checked,
+    CheckMotion,
+    CheckProgram,
+    Positions,
+    Prepare,
+)
+from robots.collision import Cell, build_cell, missing_meshes, pending, unshaped, unshaped_moving
 from robots.joints import FloatArray
 from robots.programs.check import check_plan, check_program
 from robots.programs.steps import CheckResult, Step, StepKind, Violation, ViolationKind
@@ -23,14 +31,18 @@ def begin(cells: Cells) -> Callable[[Any], Any]:
     def cell_of(robot: str) -> Cell:
         names = tuple(each.name for each in cells[robot].robots)
         if names not in ready:
-            ready[names] = build_cell(cells[robot])
+            # Studies of links take up to minutes: they go on beside this process.
+            cell = build_cell(cells[robot], wait=False)
+            if pending(cell):
+                return cell
+            ready[names] = cell
         return ready[names]
 
     def answer(question: Prepare | CheckMotion | CheckProgram) -> str | Checked:
         cell = cell_of(question.robot)
         match question:
             case Prepare(robot):
-                return _why_not(cell, robot)
+                return PENDING if pending(cell) else _why_not(cell, robot)
             case CheckMotion():
                 steps = [
                     Step(line=0, kind=StepKind.MOVE, target=np.array(target)) for target in question.targets

@@ -10,6 +10,7 @@ from robots.collision.cell import (
     build_cell,
     distances,
     missing_meshes,
+    pending,
     unshaped,
     unshaped_moving,
 )
@@ -50,6 +51,7 @@ __all__ = [
     "outside_nearest",
     "own_contacts",
     "own_nearest",
+    "pending",
     "sample_pairs",
     "unshaped",
     "unshaped_moving",

@@ -282,12 +282,13 @@ class _Own:
                     there = at.on_the_way(one, share), at.on_the_way(other, share)
                     distance = self._distance(gauge, *there, number)
             if distance == 0.0:
-                points = gauge.points(self._arm.bodies[one], there[0], self._arm.bodies[other], there[1])
+                bodies = self._arm.own.measured[number]
+                points = gauge.points(bodies[0], there[0], bodies[1], there[1])
                 yield _Near((names[one], names[other]), distance, points)
 
     def _distance(self, gauge: Gauge, one_at: Any, other_at: Any, number: int) -> float:
-        one, other = self._arm.own.pairs[number]
-        return gauge.distance(self._arm.bodies[one], one_at, self._arm.bodies[other], other_at)
+        one, other = self._arm.own.measured[number]
+        return gauge.distance(one, one_at, other, other_at)
 
     def _met(self, gauge: Gauge, at: Placed, number: int, before_m: float, after_m: float) -> float:
         """As `_Around._met`."""
@@ -297,4 +298,6 @@ class _Own:
             return self._distance(gauge, at.on_the_way(one, share), at.on_the_way(other, share), number)
 
         # Of two that go along together, the one hardly moves as the other sees it.
-        return touching_share(measure, before_m, after_m, at.way(one, other, self._arm.bodies[other]))
+        return touching_share(
+            measure, before_m, after_m, at.way(one, other, self._arm.own.measured[number][1])
+        )

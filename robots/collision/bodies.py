@@ -74,15 +74,29 @@ def exact_bodies(shapes: Sequence[Shape]) -> tuple[Body, ...]:
     Raises:
         MeshError: If a mesh file cannot be read.
     """
-    vertices, triangles = _solid(link_mesh(shapes))
-    if not len(triangles):
-        return hull_bodies(shapes)
+    triangles = surface(shapes)
+    return (exact_body(triangles),) if len(triangles) else hull_bodies(shapes)
+
+
+def exact_body(triangles: FloatArray) -> Body:
+    """The triangles themselves, by their corners (n, 3, 3), n at least 1."""
+    vertices, numbers = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     geometry = coal.BVHModelOBBRSS()
     geometry.beginModel(len(triangles), len(vertices))
     geometry.addVertices(vertices)
-    geometry.addTriangles(triangles)
+    geometry.addTriangles(numbers.reshape(-1, 3))
     geometry.endModel()
-    return (_body(geometry, vertices),)
+    return _body(geometry, vertices)
+
+
+def surface(shapes: Sequence[Shape]) -> FloatArray:
+    """The triangles of shapes by their corners: (n, 3, 3) [m].
+
+    Raises:
+        MeshError: If a mesh file cannot be read.
+    """
+    vertices, triangles = _solid(link_mesh(shapes))
+    return vertices[triangles]
 
 
 def hull_body(points: FloatArray) -> Body:
@@ -121,6 +135,12 @@ def _about(points: FloatArray, cell_m: float) -> FloatArray:
     cells = np.unique(np.floor(points / cell_m), axis=0)
     corners = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1]), axis=-1).reshape(-1, 3)
     return np.unique((cells[:, None] + corners).reshape(-1, 3), axis=0) * cell_m
+
+
+def wider(body: Body, points: FloatArray) -> Body:
+    """A body whose box and balls hold some points (n, 3), too."""
+    corners = np.array([body.center - body.half, body.center + body.half])
+    return _body(body.geometry, np.concatenate([points, corners]))
 
 
 def _body(geometry: Any, points: FloatArray) -> Body:

@@ -15,6 +15,7 @@ from robots.cells import FLOOR, CellDescription, CellRobot, Fixture, Floor
 from robots.collision.bodies import Body, exact_bodies, hull_bodies, piece_bodies
 from robots.collision.obstacles import Balls, Obstacles, balls_of, joined
 from robots.collision.own import OwnPairs, own_pairs
+from robots.collision.pairs import PairPlan, plan_pairs
 from robots.description import load
 from robots.errors import MeshError
 from robots.joints import FloatArray, Joints
@@ -34,6 +35,7 @@ class Arm:
         links: (b,) number of each body's link among the model's.
         moving: (b,) whether a joint moves the body.
         balls: They cover the bodies.
+        plan: How it is checked against itself.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Arm:
     moving: NDArray[np.bool_]
     balls: Balls
     own: OwnPairs
+    plan: PairPlan
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,17 +72,18 @@ class Cell:
     ignored: frozenset[tuple[str, str]]
 
 
-def build_cell(description: CellDescription, *, exact: bool = False) -> Cell:
+def build_cell(description: CellDescription, *, exact: bool = False, wait: bool = True) -> Cell:
     """Read what a cell's checks need.
 
     Args:
         exact: Check links as their meshes, not as hulls about them: distances are some hundred times slower.
+        wait: Wait for studies of links whose hulls touch at home; else they go on, and the cell is `pending`.
 
     Raises:
         DescriptionError: If a robot's description cannot be used.
         MeshError: If a mesh cannot be read, or a fixture has no surface.
     """
-    arms = {robot.name: _arm(robot, exact=exact) for robot in description.robots}
+    arms = {robot.name: _arm(robot, exact=exact, wait=wait) for robot in description.robots}
     links = {f"{arm.name}/{link}" for arm in arms.values() for link in arm.model.link_names}
     return Cell(
         arms,
@@ -100,8 +104,18 @@ def _read(
     return description, tuple((number, body) for number, link in links for body in bodies_of(link.checked))
 
 
-def _arm(robot: CellRobot, *, exact: bool) -> Arm:
+def _arm(robot: CellRobot, *, exact: bool, wait: bool) -> Arm:
+    plan = plan_pairs(robot.model, robot.confined, wait=wait)
     description, bodies = _read(robot.model, robot.confined, exact)
+    pairs = plan.pairs
+    if exact:
+        # What is checked in parts stays so; hulls become meshes.
+        pairs = [
+            (one, other, [(bodies[one][1], bodies[other][1])] if len(measured) == 1 else measured)
+            for one, other, measured in pairs
+        ]
+    else:
+        bodies = plan.bodies
     model, tree = build_model(description), tree_of(description)
     links = np.array([number for number, _ in bodies], dtype=np.int64)
     return Arm(
@@ -118,7 +132,8 @@ def _arm(robot: CellRobot, *, exact: bool) -> Arm:
         links=links,
         moving=np.array([tree.links[number].joint != BASE for number in links], dtype=np.bool_),
         balls=balls_of([body for _, body in bodies]),
-        own=own_pairs(description, tree, bodies),
+        own=own_pairs(tree, bodies, pairs),
+        plan=plan,
     )
 
 
@@ -132,6 +147,11 @@ def _standing(fixture: Fixture, links: set[str]) -> Obstacles:
         raise MeshError(what, "has no surface: nothing could be checked against it")
     placements = np.tile(np.asarray(fixture.fixture_to_site, dtype=np.float64), (len(bodies), 1, 1))
     return Obstacles((fixture.name,) * len(bodies), bodies, placements, np.zeros(len(bodies), dtype=np.bool_))
+
+
+def pending(cell: Cell) -> tuple[str, ...]:
+    """Arms of a cell whose own links are still being studied."""
+    return tuple(name for name, arm in cell.arms.items() if arm.plan.pending)
 
 
 def unshaped(cell: Cell, robot: str) -> tuple[str, ...]:

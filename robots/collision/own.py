@@ -2,17 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from robots.collision.bodies import TOUCH_M, Body
-from robots.collision.sampling import are_neighbours
 from robots.joints import FloatArray
 from robots.model import RobotModel, all_positions
-from robots.schema import RobotDescription
 from robots.tree import Tree
 
 Points = tuple[FloatArray, FloatArray]
@@ -23,40 +20,53 @@ class OwnPairs:
     """Bodies of one arm that are checked against each other.
 
     Attributes:
-        pairs: Numbers of both bodies, in the order of Pinocchio's results.
+        pairs: Numbers of both bodies among the arm's, in the order of Pinocchio's results.
+        measured: What is checked of each pair: the bodies themselves, or one part of each.
     """
 
     pairs: tuple[tuple[int, int], ...]
+    measured: tuple[tuple[Body, Body], ...]
     geometry: Any
     workspace: Any
 
 
-def own_pairs(description: RobotDescription, tree: Tree, bodies: Sequence[tuple[int, Body]]) -> OwnPairs:
-    """All pairs but those of neighbours (one joint apart), and those that the description leaves out.
+Pairs = Sequence[tuple[int, int, Sequence[tuple[Body, Body]]]]
+
+
+def own_pairs(tree: Tree, bodies: Sequence[tuple[int, Body]], pairs: Pairs) -> OwnPairs:
+    """The workspace for checks of an arm's own pairs.
 
     Args:
         bodies: Each with the number of its link.
+        pairs: Numbers of two bodies, and what is checked of them: themselves, or pairs of their parts.
     """
     geometry = pin.GeometryModel()
-    for number, (link_number, body) in enumerate(bodies):
-        link = tree.links[link_number]
-        geometry.addGeometryObject(
-            # Pinocchio counts joints from 1; its 0 is the base.
-            pin.GeometryObject(str(number), link.joint + 1, pin.SE3(link.link_to_joint), body.geometry)
-        )
-    ignored = {frozenset(pair) for pair in description.collision.ignore}
-    pairs = []
-    for one, other in combinations(range(len(bodies)), 2):
-        first, second = tree.links[bodies[one][0]], tree.links[bodies[other][0]]
-        if are_neighbours(tree, first.joint, second.joint) or {first.name, second.name} in ignored:
-            continue
-        pairs.append((one, other))
-        geometry.addCollisionPair(pin.CollisionPair(one, other))
+    numbers: dict[tuple[int, int], int] = {}
+
+    def added(number: int, body: Body) -> int:
+        if (number, id(body)) not in numbers:
+            link = tree.links[bodies[number][0]]
+            numbers[number, id(body)] = geometry.addGeometryObject(
+                # Pinocchio counts joints from 1; its 0 is the base.
+                pin.GeometryObject(
+                    str(len(numbers)), link.joint + 1, pin.SE3(link.link_to_joint), body.geometry
+                )
+            )
+        return numbers[number, id(body)]
+
+    flat = [(one, other, each) for one, other, measured in pairs for each in measured]
+    for one, other, (first, second) in flat:
+        geometry.addCollisionPair(pin.CollisionPair(added(one, first), added(other, second)))
     workspace = pin.GeometryData(geometry)
     for request in workspace.collisionRequests:
         request.security_margin = TOUCH_M
         request.enable_contact = True
-    return OwnPairs(tuple(pairs), geometry, workspace)
+    return OwnPairs(
+        tuple((one, other) for one, other, _ in flat),
+        tuple(measured for _, _, measured in flat),
+        geometry,
+        workspace,
+    )
 
 
 def touching_pairs(own: OwnPairs, model: RobotModel, positions: FloatArray) -> dict[int, Points]:

@@ -1,24 +1,25 @@
 """Which links touch which, found by trying: what a description may leave out of its collision checks.
 
-Links count as the convex hulls of their shapes.
+Links count as the convex hulls of what is checked of them; "always" holds for their meshes, too.
 """
 
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import combinations
+from typing import Any
 
 import coal
 import numpy as np
 
-from robots.collision.bodies import hull_bodies, transform
+from robots.collision.bodies import exact_bodies, hull_bodies, transform
 from robots.errors import DescriptionError
 from robots.joints import FloatArray, Joints, constraint_values
-from robots.model import build_model, link_placements
+from robots.model import RobotModel, build_model, link_placements
 from robots.schema import RobotDescription
 from robots.tree import BASE, Tree, tree_of
 
-# A pair that touches in a thousandth of all positions is missed once in 150 times.
-SAMPLES = 5_000
+# A pair that touches in a thousandth of all positions is missed once in 22,000 times.
+SAMPLES = 10_000
 # Fewer positions say neither never nor always.
 FEWEST = 1_000
 # Walks among coupled limits: rounds of so many steps a joint, each round after the shape that the last found.
@@ -90,6 +91,7 @@ def sample_pairs(description: RobotDescription, *, samples: int = SAMPLES, seed:
         for index, (one, other) in enumerate(pairs):
             result.clear()
             touched[index] += coal.collide(hulls[one], at[one], hulls[other], at[other], request, result) > 0
+    _confirm_always(tree, model, all_positions, pairs, touched)
     return Sampling(
         tried,
         tuple(
@@ -97,6 +99,24 @@ def sample_pairs(description: RobotDescription, *, samples: int = SAMPLES, seed:
             for pair, count in zip(pairs, touched.tolist(), strict=True)
         ),
     )
+
+
+def _confirm_always(
+    tree: Tree, model: RobotModel, positions: FloatArray, pairs: list[tuple[str, str]], touched: Any
+) -> None:
+    """Take one off the count of a pair whose hulls touch in all positions and whose meshes do not."""
+    links = {link.name: link for link in tree.links}
+    request, result = coal.CollisionRequest(), coal.CollisionResult()
+    for index in np.flatnonzero(touched == len(positions)).tolist():
+        one, other = pairs[index]
+        (first,), (second,) = (exact_bodies(links[name].checked) for name in pairs[index])
+        numbers = [model.link_names.index(name) for name in (one, other)]
+        for each in positions:
+            first_at, second_at = (transform(at) for at in link_placements(model, each)[numbers])
+            result.clear()
+            if not coal.collide(first.geometry, first_at, second.geometry, second_at, request, result):
+                touched[index] -= 1
+                break
 
 
 def _contact(touched: int, tried: int, *, adjacent: bool) -> Contact:

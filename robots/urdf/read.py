@@ -43,6 +43,7 @@ class UrdfRobot:
         notes: What was odd and how it was taken, a sentence each.
         missing: Mesh files that were not found, as the URDF names them.
         unchecked: Those of them that a collision check would use.
+        ignored: Pairs of links that an SRDF says need no check, and its reason.
     """
 
     name: str
@@ -50,6 +51,7 @@ class UrdfRobot:
     notes: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
     unchecked: tuple[str, ...] = ()
+    ignored: tuple[tuple[tuple[str, str], str], ...] = ()
 
 
 def read_urdf(text: str, source: Path, *, resolve: Resolve) -> UrdfRobot:

@@ -10,12 +10,53 @@ from robots.errors import DescriptionError
 from robots.tree import Tree
 from robots.urdf.values import WrongElement, numbers
 
+_MOST_BYTES = 4_000_000
 # What a robot's own people call the position that it starts from, the best first.
 _HOMES = ("home", "default", "arm_up", "half_sitting", "standing")
 
 
+def srdf_beside(urdf: Path, robot: str) -> Path | None:
+    """The SRDF in a URDF's folder that is of its robot; None: there is none.
+
+    It has the URDF's file name or the robot's name, or is alone with the URDF.
+    """
+    try:
+        found = sorted(urdf.parent.glob("*.srdf"))
+        alone = len(found) == 1 and len(list(urdf.parent.glob("*.urdf"))) == 1
+    except OSError:
+        return None
+    for path in found:
+        if path.stem == urdf.stem or alone or _robot_name(path) == robot:
+            return path
+    return None
+
+
+def _robot_name(path: Path) -> str:
+    try:
+        return Xml.fromstring(path.read_text(encoding="utf-8").strip()).get("name", "")
+    except (OSError, ValueError, Xml.ParseError):
+        return ""
+
+
+def ignored_beside(urdf: Path, robot: str, tree: Tree) -> tuple[list[tuple[tuple[str, str], str]], str]:
+    """Pairs that the SRDF beside a URDF leaves out, each with the reason, and a note if it cannot be used."""
+    path = srdf_beside(urdf, robot)
+    if path is None:
+        return [], ""
+    try:
+        if path.stat().st_size > _MOST_BYTES:
+            return [], f"{path.name}: has more than {_MOST_BYTES:,} bytes, so it is not used"
+        _, pairs = read_srdf(path.read_text(encoding="utf-8"), path, tree)
+    except (OSError, UnicodeDecodeError, DescriptionError) as error:
+        reason = error.problems[0] if isinstance(error, DescriptionError) else "cannot be read"
+        return [], f"{path.name}: {reason}; it is not used"
+    return [(pair, f"{path.name} says so") for pair in pairs], ""
+
+
 def read_srdf(text: str, source: Path, tree: Tree) -> tuple[dict[str, float], list[tuple[str, str]]]:
     """Home of some joints [rad] or [m] by name, and the pairs, of what the tree has.
+
+    Pairs that an SRDF leaves out because they never touched (MoveIt's reason "Never") stay checked.
 
     Raises:
         DescriptionError: If it is no SRDF.
@@ -54,6 +95,8 @@ def _ignored(root: Xml.Element, tree: Tree) -> list[tuple[str, str]]:
     pairs = []
     for element in root.findall("disable_collisions"):
         one, other = element.get("link1", ""), element.get("link2", "")
+        if element.get("reason") == "Never":
+            continue
         if one in links and other in links and one != other:
             pairs.append((one, other))
     return pairs

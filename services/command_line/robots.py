@@ -26,12 +26,17 @@ def check(robot: str, as_json: bool) -> None:
     name = robot
     problems: list[dict[str, Any]] = []
     warnings: list[dict[str, Any]] = []
+    report: dict[str, Any] = {}
     try:
         description = load(robot)
         name = description.name
         found, odd = mesh_findings(description)
         problems += [{"file": each.file, "path": [], "text": each.text} for each in found]
         warnings = [{"file": each.file, "text": each.text} for each in odd]
+        if not problems:
+            from robots.collision.report import collision_report
+
+            report = collision_report(robot)
     except DescriptionError as error:
         if not Path(error.source).is_file():
             raise  # nothing was checked
@@ -40,12 +45,18 @@ def check(robot: str, as_json: bool) -> None:
             for path, text in zip(error.paths, error.problems, strict=True)
         ]
     if as_json:
-        print_json({"ok": not problems, "problems": problems, "warnings": warnings})
+        print_json({"ok": not problems, "problems": problems, "warnings": warnings, **report})
     else:
         for problem in problems:
             print(f"{problem['file']}: {problem['text']}")
         for warning in warnings:
             print(f"{warning['file']}: warning: {warning['text']}")
+        for link, way in report.get("stands_out", {}).items():
+            print(f"{name}: {link}: its visual geometry stands out of what is checked by {way * 1000:.1f} mm")
+        for each in report.get("not_checked", []):
+            print(f"{name}: {' and '.join(each['links'])} are not checked: {each['reason']}")
+        for each in report.get("touch_at_home", []):
+            print(f"{name}: {' and '.join(each['links'])} touch at home as hulls: {each['reason']}")
         if not problems:
             print(f"{name}: a right description")
     if problems:

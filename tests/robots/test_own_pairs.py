@@ -1,0 +1,198 @@
+"""Which links of an arm are checked against each other, and as what."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robots.cells import CellDescription, CellRobot
+from robots.collision import build_cell, near_along, own_contacts, own_nearest, pending, study, surfaces
+from robots.collision.cell import Cell
+from robots.collision.surfaces import Part, cut
+from robots.meshes.solids import ball
+from services.command_line.main import run
+
+REAL = Path(__file__).parents[3] / "shared" / "testdata" / "urdf" / "abb_irb2400_support"
+needs_real_robots = pytest.mark.skipif(not REAL.is_dir(), reason="no ../shared/testdata/urdf: no real robots")
+
+
+def solid(x: float, size: str, z: float = 0.0) -> str:
+    return f'<collision><origin xyz="{x} 0 {z}"/><geometry><box size="{size}"/></geometry></collision>'
+
+
+# The hand slides along x between two walls of the base, 0.19 m to each side; their hull holds it.
+WALLS = solid(-0.2, "0.02 0.4 0.4") + solid(0.2, "0.02 0.4 0.4")
+ARM = """<robot name="hollow">
+<link name="base">{base}</link>
+<link name="arm">{arm}</link>
+<link name="hand">{hand}</link>
+<joint name="turn" type="revolute"><axis xyz="0 0 1"/><parent link="base"/><child link="arm"/>
+  <limit lower="-0.1" upper="0.1" velocity="1" effort="1"/></joint>
+<joint name="slide" type="prismatic"><axis xyz="1 0 0"/><parent link="arm"/><child link="hand"/>
+  <limit lower="-0.3" upper="0.3" velocity="1" effort="1"/></joint>
+</robot>"""
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def hollow(folder: Path, *, base: str = WALLS, hand: str = solid(0, "0.1 0.1 0.1")) -> Path:
+    path = folder / "hollow.urdf"
+    path.write_text(ARM.format(base=base, arm=solid(0, "0.01 0.01 0.01", 0.3), hand=hand))
+    return path
+
+
+def cell_of(model: Path, *, wait: bool = True) -> Cell:
+    return build_cell(CellDescription((CellRobot("arm", model, np.eye(4)),)), wait=wait)
+
+
+def touching(cell: Cell, *positions: float) -> list[tuple[str, str]]:
+    return [each.pair for each in own_contacts(cell, "arm", np.array(positions))]
+
+
+def test_links_whose_hulls_touch_at_home_and_meshes_do_not_are_checked_in_parts(tmp_path: Path) -> None:
+    cell = cell_of(hollow(tmp_path))
+    pair = ("arm/base", "arm/hand")
+    assert touching(cell, 0.0, 0.0) == []
+    assert touching(cell, 0.0, 0.135) == []
+    assert touching(cell, 0.0, 0.145) == [pair]
+    nearest = own_nearest(cell, "arm", np.zeros(2))
+    assert nearest is not None
+    assert nearest.distance_m == pytest.approx(0.14, abs=0.01)
+    # And along a path: into the wall.
+    path = np.column_stack([np.zeros(50), np.linspace(0.0, 0.2, 50)])
+    (met,) = near_along(cell, "arm", path, {}, within_m=0.01).encounters
+    assert met.pair == pair
+    assert path[met.samples[0], 1] == pytest.approx(0.14, abs=0.006)
+    ((links, text),) = cell.arms["arm"].plan.refined
+    assert links == ("base", "hand")
+    assert "convex parts" in text
+
+
+def test_a_study_is_made_once_for_the_same_content(
+    tmp_path: Path, own_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = hollow(tmp_path)
+    cell_of(model)
+    (kept,) = own_cache.rglob("*.npz")
+    other = tmp_path / "other"
+    other.mkdir()
+    shutil.copy(model, other)
+
+    def refused(*_: object, **__: object) -> None:
+        raise AssertionError("another process was started")
+
+    monkeypatch.setattr(study.subprocess, "Popen", refused)
+    assert touching(cell_of(other / model.name), 0.0, 0.0) == []
+    assert [*own_cache.rglob("*.npz")] == [kept]
+
+
+def test_a_cell_is_pending_until_the_study_ends(tmp_path: Path) -> None:
+    model = hollow(tmp_path)
+    waiting = cell_of(model, wait=False)
+    assert pending(waiting) == ("arm",)
+    assert touching(waiting, 0.0, 0.0) == [("arm/base", "arm/hand")]
+    assert pending(cell_of(model)) == ()
+    assert pending(cell_of(model, wait=False)) == ()
+
+
+def test_a_study_that_takes_too_long_leaves_hulls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(study, "TIME_LIMIT_S", 0.0)
+    cell = cell_of(hollow(tmp_path))
+    assert touching(cell, 0.0, 0.0) == [("arm/base", "arm/hand")]
+    ((_, text),) = cell.arms["arm"].plan.refined
+    assert "hulls are checked" in text
+
+
+def test_only_a_pair_that_touches_everywhere_as_meshes_too_is_ignored(tmp_path: Path) -> None:
+    # The bar that the hand is goes through the base, wherever it slides.
+    inside = solid(0, "1.2 0.05 0.05")
+    always = cell_of(hollow(tmp_path, base=solid(0, "0.01 0.2 0.01"), hand=inside))
+    reasons = dict(always.arms["arm"].plan.ignored)
+    assert "all of 10,000 positions" in reasons["base", "hand"]
+    assert touching(always, 0.0, 0.0) == []
+
+
+def test_touching_at_home_is_no_reason_to_ignore_a_pair(tmp_path: Path) -> None:
+    cell = cell_of(hollow(tmp_path, base=solid(0.05, "0.02 0.4 0.4")))
+    assert ("base", "hand") not in dict(cell.arms["arm"].plan.ignored)
+    assert touching(cell, 0.0, 0.0) == [("arm/base", "arm/hand")]
+    assert touching(cell, 0.0, -0.2) == []
+
+
+@pytest.mark.parametrize(("reason", "ignored"), [("Default", True), ("User", True), ("Never", False)])
+def test_pairs_that_the_srdf_beside_leaves_out_are_ignored_unless_they_never_touched(
+    tmp_path: Path, reason: str, ignored: bool
+) -> None:
+    model = hollow(tmp_path)
+    disabled = f'<disable_collisions link1="hand" link2="base" reason="{reason}"/>'
+    (tmp_path / "any.srdf").write_text(f'<robot name="hollow">{disabled}</robot>')
+    reasons = dict(cell_of(model).arms["arm"].plan.ignored)
+    assert (reasons.get(("base", "hand")) == "any.srdf says so") is ignored
+
+
+def test_the_srdf_of_another_robot_and_a_broken_one_are_not_used(tmp_path: Path) -> None:
+    model = hollow(tmp_path)
+    (tmp_path / "second.urdf").write_text("<robot/>")
+    srdf = tmp_path / "any.srdf"
+    srdf.write_text('<robot name="x"><disable_collisions link1="hand" link2="base"/></robot>')
+    assert ("base", "hand") not in dict(cell_of(model).arms["arm"].plan.ignored)
+    (tmp_path / "second.urdf").unlink()
+    srdf.write_text("<robot")
+    assert touching(cell_of(model), 0.0, 0.0) == []
+
+
+def test_robot_check_lists_what_is_not_checked_and_what_stands_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    seen = '<visual><geometry><box size="0.1 0.1 0.118"/></geometry></visual>'
+    model = hollow(tmp_path, hand=seen + solid(0, "0.1 0.1 0.1"))
+    assert run(["robot", "check", str(model), "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["not_checked"] == [
+        {"links": ["base", "arm"], "reason": "one joint apart"},
+        {"links": ["arm", "hand"], "reason": "one joint apart"},
+    ]
+    assert report["touch_at_home"][0]["links"] == ["base", "hand"]
+    assert report["stands_out"] == {"hand": pytest.approx(0.009, abs=1e-6)}
+    assert run(["robot", "check", str(model)]) == 0
+    assert "stands out of what is checked by 9.0 mm" in capsys.readouterr().out
+
+
+@needs_real_robots
+def test_a_real_arm_with_a_spherical_wrist_is_free_at_home_with_and_without_its_srdf(tmp_path: Path) -> None:
+    shutil.copytree(REAL, tmp_path / REAL.name, copy_function=shutil.copyfile)
+    model = tmp_path / REAL.name / "urdf" / "irb2400_12_155.urdf"
+    with_srdf = cell_of(model)
+    (tmp_path / REAL.name / "urdf" / "abb_irb2400.srdf").unlink()
+    other = model.rename(model.with_name("other.urdf"))
+    without = cell_of(other)
+    for cell, reason in ((with_srdf, "abb_irb2400.srdf says so"), (without, "all of 10,000 positions")):
+        assert touching(cell, *np.zeros(6)) == []
+        assert reason in dict(cell.arms["arm"].plan.ignored)["link_4", "link_6"]
+        # What never touched stays checked.
+        assert ("link_2", "link_6") not in dict(cell.arms["arm"].plan.ignored)
+
+
+def test_parts_cover_the_surface_that_was_cut() -> None:
+    vertices, triangles = ball(1.0, 16)
+    whole = vertices[triangles]
+    parts = [Part(whole)]
+    for _ in range(5):
+        parts = [half for part in parts for half in part.halves()]
+    area = sum(float(_areas(part.triangles).sum()) for part in parts)
+    assert area == pytest.approx(float(_areas(whole).sum()), rel=1e-9)
+    below, above = cut(whole, 2, 0.25)
+    assert below.triangles[:, :, 2].max() == pytest.approx(0.25)
+    assert above.triangles[:, :, 2].min() == pytest.approx(0.25)
+    assert surfaces.MOST_PARTS >= 32
+
+
+def _areas(triangles: np.ndarray) -> np.ndarray:
+    edges = triangles[:, 1:] - triangles[:, :1]
+    return np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) / 2
