@@ -69,7 +69,7 @@ def check_chunk(name: str, what: str = "operator") -> str:
     if len(name) > LONGEST_CHUNK or not _CHUNK.fullmatch(name):
         raise KeyNameError(
             f"{what} {one_line(name, LONGEST_NAME)!r} cannot be used: letters, digits, '_', '.' and '-', "
-            f"beginning with a letter or digit, at most {LONGEST_CHUNK}"
+            f"beginning with a letter or digit, at most {LONGEST_CHUNK} characters"
         )
     return name
 

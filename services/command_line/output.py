@@ -21,5 +21,11 @@ def show_directions() -> None:
         # A test's own stream is another kind, and stays.
         if type(stream) is io.TextIOWrapper:
             line_buffering, encoding, errors = stream.line_buffering, stream.encoding, stream.errors
-            shown = _Shown(stream.detach(), encoding=encoding, errors=errors, line_buffering=line_buffering)
+            shown = _Shown(
+                stream.detach(),
+                encoding=encoding,
+                errors=errors,
+                line_buffering=line_buffering,
+                write_through=stream.write_through,
+            )
             setattr(sys, name, shown)

@@ -77,7 +77,7 @@ class Plant:
 
     async def units(self, number):
         """Wait until the gateway has taken so many more units of the controller's."""
-        seen = self.seen["joints"]
+        seen = self.seen.setdefault("joints", [])
         more = len(seen) + number
         await until(lambda: len(seen) >= more)
 

@@ -30,7 +30,7 @@ CASES = [
     ("lease/request/*", '{"action": "ACQUIRE"}', "has a wildcard"),
     ("command/stop", json.dumps(MOVE), "operator 'stop' cannot be used: a request is called so"),
     ("command/李\x1b[1m", json.dumps(MOVE), "cannot be used: letters, digits"),
-    ("lease/request/" + "o" * 300, '{"action": "ACQUIRE"}', "a name has at most 200 characters"),
+    ("lease/request/" + "o" * 300, '{"action": "ACQUIRE"}', "at most 200 characters"),
 ]
 
 

@@ -232,7 +232,7 @@ async def gateway_process(mesh, folder, port, *, wrapped=()):
     process = await asyncio.create_subprocess_exec(*wrapped, sys.executable, *map(str, command))
     async with open_session(mesh) as monitor:
         plant = Plant(monitor, folder / "audit" / "hall" / "arm.jsonl")
-        topics = ("controller", "lease", "events")
+        topics = ("joints", "controller", "lease", "events")
         watching = [asyncio.create_task(watch(monitor, plant, topic)) for topic in topics]
         try:
             await until(lambda: plant.seen.get("controller"), timeout_s=30.0)

@@ -222,8 +222,16 @@ def test_a_command_id_that_was_used_for_other_content_is_refused_and_written_dow
             again = await plant.command(C.SPEED, speed_percent=50, id=9, not_after=soon)
             assert json.loads(first)["text"] == again.text
             await until(lambda: plant.controller.counters.units_sent == 2)
-            refused = [each.text for each in plant.seen["audit"] if each.outcome == schema.AuditEntry.REFUSED]
-            assert sum("id 9 was used for SPEED 50 %" in text for text in refused) == 5
+            refused = schema.AuditEntry.REFUSED
+            await until(
+                lambda: (
+                    sum(
+                        each.outcome == refused and "id 9 was used for SPEED 50 %" in each.text
+                        for each in plant.seen["audit"]
+                    )
+                    == 5
+                )
+            )
 
     run(main())
 

@@ -129,7 +129,8 @@ def test_clearance_is_live_and_counts_the_other_robot_only_while_it_tells_where_
             points = [(p.x, p.y, p.z) for p in (state.clearance.first_point, state.clearance.second_point)]
             assert np.subtract(*points) @ np.subtract(*points) == pytest.approx(expected.distance_m**2)
             own = own_nearest(BUILT, "left", left)
-            assert state.own_clearance.distance == pytest.approx(own.distance_m, abs=1e-9)
+            # GJK ends within its tolerance, from whatever pose was measured before.
+            assert state.own_clearance.distance == pytest.approx(own.distance_m, abs=1e-6)
             del places["right"]
             state = await until(monitor, "kinematics", lambda m: m.not_counted)
             assert list(state.not_counted) == ["right"]

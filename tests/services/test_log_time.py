@@ -36,7 +36,11 @@ def test_what_comes_while_the_recorder_is_busy_came_after_it_was_published(mesh)
 
     async def main():
         async with open_session(mesh) as own, open_session(mesh) as other:
-            taking, sink, wall_clock = intake.Intake(own.zenoh_session, "site"), Slow(), WallClock()
+            taking, sink, wall_clock = (
+                intake.Intake(own.zenoh_session, "site", own.ignored),
+                Slow(),
+                WallClock(),
+            )
             try:
                 with taking.lock:
                     taking.robot("arm").attach(sink, frozenset({"joints"}))

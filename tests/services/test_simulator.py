@@ -225,7 +225,7 @@ def test_garbage_comes_between_good_units_and_harms_none():
     ("options", "error", "text"),
     [
         ({"listen": "here"}, ListenError, "HOST:PORT"),
-        ({"listen": "0.0.0.0:0"}, ListenError, "insecure = true"),
+        ({"listen": "0.0.0.0:0"}, ListenError, "--insecure"),
         ({"faults": ("melt",)}, SimulatorError, "'melt' is unknown; there are freeze, garbage"),
         ({"faults": ("freeze@soon",)}, SimulatorError, "freeze@soon"),
         ({"rate_hz": 0.0}, SimulatorError, "rate 0 Hz"),
