@@ -2,34 +2,39 @@
 
 It is tried on keys of a robot that does not exist, of its replay, by a wildcard that means it, and of
 another site; publishing and deleting on the site's real robots too. No service takes any of it: what is
-published has no header, and answers are empty. Where no such probe exists (presence, which everybody would
-see; stops, leases and commands of real robots; the routers' own `@/**`), the file of rules is compared with
-what principals.toml gives, and nothing is tried. What should be comes from the table.
+published has no header, and answers are empty. `security_probes` tries leases, commands and tokens of real
+robots. Where no harmless probe exists (presence of services, which everybody would see; stops, other
+requests, reading and answering on real robots), the file of rules is compared with what principals.toml
+gives, and nothing is tried. What should be comes from the table.
 """
 
 import json
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from contextlib import ExitStack
-from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain, product
-from pathlib import Path
-from threading import Condition
 
 import zenoh
 
 from bus.access import NOBODYS_ROBOT, Act, Principal
-from bus.endpoints import bundle, client_config, first_line
 from bus.keys import has_wildcard
 from bus.topics import Role, Topic
+from services.command_line.security_people import (
+    Person,
+    Trial,
+    open_as,
+    settle,
+    wait_until,
+    who_answers,
+    with_files,
+)
+from services.command_line.security_probes import probe
 from services.command_line.security_rules import wrong_rules
 from services.command_line.security_table import ROBOTS, ROWS, names, should, tried, tried_on_real
 from services.keys import Folder, deeds
 from services.keys.errors import KeysError
-from services.keys.principals import Principals
 
-_TIMEOUT_S = 10.0
 _QUIET_S = 0.3
 _WORDS: dict[Act, str] = {
     "put": "publish",
@@ -37,25 +42,8 @@ _WORDS: dict[Act, str] = {
     "declare_subscriber": "read",
     "declare_queryable": "answer",
     "query": "ask",
+    "liveliness_token": "be present as",
 }
-
-
-@dataclass(frozen=True)
-class Trial:
-    """Somebody's act on a key, and whether it went through."""
-
-    who: str
-    act: Act
-    key: str
-
-
-@dataclass
-class Person:
-    """Who tries."""
-
-    principal: Principal
-    session: zenoh.Session
-    heard: set[str] = field(default_factory=set)
 
 
 def run(keys: Folder, connect: tuple[str, ...], as_json: bool) -> int:
@@ -70,12 +58,20 @@ def run(keys: Folder, connect: tuple[str, ...], as_json: bool) -> int:
         raise KeysError(f"{keys.principals} names no routers: --connect tls/HOST:PORT says where they are")
     with ExitStack() as opened:
         people = [
-            Person(entry, opened.enter_context(_open(routers, file)))
-            for entry, file in _with_files(keys, principals)
+            Person(entry, opened.enter_context(open_as(routers, file)))
+            for entry, file in with_files(keys, principals)
         ]
         robots = sorted({robot for each in principals.entries for robot in each.robots or ()})
         trials = _trials(people, principals.site, robots)
-        done = _try(people, principals.site, trials)
+        witness = next((each for each in people if each.principal.role is Role.ROUTER), None)
+        if witness is None:
+            raise KeysError(
+                "the router's own certificate is needed to see what goes through: keys/router.pem"
+            )
+        done = _try(people, witness, principals.site, trials)
+        probed = probe(people, witness, principals.site, robots)
+        trials |= probed.trials
+        done |= probed.done
     rules = wrong_rules(keys, principals)
     roles = {person.principal.name: person.principal for person in people}
     allowed = {trial for trial in trials if should(roles[trial.who], trial.act, trial.key)}
@@ -86,6 +82,8 @@ def run(keys: Folder, connect: tuple[str, ...], as_json: bool) -> int:
             print(json.dumps(row | {"should": trial in allowed, "does": trial in done}))
         for problem in rules:
             print(json.dumps({"rules": problem}))
+        for robot in probed.left_out:
+            print(json.dumps({"not_running": robot}))
         return 1 if wrong or rules else 0
     _print([*roles.values()], principals.site, done)
     for trial in wrong:
@@ -100,31 +98,16 @@ def run(keys: Folder, connect: tuple[str, ...], as_json: bool) -> int:
     absent = sorted({role.value for role in Role} - {each.role.value for each in roles.values()})
     if absent:
         print(f"not tried, without a certificate here: {', '.join(absent)}")
+    if probed.left_out:
+        print(
+            f"leases, commands and tokens not tried, without a running gateway: {', '.join(probed.left_out)}"
+        )
     print(
-        "not tried, compared in the rules only: presence; stops, leases and commands of real robots; @/**: "
+        "not tried, compared in the rules only: presence of services; of real robots what is read and "
+        "answered, stops, and requests other than leases and commands: "
         + (f"{len(rules)} wrong" if rules else "the rules are what principals.toml gives")
     )
     return 1 if wrong or rules else 0
-
-
-def _with_files(keys: Folder, principals: Principals) -> Iterable[tuple[Principal, Path]]:
-    """Everybody of the site whose certificate lies here and is good."""
-    now = deeds.now()
-    for entry in principals.entries:
-        file = Path(deeds.file_of(keys, principals.site, entry))
-        good = entry.revoked is None and entry.expires is not None and entry.expires > now
-        if good and not entry.sites and file.is_file():
-            yield entry.principal, file
-
-
-def _open(routers: tuple[str, ...], file: Path) -> zenoh.Session:
-    config = client_config(routers, bundle(file))
-    # One link: what is tried and the question that ends it keep their order.
-    config.insert_json5("connect/endpoints", json.dumps(list(routers)))
-    try:
-        return zenoh.open(config)
-    except zenoh.ZError as error:
-        raise KeysError(f"no router at {', '.join(routers)} takes {file}: {first_line(error)}") from None
 
 
 # -------------------------------------------------------------- what is tried
@@ -143,11 +126,8 @@ def _trials(people: list[Person], site: str, robots: Iterable[str]) -> set[Trial
     return trials
 
 
-def _try(people: list[Person], site: str, trials: set[Trial]) -> set[Trial]:
+def _try(people: list[Person], witness: Person, site: str, trials: set[Trial]) -> set[Trial]:
     """What went through."""
-    witness = next((each for each in people if each.principal.role is Role.ROUTER), None)
-    if witness is None:
-        raise KeysError("the router's own certificate is needed to see what goes through: keys/router.pem")
     keys = {act: sorted({trial.key for trial in trials if trial.act == act}) for act in _WORDS}
     by_name = {each.principal.name: each for each in people}
     done: set[Trial] = set()
@@ -159,7 +139,9 @@ def _try(people: list[Person], site: str, trials: set[Trial]) -> set[Trial]:
 
     # Published: the witness hears it, with the name of who did.
     def hear(sample: zenoh.Sample) -> None:
-        if sample.attachment is not None and (name := sample.attachment.to_string()) in by_name:
+        # A real robot's own messages have a header there, which is no text.
+        mark = sample.attachment.to_bytes() if sample.attachment is not None else b""
+        if (name := mark.decode(errors="replace")) in by_name:
             act: Act = "delete" if sample.kind == zenoh.SampleKind.DELETE else "put"
             done.add(Trial(name, act, str(sample.key_expr)))
 
@@ -167,13 +149,13 @@ def _try(people: list[Person], site: str, trials: set[Trial]) -> set[Trial]:
         # Whole keys: who listens to all of a robot makes its cameras draw.
         for key in {*keys["put"], *keys["delete"]}:
             declared.enter_context(witness.session.declare_subscriber(key, hear))
-        _settle(witness, site)
+        settle(witness, site)
         for person in people:
             for key in of(person, "put"):
                 person.session.put(key, b"", attachment=person.principal.name)
             for key in of(person, "delete"):
                 person.session.delete(key, attachment=person.principal.name)
-            _settle(person, site)
+            settle(person, site)
         time.sleep(_QUIET_S)
     done -= {trial for trial in done if trial not in trials}
     # Read: the witness publishes everything once.
@@ -181,17 +163,17 @@ def _try(people: list[Person], site: str, trials: set[Trial]) -> set[Trial]:
         for person in people:
 
             def note(sample: zenoh.Sample, person: Person = person) -> None:
-                if sample.attachment is not None and sample.attachment.to_string() == "witness":
+                if sample.attachment is not None and sample.attachment.to_bytes() == b"witness":
                     person.heard.add(str(sample.key_expr))
 
             for key in of(person, "declare_subscriber"):
                 declared.enter_context(person.session.declare_subscriber(key, note))
-            _settle(person, site)
+            settle(person, site)
         for key in keys["declare_subscriber"]:
             witness.session.put(key, b"", attachment="witness")
         for person in people:
             wanted = set(of(person, "declare_subscriber"))
-            _wait(partial(wanted.issubset, person.heard))
+            wait_until(partial(wanted.issubset, person.heard))
             done |= {Trial(person.principal.name, "declare_subscriber", key) for key in person.heard}
     # Answered: the witness asks. By a wildcard alone: a session with both would answer as either.
     answered = keys["declare_queryable"]
@@ -201,16 +183,16 @@ def _try(people: list[Person], site: str, trials: set[Trial]) -> set[Trial]:
                 for key in of(person, "declare_queryable"):
                     if has_wildcard(key) is vague:
                         declared.enter_context(_answering(person, key))
-                _settle(person, site)
-            asked = _ask(witness, (key for key in answered if not has_wildcard(key)))
+                settle(person, site)
+            asked = who_answers(witness, (key for key in answered if not has_wildcard(key)))
             done |= {Trial(name, "declare_queryable", key) for name, key in chain(*asked.values())}
     # Asked: the witness answers.
     with ExitStack() as declared:
         for key in keys["query"]:
             declared.enter_context(_answering(witness, key))
-        _settle(witness, site)
+        settle(witness, site)
         for person in people:
-            asked = _ask(person, of(person, "query"))
+            asked = who_answers(person, of(person, "query"))
             done |= {Trial(person.principal.name, "query", key) for key, by in asked.items() if by}
     return done & trials
 
@@ -221,47 +203,6 @@ def _answering(person: Person, key: str) -> zenoh.Queryable[None]:
             query.reply(str(query.key_expr), b"", attachment=f"{person.principal.name} {key}")
 
     return person.session.declare_queryable(key, reply)
-
-
-def _settle(person: Person, site: str) -> None:
-    """Until the router has judged what was sent: a question that everybody may ask comes back behind it."""
-    list(person.session.get(f"robomesh/{site}/{NOBODYS_ROBOT}/recordings/list", timeout=_TIMEOUT_S))
-
-
-def _ask(person: Person, keys: Iterable[str]) -> dict[str, set[tuple[str, str]]]:
-    """Who answered each key, and as what; all are asked at once."""
-    answers: dict[str, set[tuple[str, str]]] = {key: set() for key in keys}
-    left, done = len(answers), Condition()
-
-    def ended() -> None:
-        nonlocal left
-        with done:
-            left -= 1
-            done.notify_all()
-
-    for key, by in answers.items():
-
-        def on_reply(reply: zenoh.Reply, by: set[tuple[str, str]] = by) -> None:
-            if reply.ok is not None and reply.ok.attachment is not None:
-                name, _, own = reply.ok.attachment.to_string().partition(" ")
-                by.add((name, own))
-
-        person.session.get(
-            key,
-            zenoh.handlers.Callback(on_reply, ended),
-            target=zenoh.QueryTarget.ALL,
-            consolidation=zenoh.ConsolidationMode.NONE,
-            timeout=_TIMEOUT_S,
-        )
-    with done:
-        done.wait_for(lambda: left == 0, 2 * _TIMEOUT_S)
-    return answers
-
-
-def _wait(there: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 1.0
-    while not there() and time.monotonic() < deadline:
-        time.sleep(0.01)
 
 
 # ------------------------------------------------------------------- printed

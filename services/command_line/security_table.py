@@ -3,6 +3,8 @@
 Written apart from the rules' generator (`bus/access.py`), which it judges.
 """
 
+from collections.abc import Iterable
+
 from bus import topics
 from bus.access import NOBODYS_ROBOT, Act, Principal
 from bus.errors import UnknownTopicError
@@ -12,6 +14,8 @@ from bus.topics import REQUESTS, TOPICS, Request, Role, Topic
 ROWS: tuple[Topic | Request, ...] = (*TOPICS.values(), *REQUESTS.values())
 # Means the robot that nobody has, and would mean another's whose name begins so.
 VAGUE = f"{NOBODYS_ROBOT}$*"
+# Of routers themselves: no rule gives it to anybody.
+ROUTERS_OWN = "@/**"
 ROBOTS = (NOBODYS_ROBOT, f"{REPLAY}{NOBODYS_ROBOT}", VAGUE)
 
 
@@ -26,6 +30,13 @@ def names(row: Topic | Request, who: Principal) -> list[str]:
     if row.name == "health/*":
         return [f"health/{who.role.value}.{NOBODYS_ROBOT}"]
     return [row.name.replace("*", NOBODYS_ROBOT)]
+
+
+def names_of_operators(people: Iterable[Principal]) -> set[str]:
+    """Return in whose names control is asked for, and the name of an operator of another site."""
+    askers = REQUESTS["lease/request/*"].askers
+    own = [who for who in people if who.role in askers]
+    return {who.name for who in own} | {f"nobody.{who.site}x" for who in own}
 
 
 def tried_on_real(row: Topic | Request) -> tuple[Act, ...]:
@@ -44,6 +55,8 @@ def tried(row: Topic | Request, robot: str) -> tuple[Act, ...]:
 
 def should(who: Principal, act: Act, key: str) -> bool:
     """Whether somebody may do that."""
+    if key == ROUTERS_OWN:
+        return False
     site, robot, name = parse_expression(key)
     if who.role is Role.ROUTER:
         return True  # it brings what it has let in
@@ -52,6 +65,9 @@ def should(who: Principal, act: Act, key: str) -> bool:
     if act == "query":
         row = topics.request(name)
         return who.role in row.askers and (not row.in_name or _own_name(who, name.rpartition("/")[2]))
+    if act == "liveliness_token":
+        owner = name.rpartition("/")[2].rpartition(".")[0]
+        return who.role in REQUESTS["lease/request/*"].askers and _own_name(who, owner)
     if act == "declare_subscriber":
         return who.role in topics.topic(name).subscribers
     speak = who.role in _speakers(name)
