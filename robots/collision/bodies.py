@@ -99,6 +99,12 @@ def surface(shapes: Sequence[Shape]) -> FloatArray:
     return vertices[triangles]
 
 
+def piece_points(triangles: FloatArray) -> Iterator[FloatArray]:
+    """The points (k, 3) of each piece of some triangles (n, 3, 3) that hangs together."""
+    vertices, numbers = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    return _pieces(vertices, numbers.reshape(-1, 3))
+
+
 def hull_body(points: FloatArray) -> Body:
     """The convex hull of (n, 3) points, n at least 1."""
     hull = _convex(_with_volume(points))

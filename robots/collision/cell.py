@@ -109,11 +109,7 @@ def _arm(robot: CellRobot, *, exact: bool, wait: bool) -> Arm:
     description, bodies = _read(robot.model, robot.confined, exact)
     pairs = plan.pairs
     if exact:
-        # What is checked in parts stays so; hulls become meshes.
-        pairs = [
-            (one, other, [(bodies[one][1], bodies[other][1])] if len(measured) == 1 else measured)
-            for one, other, measured in pairs
-        ]
+        pairs = [(one, other, (bodies[one][1], bodies[other][1])) for one, other, _ in pairs]
     else:
         bodies = plan.bodies
     model, tree = build_model(description), tree_of(description)

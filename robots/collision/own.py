@@ -21,7 +21,7 @@ class OwnPairs:
 
     Attributes:
         pairs: Numbers of both bodies among the arm's, in the order of Pinocchio's results.
-        measured: What is checked of each pair: the bodies themselves, or one part of each.
+        measured: What is checked of each pair: the hulls, or the exact meshes.
     """
 
     pairs: tuple[tuple[int, int], ...]
@@ -30,7 +30,7 @@ class OwnPairs:
     workspace: Any
 
 
-Pairs = Sequence[tuple[int, int, Sequence[tuple[Body, Body]]]]
+Pairs = Sequence[tuple[int, int, tuple[Body, Body]]]
 
 
 def own_pairs(tree: Tree, bodies: Sequence[tuple[int, Body]], pairs: Pairs) -> OwnPairs:
@@ -38,7 +38,7 @@ def own_pairs(tree: Tree, bodies: Sequence[tuple[int, Body]], pairs: Pairs) -> O
 
     Args:
         bodies: Each with the number of its link.
-        pairs: Numbers of two bodies, and what is checked of them: themselves, or pairs of their parts.
+        pairs: Numbers of two bodies, and what is checked of them: themselves, or their exact meshes.
     """
     geometry = pin.GeometryModel()
     numbers: dict[tuple[int, int], int] = {}
@@ -54,16 +54,15 @@ def own_pairs(tree: Tree, bodies: Sequence[tuple[int, Body]], pairs: Pairs) -> O
             )
         return numbers[number, id(body)]
 
-    flat = [(one, other, each) for one, other, measured in pairs for each in measured]
-    for one, other, (first, second) in flat:
+    for one, other, (first, second) in pairs:
         geometry.addCollisionPair(pin.CollisionPair(added(one, first), added(other, second)))
     workspace = pin.GeometryData(geometry)
     for request in workspace.collisionRequests:
         request.security_margin = TOUCH_M
         request.enable_contact = True
     return OwnPairs(
-        tuple((one, other) for one, other, _ in flat),
-        tuple(measured for _, _, measured in flat),
+        tuple((one, other) for one, other, _ in pairs),
+        tuple(measured for _, _, measured in pairs),
         geometry,
         workspace,
     )

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import combinations, product
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 
-from robots.collision.bodies import Body, hull_bodies, hull_body, surface, wider
+from robots.collision.bodies import Body, exact_body, hull_bodies, surface, wider
 from robots.collision.own import Pairs, own_pairs, touching_pairs
 from robots.collision.sampling import SAMPLES, allowed_positions, are_neighbours
 from robots.collision.study import Case, Found, Kind, studied
@@ -27,7 +27,8 @@ class PairPlan:
     """How an arm is checked against itself.
 
     Attributes:
-        bodies: Hulls, each with the number of its link; the box of one that has parts holds them.
+        bodies: Hulls, each with the number of its link; the box of one that is checked as what is drawn
+            holds that, too.
         pairs: Numbers of two bodies, and what is checked of them.
         ignored: Pairs that are not checked, and the reason.
         refined: Pairs that touch at home as hulls, and what was found of them.
@@ -103,7 +104,7 @@ def _start(model: str | Path, confined: bool) -> _Start:
         if reason := reasons.get(frozenset(links)):
             ignored.append((links, reason))
         else:
-            pairs.append((one, other, [(bodies[one][1], bodies[other][1])]))
+            pairs.append((one, other, (bodies[one][1], bodies[other][1])))
     plan = PairPlan(bodies, tuple(pairs), tuple(ignored), ())
     touching = tuple(touching_pairs(own_pairs(tree, bodies, pairs), built, built.joints.home))
     if not touching:
@@ -130,20 +131,22 @@ def _case(links: Sequence[TreeLink], model: RobotModel, pairs: Sequence[tuple[in
 def _refined(start: _Start, found: Sequence[Found]) -> PairPlan:
     """The plan with what a study found."""
     bodies, ignored, refined = list(start.plan.bodies), list(start.plan.ignored), []
-    by_pair = dict(zip(start.touching, found, strict=True))
+    by_pair = dict(zip(start.touching, range(len(found)), strict=True))
     pairs = []
     for number, (one, other, measured) in enumerate(start.plan.pairs):
-        result = by_pair.get(number)
         links = start.names[one], start.names[other]
-        if result is not None and result.kind is Kind.ALWAYS:
-            ignored.append((links, result.text))
-            continue
-        if result is not None:
+        if start.case is not None and (place := by_pair.get(number)) is not None:
+            result = found[place]
+            if result.kind is Kind.ALWAYS:
+                ignored.append((links, result.text))
+                continue
             refined.append((links, result.text))
-        if result is not None and result.kind is Kind.PARTS:
-            first, second = ([hull_body(points) for points in side] for side in result.parts)
-            measured = list(product(first, second))
-            for body, side in ((one, result.parts[0]), (other, result.parts[1])):
-                bodies[body] = bodies[body][0], wider(bodies[body][1], np.concatenate(side))
+            if result.kind is not Kind.HULLS:
+                some = start.case.checked if result.kind is Kind.COLLISION_MESHES else start.case.drawn
+                surfaces = [some[each] for each in start.case.pairs[place]]
+                measured = exact_body(surfaces[0]), exact_body(surfaces[1])
+                if result.kind is Kind.VISUAL_MESHES:
+                    for body, triangles in zip((one, other), surfaces, strict=True):
+                        bodies[body] = bodies[body][0], wider(bodies[body][1], triangles.reshape(-1, 3))
         pairs.append((one, other, measured))
     return PairPlan(tuple(bodies), tuple(pairs), tuple(ignored), tuple(refined))

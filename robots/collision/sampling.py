@@ -11,7 +11,8 @@ from typing import Any
 import coal
 import numpy as np
 
-from robots.collision.bodies import exact_bodies, hull_bodies, transform
+from robots.collision.bodies import hull_bodies, surface, transform
+from robots.collision.surfaces import Surface, Touch
 from robots.errors import DescriptionError
 from robots.joints import FloatArray, Joints, constraint_values
 from robots.model import RobotModel, build_model, link_placements
@@ -106,15 +107,15 @@ def _confirm_always(
 ) -> None:
     """Take one off the count of a pair whose hulls touch in all positions and whose meshes do not."""
     links = {link.name: link for link in tree.links}
-    request, result = coal.CollisionRequest(), coal.CollisionResult()
+    touch = Touch()
     for index in np.flatnonzero(touched == len(positions)).tolist():
-        one, other = pairs[index]
-        (first,), (second,) = (exact_bodies(links[name].checked) for name in pairs[index])
-        numbers = [model.link_names.index(name) for name in (one, other)]
+        surfaces = [Surface(surface(links[name].checked)) for name in pairs[index]]
+        if not all(len(each.triangles) for each in surfaces):
+            continue
+        numbers = [model.link_names.index(name) for name in pairs[index]]
         for each in positions:
-            first_at, second_at = (transform(at) for at in link_placements(model, each)[numbers])
-            result.clear()
-            if not coal.collide(first.geometry, first_at, second.geometry, second_at, request, result):
+            one_at, other_at = link_placements(model, each)[numbers]
+            if not touch(surfaces[0], surfaces[1], np.linalg.solve(one_at, other_at)):
                 touched[index] -= 1
                 break
 

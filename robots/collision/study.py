@@ -1,9 +1,9 @@
-"""Pairs of an arm's links whose hulls touch at home: which may be ignored, and which are checked in parts.
+"""Pairs of an arm's links whose hulls touch at home: which may be ignored, and what of the others is checked.
 
-    python -m robots.collision.study KEPT.npz < CASE.npz      in a process of its own, with limits
+    python -m robots.collision.study KEPT.json < CASE.npz      in a process of its own, with limits
 
 A pair that touches in all sampled positions, as exact meshes too, is ignored. One whose meshes are apart at
-home is checked as convex parts of its meshes. What is found is kept in the user's cache by its content.
+home is checked as meshes. What is found is kept in the user's cache by its content; a failure is not kept.
 """
 
 import contextlib
@@ -18,7 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -27,25 +27,26 @@ from typing import Any
 import numpy as np
 
 from robots.collision.sampling import SAMPLES
-from robots.collision.surfaces import Part, Surface, Touch, parted, relative
+from robots.collision.surfaces import Surface, Touch
 from robots.glb import cache_folder
 from robots.joints import FloatArray
 
 log = logging.getLogger(__name__)
 
 # Part of each name in the cache: counts up when the same case is to give another result.
-_VERSION = 1
+_VERSION = 2
 TIME_LIMIT_S = 120.0
 _MEMORY_LIMIT = 4 << 30
-# Positions in which parts are tried, and at most so many in which they are cut further.
-_TRIED, _CUT_AT = 400, 40
+# A study that failed is tried again after so long [s], then after twice that, and so on.
+_AGAIN_S, _LATEST_AGAIN_S = 30.0, 3600.0
 
 
 class Kind(StrEnum):
-    """What becomes of a pair: it touches in every position, is checked in parts, or as its hulls."""
+    """What becomes of a pair: it touches in every position, or what is checked of it."""
 
     ALWAYS = "always"
-    PARTS = "parts"
+    COLLISION_MESHES = "collision meshes"
+    VISUAL_MESHES = "visual meshes"
     HULLS = "hulls"
 
 
@@ -65,44 +66,50 @@ class Case:
     placements: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Found:
-    """What was found of a pair.
-
-    Attributes:
-        parts: Of both links, for each part its triangles' corners (n, 3) in the link's frame [m].
-        text: In words.
-    """
+    """What was found of a pair, and in words."""
 
     kind: Kind
     text: str
-    parts: tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]] = ((), ())
 
 
 def studied(case: Case, *, wait: bool = True) -> tuple[Found, ...] | None:
     """What is found of each pair of a case, from the cache where it was studied before.
 
     Args:
-        wait: Else a study that takes time goes on in its own process, and None is returned until it ends.
+        wait: Else a study that takes time goes on in its own process, and None is returned until it has found
+            something. One that failed is tried again later: until then waiting gives hulls.
     """
-    path = cache_folder().parent / "collision" / f"{_key(case)}.npz"
-    with contextlib.suppress(OSError, ValueError, KeyError):
+    path = cache_folder().parent / "collision" / f"{_key(case)}.json"
+    with contextlib.suppress(OSError, ValueError):
         return _loaded(path.read_bytes())
+    failures, again_s = _failed.get(path, (0, 0.0))
     running = _running.get(path)
-    if running is None:
+    if running is None and time.monotonic() >= again_s:
         running = _running[path] = _Study(case, path)
-    if not wait and not running.ended:
-        return None
-    found = running.result()
-    del _running[path]
-    return found
+    if running is not None:
+        if not wait and not running.ended:
+            return None
+        del _running[path]
+        found = running.result()
+        if found is not None:
+            _failed.pop(path, None)
+            return found
+        pause_s = min(_AGAIN_S * 2**failures, _LATEST_AGAIN_S)
+        _failed[path] = failures + 1, time.monotonic() + pause_s
+        log.warning("two links that touch at home: %s; it is tried again in %.0f s", _FAILED, pause_s)
+    return tuple(Found(Kind.HULLS, f"{_FAILED}: hulls are checked") for _ in case.pairs) if wait else None
+
+
+_FAILED = f"the study of them failed or took over {TIME_LIMIT_S:.0f} s or {_MEMORY_LIMIT >> 30} GB"
 
 
 class _Study:
     """A process that studies a case, and ends when it takes too long."""
 
     def __init__(self, case: Case, path: Path) -> None:
-        self._case, self._path = case, path
+        self._path = path
         with tempfile.TemporaryFile() as given:
             given.write(_stored(case))
             given.seek(0)
@@ -120,24 +127,22 @@ class _Study:
     def ended(self) -> bool:
         return self._process.poll() is not None or time.monotonic() > self._until_s
 
-    def result(self) -> tuple[Found, ...]:
+    def result(self) -> tuple[Found, ...] | None:
+        """What was found, when the process has ended; None: it failed."""
         try:
             self._process.wait(max(self._until_s - time.monotonic(), 0.0))
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        with contextlib.suppress(OSError, ValueError, KeyError):
+        try:
             return _loaded(self._path.read_bytes())
-        text = (
-            f"a study of them took over {TIME_LIMIT_S:.0f} s or {_MEMORY_LIMIT >> 30} GB: hulls are checked"
-        )
-        log.warning("two links that touch at home: %s", text)
-        found = tuple(Found(Kind.HULLS, text) for _ in self._case.pairs)
-        _keep(self._path, _saved(found))
-        return found
+        except (OSError, ValueError):
+            return None
 
 
 _running: dict[Path, _Study] = {}
+# How many times a study failed, and when it is tried again.
+_failed: dict[Path, tuple[int, float]] = {}
 
 
 def study(case: Case) -> tuple[Found, ...]:
@@ -154,36 +159,16 @@ def _pair(
     case: Case, pair: tuple[int, int], levels: Sequence[tuple[Surface, Surface]], touch: Touch
 ) -> Found:
     one, other = (case.placements[:, number] for number in pair)
-    places = relative(one, other)
-    first = levels[0]
-    if not all(len(surface.whole.triangles) for surface in first):
+    places = np.linalg.solve(one, other)
+    checked = levels[0]
+    if not all(len(surface.triangles) for surface in checked):
         return Found(Kind.HULLS, "they touch at home; one has no surface, so hulls are checked")
-    enough = len(places) >= SAMPLES
-    if enough and all(touch(*_exact(first), place) for place in places):
+    if len(places) >= SAMPLES and all(touch(*checked, place) for place in places):
         return Found(Kind.ALWAYS, f"they touch in all of {len(places):,} positions, as exact meshes too")
-    for level, geometry in zip(levels, ("collision", "visual"), strict=True):
-        if not all(len(surface.whole.triangles) for surface in level) or touch(*_exact(level), places[0]):
-            continue
-        hulls = [surface.whole.body.geometry for surface in level]
-        free = [
-            place
-            for place in places[1:_TRIED]
-            if touch(hulls[0], hulls[1], place) and not touch(*_exact(level), place)
-        ]
-        sides = parted(*level, [places[0], *free[:_CUT_AT]], touch)
-        if sides is not None:
-            counts = " and ".join(str(len(side)) for side in sides)
-            text = f"checked as {counts} convex parts of their {geometry} geometry"
-            return Found(Kind.PARTS, text, (_corners(sides[0]), _corners(sides[1])))
+    for level, kind in zip(levels, (Kind.COLLISION_MESHES, Kind.VISUAL_MESHES), strict=True):
+        if all(len(surface.triangles) for surface in level) and not touch(*level, places[0]):
+            return Found(kind, f"only their hulls touch at home: checked as exact {kind}")
     return Found(Kind.HULLS, "they touch at home, as exact meshes too, but not in all positions")
-
-
-def _exact(level: tuple[Surface, Surface]) -> tuple[Any, Any]:
-    return level[0].exact, level[1].exact
-
-
-def _corners(parts: Sequence[Part]) -> tuple[FloatArray, ...]:
-    return tuple(np.unique(part.triangles.reshape(-1, 3), axis=0) for part in parts)
 
 
 def _key(case: Case) -> str:
@@ -199,7 +184,9 @@ def _stored(case: Case) -> bytes:
     arrays: dict[str, Any] = {"pairs": np.array(case.pairs), "placements": case.placements}
     for name, some in (("checked", case.checked), ("drawn", case.drawn)):
         arrays |= {f"{name}{number}": each for number, each in enumerate(some)}
-    return _npz(arrays)
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)
+    return buffer.getvalue()
 
 
 def _given(data: bytes) -> Case:
@@ -213,36 +200,11 @@ def _given(data: bytes) -> Case:
 
 
 def _saved(found: Sequence[Found]) -> bytes:
-    arrays: dict[str, Any] = {}
-    rows = []
-    for number, each in enumerate(found):
-        rows.append([each.kind, each.text, [len(side) for side in each.parts]])
-        for side, parts in enumerate(each.parts):
-            arrays |= {f"{number}/{side}/{part}": points for part, points in enumerate(parts)}
-    arrays["found"] = np.array(json.dumps(rows))
-    return _npz(arrays)
+    return json.dumps([[each.kind, each.text] for each in found]).encode()
 
 
 def _loaded(data: bytes) -> tuple[Found, ...]:
-    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-        rows = json.loads(str(arrays["found"]))
-        return tuple(
-            Found(
-                Kind(kind),
-                text,
-                (
-                    tuple(arrays[f"{number}/0/{part}"] for part in range(counts[0])),
-                    tuple(arrays[f"{number}/1/{part}"] for part in range(counts[1])),
-                ),
-            )
-            for number, (kind, text, counts) in enumerate(rows)
-        )
-
-
-def _npz(arrays: Mapping[str, Any]) -> bytes:
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, **arrays)
-    return buffer.getvalue()
+    return tuple(Found(Kind(kind), text) for kind, text in json.loads(data))
 
 
 def _keep(path: Path, data: bytes) -> None:
