@@ -39,6 +39,8 @@ TIME_LIMIT_S = 120.0
 _MEMORY_LIMIT = 4 << 30
 # A study that failed is tried again after so long [s], then after twice that, and so on.
 _AGAIN_S, _LATEST_AGAIN_S = 30.0, 3600.0
+# After so many failures also a caller that does not wait gets hulls.
+_TRIES = 4
 
 
 class Kind(StrEnum):
@@ -97,9 +99,12 @@ def studied(case: Case, *, wait: bool = True) -> tuple[Found, ...] | None:
             _failed.pop(path, None)
             return found
         pause_s = min(_AGAIN_S * 2**failures, _LATEST_AGAIN_S)
-        _failed[path] = failures + 1, time.monotonic() + pause_s
+        failures += 1
+        _failed[path] = failures, time.monotonic() + pause_s
         log.warning("two links that touch at home: %s; it is tried again in %.0f s", _FAILED, pause_s)
-    return tuple(Found(Kind.HULLS, f"{_FAILED}: hulls are checked") for _ in case.pairs) if wait else None
+    if not wait and failures < _TRIES:
+        return None
+    return tuple(Found(Kind.HULLS, f"{_FAILED}: hulls are checked") for _ in case.pairs)
 
 
 _FAILED = f"the study of them failed or took over {TIME_LIMIT_S:.0f} s or {_MEMORY_LIMIT >> 30} GB"

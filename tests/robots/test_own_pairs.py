@@ -119,6 +119,9 @@ def test_a_study_that_fails_leaves_hulls_and_is_tried_again(
     # Not at once, ...
     assert pending(cell_of(model, wait=False)) == ("arm",)
     assert study._running == {}
+    study._failed[path] = (study._TRIES, study._failed[path][1])
+    unready = cell_of(model, wait=False)
+    assert (pending(unready), touching(unready, 0.0, 0.0)) == ((), [("arm/base", "arm/hand")])
     # ... but later.
     study._failed[path] = (failures, 0.0)
     assert touching(cell_of(model), 0.0, 0.0) == []
