@@ -18,8 +18,13 @@ from dataclasses import dataclass
 
 from services.errors import ServiceError
 
-# Together less than the 2 s in which a site must be down.
-_ASK_S = 1.3
+# A site is down within 2 s, unless a process still finishes what it writes.
+_ASK_S = 1.2
+_SAY_AFTER_S = 1.5
+_FINISH_S = 10.0
+_LAST_S = 0.3
+# Longer than all of them together: after it `robomesh up` exits, whatever hangs.
+ENDS_WITHIN_S = 13.0
 _SHORTEST_WAIT_S = 0.1
 _LONGEST_WAIT_S = 10.0
 # What ran this long is taken for well: its next failure waits the shortest time again.
@@ -46,12 +51,22 @@ class Program:
         needed: The site cannot do without it: when it cannot start at all, nothing starts.
         spare: Another process of it stands by (`wait_for_turn`): on a busy machine loading a service takes
             seconds, and starting one that is loaded does not.
+        finishes: What it finishes at its end and no kill may cut, in words; empty: nothing.
+        last: Ends after the others, which need it for that.
     """
 
     name: str
     arguments: tuple[str, ...]
     needed: bool = True
     spare: bool = False
+    finishes: str = ""
+    last: bool = False
+
+
+@dataclass(frozen=True)
+class _Running:
+    program: Program
+    process: asyncio.subprocess.Process
 
 
 class CouldNotStartError(ServiceError):
@@ -65,7 +80,7 @@ async def supervise(
     write: Callable[[str], None],
     following: Following = dict,
 ) -> None:
-    """Run the programs, in order, until cancelled.
+    """Run the programs, in order, until cancelled; then end them. Cancelled again, kill them.
 
     Args:
         ready: Runs beside them; for whoever waits until the site is up.
@@ -76,7 +91,7 @@ async def supervise(
         CouldNotStartError: If a needed one exits with status 2 before it ever ran well.
     """
     width = max(len(program.name) for program in programs)
-    running: dict[str, asyncio.subprocess.Process] = {}
+    running: dict[str, _Running] = {}
 
     def keep(program: Program) -> Coroutine[None, None, None]:
         return _keep(program, running, _prefixed(write, f"{program.name:<{width}} | "))
@@ -86,7 +101,7 @@ async def supervise(
             for program in programs:
                 group.create_task(keep(program))
             group.create_task(_once(ready))
-            group.create_task(_follow(following, running, keep))
+            group.create_task(_follow(following, running, keep, write))
     except ExceptionGroup as errors:
         # Not `except*`: before Python 3.11.4 what it raises comes out in a group again.
         could_not, others = errors.split(ServiceError)
@@ -94,7 +109,10 @@ async def supervise(
             raise
         raise could_not.exceptions[0] from None
     finally:
-        await _end([*running.values()])
+        try:
+            await _end([*running.values()], write)
+        finally:
+            await _kill([*running.values()])
 
 
 def wait_for_turn() -> None:
@@ -114,8 +132,9 @@ def _prefixed(write: Callable[[str], None], prefix: str) -> Callable[[str], None
 
 async def _follow(
     following: Following,
-    running: dict[str, asyncio.subprocess.Process],
+    running: dict[str, _Running],
     keep: Callable[[Program], Coroutine[None, None, None]],
+    write: Callable[[str], None],
 ) -> None:
     """Start what is wanted and does not run yet; end what runs and is not wanted any more."""
     groups: dict[Hashable, list[tuple[Program, asyncio.Task[None]]]] = {}
@@ -127,7 +146,10 @@ async def _follow(
                 task.cancel()
             # A robot that changed must have let go of its name before it comes again.
             await asyncio.gather(*(task for _, task in gone), return_exceptions=True)
-            await _end([running.pop(program.name) for program, _ in gone if program.name in running])
+            names = [program.name for program, _ in gone if program.name in running]
+            await _end([running[name] for name in names], write)
+            for name in names:
+                del running[name]
             for key in wanted.keys() - groups.keys():
                 groups[key] = [(each, tasks.create_task(keep(each))) for each in wanted[key]()]
             await asyncio.sleep(_FOLLOW_EACH_S)
@@ -137,9 +159,7 @@ async def _once(ready: Callable[[], Awaitable[None]]) -> None:
     await ready()
 
 
-async def _keep(
-    program: Program, running: dict[str, asyncio.subprocess.Process], write: Callable[[str], None]
-) -> None:
+async def _keep(program: Program, running: dict[str, _Running], write: Callable[[str], None]) -> None:
     wait_s = _SHORTEST_WAIT_S
     ran_well = False
     while True:
@@ -150,7 +170,7 @@ async def _keep(
         except OSError as error:  # no memory, or no process, is left just now: the others need not end too
             how = f"could not be started: {error.strerror}"
         else:
-            running[program.name] = process
+            running[program.name] = _Running(program, process)
             assert process.stdout is not None
             async with _standing_by(program, running):
                 async for line in _lines(process.stdout):
@@ -182,29 +202,27 @@ async def _lines(stream: asyncio.StreamReader) -> AsyncIterator[str]:
         yield rest.decode(errors="replace").rstrip()
 
 
-async def _next(
-    program: Program, running: dict[str, asyncio.subprocess.Process]
-) -> asyncio.subprocess.Process:
+async def _next(program: Program, running: dict[str, _Running]) -> asyncio.subprocess.Process:
     """The spare, told that it is its turn, or a new process."""
-    spare = running.pop(_spare(program), None)
-    if spare is None or spare.returncode is not None:
+    waiting = running.pop(_spare(program), None)
+    if waiting is None or waiting.process.returncode is not None:
         return await _start(program)
+    spare = waiting.process
     assert spare.stdin is not None
     spare.stdin.write(b"\n")
     return spare
 
 
 @contextlib.asynccontextmanager
-async def _standing_by(
-    program: Program, running: dict[str, asyncio.subprocess.Process]
-) -> AsyncIterator[None]:
+async def _standing_by(program: Program, running: dict[str, _Running]) -> AsyncIterator[None]:
     """See to it that a spare is there, where there is to be one."""
 
     async def keep() -> None:
         while True:
             await asyncio.sleep(_SPARE_AFTER_S)
             with contextlib.suppress(OSError):  # the next time
-                running[_spare(program)] = spare = await _start(program, spare=True)
+                spare = await _start(program, spare=True)
+                running[_spare(program)] = _Running(program, spare)
                 await spare.wait()
 
     task = asyncio.create_task(keep()) if program.spare else None
@@ -247,18 +265,54 @@ def _environment() -> dict[str, str]:
     return {name: value for name, value in os.environ.items() if name != "ROBOMESH_KEYS"}
 
 
-async def _end(processes: Sequence[asyncio.subprocess.Process]) -> None:
-    for process in processes:
+async def _end(those: Sequence[_Running], write: Callable[[str], None]) -> None:
+    """End processes: what finishes something is waited for, and what it needs ends after it."""
+    before = [each for each in those if not each.program.last]
+    _signal(before, signal.SIGTERM)
+    finishing = [each for each in before if each.program.finishes]
+    async with asyncio.TaskGroup() as group:
+        group.create_task(_end_soon([each for each in before if not each.program.finishes]))
+        group.create_task(_finish(finishing, write))
+    last = [each for each in those if each.program.last]
+    _signal(last, signal.SIGTERM)
+    await _ended(last, within_s=_LAST_S)
+    await _kill(last)
+
+
+async def _end_soon(those: Sequence[_Running]) -> None:
+    await _ended(those, within_s=_ASK_S)
+    await _kill(those)
+
+
+async def _finish(those: Sequence[_Running], write: Callable[[str], None]) -> None:
+    await _ended(those, within_s=_SAY_AFTER_S)
+    for each in _left(those):
+        write(f"waiting for {each.program.name}: {each.program.finishes}; Ctrl-C again kills it")
+    await _ended(those, within_s=_FINISH_S - _SAY_AFTER_S)
+    for each in _left(those):
+        write(f"{each.program.name} did not end within {_FINISH_S:.0f} s and is killed")
+    await _kill(those)
+
+
+async def _ended(those: Sequence[_Running], *, within_s: float) -> None:
+    with contextlib.suppress(TimeoutError):
+        async with asyncio.timeout(within_s):
+            await asyncio.gather(*(each.process.wait() for each in those))
+
+
+async def _kill(those: Sequence[_Running]) -> None:
+    _signal(those, signal.SIGKILL)
+    await asyncio.gather(*(each.process.wait() for each in those))
+
+
+def _left(those: Sequence[_Running]) -> list[_Running]:
+    return [each for each in those if each.process.returncode is None]
+
+
+def _signal(those: Sequence[_Running], number: signal.Signals) -> None:
+    for each in _left(those):
         with contextlib.suppress(ProcessLookupError):
-            process.send_signal(signal.SIGTERM)
-    try:
-        async with asyncio.timeout(_ASK_S):
-            await asyncio.gather(*(process.wait() for process in processes))
-    except TimeoutError:
-        for process in processes:
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-        await asyncio.gather(*(process.wait() for process in processes))
+            each.process.send_signal(number)
 
 
 def _status(status: int) -> str:

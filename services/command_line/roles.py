@@ -68,6 +68,7 @@ def gateway(path: Path | None, connect: str, controllers: list[str], started: st
         session_settings=_session(site, connect, "started" if started else "gateway"),
         present_for=_each_robot(site),
         metrics=metrics_address(site, metrics),
+        ends_within_s=service.WRITES_WITHIN_S,
     )
 
 
@@ -131,6 +132,7 @@ def recorder(path: Path | None, connect: str, metrics: str = "") -> None:
         session_settings=_session(site, connect, "recorder"),
         present_for=[(site.site, WHOLE_SITE)],
         metrics=metrics_address(site, metrics),
+        ends_within_s=service.WRITES_WITHIN_S,
     )
 
 

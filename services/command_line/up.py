@@ -23,11 +23,12 @@ from services.keys.errors import KeysError
 from services.listen import reachable, split_address
 from services.site import Robot, Site
 from services.started import may_start, read_started
-from services.supervisor import Program, supervise
+from services.supervisor import ENDS_WITHIN_S, Program, supervise
 
 log = logging.getLogger(__name__)
 
 _CONSOLE_POLL_S = 0.1
+_STOPS_AND_AUDIT = "stopping its robots and completing the audit log"
 
 
 def run(path: Path | None, metrics: str = "") -> None:
@@ -53,7 +54,8 @@ def run(path: Path | None, metrics: str = "") -> None:
             ready=ready,
             write=_write,
             following=following_with_metrics(_Started(site, path, endpoint).wanted, metered),
-        )
+        ),
+        ends_within_s=ENDS_WITHIN_S,
     )
 
 
@@ -69,15 +71,21 @@ def programs(site: Site, path: Path | None, endpoint: str) -> tuple[Program, ...
             controllers += controller
     # Of a site without robots they would end at once; robots that are started later bring their own.
     of_robots = (
-        Program(name="gateway", arguments=("gateway", *of_site, *attach, *controllers)),
+        Program(
+            name="gateway",
+            arguments=("gateway", *of_site, *attach, *controllers),
+            finishes=_STOPS_AND_AUDIT,
+        ),
         Program(name="kinematics", arguments=("kinematics", *of_site, *attach)),
     )
     return (
-        Program(name="router", arguments=("router", *of_site), spare=True),
+        Program(name="router", arguments=("router", *of_site), spare=True, last=True),
         *simulators,
         *(of_robots if site.robot else ()),
         Program(name="console", arguments=("console", *of_site, *attach, "--supervised")),
-        Program(name="recorder", arguments=("recorder", *of_site, *attach)),
+        Program(
+            name="recorder", arguments=("recorder", *of_site, *attach), finishes="closing its recordings"
+        ),
         Program(name="player", arguments=("player", *of_site, *attach), needed=False),
         Program(name="watch", arguments=("watch", *of_site, *attach), needed=False),
         # Without OpenGL everything else runs.
@@ -93,7 +101,12 @@ def _programs_of_started(robot: Robot, site: str, path: Path | None, endpoint: s
     rest = (*attach, "--started", name)
     return (
         replace(simulator, needed=False),
-        Program(name=f"gateway {name}", arguments=("gateway", *rest, *controller), needed=False),
+        Program(
+            name=f"gateway {name}",
+            arguments=("gateway", *rest, *controller),
+            needed=False,
+            finishes=_STOPS_AND_AUDIT,
+        ),
         Program(name=f"kinematics {name}", arguments=("kinematics", *rest), needed=False),
     )
 
@@ -110,7 +123,7 @@ def _simulator(robot: Robot, site: str, attach: tuple[str, ...]) -> tuple[Progra
     for_ = ("--for", f"{site}/{robot.name}", *attach)
     arguments = ("simulate", "--robot", robot.model, "--listen", f"127.0.0.1:{port}", *demo, *codes, *for_)
     return (
-        Program(name=f"simulate {robot.name}", arguments=arguments),
+        Program(name=f"simulate {robot.name}", arguments=arguments, last=True),
         ("--controller", f"{robot.name}=tcp://127.0.0.1:{port}"),
     )
 
