@@ -91,6 +91,7 @@ def test_fk_and_ik_answer_json_lines_with_the_option_and_without(
     assert set(json.loads(capsys.readouterr().out)) >= {"solutions", "residual_m", "residual_rad", "reason"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("example", ["check.py", "inverse.py"])
 def test_example_without_arguments_says_how_it_is_called(example: str) -> None:
     done = subprocess.run(
@@ -112,6 +113,7 @@ def test_simulator_beyond_loopback_names_its_own_option(capsys: pytest.CaptureFi
     assert "tls = {" not in error
 
 
+@pytest.mark.slow
 def test_command_that_is_interrupted_while_it_loads_ends_with_130_and_no_traceback() -> None:
     script = (
         "import os, signal, sys\n"
