@@ -93,6 +93,8 @@ def row_problems(description: DhDescription) -> Iterator[Problem]:
         text = f"joint {name!r}: {len(numbers)} joints have that name; each needs its own"
         yield Problem(("joint", numbers[-1], "name"), text)
     yield from _body_problems(("base",), "'base'", description.base.mesh_pose.xyz, description.units)
+    start = description.base.pose.xyz
+    yield from _length_problems(("base", "pose", "xyz"), "base pose xyz", start, description.units)
     joints = {joint.name: JointFacts(joint.type, joint.home) for joint in description.joints}
     yield from common_problems(description, links=description.link_names, joints=joints)
 

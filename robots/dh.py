@@ -51,7 +51,7 @@ class _Chain:
         numbers: Joints of the chain.
         joints: (4, 4) every joint's frame.
         rows: One a joint of the chain.
-        frames: (4, 4) of frame 0 to n.
+        frames: (4, 4) of the frame in which the rows begin, then of each row's end.
         link_names: Of the rows' links.
     """
 
@@ -63,10 +63,14 @@ class _Chain:
     link_names: tuple[str, ...]
 
     def place(self, joint: int) -> int:
-        """Which of the frames carries what a joint moves: 0 for the base's."""
+        """Which of the links carries what a joint moves: 0 for the base."""
         while joint != BASE and joint not in self.numbers:
             joint = self.tree.joints[joint].parent
         return 0 if joint == BASE else self.numbers.index(joint) + 1
+
+    def link_to_base(self, place: int) -> FloatArray:
+        """(4, 4) of a link's frame. The base keeps its own, wherever the rows begin."""
+        return np.eye(4) if place == 0 else self.frames[place]
 
 
 def dh_form(description: UrdfDescription) -> DhForm:
@@ -83,11 +87,13 @@ def dh_form(description: UrdfDescription) -> DhForm:
     def on_row(link: str, frame_to_link: FloatArray) -> tuple[int, FloatArray]:
         place = chain.place(links[link].joint)
         link_to_base = _joint_frame(chain, links[link].joint) @ links[link].link_to_joint
-        return place, inverse(chain.frames[place]) @ link_to_base @ frame_to_link
+        return place, inverse(chain.link_to_base(place)) @ link_to_base @ frame_to_link
 
     names = (BASE_LINK, *chain.link_names)
     values: dict[str, Any] = {"name": description.name, "title": description.title}
     values["provenance"] = description.provenance
+    if not np.array_equal(chain.frames[0], np.eye(4)):
+        values["base"] = {"pose": _pose_values(chain.frames[0])}
     values["joint"] = list(_joint_values(chain, joints))
     _, tool_to_last = on_row(*frames[TOOL_FRAME])
     values["tool"] = _pose_values(tool_to_last)
@@ -157,9 +163,14 @@ def _chain(description: UrdfDescription, tree: Tree, joints: Joints, tool_link: 
         # What is beside the chain stands at home, for ever.
         position = 0.0 if number in numbers else _home(tree, number, homes)
         placed.append(parent @ joint.joint_to_parent @ moved(joint.type, joint.axis, position))
-    made = rows_as_made(tree, numbers)
     axes = [placed[number] @ axis_to_z(tree.joints[number]) for number in numbers]
-    base = np.eye(4) if made else base_frame(axes[0])
+    base = base_frame(axes[0])
+    if not np.array_equal(base, np.eye(4)):
+        # Of our own writer, for rows that begin elsewhere: its first theta (or d) is in the pose now.
+        made = rows_as_made(tree, numbers, placed[numbers[0]])
+        base = placed[numbers[0]] if made else base
+    else:
+        made = rows_as_made(tree, numbers, base)
     rows = tuple(row for row, _ in made) if made else rows_of_axes(base, axes)
     frames = [base]
     for row in rows:
@@ -233,25 +244,14 @@ def _whole_robot_values(
             pairs.append(pair)
     return {
         "constraint": [each for each in said["constraint"] if set(each["joints"]) <= on_chain],
-        "view": {name: _moved_view(view, chain.frames[0]) for name, view in said["view"].items()},
+        "view": said["view"],
         "collision": {"ignore": [[names[one], names[other]] for one, other in pairs]} if pairs else {},
     }
 
 
-def _moved_view(view: dict[str, Any], base: FloatArray) -> dict[str, Any]:
-    turn, shift = base[:3, :3].T, 1000.0 * base[:3, 3]
-    points = {key: [_clean(x) for x in turn @ (np.array(view[key]) - shift)] for key in ("eye", "target")}
-    return {**view, **points, "up": [_clean(x) for x in turn @ np.array(view["up"])]}
-
-
 def _notes(chain: _Chain, joints: Joints, tool_to_last: FloatArray) -> Iterator[str]:
-    base = chain.frames[0]
-    if not np.array_equal(base, np.eye(4)):
-        pose = _pose_values(base)
-        yield (
-            "the first joint's axis is not the base's z: the base frame moves to "
-            f"xyz = {_listed(pose['xyz'])} mm, rpy = {_listed(pose['rpy'])}°; place the robot so"
-        )
+    if not np.array_equal(chain.frames[0], np.eye(4)):
+        yield "the first joint's axis is not the base's z: [base] pose says where the first row begins"
     beside = [joint.name for number, joint in enumerate(chain.tree.joints) if number not in chain.numbers]
     if beside:
         named = ", ".join(beside[:6]) + (f" and {len(beside) - 6} more" if len(beside) > 6 else "")
@@ -301,7 +301,3 @@ def _clean(number: float) -> float:
 def _said(number: float) -> float:
     """A limit without what the URDF's own rounding left on it: 360, not 360.000000000024."""
     return round(float(number), 9) + 0.0
-
-
-def _listed(values: Sequence[float]) -> str:
-    return f"[{', '.join(f'{value:.6g}' for value in values)}]"

@@ -111,10 +111,16 @@ def _row(frame: FloatArray, point: FloatArray, axis: FloatArray) -> Row:
     return Row(a, float(np.arctan2(sine, uz)), d, float(np.arctan2(ny, nx)))
 
 
-def rows_as_made(tree: Tree, chain: Sequence[int]) -> tuple[tuple[Row, TreeLink], ...] | None:
-    """The rows and their links of a chain that D-H rows were made into; None: it is no such chain."""
+def rows_as_made(
+    tree: Tree, chain: Sequence[int], base: FloatArray
+) -> tuple[tuple[Row, TreeLink], ...] | None:
+    """The rows and their links of a chain that D-H rows were made into; None: it is no such chain.
+
+    Args:
+        base: (4, 4) the frame in which the first row begins, in the base frame.
+    """
     made: list[tuple[Row, TreeLink]] = []
-    before = np.eye(4)
+    before = base
     for place, number in enumerate(chain):
         joint = tree.joints[number]
         if not np.allclose(joint.axis, (0.0, 0.0, 1.0), rtol=0, atol=_ZERO):

@@ -93,6 +93,17 @@ class Body(_Table):
     color: Color | None = None
 
 
+class Base(Body):
+    """The base link, and where the D-H rows begin.
+
+    Attributes:
+        pose: Of the frame in which the first row begins, whose z is the first joint's axis, in the
+            base link's frame.
+    """
+
+    pose: Pose = Pose()
+
+
 class Link(Body):
     """The link that a joint moves; named as the joint unless it says otherwise."""
 
@@ -227,7 +238,7 @@ class RobotDescription(_Table):
 class DhDescription(RobotDescription):
     """A serial arm by its D-H rows."""
 
-    base: Body = Body()
+    base: Base = Base()
     joints: tuple[Joint, ...] = Field(alias="joint")
 
     @property

@@ -66,7 +66,8 @@ def dh_summary(description: RobotDescription) -> dict[str, Any] | None:
     """D-H rows in m and rad, of a URDF its chain to the tool; None where rows cannot say it.
 
     Returns:
-        `rows` with joint, type, a, alpha, d, theta and link, and `notes` on how they were found.
+        `rows` with joint, type, a, alpha, d, theta and link; `start`, the pose of the frame in which
+        the first row begins, in the base frame; and `notes` on how they were found.
     """
     notes: tuple[str, ...] = ()
     if isinstance(description, UrdfDescription):
@@ -90,7 +91,9 @@ def dh_summary(description: RobotDescription) -> dict[str, Any] | None:
         }
         for row in description.joints
     ]
-    return {"rows": rows, "notes": list(notes)}
+    pose = description.base.pose
+    start = {"xyz": [value * length for value in pose.xyz], "rpy": [value * angle for value in pose.rpy]}
+    return {"rows": rows, "start": start, "notes": list(notes)}
 
 
 def _mesh_name(shape: Shape) -> str:

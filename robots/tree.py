@@ -181,6 +181,8 @@ def _confined(tree: Tree, folder: Path) -> Tree:
 def _tree_of_rows(description: DhDescription) -> Tree:
     """How a standard D-H row becomes a joint and a link's frame.
 
+    Row 0 ends at the base's pose.
+
     joint i's placement = link frame of row i-1 (Trans(z, d) Trans(x, a) Rot(x, alpha)), then
         rotary:     Rot(z, theta), and the variable turns about z
         prismatic:  Rot(z, theta) Trans(z, d), and the variable moves along z
@@ -190,8 +192,8 @@ def _tree_of_rows(description: DhDescription) -> Tree:
     """
     units = description.units
     length, angle = length_factor(units), angle_factor(units)
-    before = np.eye(4)  # link i-1 in joint i-1
-    links = [TreeLink(BASE_LINK, BASE, before, *_shapes(description, description.base))]
+    links = [TreeLink(BASE_LINK, BASE, np.eye(4), *_shapes(description, description.base))]
+    before = pose_matrix(description.base.pose, units)  # the end of row i-1 in joint i-1, or the base
     joints = []
     for number, row in enumerate(description.joints):
         rotary = row.type is JointType.ROTARY

@@ -108,6 +108,11 @@ def _print_summary(summary: dict[str, Any], tool: list[float]) -> None:
                 f"{_cell(value)}{'*' if key == variable else ' '}" for key, value in cells.items()
             )
             print(f"  {row['joint']:<{wide}} {text}  {row['link']}")
+        start = summary["dh"]["start"]
+        if any(start["xyz"] + start["rpy"]):
+            xyz = ", ".join(f"{1000 * value:.6g}" for value in start["xyz"])
+            rpy = ", ".join(f"{degrees(angle):.6g}" for angle in start["rpy"])
+            print(f"  the first row begins at xyz [{xyz}] mm, rpy [{rpy}]° in the base frame")
         for note in summary["dh"]["notes"]:
             print(f"  note: {note}")
     print(f"  {'joints':<{wide}} {'type':<10} {'limits':>20} {'home':>9}  most: speed, /s, /s")

@@ -3,16 +3,20 @@
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from robots.description import from_values, library_names, load
 from robots.dh import DhForm, dh_form
 from robots.errors import DescriptionError
-from robots.model import RobotModel, build_model, frame_placements, link_placements, tool_placement
+from robots.model import build_model, frame_placements, link_placements, tool_placement
 from robots.poses import rpy_rotation
-from robots.schema import DhDescription, UrdfDescription
+from robots.save import write_description
+from robots.schema import DhDescription, Pose, UrdfDescription
+from robots.summary import dh_summary
 from robots.tree import tree_of
 from robots.urdf.write import to_urdf
+from robots.views import views_of
 
 
 def urdf(*joints: tuple[str, str, str, str], tool: str = "0.1 0.2 0.3") -> str:
@@ -80,36 +84,19 @@ CHAINS = {
 }  # fmt: skip
 
 
-def placed_base(form: DhForm) -> np.ndarray:
-    """The pose that the note on the base tells; where it stood if there is none."""
-    placement = np.eye(4)
-    for note in form.notes:
-        if "the base frame moves to" in note:
-            xyz, rpy = (
-                [float(number) for number in note.split(f"{key} = [")[1].split("]")[0].split(",")]
-                for key in ("xyz", "rpy")
-            )
-            placement[:3, :3] = rpy_rotation(*np.radians(rpy))
-            placement[:3, 3] = np.multiply(xyz, 0.001)
-    return placement
-
-
 @pytest.mark.parametrize("name", CHAINS)
 def test_tool_and_shapes_stand_where_they_stood_at_all_positions(name: str, tmp_path: Path) -> None:
     before = described(tmp_path, CHAINS[name])
     form = dh_form(before)
     rows = build_model(rebuilt(form, tmp_path))
     urdf_model = build_model(before)
-    base = exact_base(urdf_model, rows)
-    # The note is for people: six digits.
-    np.testing.assert_allclose(placed_base(form), base, atol=2e-6)
     shapes = {link.name: link.shapes for link in tree_of(before).links}
     random = np.random.default_rng(4)
     for _ in range(50):
         positions = random.uniform(rows.joints.lower, rows.joints.upper)
-        was, now = link_placements(urdf_model, positions), base @ link_placements(rows, positions)
+        was, now = link_placements(urdf_model, positions), link_placements(rows, positions)
         np.testing.assert_allclose(
-            base @ tool_placement(rows, positions), tool_placement(urdf_model, positions), atol=1e-12
+            tool_placement(rows, positions), tool_placement(urdf_model, positions), atol=1e-12
         )
         for index, link in enumerate(("base", *rows.link_names[1:])):
             urdf_link = urdf_model.link_names[index]
@@ -119,11 +106,71 @@ def test_tool_and_shapes_stand_where_they_stood_at_all_positions(name: str, tmp_
             )
 
 
-def exact_base(before: RobotModel, after: RobotModel) -> np.ndarray:
-    """Where the rows' base stands in the URDF's: from the tool at one position."""
-    home = before.joints.home
-    base: np.ndarray = tool_placement(before, home) @ np.linalg.inv(tool_placement(after, home))
-    return base
+# As KUKA's: the first axis points down, positive turns go clockwise from above.
+KUKA_LIKE = urdf(
+    ("revolute", "0 0 0.4", "0 0 0", "0 0 -1"), ("revolute", "0.025 0 0", "0 0 0", "0 1 0"),
+    ("revolute", "0.56 0 0", "0 0 0", "0 1 0"), ("revolute", "0 0 0.035", "0 0 0", "-1 0 0"),
+    ("revolute", "0.515 0 0", "0 0 0", "0 1 0"), ("revolute", "0 0 0", "0 0 0", "-1 0 0"),
+)  # fmt: skip
+TILTED = urdf(
+    ("revolute", "0.1 0.2 0.3", "0.4 0.1 0.2", "0 0 1"), ("revolute", "0.3 0 0.1", "0.3 0 0", "0 1 0")
+)
+
+
+@pytest.mark.parametrize("text", [KUKA_LIKE, TILTED])
+def test_base_frame_stays_where_the_first_axis_is_not_its_z(text: str, tmp_path: Path) -> None:
+    before = described(
+        tmp_path,
+        text,
+        '[[frame]]\nname = "plate"\nlink = "l0"\nxyz = [10, 20, 30]\nrpy = [0, 0, 40]\n'
+        "[view.mine]\neye = [1000, 0, 500]\ntarget = [0, 0, 400]\n",
+    )
+    form = dh_form(before)
+    after = rebuilt(form, tmp_path)
+    assert after.base.pose != Pose()
+    assert form.notes == (
+        "the first joint's axis is not the base's z: [base] pose says where the first row begins",
+    )
+    # By Pinocchio's own reader of URDF, not by ours.
+    model = pin.buildModelFromXML(text)
+    data, tool = model.createData(), model.getFrameId("tool0")
+    by_rows = build_model(after)
+    random = np.random.default_rng(5)
+    for _ in range(50):
+        positions = random.uniform(model.lowerPositionLimit, model.upperPositionLimit)
+        pin.framesForwardKinematics(model, data, positions)
+        expected = data.oMf[tool].homogeneous
+        np.testing.assert_allclose(tool_placement(by_rows, positions), expected, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(link_placements(by_rows, positions)[0], np.eye(4))
+    plate = frame_placements(by_rows, positions)["plate"]
+    np.testing.assert_allclose(plate[:3, 3], [0.01, 0.02, 0.03], atol=1e-12)
+    assert views_of(after)[-1].eye.tolist() == [1.0, 0.0, 0.5]
+
+
+@pytest.mark.parametrize("text", [KUKA_LIKE, TILTED])
+def test_rows_that_begin_elsewhere_come_back_from_a_file_and_from_our_own_urdf(
+    text: str, tmp_path: Path
+) -> None:
+    form = dh_form(described(tmp_path, text))
+    saved = write_description(form.values, {}, tmp_path / "saved")
+    original = load(saved.path)
+    assert isinstance(original, DhDescription)
+    again = rebuilt(dh_form(described(tmp_path, to_urdf(original))), tmp_path)
+    one, other = build_model(original), build_model(again)
+    assert other.link_names == one.link_names
+    positions = np.linspace(-1.0, 1.0, len(one.joints))
+    np.testing.assert_allclose(link_placements(other, positions), link_placements(one, positions), atol=1e-12)
+    summary = dh_summary(original)
+    assert summary is not None
+    first = build_model(rebuilt(form, tmp_path))
+    np.testing.assert_allclose(link_placements(one, positions), link_placements(first, positions), atol=1e-12)
+    roll, pitch, yaw = summary["start"]["rpy"]
+    start = rpy_rotation(roll, pitch, yaw)
+    axis = pin.buildModelFromXML(text).jointPlacements[1].homogeneous[:3, :3] @ AXES[text]
+    np.testing.assert_allclose(start[:, 2], axis, atol=1e-12)
+
+
+AXES = {KUKA_LIKE: [0, 0, -1], TILTED: [0, 0, 1]}
 
 
 def test_known_arm_gives_the_known_rows(tmp_path: Path) -> None:
@@ -188,11 +235,10 @@ def test_any_chain_is_exact_or_says_that_it_is_not(tmp_path: Path) -> None:
             told += 1
             continue
         one, other = build_model(before), build_model(rebuilt(form, tmp_path))
-        base = exact_base(one, other)
         for _ in range(5):
             positions = random.uniform(one.joints.lower, one.joints.upper)
             expected = tool_placement(one, positions)
-            np.testing.assert_allclose(base @ tool_placement(other, positions), expected, atol=1e-12)
+            np.testing.assert_allclose(tool_placement(other, positions), expected, atol=1e-12)
     assert told < 30
 
 

@@ -2,13 +2,14 @@
 
 import io
 import json
+import shutil
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
-from robots.description import load
+from robots.description import LIBRARY, load
 from robots.model import build_model, link_placements, tool_placement
 from robots.schema import DhDescription, UrdfDescription
 from services.command_line.main import run
@@ -179,6 +180,7 @@ def test_show_prints_the_rows_with_what_varies_marked(capsys: pytest.CaptureFixt
     assert ["waist", "0.000", "90.000", "350.000", "0.000*", "column"] in lines
     assert ["wrist", "0.000", "90.000", "0.000", "90.000*", "wrist"] in lines
     assert ["tool", "at", "home:", "420.0", "0.0", "650.0", "mm"] in lines
+    assert not [line for line in lines if line[:3] == ["the", "first", "row"]]
 
 
 def test_show_gives_the_rows_of_a_urdf_in_si(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -189,6 +191,20 @@ def test_show_gives_the_rows_of_a_urdf_in_si(arm: Path, capsys: pytest.CaptureFi
     assert (turn["a"], turn["d"], abs(turn["alpha"])) == pytest.approx((0.3, 0.4, np.pi / 2 - 0.3))
     assert lift["type"] == "prismatic"
     assert [frame["link"] for frame in shown["frames"]] == ["hand"]
+
+
+def test_show_says_where_the_rows_begin_if_not_in_the_base_frame(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot = tmp_path / "puma" / "robot.toml"
+    shutil.copytree(LIBRARY / "puma560", robot.parent)
+    text = robot.read_text()
+    assert "[base]\n" in text
+    pose = "pose = { xyz = [0, 0, 400], rpy = [180, 0, 0] }"
+    robot.write_text(text.replace("[base]\n", f"[base]\n{pose}\n"))
+    assert run(["robot", "show", str(robot)]) == 0
+    said = "the first row begins at xyz [0, 0, 400] mm, rpy [180, 0, 0]° in the base frame"
+    assert said in capsys.readouterr().out
 
 
 @pytest.mark.slow

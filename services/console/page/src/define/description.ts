@@ -62,7 +62,8 @@ export interface Description {
   title: string;
   provenance: string;
   units: Units;
-  base: Body;
+  /** Its pose is of the frame in which the first row begins, in the base link's. */
+  base: Body & { pose: Pose };
   joint: Joint[];
   tool: Pose;
   frame: NamedFrame[];
@@ -108,7 +109,7 @@ export function complete(given: GivenDescription): Description {
     title: given.title ?? "",
     provenance: given.provenance ?? "",
     units,
-    base: body(given.base),
+    base: { ...body(given.base), pose: pose(given.base?.pose) },
     joint: (given.joint ?? []).map((row) => ({
       ...newJoint(row.name ?? "", row.type ?? "rotary", units),
       ...row,
@@ -142,7 +143,7 @@ export function concise(from: Description): object {
     ...(from.title && { title: from.title }),
     ...(from.provenance && { provenance: from.provenance }),
     units: from.units,
-    base: shape(from.base),
+    base: { ...shape(from.base), ...(!isZero(from.base.pose) && { pose: from.base.pose }) },
     joint: from.joint.map((row) => ({
       ...row,
       link: { ...(row.link.name && { name: row.link.name }), ...shape(row.link) },

@@ -162,6 +162,19 @@ function BodyDetails({ body, description }: { body: Body; description: Descripti
           />
         </>
       )}
+      {part === "base" && (
+        <>
+          <h4>{d("base_pose")}</h4>
+          <PoseFields
+            path="base/pose"
+            of={d("base_pose")}
+            pose={description.base.pose}
+            length={description.units.length}
+            angle={angleUnit(description.units)}
+            set={(change, field) => edit((now) => change(now.description.base.pose), `base/pose/${field}`)}
+          />
+        </>
+      )}
       <ProblemWords path={path} />
     </Section>
   );

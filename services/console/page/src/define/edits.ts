@@ -98,7 +98,7 @@ export function setUnits(of: Description, units: Units): void {
     const own = first === "prismatic" ? length : angle;
     constraint.limits = [own(constraint.limits[0]), own(constraint.limits[1])];
   }
-  for (const pose of [of.base.mesh_pose, of.tool, ...of.frame]) place(pose);
+  for (const pose of [of.base.mesh_pose, of.base.pose, of.tool, ...of.frame]) place(pose);
   for (const view of Object.values(of.view)) {
     view.eye = lengths(view.eye);
     view.target = lengths(view.target);

@@ -34,12 +34,13 @@ export function alongNormal({ a, alpha }: Row): Matrix4 {
   return new Matrix4().makeRotationX(alpha).setPosition(a, 0, 0);
 }
 
-/** Placement of every link in the base frame [m], base first. */
-export function linkPlacements(rows: readonly Row[]): Matrix4[] {
+/** Placement of every link in the base frame [m], base first; `start` is the frame in which the rows begin. */
+export function linkPlacements(start: Matrix4, rows: readonly Row[]): Matrix4[] {
   const placements = [new Matrix4()];
+  let previous = start;
   for (const row of rows) {
-    const previous = placements[placements.length - 1] ?? new Matrix4();
-    placements.push(previous.clone().multiply(alongAxis(row)).multiply(alongNormal(row)));
+    previous = previous.clone().multiply(alongAxis(row)).multiply(alongNormal(row));
+    placements.push(previous);
   }
   return placements;
 }
@@ -69,7 +70,7 @@ export function poseOf(placement: Matrix4, units: Units): Pose {
 /** How far from the base's origin the tool can come [m]: an upper bound. */
 export function reach(of: Description): number {
   const one = metres(of.units);
-  let total = Math.hypot(...of.tool.xyz);
+  let total = Math.hypot(...of.base.pose.xyz) + Math.hypot(...of.tool.xyz);
   for (const { a, d, type, limits } of of.joint) {
     total += Math.hypot(a, d) + (type === "prismatic" ? Math.max(Math.abs(limits[0]), Math.abs(limits[1])) : 0);
   }

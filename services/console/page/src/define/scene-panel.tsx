@@ -36,10 +36,12 @@ function pictureOf(now: Draft): Picture {
     return { glb, scale: body.mesh_scale, pose: poseMatrix(body.mesh_pose, description.units), color: body.color };
   });
   const part = chosen.value;
-  const placements = linkPlacements(rows);
+  const start = poseMatrix(description.base.pose, description.units);
+  const placements = linkPlacements(start, rows);
   const links = linkNames(description);
   return {
     placements,
+    start,
     rows,
     frames: description.frame.map((frame) => ({
       name: frame.name,

@@ -32,6 +32,8 @@ export interface Shown {
 /** All that the picture shows, in metres. */
 export interface Picture {
   placements: readonly THREE.Matrix4[];
+  /** The frame in which the rows begin. */
+  start: THREE.Matrix4;
   rows: readonly Row[];
   shapes: readonly (Shown | null)[];
   /** In the last link's frame. */

@@ -23,6 +23,8 @@ const UP = new THREE.Vector3(0, 1, 0);
 interface Drawn {
   /** Of the links, base first. */
   placements: readonly THREE.Matrix4[];
+  /** The frame in which the rows begin. */
+  start: THREE.Matrix4;
   rows: readonly Row[];
   frames: readonly { name: string; placement: THREE.Matrix4 }[];
   /** Of the whole arm [m]. */
@@ -36,10 +38,10 @@ export class Skeleton {
   private readonly labels = new Map<string, THREE.SpriteMaterial>();
 
   /** @param chosen The row drawn bright; null: all are. */
-  update({ placements, rows, frames, size }: Drawn, tool: THREE.Matrix4, chosen: number | null): void {
+  update({ placements, start, rows, frames, size }: Drawn, tool: THREE.Matrix4, chosen: number | null): void {
     this.group.clear();
     rows.forEach((row, index) => {
-      const before = placements[index];
+      const before = index === 0 ? start : placements[index];
       const after = placements[index + 1];
       if (!before || !after) return;
       const bright = chosen === null || chosen === index;
@@ -57,6 +59,7 @@ export class Skeleton {
     });
     const first = placements[0];
     if (first) this.frame(first, size, chosen === null);
+    if (!first?.equals(start)) this.frame(start, size, chosen === null || chosen === 0);
     for (const { name, placement } of [...frames, { name: "tool", placement: tool }]) {
       const beside = new THREE.Vector3().setFromMatrixColumn(placement, 0).multiplyScalar(0.14 * size);
       this.frame(placement, size * 1.5, true);

@@ -168,6 +168,7 @@ const TEXTS = {
   guess: ["Guess: {guess}", "推测：{guess}"],
   use_guess: ["Use it", "采用"],
   pose: ["Its place in the link’s frame", "在连杆坐标系中的位置"],
+  base_pose: ["Where the first row begins, in the base frame", "第一行 D-H 参数的起点（相对基座坐标系）"],
   tool_pose: ["Tool frame, from the last link’s", "工具坐标系（相对末端连杆）"],
   field_of: ["{field} of {name}", "{name} 的 {field}"],
 
