@@ -6,6 +6,7 @@ from base64 import b64encode
 from pathlib import Path
 
 import ezdxf
+import numpy as np
 import pytest
 
 from robots.errors import MeshError
@@ -135,3 +136,15 @@ def test_step_that_needs_too_much_memory_says_so(tmp_path: Path, monkeypatch: py
     done.returncode = 1
     with pytest.raises(MeshError, match="finds no STEP model in it"):
         read_mesh(file)
+
+
+def test_objects_with_texture_places_and_normals_may_count_backwards(tmp_path: Path) -> None:
+    # As trimesh's models/negative_indices.obj, with a second object.
+    points = "".join(f"v {x} {y} {z}\n" for x in (1, -1) for y in (1, -1) for z in (-1, 1))
+    rest = "vt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 1\n"
+    faces = ["f -4/-3/-1 -2/-2/-1 -1/-1/-1 -3/-1/-1\n", "f -8/-3/-1 -7/-2/-1 -5/-1/-1\n"]
+    text = "".join(f"o part{each}\n{points}{rest}usemtl m\ns off\n{''.join(faces)}" for each in range(2))
+    mesh = read_mesh(written(tmp_path, "a.obj", text))
+    corners = {tuple(p) for part in mesh.parts for p in part.vertices[np.unique(part.triangles)].tolist()}
+    assert mesh.triangle_count == 6
+    assert corners == {(x, y, z) for x in (1, -1) for y in (1, -1) for z in (1, -1)} - {(1, -1, -1)}

@@ -1,5 +1,6 @@
 """Define's workers: what hangs, dies or grows over a file harms nobody else."""
 
+import asyncio
 import contextlib
 import os
 import shutil
@@ -7,14 +8,17 @@ import signal
 import subprocess
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
+from starlette.requests import Request
 
 from robots.description import load
 from robots.urdf.write import to_urdf
-from services.console.define import store
+from services.console.accounts.sessions import SignedIn
+from services.console.define import routes, store
 from services.console.define.errors import RefusedRequest
-from services.console.define.workshop import Limits, Worker, Workshop
+from services.console.define.workshop import Limits, Worker, Workers, Workshop
 from tests.conftest import run
 from tests.robots.test_step import step_box
 from tests.services.defining import defining
@@ -144,14 +148,125 @@ def test_what_nobody_waits_for_any_more_is_not_done(tmp_path):
     run(main())
 
 
+BOX = b"#VRML V2.0 utf8\nShape { geometry Box { } }\n"
+
+
+def comb(teeth):
+    """A face with many corners, slow to cut into triangles."""
+    corners = [(0, 0)]
+    for y in range(0, 4 * teeth, 4):
+        corners += [(1, y), (100, y + 0.5), (100, y + 1.5), (1, y + 2)]
+    points = ", ".join(f"{x} {y} 0" for x, y in [*corners, (0, 4 * teeth)])
+    return (
+        "#VRML V2.0 utf8\nShape { geometry IndexedFaceSet { convex FALSE coord Coordinate { point [ "
+        f"{points} ] }} coordIndex [ {' '.join(map(str, range(len(corners) + 1)))} -1 ] }} }}\n"
+    ).encode()
+
+
+async def stopped_workers(workshop, folder):
+    """The process ids of the main and the brief worker for slow jobs, started and then stopped."""
+    started = [workshop.slow.do("mesh", folder, {"file": "box.wrl"}) for _ in range(2)]
+    await asyncio.gather(*started)
+    main, brief = workshop.slow.pids
+    for pid in (main, brief):
+        os.kill(pid, signal.SIGSTOP)
+    return main, brief
+
+
+@pytest.mark.slow
+def test_a_small_file_waits_for_no_slow_one(tmp_path):
+    kept = store.open_store(tmp_path / "store")
+    files = {"comb.wrl": store.put(kept, comb(teeth=1000)), "box.wrl": store.put(kept, BOX)}
+    folder = store.lay_out(kept, files)
+
+    async def main():
+        workshop = Workshop(kept.folder, Limits(slow_s=30.0))
+        try:
+            first, second = await stopped_workers(workshop, folder)
+            os.kill(second, signal.SIGCONT)
+            slow = asyncio.create_task(workshop.slow.do("mesh", folder, {"file": "comb.wrl"}))
+            await asyncio.sleep(0)
+            assert (await workshop.slow.do("mesh", folder, {"file": "box.wrl"}))["glb"]
+            assert not slow.done()
+            os.kill(first, signal.SIGCONT)
+            assert (await slow)["glb"]
+        finally:
+            await workshop.close()
+
+    run(main())
+
+
+@pytest.mark.slow
+def test_two_slow_files_hold_up_no_third_asker_and_both_are_read(tmp_path):
+    kept = store.open_store(tmp_path / "store")
+    files = {"comb.wrl": store.put(kept, comb(teeth=1000)), "box.wrl": store.put(kept, BOX)}
+    folder = store.lay_out(kept, files)
+
+    async def main():
+        workshop = Workshop(kept.folder, Limits(slow_s=60.0, brief_s=5.0))
+
+        def ask(asker, file):
+            return asyncio.create_task(workshop.slow.do("mesh", folder, {"file": file}, asker=asker))
+
+        try:
+            first, second = await stopped_workers(workshop, folder)
+            slow = [ask("one", "comb.wrl"), ask("two", "comb.wrl")]
+            more = [ask("two", "comb.wrl") for _ in range(3)]
+            assert (await ask("three", "box.wrl"))["glb"]
+            assert not alive(second)
+            assert not any(each.done() for each in slow)
+            os.kill(first, signal.SIGCONT)
+            assert all(each["glb"] for each in await asyncio.gather(*slow, *more))
+        finally:
+            await workshop.close()
+
+    run(main())
+
+
+def test_askers_take_turns(tmp_path):
+    kept = store.open_store(tmp_path / "store")
+    order = []
+
+    async def main():
+        begin = asyncio.Event()
+        workers = Workers(Worker(kept.folder, longest_s=5.0, memory_bytes=LIMITS.memory_bytes))
+
+        async def ask(asker):
+            async def wanted():
+                order.append(asker)
+                await begin.wait()
+                return False
+
+            with pytest.raises(RefusedRequest, match="nobody waits"):
+                await workers.do("mesh", kept.folder, {}, asker=asker, wanted=wanted)
+
+        asked = [asyncio.create_task(ask(asker)) for asker in ("flood", "flood", "flood", "flood", "other")]
+        gone = asyncio.create_task(ask("gone"))
+        await asyncio.sleep(0)
+        gone.cancel()
+        begin.set()
+        await asyncio.gather(*asked)
+
+    run(main())
+    assert order == ["flood", "flood", "other", "flood", "flood"]
+
+
+def test_the_asker_is_the_account_or_else_the_address():
+    account = SimpleNamespace(name="eve")
+    who = object.__new__(SignedIn)
+    who.account = account
+    scope = {"type": "http", "client": ("192.0.2.7", 1)}
+    assert routes._asker(Request(scope)) == "192.0.2.7"
+    assert routes._asker(Request(scope | {"signed_in": None})) == "192.0.2.7"
+    assert routes._asker(Request(scope | {"signed_in": who})) == "account eve"
+
+
 @pytest.mark.slow
 def test_a_cancelled_request_leaves_no_answer_for_the_next(tmp_path):
     kept = store.open_store(tmp_path / "store")
     folder = store.lay_out(kept, {"a.wrl": store.put(kept, POINTS % b"0 0 0")})
 
     async def main():
-        import asyncio
-
         workshop = Workshop(kept.folder, LIMITS)
         try:
             first = asyncio.create_task(workshop.slow.do("mesh", folder, {"file": "a.wrl"}))

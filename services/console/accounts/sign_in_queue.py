@@ -3,9 +3,9 @@
 Whoever sends many tries at once delays, and displaces, the own ones alone. No I/O and no clock.
 """
 
-from collections import OrderedDict, deque
 from typing import Generic, TypeVar
 
+from services.console.asker_queue import AskerQueue
 from services.console.errors import SignInBusyError
 
 Job = TypeVar("Job")
@@ -13,17 +13,17 @@ Job = TypeVar("Job")
 # Tries that may wait: in all, of one address, and of one name at that address.
 MOST_WAITING, MOST_OF_ADDRESS, MOST_OF_NAME = 64, 16, 4
 
-_Names = OrderedDict[str, deque[Job]]
-
 
 class SignInQueue(Generic[Job]):
     """Jobs by address and name, taken in turn."""
 
     def __init__(self) -> None:
-        self._addresses: OrderedDict[str, _Names[Job]] = OrderedDict()
+        # Each job's address, and its names' jobs.
+        self._addresses: AskerQueue[str] = AskerQueue()
+        self._names: dict[str, AskerQueue[Job]] = {}
 
     def __len__(self) -> int:
-        return sum(self._of_address(address) for address in self._addresses)
+        return len(self._addresses)
 
     def add(self, job: Job, *, address: str, name: str) -> Job | None:
         """Queue a job; return the one that lost its place to it, if any.
@@ -34,56 +34,42 @@ class SignInQueue(Generic[Job]):
         Raises:
             SignInBusyError: If this address, or this name there, has the most jobs itself.
         """
-        own, displaced = self._of_name(address, name), None
+        names: AskerQueue[Job] = self._names.get(address, AskerQueue())
+        own, displaced = names.count(name), None
         if own >= MOST_OF_NAME:
             raise busy()
-        if self._of_address(address) >= MOST_OF_ADDRESS:
-            if self._of_name(address, self._fullest_name(address)) <= own + 1:
+        if self._addresses.count(address) >= MOST_OF_ADDRESS:
+            if names.count(names.fullest()) <= own + 1:
                 raise busy()
             displaced = self._remove_newest(address)
         elif len(self) >= MOST_WAITING:
-            fullest = max(self._addresses, key=self._of_address)
-            if self._of_address(fullest) <= self._of_address(address) + 1:
+            fullest = self._addresses.fullest()
+            if self._addresses.count(fullest) <= self._addresses.count(address) + 1:
                 raise busy()
             displaced = self._remove_newest(fullest)
-        self._addresses.setdefault(address, OrderedDict()).setdefault(name, deque()).append(job)
+        self._addresses.add(address, address)
+        self._names.setdefault(address, names).add(name, job)
         return displaced
 
     def take(self) -> Job | None:
         """Remove and return the next job, of the next address its next name's; None: there is none."""
-        if not self._addresses:
+        address = self._addresses.take()
+        if address is None:
             return None
-        address = next(iter(self._addresses))
-        names = self._addresses[address]
-        name, jobs = next(iter(names.items()))
-        job = jobs.popleft()
-        # To the end: the others come first, also before whoever has one job only and sends the next at once.
-        self._addresses.move_to_end(address)
-        names.move_to_end(name)
-        self._forget_empty(address, name)
+        job = self._names[address].take()
+        self._forget_empty(address)
         return job
 
     def _remove_newest(self, address: str) -> Job:
-        name = self._fullest_name(address)
-        job = self._addresses[address][name].pop()
-        self._forget_empty(address, name)
+        self._addresses.remove_newest(address)
+        names = self._names[address]
+        job = names.remove_newest(names.fullest())
+        self._forget_empty(address)
         return job
 
-    def _fullest_name(self, address: str) -> str:
-        return max(self._addresses[address], key=lambda name: self._of_name(address, name))
-
-    def _forget_empty(self, address: str, name: str) -> None:
-        names = self._addresses[address]
-        if not names[name]:
-            del names[name]
-        if not names:
-            del self._addresses[address]
-
-    def _of_address(self, address: str) -> int:
-        return sum(map(len, self._addresses[address].values())) if address in self._addresses else 0
-
-    def _of_name(self, address: str, name: str) -> int:
-        return len(self._addresses[address].get(name, ())) if address in self._addresses else 0
+    def _forget_empty(self, address: str) -> None:
+        if not self._names[address]:
+            del self._names[address]
 
 
 def busy() -> SignInBusyError:

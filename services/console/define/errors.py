@@ -2,6 +2,7 @@
 
 services.errors.ServiceError
 └── RefusedRequest      a request that is answered in words, with an HTTP status
+    └── TooSlowError    a job that took longer than its worker gives it
 """
 
 from services.errors import ServiceError
@@ -19,3 +20,7 @@ class RefusedRequest(ServiceError):
         self.status = status
         self.text = text
         super().__init__(text)
+
+
+class TooSlowError(RefusedRequest):
+    """A job took longer than its worker gives it, and was ended."""

@@ -11,7 +11,7 @@ from collections import OrderedDict
 from collections.abc import Awaitable, Callable
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypedDict, TypeVar
 
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
@@ -20,6 +20,7 @@ from starlette.routing import Mount, Route
 from robots.description import library_names
 from robots.errors import RobotError, RobotExistsError
 from robots.save import read_robot, refused_path, revision_of, write_description, zip_description
+from services.console.accounts.sessions import SignedIn
 from services.console.answered import Handler, answered
 from services.console.define import saved, store
 from services.console.define.errors import RefusedRequest
@@ -76,18 +77,18 @@ class Define:
 
     # ------------------------------------------------------------------ what there is
 
-    async def robots(self, _: Request) -> Response:
+    async def robots(self, request: Request) -> Response:
         """What can be opened, and where robots are saved."""
         site = self.settings.site
         running = frozenset(started_names(site)) | {robot.name for robot in site.robot}
         rows = await asyncio.to_thread(lambda: list(saved.listing(site, running)))
         for row in rows:
             if row["joints"] is None:
-                row["joints"] = await self._joint_count(row["name"])
+                row["joints"] = await self._joint_count(row["name"], _asker(request))
         folder = str(site.define.folder)
         return JSONResponse({"robots": rows, "can_start": self.settings.can_start, "folder": folder})
 
-    async def _joint_count(self, name: str) -> int:
+    async def _joint_count(self, name: str, asker: str) -> int:
         """Of a robot whose joints are in another file than its robot.toml; 0 where it cannot be read."""
         revision = ""
         try:
@@ -96,7 +97,7 @@ class Define:
                 return self._joint_counts[revision]
             values, files = await self._opened(name)
             folder = await self._laid_out({"files": files})
-            found = await self.workshop.quick.do("joint_count", folder, {"description": values})
+            found = await self.workshop.quick.do("joint_count", folder, {"description": values}, asker=asker)
             count: int = found["joints"]
         except (RefusedRequest, RobotError, OSError):
             count = 0  # what is wrong with it is told when it is opened
@@ -113,7 +114,9 @@ class Define:
         if "urdf" in values:
             # What is edited is D-H rows.
             folder = await self._laid_out({"files": files})
-            opened = await self.workshop.slow.do("import", folder, {"description": values})
+            opened = await self.workshop.slow.do(
+                "import", folder, {"description": values}, asker=_asker(request)
+            )
         return JSONResponse(opened | {"revision": revision})
 
     def _folder(self, name: str) -> Path:
@@ -168,7 +171,7 @@ class Define:
         file = self._file_of(asked)
         known = self._meshes.get((folder.name, file))
         if known is None or store.stored(self.store, known["glb"]) is None:
-            known = await self.workshop.slow.do("mesh", folder, {"file": file}, wanted=_waits(request))
+            known = await self.workshop.slow.do("mesh", folder, {"file": file}, **_of(request))
             _remember(self._meshes, (folder.name, file), known)
         return JSONResponse(known)
 
@@ -178,7 +181,7 @@ class Define:
         folder = await self._laid_out(asked)
 
         request_ = {"description": asked["description"], "joints": asked.get("joints")}
-        return JSONResponse(await self.workshop.quick.do("check", folder, request_, wanted=_waits(request)))
+        return JSONResponse(await self.workshop.quick.do("check", folder, request_, **_of(request)))
 
     async def collisions(self, request: Request) -> Response:
         """How often each pair of links touches."""
@@ -199,7 +202,7 @@ class Define:
 
     async def _slow(self, request: Request, job: str, asked: Json, of: Json) -> Response:
         folder = await self._laid_out(asked)
-        return JSONResponse(await self.workshop.slow.do(job, folder, of, wanted=_waits(request)))
+        return JSONResponse(await self.workshop.slow.do(job, folder, of, **_of(request)))
 
     # ------------------------------------------------------------------ save and start
 
@@ -208,13 +211,15 @@ class Define:
         asked = await self._json(request, description=dict)
         values, folder = asked["description"], await self._laid_out(asked)
         name = values.get("name")
-        found = await self.workshop.quick.do("check", folder, {"description": values})
+        found = await self.workshop.quick.do("check", folder, {"description": values}, asker=_asker(request))
         problems = found["problems"]
         if name in library_names():
             text = f"name = {name!r}: a robot of the library has that name; give yours another"
             problems.append({"path": ["name"], "text": text})
         if not problems:
-            found = await self.workshop.slow.do("meshes", folder, {"description": values})
+            found = await self.workshop.slow.do(
+                "meshes", folder, {"description": values}, asker=_asker(request)
+            )
             problems = found["problems"]
         if problems:
             return JSONResponse({"problems": problems}, status_code=422)
@@ -250,7 +255,7 @@ class Define:
         name = (await self._json(request, name=str))["name"]
         values, files = await self._opened(name)
         folder = await self._laid_out({"files": files})
-        found = await self.workshop.slow.do("meshes", folder, {"description": values})
+        found = await self.workshop.slow.do("meshes", folder, {"description": values}, asker=_asker(request))
         if found["problems"]:
             raise RefusedRequest(422, found["problems"][0]["text"])
         async with self._writing:
@@ -301,6 +306,23 @@ class Define:
         if file not in asked["files"]:
             raise RefusedRequest(422, f"file {file!r}: is not one of the files given")
         return file
+
+
+def _asker(request: Request) -> str:
+    """Whose turn a job takes: the account's, else the address's."""
+    who = request.scope.get("signed_in")
+    if isinstance(who, SignedIn):
+        return f"account {who.account.name}"
+    return request.client.host if request.client else ""
+
+
+class _Of(TypedDict):
+    asker: str
+    wanted: Callable[[], Awaitable[bool]]
+
+
+def _of(request: Request) -> _Of:
+    return {"asker": _asker(request), "wanted": _waits(request)}
 
 
 def _waits(request: Request) -> Callable[[], Awaitable[bool]]:

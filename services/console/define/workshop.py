@@ -1,4 +1,4 @@
-"""The console's end of its workers: one for what must answer as one types, one for what may take long.
+"""The console's end of its workers: one for what must answer as one types, two for what may take long.
 
 Started when first needed and kept, for their imports cost over a second; one that hangs or dies
 is ended and the next request starts another.
@@ -13,12 +13,13 @@ import shutil
 import signal
 import sys
 import tempfile
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from services.console.define.errors import RefusedRequest
+from services.console.asker_queue import AskerQueue
+from services.console.define.errors import RefusedRequest, TooSlowError
 
 log = logging.getLogger(__name__)
 
@@ -33,22 +34,23 @@ class Limits:
     Attributes:
         quick_s: A check as one types.
         slow_s: Reading and converting files, sampling collisions.
+        brief_s: The same, in the worker that no slow file may hold up.
         memory_bytes: Of a worker.
     """
 
     quick_s: float = 10.0
     slow_s: float = 180.0
+    brief_s: float = 10.0
     memory_bytes: int = 6 * 1024**3
 
 
 class Worker:
-    """One worker process; one job at a time, the others wait."""
+    """One worker process; one job at a time."""
 
     def __init__(self, folder: Path, *, longest_s: float, memory_bytes: int) -> None:
         self._folder = folder
         self._longest_s = longest_s
         self._memory_bytes = memory_bytes
-        self._turn = asyncio.Lock()
         self._process: asyncio.subprocess.Process | None = None
         self._temporary: Path | None = None
 
@@ -65,19 +67,19 @@ class Worker:
         *,
         wanted: Callable[[], Awaitable[bool]] | None = None,
     ) -> dict[str, Any]:
-        """What a job comes to.
+        """What a job comes to; no other may be under way.
 
         Args:
-            wanted: Whether somebody still waits for it, asked when its turn has come.
+            wanted: Whether somebody still waits for it.
 
         Raises:
-            RefusedRequest: If it says no, took too long, ended the process, or nobody waits for it any more.
+            TooSlowError: If it took too long.
+            RefusedRequest: If it says no, ended the process, or nobody waits for it any more.
         """
-        async with self._turn:
-            if wanted is not None and not await wanted():
-                raise RefusedRequest(499, "nobody waits for this any more")
-            line = json.dumps({"job": job, "folder": str(folder), "request": request}) + "\n"
-            answer = await self._answer(job, line)
+        if wanted is not None and not await wanted():
+            raise RefusedRequest(499, "nobody waits for this any more")
+        line = json.dumps({"job": job, "folder": str(folder), "request": request}) + "\n"
+        answer = await self._answer(job, line)
         if "refused" in answer:
             raise RefusedRequest(422, answer["refused"])
         done: dict[str, Any] = answer["done"]
@@ -92,9 +94,7 @@ class Worker:
                 log.warning("the worker ended over %s (status %s)", job, await self._end())
             except TimeoutError:
                 await self._end()
-                raise RefusedRequest(
-                    422, f"this took more than {self._longest_s:g} s and was ended"
-                ) from None
+                raise TooSlowError(422, f"this took more than {self._longest_s:g} s and was ended") from None
             except BaseException:
                 # Whoever asked is gone; the answer must not be taken for the next one's.
                 await self._end()
@@ -156,13 +156,95 @@ async def _ask(process: asyncio.subprocess.Process, line: str) -> dict[str, Any]
     return found
 
 
-class Workshop:
-    """The two workers."""
+class Workers:
+    """Workers whose askers take turns, and where no slow job holds up the others.
 
-    def __init__(self, folder: Path, limits: Limits) -> None:
-        self.quick = Worker(folder, longest_s=limits.quick_s, memory_bytes=limits.memory_bytes)
-        self.slow = Worker(folder, longest_s=limits.slow_s, memory_bytes=limits.memory_bytes)
+    A job that the brief worker does not finish in its time is begun again by the main one: slow jobs
+    wait for each other, and small ones for the brief worker alone.
+    """
+
+    def __init__(self, main: Worker, brief: Worker | None = None) -> None:
+        self._main = main
+        self._idle = [main] if brief is None else [main, brief]
+        self._all = tuple(self._idle)
+        self._fresh: AskerQueue[asyncio.Future[Worker]] = AskerQueue()
+        self._slow: AskerQueue[asyncio.Future[Worker]] = AskerQueue()
+
+    @property
+    def pids(self) -> list[int]:
+        """Of their processes, those that run."""
+        return [worker.pid for worker in self._all if worker.pid is not None]
+
+    async def do(
+        self,
+        job: str,
+        folder: Path,
+        request: dict[str, Any],
+        *,
+        asker: str = "",
+        wanted: Callable[[], Awaitable[bool]] | None = None,
+    ) -> dict[str, Any]:
+        """What a job comes to.
+
+        Args:
+            asker: Whose turn it takes.
+            wanted: Whether somebody still waits for it, asked when its turn has come.
+
+        Raises:
+            RefusedRequest: If it says no, took too long, ended the process, or nobody waits for it any more.
+        """
+        async with self._turn(self._fresh, asker) as worker:
+            try:
+                return await worker.do(job, folder, request, wanted=wanted)
+            except TooSlowError:
+                if worker is self._main:
+                    raise
+        async with self._turn(self._slow, asker) as worker:
+            return await worker.do(job, folder, request, wanted=wanted)
 
     async def close(self) -> None:
-        """End both."""
+        """End their processes."""
+        await asyncio.gather(*(worker.close() for worker in self._all))
+
+    @contextlib.asynccontextmanager
+    async def _turn(self, queue: AskerQueue[asyncio.Future[Worker]], asker: str) -> AsyncIterator[Worker]:
+        turn: asyncio.Future[Worker] = asyncio.get_running_loop().create_future()
+        queue.add(asker, turn)
+        self._hand_out()
+        try:
+            yield await turn
+        finally:
+            # An asker who went while waiting holds no worker, unless one was handed out in that instant.
+            if turn.done() and not turn.cancelled():
+                self._idle.append(turn.result())
+                self._hand_out()
+
+    def _hand_out(self) -> None:
+        for worker in sorted(self._idle, key=self._all.index):
+            turn = self._next(self._slow) if worker is self._main else None
+            turn = turn or self._next(self._fresh)
+            if turn is not None:
+                self._idle.remove(worker)
+                turn.set_result(worker)
+
+    @staticmethod
+    def _next(queue: AskerQueue[asyncio.Future[Worker]]) -> asyncio.Future[Worker] | None:
+        while (turn := queue.take()) is not None:
+            if not turn.done():
+                return turn  # the others' askers have gone
+        return None
+
+
+class Workshop:
+    """The workers: quick ones for what is asked as one types, slow ones for files."""
+
+    def __init__(self, folder: Path, limits: Limits) -> None:
+        def worker(longest_s: float) -> Worker:
+            return Worker(folder, longest_s=longest_s, memory_bytes=limits.memory_bytes)
+
+        self.quick = Workers(worker(limits.quick_s))
+        self.slow = Workers(worker(limits.slow_s), brief=worker(min(limits.brief_s, limits.slow_s)))
+
+    async def close(self) -> None:
+        """End them all."""
         await asyncio.gather(self.quick.close(), self.slow.close())
