@@ -24,6 +24,7 @@ from tests.browser.define.page import (
     tab,
     tools,
 )
+from tests.robots.test_dh import KUKA_LIKE
 
 pytestmark = pytest.mark.browser
 
@@ -306,6 +307,35 @@ def test_a_urdf_and_its_shapes_become_rows(open_page, tmp_path):
     # The home of a URDF is zero: the arm stretched out.
     assert np.allclose(drawn[:3, 3], [0.6, 0.0, 0.3], atol=1e-6)
     assert np.allclose(drawn, said, atol=1e-9)
+
+
+def test_a_urdf_whose_first_axis_points_down_keeps_its_base_frame(open_page, plant):
+    page = open_page("#/define")
+    drop(page, ("down.urdf", KUKA_LIKE.encode()))
+    expect(page.locator(".dh-table tbody tr")).to_have_count(6, timeout=60_000)
+    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "7", timeout=60_000)
+    drawn, said = tools(page)
+    # As the URDF adds it up at position zero, in its own base frame.
+    assert np.allclose(drawn[:3, 3], [0.1 + 0.025 + 0.56 + 0.515, 0.2, 0.4 + 0.035 + 0.3], atol=1e-6)
+    assert np.allclose(drawn, said, atol=1e-9)
+    choose(page, "base")
+    assert abs(float(field(page, "base/pose/rpy/0").input_value().replace("−", "-"))) == 180.0
+    field(page, "base/pose/xyz/2").fill("100")
+    tab(page, "Robot")
+    field(page, "units/length").select_option("m")
+    settled(page)
+    drawn, said = tools(page)
+    assert np.allclose(drawn[2, 3], 0.735 + 0.1, atol=1e-6)
+    assert np.allclose(drawn, said, atol=1e-9)
+    button(page, "Save").click()
+    expect(page.locator(".save-state")).to_have_text("Saved")
+    saved = plant.robots / "down" / "robot.toml"
+    assert tomllib.loads(saved.read_text())["base"]["pose"]["xyz"] == [0.0, 0.0, 0.1]
+    choose(page, "base")
+    page.reload()
+    expect(page.locator(".dh-table tbody tr")).to_have_count(6, timeout=60_000)
+    choose(page, "base")
+    expect(field(page, "base/pose/xyz/2")).to_have_value("0.1")
 
 
 OPENHRP = b"""#VRML V2.0 utf8
