@@ -131,7 +131,7 @@ def running_site(
         if process.poll() is None:
             process.send_signal(signal.SIGINT)
             try:
-                process.wait(5.0)
+                process.wait(15.0)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
