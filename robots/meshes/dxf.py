@@ -35,6 +35,7 @@ _CREASE = np.radians(30)
 _BYBLOCK, _BYLAYER = 0, 256
 _CURVES = {"LINE", "LWPOLYLINE", "POLYLINE", "CIRCLE", "ARC", "ELLIPSE", "SPLINE"}
 _FLAT = {"3DFACE", "SOLID", "TRACE"}
+_READ = {"INSERT", "MESH", "POINT"} | _CURVES | _FLAT
 _ACIS = {"3DSOLID", "BODY", "REGION", "SURFACE", "EXTRUDEDSURFACE", "LOFTEDSURFACE", "REVOLVEDSURFACE"}
 # $INSUNITS [m]; 0 says nothing.
 UNITS_M = {1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 6: 1.0, 7: 1000.0, 8: 2.54e-8, 9: 2.54e-5, 10: 0.9144}
@@ -170,6 +171,10 @@ def _walk(path: Path, drawing: Any, entity: Any, above: _Look, found: _Found, de
 
 def _draw(path: Path, drawing: Any, entity: Any, above: _Look, found: _Found, depth: int) -> None:
     kind = entity.dxftype()
+    # Not every entity has a layer and a transparency: ACAD_TABLE has none in ezdxf.
+    if kind not in _READ:
+        found.left_out[kind] += 1
+        return
     look = _look(drawing, entity, above)
     if kind == "INSERT":
         for one in _copies(path, entity, found):
@@ -192,10 +197,8 @@ def _draw(path: Path, drawing: Any, entity: Any, above: _Look, found: _Found, de
         if not np.isfinite(size):
             raise MeshError(path, f"{kind} on layer {look.layer!r} has a point that is not finite")
         found.lines.setdefault(look, []).append(_array(curve.flattening(size / 200)))
-    elif kind == "POINT":
-        found.points.setdefault(look, []).append(_array([entity.dxf.location]))
     else:
-        found.left_out[kind] += 1
+        found.points.setdefault(look, []).append(_array([entity.dxf.location]))
 
 
 def _skip(entity: Any, found: _Found) -> None:

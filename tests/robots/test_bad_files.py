@@ -125,6 +125,21 @@ def test_broken_entity_of_a_drawing_is_left_out_and_named(tmp_path: Path) -> Non
     assert warning.startswith(f"SPLINE {spline.dxf.handle} left out: it is broken")
 
 
+@pytest.mark.parametrize("kind", ["ACAD_TABLE", "acad_table"])
+def test_table_of_a_drawing_is_left_out_and_counted(tmp_path: Path, kind: str) -> None:
+    drawing = ezdxf.new()
+    drawing.modelspace().add_line((0, 0), (1, 0))
+    path = tmp_path / "a.dxf"
+    drawing.saveas(path)
+    before, line, after = path.read_text().partition("  0\nLINE\n")
+    assert line
+    table = f"  0\n{kind}\n  5\nFFF1\n100\nAcDbEntity\n  8\n0\n100\nAcDbBlockReference\n  2\n*T1\n"
+    path.write_text(f"{before}{table}{line}{after}")
+    mesh = read_mesh(path)
+    assert len(mesh.wires) == 1
+    assert mesh.warnings == (f"left out: 1 {kind}",)
+
+
 def test_step_that_needs_too_much_memory_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     done = step.subprocess.CompletedProcess([], 0, b"", b"")
     monkeypatch.setattr(step.subprocess, "run", lambda *_, **__: done)
