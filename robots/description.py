@@ -184,7 +184,7 @@ def _urdf_robot(description: UrdfDescription, *, confined: bool) -> UrdfRobot:
         from robots.vrml_robot import read_vrml_robot
 
         try:
-            found = read_vrml_robot(urdf, within=folder if confined else None)
+            found = read_vrml_robot(urdf, within=description.folder_around(urdf))
         except MeshError as error:
             place = f"{error.place}: " if error.place else ""
             raise DescriptionError(error.source, [f"{place}{error.reason}"]) from error

@@ -114,11 +114,18 @@ def _copied(description: DhDescription) -> Imported:
             if path not in places:
                 places[path] = _inside(str(table[key]), set(files))
                 files[places[path]] = _bytes(path)
-                mesh = read_mesh(path, within=description.within)
-                notes += [f"{places[path]} names {name!r}, which is not there" for name in mesh.missing]
+                folder = description.folder_around(path)
+                mesh = read_mesh(path, within=folder)
+                notes += [_not_read(path, places[path], name, folder) for name in mesh.missing]
                 notes += _copied_beside(path, places[path], mesh.files, files)
             table[key] = places[path]
     return Imported(values, files, tuple(notes), ())
+
+
+def _not_read(path: Path, place: str, address: str, folder: Path) -> str:
+    if Path(os.path.normpath(path.resolve().parent / address)).is_relative_to(folder.resolve()):
+        return f"{place} names {address!r}, which is not there"
+    return f"{place} names {address!r}, which is outside of the robot's folder; it is not copied"
 
 
 def _copied_beside(path: Path, place: str, others: Sequence[Path], files: dict[str, bytes]) -> Iterator[str]:

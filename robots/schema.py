@@ -7,6 +7,7 @@ Source: Chen, Zhang, Xue 2001, section 3.3 (the description file of the model de
 """
 
 import difflib
+import os
 from collections.abc import Iterable
 from enum import StrEnum
 from pathlib import Path
@@ -220,6 +221,19 @@ class RobotDescription(_Table):
     def within(self) -> Path | None:
         """The only folder whose files may be read for it; None: any."""
         return self._within
+
+    def folder_around(self, file: Path) -> Path:
+        """The only folder whose files may be read when a file of the description names them.
+
+        It is the least folder that holds the file and the description, or the description's ROS package.
+        """
+        if self._within is not None:
+            return self._within
+        home, its = self._source.resolve().parent, file.resolve().parent
+        package = next((each for each in (home, *home.parents) if (each / "package.xml").is_file()), home)
+        around = Path(os.path.commonpath([package, its]))
+        # A mesh of a package that is installed elsewhere has nothing to do with the description's folder.
+        return its if around == Path(around.anchor) else around
 
     def confined_to(self, folder: Path) -> Self:
         """The same description, for which only files below a folder are read."""

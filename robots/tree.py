@@ -161,17 +161,23 @@ def tree_of(description: RobotDescription) -> Tree:
     else:
         assert isinstance(description, DhDescription)
         tree = _tree_of_rows(description)
-    return tree if description.within is None else _confined(tree, description.within)
+    return _confined(tree, description)
 
 
-def _confined(tree: Tree, folder: Path) -> Tree:
+def _confined(tree: Tree, description: RobotDescription) -> Tree:
+    """The same tree; what its mesh files name is read from the robot's own folder only."""
+
+    def confined(shape: Shape) -> Shape:
+        mesh = shape.mesh
+        return replace(shape, within=description.folder_around(mesh)) if isinstance(mesh, Path) else shape
+
     return replace(
         tree,
         links=tuple(
             replace(
                 link,
-                shapes=tuple(replace(shape, within=folder) for shape in link.shapes),
-                collision=tuple(replace(shape, within=folder) for shape in link.collision),
+                shapes=tuple(map(confined, link.shapes)),
+                collision=tuple(map(confined, link.collision)),
             )
             for link in tree.links
         ),

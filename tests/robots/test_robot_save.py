@@ -14,9 +14,10 @@ import pytest
 
 from robots.description import LIBRARY, load
 from robots.errors import DescriptionError, RobotExistsError, SaveError
-from robots.glb import link_meshes
+from robots.glb import link_mesh, link_meshes
 from robots.save import Saved, read_robot, refused_path, revision_of, write_description, zip_description
 from robots.save_text import description_text
+from robots.tree import tree_of
 
 PT500 = (LIBRARY / "pt500" / "robot.toml").read_text(encoding="utf-8")
 
@@ -301,15 +302,48 @@ def test_a_full_disk_is_told_in_words_and_the_old_robot_stays(small_disk):
 BOX = "#VRML V2.0 utf8\nShape { geometry Box { } }\n"
 
 
-def test_a_robot_that_is_confined_shows_no_file_of_another_folder(tmp_path):
-    (tmp_path / "outside.wrl").write_text(BOX)
-    robot = tmp_path / "arm"
-    robot.mkdir()
-    (robot / "base.wrl").write_text(f'{BOX}Inline {{ url "{tmp_path}/outside.wrl" }}\n')
+def write_inlining_robot(folder, address):
+    """Write a robot whose base shows a box, and inlines a file."""
+    folder.mkdir()
+    (folder / "base.wrl").write_text(f'{BOX}Inline {{ url "{address}" }}\n')
     values, _ = read_robot(LIBRARY / "pt500")
     rows = [row | {"link": {}} for row in values["joint"]]
     values |= {"base": {"mesh": "base.wrl"}, "joint": rows}
-    (robot / "robot.toml").write_text(description_text(values))
+    (folder / "robot.toml").write_text(description_text(values))
+
+
+@pytest.mark.parametrize("address", ["../outside.wrl", "{folder}/outside.wrl", "link.wrl"])
+def test_a_robots_mesh_shows_no_file_outside_of_the_robots_folder(tmp_path, address):
+    (tmp_path / "outside.wrl").write_text(BOX)
+    robot = tmp_path / "arm"
+    write_inlining_robot(robot, address.format(folder=tmp_path))
+    (robot / "link.wrl").symlink_to(tmp_path / "outside.wrl")
+    (shape,) = tree_of(load(robot)).links[0].shapes
+    mesh = link_mesh([shape])
+    assert mesh.triangle_count == 12
+    assert "no such file in the folder 'arm', and no other is read; it is left out" in mesh.warnings[0]
+
+
+@pytest.mark.parametrize("confined", [False, True])
+def test_a_vrml_robot_shows_no_file_outside_of_its_folder(tmp_path, confined):
+    (tmp_path / "outside.wrl").write_text(BOX)
+    robot = tmp_path / "arm" / "arm.wrl"
+    robot.parent.mkdir()
+    joint = (
+        'Joint { jointType "rotate" jointId 0 children Segment { children Inline { url "../outside.wrl" } } }'
+    )
+    robot.write_text("#VRML V2.0 utf8\n" + joint)
+    description = load(robot, confined=confined)
+    assert not any(link.shapes for link in tree_of(description).links)
+    said = "no such file in the folder 'arm', and no other is read"
+    assert any(said in note for note in description.robot.notes)
+
+
+def test_a_robot_that_is_confined_shows_no_file_of_another_folder(tmp_path):
+    (tmp_path / "package.xml").touch()  # what is in the robot's package may be read, if it is not confined
+    (tmp_path / "outside.wrl").write_text(BOX)
+    robot = tmp_path / "arm"
+    write_inlining_robot(robot, f"{tmp_path}/outside.wrl")
     cache = tmp_path / "cache"
     # Anybody else's GLB in the cache is not taken for it, nor the other way round.
     free = link_meshes(load(robot), cache=cache)["base"]

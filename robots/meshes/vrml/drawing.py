@@ -187,7 +187,8 @@ class Drawing:
         if texture is None or not addresses:
             return ""
         if self.files.find(texture.source, addresses) is None:
-            texture.warn(f"{addresses[0][:200]!r}: no such file", once=f"texture {addresses[0]}")
+            trouble = self.files.trouble(addresses[0])
+            texture.warn(f"{addresses[0][:200]!r}: {trouble}", once=f"texture {addresses[0]}")
         return addresses[0]
 
     def _inline(self, node: Node, placement: FloatArray, inside: tuple[Path, ...], depth: int) -> None:
@@ -195,9 +196,8 @@ class Drawing:
         found = self.files.find(node.source, addresses)
         if found is None:
             if addresses:
-                node.warn(
-                    f"{addresses[0][:200]!r}: no such file; it is left out", once=f"inline {addresses[0]}"
-                )
+                trouble = self.files.trouble(addresses[0])
+                node.warn(f"{addresses[0][:200]!r}: {trouble}; it is left out", once=f"inline {addresses[0]}")
             return
         if found in inside:
             raise node.error(f"{addresses[0][:200]!r} leads back to itself")

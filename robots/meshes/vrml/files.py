@@ -19,12 +19,14 @@ class Files:
     Attributes:
         within: Files elsewhere count as missing; none: any place will do.
         missing: Files that are not there, as they are named, each once.
+        outside: Those of them that are not looked for: they lie elsewhere.
         asked: Where files were looked for, found there or not, each once.
     """
 
     within: Path | None = None
     scenes: dict[Path, Scene] = field(default_factory=dict)
     missing: dict[str, None] = field(default_factory=dict)
+    outside: dict[str, None] = field(default_factory=dict)
     asked: dict[Path, None] = field(default_factory=dict)
     _count: Count = field(default_factory=Count)
 
@@ -41,7 +43,7 @@ class Files:
                 where, _, name = address.partition("#")
                 found = self.find(proto.source, [where])
                 if found is None:
-                    proto.trouble = f"{where!r}: no such file"
+                    proto.trouble = f"{where!r}: {self.trouble(where)}"
                     continue
                 unlinked += self._read(found)
                 protos = self.scenes[found].protos
@@ -70,6 +72,7 @@ class Files:
             try:
                 path = (source.path.parent / name).resolve()
                 if self.within is not None and not path.is_relative_to(self.within.resolve()):
+                    self.outside[addresses[0][:200]] = None
                     continue
                 self.asked[path] = None
                 if path.is_file():
@@ -79,6 +82,12 @@ class Files:
         if addresses and addresses[0]:
             self.missing[addresses[0][:200]] = None
         return None
+
+    def trouble(self, address: str) -> str:
+        """Why a file is not read that `find` has not found, in words."""
+        if self.within is not None and address[:200] in self.outside:
+            return f"no such file in the folder {self.within.resolve().name!r}, and no other is read"
+        return "no such file"
 
     def warnings(self) -> Iterator[str]:
         """What was odd in any of them; of others than the first with their names."""
