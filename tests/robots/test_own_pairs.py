@@ -15,6 +15,8 @@ from robots.meshes.solids import ball
 from services.command_line.main import run
 
 REAL = Path(__file__).parents[3] / "shared" / "testdata" / "urdf" / "abb_irb2400_support"
+# Studies run in processes of their own.
+pytestmark = pytest.mark.slow
 needs_real_robots = pytest.mark.skipif(not REAL.is_dir(), reason="no ../shared/testdata/urdf: no real robots")
 
 

@@ -35,6 +35,8 @@ from tests.cells import arm_alone
 from tests.conftest import free_port
 from tests.renderer.bodies import context_or_skip
 
+pytestmark = pytest.mark.slow
+
 SITE = "hall"
 WITHIN_S = 60.0
 

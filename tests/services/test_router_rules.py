@@ -18,6 +18,8 @@ from services.keys import Folder, certificates, deeds, renewals
 from services.router.router import AccessError, read_access
 from tests.conftest import free_port, run
 
+pytestmark = pytest.mark.slow
+
 SITE = "here"
 
 

@@ -19,6 +19,8 @@ from services.simulator.faults import Span, parse_fault
 from services.simulator.simulator import Settings, serve
 from tests.conftest import run
 
+pytestmark = pytest.mark.slow
+
 PT600 = load("pt600")
 JOINTS = joints_of(PT600)
 DEGREES = 180.0 / np.pi
