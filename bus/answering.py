@@ -34,7 +34,7 @@ _MOST_MARKS = 256
 # Of one owner's row so many have no answer yet, and so many of them are one asker's.
 _MOST = 256
 _MOST_OF_ONE = 16
-# Who asks while too many wait is told so, so many at once and so many a second.
+# Limits of the "too many requests wait" answers: at once, and a second.
 _BUSY_BURST = 1024
 _BUSY_PER_S = 250.0
 _ANYBODY = "*"

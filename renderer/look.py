@@ -91,7 +91,7 @@ def look_of(description: Description) -> Look:
 def floor_of(description: Description) -> float | None:
     """Height of the floor of a robot's cell, in the site's frame [m]; None: there is none."""
     if not description.HasField("floor"):
-        # An older sender tells of none: the robot stands on it.
+        # An older publisher sends no floor: the floor is at the robot's base.
         return description.base_to_site[11] if len(description.base_to_site) == 16 else 0.0
     return description.floor.height if description.floor.HasField("height") else None
 

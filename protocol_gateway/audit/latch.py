@@ -209,7 +209,7 @@ def reason_of(error: Exception) -> str:
 def _line(state: LatchState, sequence: int) -> bytes:
     row: dict[str, Any] = {"sequence": sequence, **asdict(state)}
     if state.stop is not None:
-        # When it was sent is on a clock that begins anew with the machine.
+        # The time of sending is on a monotonic clock, which a restart of the machine resets.
         stop = asdict(replace(state.stop, sent_s=None))
         row["stop"] = {
             name: one_line(value, _LONGEST_TEXT) if isinstance(value, str) else value

@@ -135,7 +135,7 @@ def _number(text: str) -> int:
 
 
 def _text(stop: Stop | None) -> str:
-    # When it was sent is on a clock that begins anew with the machine.
+    # The time of sending is on a monotonic clock, which a restart of the machine resets.
     return "" if stop is None else json.dumps(asdict(replace(stop, sent_s=None)), ensure_ascii=False)
 
 

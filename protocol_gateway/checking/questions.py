@@ -15,7 +15,7 @@ PENDING = "pending"
 
 @dataclass(frozen=True)
 class Prepare:
-    """Get a robot's cell ready: the shapes of all that stands there.
+    """Prepare a robot's cell: the shapes of everything in it.
 
     The answer is why its motions cannot be checked, empty if they can, or PENDING.
     """

@@ -10,7 +10,7 @@ neither, another command   `admission.LONGEST_WAIT_S` in the gateway, as for eve
 from bus.answering import Request
 from bus.schemas.robomesh_pb2 import CommandRequest
 
-# What a client of robomesh waits unless it is told otherwise.
+# The default time-out of a robomesh client.
 UNTOLD_S = 2.0
 
 

@@ -71,7 +71,7 @@ def heights_along(
     low = (found.heights > 0.0) & (found.heights < SAMPLE_M / 2)
     # What turns about an upright axis keeps its height.
     low &= np.ptp(placements[:, found.bodies, 2, :], axis=0).max(axis=1) > 0.0
-    # Where a body moves farther, a path begins anew: it does not pass from one sample to the next.
+    # A larger jump between two samples starts a new path.
     steps = np.diff(come, axis=0).max(axis=1, initial=0.0)
     dips = (low[:-1] | low[1:]) & (found.heights[1:] > 0.0)
     dips[(steps == 0.0) | (steps > SAMPLE_M * ROUND)] = False

@@ -1,4 +1,4 @@
-"""Texts of others: nothing in them reorders or hides what stands around them."""
+"""Foreign texts: nothing in them reorders or hides the text around them."""
 
 import pytest
 
