@@ -129,7 +129,8 @@ class Answerer:
             ring: zenoh.handlers.RingChannel[zenoh.Query] = zenoh.handlers.RingChannel(RING)
             self._queryable = session.declare_queryable(key, ring)
             reading = (self._queryable.handler, self._hand_over)
-            threading.Thread(target=read, args=reading, name=f"read {key}", daemon=True).start()
+            # No daemon, as in `Subscription`.
+            threading.Thread(target=read, args=reading, name=f"read {key}").start()
 
     @property
     def closed(self) -> bool:

@@ -110,7 +110,8 @@ class Subscription:
         if history and self.topic.history in (History.LAST_100, History.KEY_FRAME):
             self._held = deque(maxlen=_ZENOH_RING)
         self._subscriber: Any = _declare(session, key_expr, self.topic)
-        self._thread = threading.Thread(target=self._read, name=f"read {key_expr}", daemon=True)
+        # No daemon: Python ends a daemon's thread within Zenoh's code, and that aborts the process.
+        self._thread = threading.Thread(target=self._read, name=f"read {key_expr}")
         self._thread.start()
         if history:
             self._ask(key_expr)

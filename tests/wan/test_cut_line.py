@@ -46,14 +46,19 @@ class Plant:
 
     def cut(self) -> None:
         """Until the routers have given the line up: nothing is kept back any more."""
+        assert self._gateway_is_present(), "so that it is seen to go"
         self.line.change(cut=True)
         self.far.until(JOINTS, stale=True, within_s=60.0)
-        until(lambda: not any(who.startswith(GATEWAY) for who in self.far.do("present")))
+        until(lambda: not self._gateway_is_present())
 
     def mend(self) -> None:
-        """Until live joints come again."""
+        """Until live joints come again, and the gateway is present, which takes longer."""
         self.line.change(cut=False)
         self.far.until(JOINTS, stale=False, within_s=60.0)
+        until(self._gateway_is_present)
+
+    def _gateway_is_present(self) -> bool:
+        return any(who.startswith(GATEWAY) for who in self.far.do("present"))
 
     def _count_stops(self) -> None:
         for _ in self.site.processes["controller"].stdout or ():
