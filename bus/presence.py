@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator
 import zenoh
 
 from bus import keys
+from bus.errors import NoAnswerError
 from bus.ignored import Ignored
 
 _TIMEOUT_S = 2.0
@@ -35,14 +36,21 @@ async def present(
 
     Args:
         ignored: Counts tokens that fit no presence key; None: they are left out uncounted.
+
+    Raises:
+        NoAnswerError: If the router did not tell all in time: a part of it would say that others are gone.
     """
     seen = Ignored() if ignored is None else ignored
     loop = asyncio.get_running_loop()
     done = asyncio.Event()
     found: set[keys.PresenceKey] = set()
+    late = False
 
     def on_reply(reply: zenoh.Reply) -> None:
-        if reply.ok is not None and (key := seen.presence(str(reply.ok.key_expr))) is not None:
+        nonlocal late
+        if reply.ok is None:
+            late = True
+        elif (key := seen.presence(str(reply.ok.key_expr))) is not None:
             found.add(key)
 
     def on_end() -> None:
@@ -51,6 +59,8 @@ async def present(
 
     session.liveliness().get(key_expr, zenoh.handlers.Callback(on_reply, on_end), timeout=_TIMEOUT_S)
     await done.wait()
+    if late or not session.info.routers_zid():
+        raise NoAnswerError(f"the router did not say within {_TIMEOUT_S:g} s who is alive: ask again")
     return sorted(found)
 
 

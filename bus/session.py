@@ -204,7 +204,11 @@ class Session:
         return watch
 
     async def present(self) -> list[keys.PresenceKey]:
-        """Who is alive now, everywhere, sorted."""
+        """Who is alive now, everywhere, sorted.
+
+        Raises:
+            NoAnswerError: If the router did not tell all in time.
+        """
         return await presence.present(self.zenoh_session, ignored=self.ignored)
 
     def _check(self, act: access.Act, key: str) -> None:

@@ -153,8 +153,8 @@ class Replay:
     async def _mesh_of_robot(self, name: str, text: str) -> bytes:
         """Recorded before meshes were in the file: the robot itself, if it is there, has them."""
         of = (self._tape.of_site, self._tape.of_robot)
-        if any((who.site, who.robot) == of for who in await self._session.present()):
-            with contextlib.suppress(BusError):
+        with contextlib.suppress(BusError):
+            if any((who.site, who.robot) == of for who in await self._session.present()):
                 return await self._session.ask_bytes(robot_key(*of, f"mesh/{name}"), timeout_s=_MESH_WITHIN_S)
         raise RefusedError(text)
 

@@ -1,7 +1,11 @@
 """Publishers, subscriptions, requests and presence over a real router."""
 
 import asyncio
+import signal
 import struct
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 import zenoh
@@ -324,6 +328,36 @@ def test_asking_for_everything_stops_nobody_but_asking_all_to_stop_stops_all(mes
             ]
 
     run(main())
+
+
+_ROUTER = """
+import sys, zenoh
+from bus.endpoints import router_config
+with zenoh.open(router_config((sys.argv[1],))):
+    sys.stdin.read()
+"""
+
+
+@pytest.mark.processes
+def test_a_router_that_does_not_say_who_is_alive_is_not_taken_for_a_mesh_without_anybody():
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    command = [sys.executable, "-c", _ROUTER, endpoint]
+    router = subprocess.Popen(command, stdin=subprocess.PIPE, cwd=Path(__file__).parents[2])
+
+    async def main():
+        async with open_session(SessionSettings(connect=(endpoint,), wait_s=20.0)) as session:
+            assert await session.present() == []
+            router.send_signal(signal.SIGSTOP)
+            try:
+                with pytest.raises(NoAnswerError, match="who is alive"):
+                    await session.present()
+            finally:
+                router.send_signal(signal.SIGCONT)
+
+    try:
+        run(main())
+    finally:
+        router.communicate()
 
 
 def test_presence_comes_and_goes(mesh):
