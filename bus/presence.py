@@ -2,6 +2,7 @@
 
 import asyncio
 import secrets
+import time
 from collections.abc import AsyncIterator
 
 import zenoh
@@ -11,6 +12,7 @@ from bus.errors import NoAnswerError
 from bus.ignored import Ignored
 
 _TIMEOUT_S = 2.0
+_RETRY_S = 0.05
 EVERYBODY = f"{keys.ROOT}/*/*/alive/*/*"
 # In the service's place: a program or page through which somebody has control of the robot.
 OPERATOR = "operator"
@@ -32,7 +34,7 @@ def session_of(name: str) -> str:
 async def present(
     session: zenoh.Session, key_expr: str = EVERYBODY, *, ignored: Ignored | None = None
 ) -> list[keys.PresenceKey]:
-    """Return who is alive now, sorted.
+    """Return who is alive now, sorted; while the link to the router is lost, wait for it.
 
     Args:
         ignored: Counts tokens that fit no presence key; None: they are left out uncounted.
@@ -41,6 +43,20 @@ async def present(
         NoAnswerError: If the router did not tell all in time: a part of it would say that others are gone.
     """
     seen = Ignored() if ignored is None else ignored
+    deadline = time.monotonic() + _TIMEOUT_S
+    while (left_s := deadline - time.monotonic()) > 0.0:
+        found = await _told(session, key_expr, seen, left_s)
+        # A link that is lost ends the answer early, as if it were whole.
+        if found is not None and session.info.routers_zid():
+            return sorted(found)
+        await asyncio.sleep(min(left_s, _RETRY_S))
+    raise NoAnswerError(f"the router did not say within {_TIMEOUT_S:g} s who is alive: ask again")
+
+
+async def _told(
+    session: zenoh.Session, key_expr: str, seen: Ignored, timeout_s: float
+) -> set[keys.PresenceKey] | None:
+    """Return who is alive as the router tells it; None: it did not tell all in time."""
     loop = asyncio.get_running_loop()
     done = asyncio.Event()
     found: set[keys.PresenceKey] = set()
@@ -57,11 +73,9 @@ async def present(
         if not loop.is_closed():
             loop.call_soon_threadsafe(done.set)
 
-    session.liveliness().get(key_expr, zenoh.handlers.Callback(on_reply, on_end), timeout=_TIMEOUT_S)
+    session.liveliness().get(key_expr, zenoh.handlers.Callback(on_reply, on_end), timeout=timeout_s)
     await done.wait()
-    if late or not session.info.routers_zid():
-        raise NoAnswerError(f"the router did not say within {_TIMEOUT_S:g} s who is alive: ask again")
-    return sorted(found)
+    return None if late else found
 
 
 class PresenceWatch:

@@ -2,14 +2,14 @@
 
 import asyncio
 import json
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from datetime import timedelta
 
 import pytest
 import zenoh
 
 from bus.endpoints import bundle, router_config
-from bus.errors import NoRightError, SessionError
+from bus.errors import NoAnswerError, NoRightError, SessionError
 from bus.keys import robot_key
 from bus.session import CERTIFICATE, SessionSettings, open_session
 from bus.topics import Role
@@ -64,7 +64,11 @@ def attached(endpoint, file, wait_s=10.0):
 
 async def until(condition):
     """Until an awaitable answers true; the test's deadline ends it."""
-    while not await condition():
+    while True:
+        # A router that follows new rules begins anew.
+        with suppress(NoAnswerError):
+            if await condition():
+                return
         await asyncio.sleep(0.05)
 
 

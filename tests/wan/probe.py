@@ -21,7 +21,7 @@ from google.protobuf import json_format
 from bus import messages
 from bus.answering import Request
 from bus.endpoints import bundle
-from bus.errors import BusError
+from bus.errors import BusError, NoAnswerError
 from bus.messages import PROTOBUF
 from bus.session import Session, SessionSettings, open_session
 from bus.subscription import Subscription
@@ -145,7 +145,9 @@ class Probe:
 
     async def present(self) -> list[str]:
         """Who is alive."""
-        return ["/".join(map(str, each)) for each in await self._session.present()]
+        while True:
+            with suppress(NoAnswerError):
+                return ["/".join(map(str, each)) for each in await self._session.present()]
 
 
 def as_json(message: Any) -> Any:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import typer
 
-from bus.errors import RefusedError
+from bus.errors import NoAnswerError, RefusedError
 from bus.keys import robot_key
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
@@ -81,7 +81,10 @@ async def _ended(session: Session, robot: find.Robot, states: Subscription, begu
             async with asyncio.timeout(_SILENCE_S):
                 state = (await anext(states)).message()
         except TimeoutError:
-            alive = await session.present()
+            try:
+                alive = await session.present()
+            except NoAnswerError:
+                continue  # nothing says that the recorder is gone
             if not any((who.site, who.service) == (robot.site, "recorder") for who in alive):
                 return _Done(newest, _gone(newest))
             continue
