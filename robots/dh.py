@@ -7,6 +7,7 @@ joint positions. What D-H rows cannot say is told in notes.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from math import degrees
 from typing import Any
 
@@ -17,7 +18,7 @@ from robots.errors import DescriptionError
 from robots.joints import Joints, joints_of
 from robots.poses import FloatArray, inverse, rotation_rpy
 from robots.schema import BASE_LINK, TOOL_FRAME, JointType, UrdfDescription
-from robots.tree import BASE, Shape, Tree, chain_to, named_frames, tree_of
+from robots.tree import BASE, Shape, Tree, are_neighbours, chain_to, named_frames, tree_of
 from robots.urdf.read import moved
 
 # Digits after the point that are kept of degrees and millimetres: 90 stays 90, and nothing moves by 1e-13 m.
@@ -237,16 +238,33 @@ def _whole_robot_values(
     said = description.model_dump(mode="json", by_alias=True)
     if description.units.length != "mm" or description.units.angle != "deg":
         said["constraint"], said["view"] = [], {}
-    pairs = []
-    for one, other in description.collision.ignore:
-        pair = sorted({places[one], places[other]})
-        if len(pair) == 2 and pair not in pairs:
-            pairs.append(pair)
     return {
         "constraint": [each for each in said["constraint"] if set(each["joints"]) <= on_chain],
         "view": said["view"],
-        "collision": {"ignore": [[names[one], names[other]] for one, other in pairs]} if pairs else {},
+        "collision": {"ignore": pairs} if (pairs := _ignored(description, chain.tree, names, places)) else {},
     }
+
+
+def _ignored(
+    description: UrdfDescription, tree: Tree, names: Sequence[str], places: Mapping[str, int]
+) -> list[list[str]]:
+    """Pairs of rows' links that the robot.toml or an SRDF leaves out.
+
+    A row's link may be made of several: then all pairs of these are left out, or one joint apart.
+    """
+    shaped = [link for link in tree.links if link.checked]
+    said = {frozenset(pair) for pair in description.collision.ignore}
+    said |= {frozenset(pair) for pair, _ in description.robot.ignored}
+    checked: set[tuple[int, int]] = set()
+    ignored: set[tuple[int, int]] = set()
+    for one, other in combinations(shaped, 2):
+        low, high = sorted((places[one.name], places[other.name]))
+        if frozenset((one.name, other.name)) in said:
+            ignored.add((low, high))
+        elif not are_neighbours(tree, one.joint, other.joint):
+            checked.add((low, high))
+    # Rows that follow each other are ignored without a word.
+    return [[names[low], names[high]] for low, high in sorted(ignored - checked) if high - low > 1]
 
 
 def _notes(chain: _Chain, joints: Joints, tool_to_last: FloatArray) -> Iterator[str]:

@@ -65,6 +65,9 @@ def _urdf(description: UrdfDescription) -> Imported:
     values |= {"urdf": f"{description.name}.urdf", "provenance": _provenance(description)}
     for gone in ("packages", "link"):  # found, and painted into the GLB
         values.pop(gone, None)
+    if description.robot.ignored:
+        pairs = [*description.collision.ignore, *(pair for pair, _ in description.robot.ignored)]
+        values["collision"] = {"ignore": [list(pair) for pair in dict.fromkeys(pairs)]}
     text = tree_urdf(description.name, tree_of(description))
     files = {values["urdf"]: text.encode()} | {glb_beside(link): glb for link, glb in meshes.items()}
     files |= {collision_beside(link): glb for link, glb in collision_meshes(description).items()}

@@ -307,3 +307,11 @@ def chain_to(tree: Tree, joint: int) -> tuple[int, ...]:
         numbers.append(joint)
         joint = tree.joints[joint].parent
     return tuple(reversed(numbers))
+
+
+def are_neighbours(tree: Tree, one: int, other: int) -> bool:
+    """Return whether links on these joints are on the same one, or one joint apart."""
+    return one == other or any(
+        joint != BASE and tree.joints[joint].parent == parent
+        for joint, parent in ((one, other), (other, one))
+    )

@@ -21,27 +21,14 @@ from robots.collision.nearest import (
     own_contacts,
     own_nearest,
 )
-from robots.collision.sampling import (
-    FEWEST,
-    SAMPLES,
-    Contact,
-    LinkPair,
-    Sampling,
-    allowed_positions,
-    sample_pairs,
-)
+from robots.collision.sampling import allowed_positions
 
 __all__ = [
-    "FEWEST",
-    "SAMPLES",
     "Along",
     "Arm",
     "Cell",
-    "Contact",
     "Encounter",
-    "LinkPair",
     "Nearest",
-    "Sampling",
     "allowed_positions",
     "build_cell",
     "distances",
@@ -52,7 +39,6 @@ __all__ = [
     "own_contacts",
     "own_nearest",
     "pending",
-    "sample_pairs",
     "unshaped",
     "unshaped_moving",
 ]

@@ -10,16 +10,21 @@ import numpy as np
 
 from robots.collision.bodies import Body, exact_body, hull_bodies, surface, wider
 from robots.collision.own import Pairs, own_pairs, touching_pairs
-from robots.collision.sampling import SAMPLES, allowed_positions, are_neighbours
-from robots.collision.study import Case, Found, Kind, studied
+from robots.collision.sampling import SAMPLES, allowed_positions
+from robots.collision.study import MEMORY_LIMIT, TIME_LIMIT_S, Case, studied
+from robots.collision.verdicts import IGNORED, Kind, Verdict
 from robots.description import load
 from robots.model import RobotModel, build_model, link_placements
 from robots.schema import RobotDescription, UrdfDescription
-from robots.tree import Tree, TreeLink, tree_of
+from robots.tree import Tree, TreeLink, are_neighbours, tree_of
 
 Bodies = tuple[tuple[int, Body], ...]
 Links = tuple[str, str]
-ADJACENT = "one joint apart"
+# What the texts of verdicts name.
+_VALUES: dict[Kind, dict[str, str | int]] = {
+    Kind.ALWAYS: {"positions": SAMPLES},
+    Kind.NOT_STUDIED: {"seconds": round(TIME_LIMIT_S), "gigabytes": MEMORY_LIMIT >> 30},
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,27 +35,39 @@ class PairPlan:
         bodies: Hulls, each with the number of its link; the box of one that is checked as what is drawn
             holds that, too.
         pairs: Numbers of two bodies, and what is checked of them.
-        ignored: Pairs that are not checked, and the reason.
-        refined: Pairs that touch at home as hulls, and what was found of them.
-        pending: The study of those goes on; until it ends they are checked as hulls.
+        verdicts: Of every two links with a shape.
+        pending: The study of pairs that touch at home goes on; until it ends they are checked as hulls.
     """
 
     bodies: Bodies
     pairs: Pairs
-    ignored: tuple[tuple[Links, str], ...]
-    refined: tuple[tuple[Links, str], ...]
+    verdicts: tuple[Verdict, ...]
     pending: bool = False
 
+    @property
+    def ignored(self) -> tuple[tuple[Links, str], ...]:
+        """Pairs that are not checked, and the reason."""
+        return tuple((each.links, each.text) for each in self.verdicts if each.kind in IGNORED)
 
-def ignored_pairs(description: RobotDescription, tree: Tree) -> dict[frozenset[str], str]:
-    """Pairs of links with a shape that are ignored without a study, and the reason."""
-    found: dict[frozenset[str], str] = {}
+    @property
+    def refined(self) -> tuple[tuple[Links, str], ...]:
+        """Pairs that touch at home as hulls, and as what they are checked."""
+        own = IGNORED | {Kind.APART}
+        return tuple((each.links, each.text) for each in self.verdicts if each.kind not in own)
+
+
+def ignored_pairs(description: RobotDescription, tree: Tree) -> dict[frozenset[str], Verdict]:
+    """Pairs of links with a shape that are ignored without a study."""
+    found: dict[frozenset[str], Verdict] = {}
     if isinstance(description, UrdfDescription):
-        found |= {frozenset(pair): reason for pair, reason in description.robot.ignored}
-    found |= {frozenset(pair): "the description says so" for pair in description.collision.ignore}
+        for links, file in description.robot.ignored:
+            found[frozenset(links)] = Verdict(links, Kind.SRDF, {"file": file})
+    for links in description.collision.ignore:
+        found[frozenset(links)] = Verdict(links, Kind.DESCRIPTION)
     for one, other in combinations([link for link in tree.links if link.checked], 2):
         if are_neighbours(tree, one.joint, other.joint):
-            found[frozenset((one.name, other.name))] = ADJACENT
+            links = one.name, other.name
+            found[frozenset(links)] = Verdict(links, Kind.ADJACENT)
     return found
 
 
@@ -64,7 +81,19 @@ def plan_pairs(model: str | Path, confined: bool, *, wait: bool) -> PairPlan:
     Raises:
         MeshError: If a mesh cannot be read.
     """
-    start = _start(model, confined)
+    return _planned(_start(model, confined), wait=wait)
+
+
+def plan_of(description: RobotDescription) -> PairPlan:
+    """Decide how an arm is checked against itself, and wait for the study.
+
+    Raises:
+        MeshError: If a mesh cannot be read.
+    """
+    return _planned(_begun(description), wait=True)
+
+
+def _planned(start: "_Start", *, wait: bool) -> PairPlan:
     if start.case is None:
         return start.plan
     found = studied(start.case, wait=wait)
@@ -84,35 +113,36 @@ class _Start:
     """
 
     plan: PairPlan
-    names: tuple[str, ...]
     touching: tuple[int, ...] = ()
     case: Case | None = None
 
 
 @lru_cache(maxsize=8)
 def _start(model: str | Path, confined: bool) -> _Start:
-    description = load(model, confined=confined)
+    return _begun(load(model, confined=confined))
+
+
+def _begun(description: RobotDescription) -> _Start:
     tree, built = tree_of(description), build_model(description)
     bodies = tuple(
         (number, body) for number, link in enumerate(tree.links) for body in hull_bodies(link.checked)
     )
-    names = tuple(tree.links[number].name for number, _ in bodies)
-    reasons = ignored_pairs(description, tree)
-    ignored, pairs = [], []
+    ignored = ignored_pairs(description, tree)
+    pairs, verdicts = [], []
     for one, other in combinations(range(len(bodies)), 2):
-        links = names[one], names[other]
-        if reason := reasons.get(frozenset(links)):
-            ignored.append((links, reason))
-        else:
+        links = tree.links[bodies[one][0]].name, tree.links[bodies[other][0]].name
+        verdict = ignored.get(frozenset(links))
+        verdicts.append(replace(verdict, links=links) if verdict else Verdict(links, Kind.APART))
+        if verdict is None:
             pairs.append((one, other, (bodies[one][1], bodies[other][1])))
-    plan = PairPlan(bodies, tuple(pairs), tuple(ignored), ())
+    plan = PairPlan(bodies, tuple(pairs), tuple(verdicts))
     touching = tuple(touching_pairs(own_pairs(tree, bodies, pairs), built, built.joints.home))
     if not touching:
-        return _Start(plan, names)
+        return _Start(plan)
     case = _case(
         [tree.links[number] for number, _ in bodies], built, [pairs[number][:2] for number in touching]
     )
-    return _Start(plan, names, touching, case)
+    return _Start(plan, touching, case)
 
 
 def _case(links: Sequence[TreeLink], model: RobotModel, pairs: Sequence[tuple[int, int]]) -> Case:
@@ -128,25 +158,28 @@ def _case(links: Sequence[TreeLink], model: RobotModel, pairs: Sequence[tuple[in
     )
 
 
-def _refined(start: _Start, found: Sequence[Found]) -> PairPlan:
+def _refined(start: _Start, found: Sequence[Kind]) -> PairPlan:
     """The plan with what a study found."""
-    bodies, ignored, refined = list(start.plan.bodies), list(start.plan.ignored), []
-    by_pair = dict(zip(start.touching, range(len(found)), strict=True))
-    pairs = []
-    for number, (one, other, measured) in enumerate(start.plan.pairs):
-        links = start.names[one], start.names[other]
-        if start.case is not None and (place := by_pair.get(number)) is not None:
-            result = found[place]
-            if result.kind is Kind.ALWAYS:
-                ignored.append((links, result.text))
-                continue
-            refined.append((links, result.text))
-            if result.kind is not Kind.HULLS:
-                some = start.case.checked if result.kind is Kind.COLLISION_MESHES else start.case.drawn
-                surfaces = [some[each] for each in start.case.pairs[place]]
-                measured = exact_body(surfaces[0]), exact_body(surfaces[1])
-                if result.kind is Kind.VISUAL_MESHES:
-                    for body, triangles in zip((one, other), surfaces, strict=True):
-                        bodies[body] = bodies[body][0], wider(bodies[body][1], triangles.reshape(-1, 3))
+    assert start.case is not None
+    bodies, verdicts, pairs = list(start.plan.bodies), [], []
+    kinds = dict(zip(start.touching, found, strict=True))
+    studied_pairs = dict(zip(start.touching, start.case.pairs, strict=True))
+    checked = iter(enumerate(start.plan.pairs))
+    for verdict in start.plan.verdicts:
+        if verdict.kind in IGNORED:
+            verdicts.append(verdict)
+            continue
+        number, (one, other, measured) = next(checked)
+        kind = kinds.get(number, Kind.APART)
+        verdicts.append(replace(verdict, kind=kind, values=_VALUES.get(kind, {})))
+        if kind is Kind.ALWAYS:
+            continue
+        if kind in (Kind.COLLISION_MESHES, Kind.VISUAL_MESHES):
+            some = start.case.checked if kind is Kind.COLLISION_MESHES else start.case.drawn
+            surfaces = [some[each] for each in studied_pairs[number]]
+            measured = exact_body(surfaces[0]), exact_body(surfaces[1])
+            if kind is Kind.VISUAL_MESHES:
+                for body, triangles in zip((one, other), surfaces, strict=True):
+                    bodies[body] = bodies[body][0], wider(bodies[body][1], triangles.reshape(-1, 3))
         pairs.append((one, other, measured))
-    return PairPlan(tuple(bodies), tuple(pairs), tuple(ignored), tuple(refined))
+    return PairPlan(tuple(bodies), tuple(pairs), tuple(verdicts))

@@ -20,7 +20,6 @@ import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -28,28 +27,20 @@ import numpy as np
 
 from robots.collision.sampling import SAMPLES
 from robots.collision.surfaces import Surface, Touch
+from robots.collision.verdicts import Kind
 from robots.glb import cache_folder
 from robots.joints import FloatArray
 
 log = logging.getLogger(__name__)
 
 # Part of each name in the cache: counts up when the same case is to give another result.
-_VERSION = 2
+_VERSION = 3
 TIME_LIMIT_S = 120.0
-_MEMORY_LIMIT = 4 << 30
+MEMORY_LIMIT = 4 << 30
 # A study that failed is tried again after so long [s], then after twice that, and so on.
 _AGAIN_S, _LATEST_AGAIN_S = 30.0, 3600.0
 # After so many failures also a caller that does not wait gets hulls.
 _TRIES = 4
-
-
-class Kind(StrEnum):
-    """What becomes of a pair: it touches in every position, or what is checked of it."""
-
-    ALWAYS = "always"
-    COLLISION_MESHES = "collision meshes"
-    VISUAL_MESHES = "visual meshes"
-    HULLS = "hulls"
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,15 +59,7 @@ class Case:
     placements: FloatArray
 
 
-@dataclass(frozen=True)
-class Found:
-    """What was found of a pair, and in words."""
-
-    kind: Kind
-    text: str
-
-
-def studied(case: Case, *, wait: bool = True) -> tuple[Found, ...] | None:
+def studied(case: Case, *, wait: bool = True) -> tuple[Kind, ...] | None:
     """What is found of each pair of a case, from the cache where it was studied before.
 
     Args:
@@ -101,13 +84,10 @@ def studied(case: Case, *, wait: bool = True) -> tuple[Found, ...] | None:
         pause_s = min(_AGAIN_S * 2**failures, _LATEST_AGAIN_S)
         failures += 1
         _failed[path] = failures, time.monotonic() + pause_s
-        log.warning("two links that touch at home: %s; it is tried again in %.0f s", _FAILED, pause_s)
+        log.warning("the study of links that touch at home failed; it is tried again in %.0f s", pause_s)
     if not wait and failures < _TRIES:
         return None
-    return tuple(Found(Kind.HULLS, f"{_FAILED}: hulls are checked") for _ in case.pairs)
-
-
-_FAILED = f"the study of them failed or took over {TIME_LIMIT_S:.0f} s or {_MEMORY_LIMIT >> 30} GB"
+    return (Kind.NOT_STUDIED,) * len(case.pairs)
 
 
 class _Study:
@@ -132,7 +112,7 @@ class _Study:
     def ended(self) -> bool:
         return self._process.poll() is not None or time.monotonic() > self._until_s
 
-    def result(self) -> tuple[Found, ...] | None:
+    def result(self) -> tuple[Kind, ...] | None:
         """What was found, when the process has ended; None: it failed."""
         try:
             self._process.wait(max(self._until_s - time.monotonic(), 0.0))
@@ -150,7 +130,7 @@ _running: dict[Path, _Study] = {}
 _failed: dict[Path, tuple[int, float]] = {}
 
 
-def study(case: Case) -> tuple[Found, ...]:
+def study(case: Case) -> tuple[Kind, ...]:
     """Study each pair of a case."""
     touch = Touch()
     checked, drawn = ([Surface(each) for each in some] for some in (case.checked, case.drawn))
@@ -160,20 +140,18 @@ def study(case: Case) -> tuple[Found, ...]:
     )
 
 
-def _pair(
-    case: Case, pair: tuple[int, int], levels: Sequence[tuple[Surface, Surface]], touch: Touch
-) -> Found:
+def _pair(case: Case, pair: tuple[int, int], levels: Sequence[tuple[Surface, Surface]], touch: Touch) -> Kind:
     one, other = (case.placements[:, number] for number in pair)
     places = np.linalg.solve(one, other)
     checked = levels[0]
     if not all(len(surface.triangles) for surface in checked):
-        return Found(Kind.HULLS, "they touch at home; one has no surface, so hulls are checked")
+        return Kind.NO_SURFACE
     if len(places) >= SAMPLES and all(touch(*checked, place) for place in places):
-        return Found(Kind.ALWAYS, f"they touch in all of {len(places):,} positions, as exact meshes too")
+        return Kind.ALWAYS
     for level, kind in zip(levels, (Kind.COLLISION_MESHES, Kind.VISUAL_MESHES), strict=True):
         if all(len(surface.triangles) for surface in level) and not touch(*level, places[0]):
-            return Found(kind, f"only their hulls touch at home: checked as exact {kind}")
-    return Found(Kind.HULLS, "they touch at home, as exact meshes too, but not in all positions")
+            return kind
+    return Kind.TOUCHING
 
 
 def _key(case: Case) -> str:
@@ -204,12 +182,12 @@ def _given(data: bytes) -> Case:
         return Case(pairs, checked, drawn, arrays["placements"])
 
 
-def _saved(found: Sequence[Found]) -> bytes:
-    return json.dumps([[each.kind, each.text] for each in found]).encode()
+def _saved(found: Sequence[Kind]) -> bytes:
+    return json.dumps(found).encode()
 
 
-def _loaded(data: bytes) -> tuple[Found, ...]:
-    return tuple(Found(Kind(kind), text) for kind, text in json.loads(data))
+def _loaded(data: bytes) -> tuple[Kind, ...]:
+    return tuple(Kind(kind) for kind in json.loads(data))
 
 
 def _keep(path: Path, data: bytes) -> None:
@@ -226,7 +204,7 @@ def main() -> None:
     path = Path(sys.argv[1])
     path.parent.mkdir(parents=True, exist_ok=True)
     os.nice(5)
-    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_LIMIT, _MEMORY_LIMIT))
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_LIMIT, MEMORY_LIMIT))
     resource.setrlimit(resource.RLIMIT_CPU, (int(TIME_LIMIT_S), int(TIME_LIMIT_S)))
     # The services of a site ask for the same study at the same time.
     with path.with_suffix(".lock").open("w") as lock:

@@ -43,7 +43,7 @@ class UrdfRobot:
         notes: What was odd and how it was taken, a sentence each.
         missing: Mesh files that were not found, as the URDF names them.
         unchecked: Those of them that a collision check would use.
-        ignored: Pairs of links that an SRDF says need no check, and its reason.
+        ignored: Pairs of links that an SRDF says need no check, and its file name.
     """
 
     name: str

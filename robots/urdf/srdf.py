@@ -39,7 +39,7 @@ def _robot_name(path: Path) -> str:
 
 
 def ignored_beside(urdf: Path, robot: str, tree: Tree) -> tuple[list[tuple[tuple[str, str], str]], str]:
-    """Pairs that the SRDF beside a URDF leaves out, each with the reason, and a note if it cannot be used."""
+    """Pairs that the SRDF beside a URDF leaves out, each with its name, and a note if it cannot be used."""
     path = srdf_beside(urdf, robot)
     if path is None:
         return [], ""
@@ -50,7 +50,7 @@ def ignored_beside(urdf: Path, robot: str, tree: Tree) -> tuple[list[tuple[tuple
     except (OSError, UnicodeDecodeError, DescriptionError) as error:
         reason = error.problems[0] if isinstance(error, DescriptionError) else "cannot be read"
         return [], f"{path.name}: {reason}; it is not used"
-    return [(pair, f"{path.name} says so") for pair in pairs], ""
+    return [(pair, path.name) for pair in pairs], ""
 
 
 def read_srdf(text: str, source: Path, tree: Tree) -> tuple[dict[str, float], list[tuple[str, str]]]:

@@ -11,7 +11,9 @@ from robots.cells import CellDescription, CellRobot
 from robots.collision import build_cell, near_along, own_contacts, own_nearest, pending, study
 from robots.collision.cell import Cell
 from robots.collision.surfaces import turns_around
+from robots.importing import imported
 from robots.meshes.solids import ball
+from robots.save import write_folder
 from services.command_line.main import run
 
 REAL = Path(__file__).parents[3] / "shared" / "testdata" / "urdf" / "abb_irb2400_support"
@@ -178,6 +180,32 @@ def test_the_srdf_of_another_robot_and_a_broken_one_are_not_used(tmp_path: Path)
     (tmp_path / "second.urdf").unlink()
     srdf.write_text("<robot")
     assert touching(cell_of(model), 0.0, 0.0) == []
+
+
+@pytest.mark.parametrize("as_dh", [True, False], ids=["rows", "urdf"])
+def test_an_imported_robot_keeps_the_pairs_that_its_srdf_leaves_out(tmp_path: Path, as_dh: bool) -> None:
+    model = hollow(tmp_path, base=solid(0.05, "0.02 0.4 0.4"))
+    disabled = '<disable_collisions link1="hand" link2="base" reason="User"/>'
+    (tmp_path / "hollow.srdf").write_text(f'<robot name="hollow">{disabled}</robot>')
+    robot = imported(str(model), as_dh=as_dh)
+    saved = write_folder(robot.values, robot.files, tmp_path / "imported").path
+    assert ("base", "hand") in dict(cell_of(saved).arms["arm"].plan.ignored)
+
+
+@pytest.mark.parametrize(
+    ("others", "ignored"), [("", False), ('<disable_collisions link1="cap" link2="base"/>', True)]
+)
+def test_a_rows_link_of_several_is_ignored_where_all_of_them_are(
+    tmp_path: Path, others: str, ignored: bool
+) -> None:
+    model = hollow(tmp_path)
+    cap = f'<link name="cap">{solid(0, "0.1 0.1 0.1", 0.1)}</link><joint name="screws" type="fixed">'
+    cap += '<parent link="hand"/><child link="cap"/></joint></robot>'
+    model.write_text(model.read_text().replace("</robot>", cap))
+    disabled = '<disable_collisions link1="hand" link2="base" reason="User"/>'
+    (tmp_path / "hollow.srdf").write_text(f'<robot name="hollow">{disabled}{others}</robot>')
+    values = imported(str(model), as_dh=True).values
+    assert values.get("collision", {}).get("ignore", []) == ([["base", "hand"]] if ignored else [])
 
 
 def test_robot_check_lists_what_is_not_checked_and_what_stands_out(

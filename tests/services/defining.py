@@ -74,7 +74,7 @@ class Page:
     @staticmethod
     def _ask(request: urllib.request.Request) -> Answer:
         try:
-            with urllib.request.urlopen(request, timeout=60.0) as answer:
+            with urllib.request.urlopen(request, timeout=200.0) as answer:
                 return Answer(answer.status, answer.read(), answer.headers)
         except urllib.error.HTTPError as error:
             with error:

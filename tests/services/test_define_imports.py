@@ -2,6 +2,7 @@
 
 import io
 import zipfile
+from pathlib import Path
 
 import ezdxf
 import numpy as np
@@ -11,11 +12,15 @@ import zenoh
 
 from bus.endpoints import router_config
 from bus.session import SessionSettings
+from robots.collision.pairs import plan_of
+from robots.collision.verdicts import IGNORED
 from robots.description import load
 from robots.urdf.write import to_urdf
 from tests.conftest import free_port
 from tests.robots.test_step import step_box
 from tests.services.defining import defining
+
+REAL = Path(__file__).parents[3] / "shared" / "testdata" / "urdf" / "abb_irb2400_support"
 
 
 @pytest.fixture(scope="module")
@@ -99,28 +104,74 @@ def test_igs_is_refused_in_words_that_name_step(page):
     assert "STEP" in answer.text
 
 
-@pytest.mark.slow
-def test_pairs_of_links_are_sampled(page):
-    found = page.post("/collisions", page.draft()).json
-    kinds = {frozenset(pair["links"]): pair["kind"] for pair in found["pairs"]}
-    assert len(kinds) == 15, "6 links"
-    assert kinds[frozenset(("base", "column"))] == "adjacent"
-    # Its forearm reaches down past the column to the floor.
-    assert kinds[frozenset(("base", "forearm"))] == "sometimes"
-
-
-@pytest.mark.slow
-def test_pairs_are_not_judged_where_a_constraint_leaves_only_home(page):
-    draft = page.draft()
-    waist, shoulder = draft["description"]["joint"][:2]
-    names = waist["name"], shoulder["name"]
-    for row in (waist, shoulder):
-        row |= {"limits": [0, 90], "home": 0}
-    only_home = {"joints": dict.fromkeys(names, 1), "limits": [-30, 0]}
-    draft["description"]["constraint"] = [only_home]
+def kinds(page, draft):
+    """What the page shows of each pair: the server's plan, and the draft's own ticks."""
     answer = page.post("/collisions", draft)
-    assert answer.status == 422
-    assert answer.text == "the constraints leave 1 positions to try: too few to say which links never touch"
+    assert answer.status == 200, answer.text
+    ticked = {frozenset(pair) for pair in draft["description"].get("collision", {}).get("ignore", [])}
+    found = {frozenset(pair["links"]): pair for pair in answer.json["pairs"]}
+    return {
+        pair: "description" if pair in ticked and each["kind"] != "adjacent" else each["kind"]
+        for pair, each in found.items()
+    }
+
+
+@pytest.mark.slow
+def test_each_pair_of_links_is_judged(page):
+    found = kinds(page, page.draft())
+    assert len(found) == 15, "6 links"
+    assert found[frozenset(("base", "column"))] == "adjacent"
+    assert found[frozenset(("base", "forearm"))] == "apart"
+
+
+@pytest.mark.slow
+def test_pairs_that_the_draft_ignores_are_judged_too(page):
+    draft = page.draft()
+    draft["description"]["collision"] = {"ignore": [["base", "forearm"]]}
+    (pair,) = (
+        each
+        for each in page.post("/collisions", draft).json["pairs"]
+        if set(each["links"]) == {"base", "forearm"}
+    )
+    assert pair["kind"] == "apart"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not REAL.is_dir(), reason="no ../shared/testdata/urdf: no real robots")
+def test_an_imported_robot_is_checked_against_itself_like_its_urdf(page):
+    """The ABB IRB 2400 with its SRDF and collision meshes, as `robomesh robot check` judges it."""
+    model = REAL / "urdf" / "irb2400_12_155.urdf"
+    files = {
+        str(path.relative_to(REAL.parent)): page.upload(path.read_bytes(), path.name)
+        for path in REAL.rglob("*")
+        if path.is_file()
+    }
+    answer = page.post("/import", {"file": str(model.relative_to(REAL.parent)), "files": files})
+    assert answer.status == 200, answer.text
+    draft = {"description": answer.json["description"] | {"name": "imported"}, "files": answer.json["files"]}
+    assert len([path for path in draft["files"] if "collision" in path]) == 7
+    found = kinds(page, draft)
+
+    # Rows have no levers: these stand still on the links that carry them.
+    arm = ("base_link", *(f"link_{number}" for number in range(1, 7)))
+    of_urdf = {
+        frozenset(link.replace("base_link", "base") for link in each.links): each.kind
+        for each in plan_of(load(model)).verdicts
+        if set(each.links) <= set(arm)
+    }
+    assert found.keys() == of_urdf.keys()
+    ignored = {pair for pair, kind in of_urdf.items() if kind in IGNORED}
+    assert {pair for pair, kind in found.items() if kind in IGNORED} == ignored
+    assert of_urdf[frozenset(("link_4", "link_6"))] == "srdf"
+    assert found[frozenset(("link_4", "link_6"))] == "description"
+    touching = {"touching", "no_surface", "not_studied"}
+    assert touching.isdisjoint(of_urdf.values())
+    assert touching.isdisjoint(found.values())
+
+    # Saved, it is as the page showed it.
+    assert page.post("/save", draft).status == 200
+    saved = plan_of(load(page.folder / "robots" / "imported"))
+    assert {frozenset(each.links): each.kind for each in saved.verdicts} == found
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from robots.checks import named_files
-from robots.collision import sample_pairs
+from robots.collision.pairs import plan_of
 from robots.description import DESCRIPTION_FILE, Problem, RobotDescription, from_values, robot_name
 from robots.errors import DescriptionError, MeshError
 from robots.importing import as_rows
@@ -94,10 +94,18 @@ def joint_count(_: Store, folder: Path, request: Json) -> Json:
 
 
 def collisions(_: Store, folder: Path, request: Json) -> Json:
-    """How often each pair of links touches, over random positions."""
-    sampling = sample_pairs(_description(folder, request["description"]))
-    rows = [{"links": list(pair.links), "kind": str(pair.contact)} for pair in sampling.pairs]
-    return {"samples": sampling.tried, "pairs": rows}
+    """How each pair of links is checked, or why it is not: as `robot check` says it.
+
+    The pairs that the description itself ignores are judged like all others: the page shows these as
+    ignored, and knows what becomes of a pair that is ticked or unticked.
+    """
+    plan = plan_of(_description(folder, request["description"] | {"collision": {}}))
+    return {
+        "pairs": [
+            {"links": list(each.links), "kind": each.kind, "values": dict(each.values)}
+            for each in plan.verdicts
+        ]
+    }
 
 
 def unzip(store: Store, folder: Path, request: Json) -> Json:

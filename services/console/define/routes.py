@@ -184,7 +184,7 @@ class Define:
         return JSONResponse(await self.workshop.quick.do("check", folder, request_, **_of(request)))
 
     async def collisions(self, request: Request) -> Response:
-        """How often each pair of links touches."""
+        """How each pair of links is checked, or why it is not."""
         asked = await self._json(request, description=dict)
         return await self._slow(request, "collisions", asked, {"description": asked["description"]})
 

@@ -33,7 +33,7 @@ class Limits:
 
     Attributes:
         quick_s: A check as one types.
-        slow_s: Reading and converting files, sampling collisions.
+        slow_s: Reading and converting files, studying links that touch at home.
         brief_s: The same, in the worker that no slow file may hold up.
         memory_bytes: Of a worker.
     """

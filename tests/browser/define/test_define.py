@@ -403,7 +403,7 @@ def test_a_zip_holds_the_description_and_its_shapes(open_page, tmp_path):
     assert np.allclose(drawn, said, atol=1e-9)
 
 
-def test_pairs_are_sampled_and_ignored_frames_constraints_and_views_are_kept(open_page, plant):
+def test_ignored_pairs_frames_constraints_and_views_are_kept(open_page, plant):
     page = opened(open_page, "pt500")
     tab(page, "Frames")
     button(page, "Add frame").click()
@@ -413,8 +413,7 @@ def test_pairs_are_sampled_and_ignored_frames_constraints_and_views_are_kept(ope
     tab(page, "Constraints")
     button(page, "Add constraint").click()
     tab(page, "Collisions")
-    button(page, "Find out by sampling").click()
-    button(page, "Ignore all: adjacent").click(timeout=60_000)
+    page.get_by_label("Ignore base and forearm").click(timeout=190_000)
     tab(page, "Views")
     button(page, "Top").click()
     page.get_by_label("Name of a new view").fill("above")
@@ -429,11 +428,70 @@ def test_pairs_are_sampled_and_ignored_frames_constraints_and_views_are_kept(ope
         ("camera", "column", (0, 100, 0))
     ]
     assert [row.joints for row in saved.constraints] == [{"shoulder": 1.0, "elbow": 1.0}]
-    assert {frozenset(pair) for pair in saved.collision.ignore} >= {frozenset(("base", "column"))}
+    assert {frozenset(pair) for pair in saved.collision.ignore} == {frozenset(("base", "forearm"))}
     view = saved.views["above"]
     # The automatic view from above: three reaches (2.7 m) over 0.45 of one.
     assert (view.target, view.projection) == ((0.0, 0.0, 405.0), "orthographic")
     assert view.eye == pytest.approx((0.0, 0.0, 3105.0), abs=0.2)
+
+
+# At home the hand is in the base's side, and out of it further along its slide.
+TOUCHING = """<robot name="touching">
+<link name="base"><collision><geometry><box size="0.3 0.3 0.3"/></geometry></collision></link>
+<link name="arm"><collision><origin xyz="0 0 0.4"/>
+  <geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
+<link name="hand"><collision><origin xyz="0.15 0 0"/>
+  <geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
+<joint name="turn" type="revolute"><axis xyz="0 0 1"/><parent link="base"/><child link="arm"/>
+  <limit lower="-0.1" upper="0.1" velocity="1" effort="1"/></joint>
+<joint name="slide" type="prismatic"><axis xyz="1 0 0"/><parent link="arm"/><child link="hand"/>
+  <limit lower="-0.1" upper="0.3" velocity="1" effort="1"/></joint>
+</robot>"""
+
+
+def test_each_pair_of_links_shows_how_it_is_checked_or_why_it_is_ignored(open_page):
+    page = open_page("#/define")
+    drop(page, ("touching.urdf", TOUCHING.encode()))
+    expect(page.locator(".dh-table")).to_have_count(1, timeout=60_000)
+    tab(page, "Collisions")
+    state = page.locator(".plan-state")
+    expect(state).to_contain_text("One checked pair touches at home", timeout=190_000)
+    expect(state).to_contain_text("Pairs checked: 1, ignored: 2")
+
+    def tick(one, other):
+        return page.get_by_label(f"Ignore {one} and {other}")
+
+    def row(one, other):
+        return page.locator(".pairs tr", has=tick(one, other))
+
+    # Links one joint apart are ignored by rule: nothing is there to tick.
+    expect(tick("base", "arm")).to_be_checked()
+    expect(tick("base", "arm")).to_be_disabled()
+    expect(row("base", "arm")).to_contain_text("Ignored. They are one joint apart.")
+    expect(row("base", "hand")).to_contain_text("They touch at home, as exact meshes too.")
+    tick("base", "hand").check()
+    expect(row("base", "hand")).to_contain_text("Ignored. The description says so.")
+    expect(state).to_contain_text("At home no checked pair touches.")
+    tick("base", "hand").uncheck()
+    expect(state).to_contain_text("One checked pair touches at home")
+    # Another home is another plan, without being asked for.
+    choose(page, 1)
+    field(page, "joint/1/home").fill("100")
+    tab(page, "Collisions")
+    expect(state).to_contain_text("At home no checked pair touches.", timeout=190_000)
+    expect(row("base", "hand")).to_contain_text("Convex hulls.")
+    button(page, "中文").click()
+    expect(page.locator(".pairs")).to_contain_text("两者仅隔一个关节")
+
+
+def test_a_plan_of_pairs_that_failed_says_why_and_is_asked_for_again(open_page):
+    page = opened(open_page, "pt500", drawn=False, refused=True)
+    page.route("**/define/collisions", lambda route: route.fulfill(status=422, body="this took too long"))
+    tab(page, "Collisions")
+    expect(page.locator(".plan-state")).to_contain_text("could not be worked out: this took too long")
+    page.unroute("**/define/collisions")
+    button(page, "Try again").click()
+    expect(page.locator(".plan-state")).to_contain_text("Pairs checked: 10, ignored: 5", timeout=190_000)
 
 
 def test_renaming_a_joint_and_a_link_leaves_nothing_that_names_the_old(open_page):

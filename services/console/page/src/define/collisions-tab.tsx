@@ -1,121 +1,129 @@
-// Pairs of links that are not checked against each other; the server finds out which by sampling.
+// How each pair of links is checked, or why it is ignored; the user may ignore more.
 
-import { signal } from "@preact/signals";
-import { useState } from "preact/hooks";
-import { linkNames } from "./description";
-import { draft, edit, identity, isOpen, seal } from "./draft";
+import { useEffect } from "preact/hooks";
+import { isPlanned, isSame, isTouching, keepPlanning, pairRows, planAgain, planFailed, planning } from "./collision-plan";
+import type { PairRow } from "./collision-plan";
+import { draft, edit, seal } from "./draft";
 import { ProblemWords } from "./fields";
-import { collisions } from "./server";
-import type { Pair } from "./server";
+import type { PairKind } from "./server";
 import { d } from "./texts";
+import type { DefineText } from "./texts";
 
-const KINDS = ["adjacent", "always", "never", "sometimes"] as const;
-// Pairs that never touched stay checked: so few positions do not prove it.
-const TO_IGNORE = ["adjacent", "always"] as const;
+const WAYS: Readonly<Partial<Record<PairKind, DefineText>>> = {
+  collision_meshes: "way_collision_meshes",
+  visual_meshes: "way_visual_meshes",
+};
+const REASONS: Readonly<Record<PairKind, DefineText | null>> = {
+  adjacent: "pair_adjacent",
+  description: "pair_description",
+  always: "pair_always",
+  apart: null,
+  collision_meshes: "pair_hulls_touch",
+  visual_meshes: "pair_hulls_touch",
+  touching: "pair_touching",
+  no_surface: "pair_no_surface",
+  not_studied: "pair_not_studied",
+};
 
-/** What sampling found, until another is sampled. */
-const found = signal<{ samples: number; pairs: readonly Pair[] } | null>(null);
-
-export function forgetPairs(): void {
-  found.value = null;
-}
-
-const isSame = (one: readonly [string, string], other: readonly [string, string]) =>
-  one.every((link) => other.includes(link));
-
-function setIgnored(pairs: readonly (readonly [string, string])[], ignored: boolean): void {
+function setIgnored(links: readonly [string, string], ignored: boolean): void {
   seal();
   edit(({ description }) => {
-    const others = description.collision.ignore.filter((pair) => !pairs.some((each) => isSame(each, pair)));
-    description.collision.ignore = ignored ? [...others, ...pairs.map(([a, b]): [string, string] => [a, b])] : others;
+    const others = description.collision.ignore.filter((pair) => !isSame(pair, links));
+    description.collision.ignore = ignored ? [...others, [...links]] : others;
   });
 }
 
 export function CollisionsTab() {
-  const [sampling, setSampling] = useState(false);
-  const [failed, setFailed] = useState("");
+  useEffect(keepPlanning, []);
   const now = draft.value;
   if (!now) return null;
-  const ignored = now.description.collision.ignore;
-  const links = linkNames(now.description);
-  const known = (found.value?.pairs ?? []).filter((pair) => pair.links.every((link) => links.includes(link)));
-  const rows = [
-    ...[...known].sort((one, other) => KINDS.indexOf(one.kind) - KINDS.indexOf(other.kind)),
-    ...ignored.filter((pair) => !known.some((each) => isSame(each.links, pair))).map((pair) => ({ links: pair, kind: null })),
-  ];
-  const sample = async () => {
-    setSampling(true);
-    setFailed("");
-    const of = identity.value;
-    try {
-      const answer = await collisions(now);
-      if (isOpen(of)) found.value = answer;
-    } catch (error) {
-      if (isOpen(of)) setFailed(d("failed", { text: error instanceof Error ? error.message : String(error) }));
-    }
-    setSampling(false);
-  };
+  const rows = pairRows.value;
+  const { ignore } = now.description.collision;
   return (
     <>
       <div class="tab-intro">
         <p class="dim small">{d("collisions_words")}</p>
-        <button class="action small-action" disabled={sampling} onClick={() => void sample()}>
-          {d(sampling ? "sampling" : "sample")}
-        </button>
       </div>
-      {failed && (
-        <p class="problem-word" role="alert">
-          <span class="shape warning" aria-hidden="true" />
-          {failed}
-        </p>
-      )}
-      {found.value && (
-        <div class="pair-tools">
-          <span class="dim small">{d("sampled", { count: found.value.samples.toLocaleString("en") })}</span>
-          {TO_IGNORE.filter((kind) => known.some((pair) => pair.kind === kind)).map((kind) => (
-            <button
-              key={kind}
-              class="quiet"
-              onClick={() => setIgnored(known.filter((pair) => pair.kind === kind).map((pair) => pair.links), true)}
-            >
-              {d("ignore_kind", { kind: d(`kind_${kind}`) })}
-            </button>
-          ))}
-        </div>
-      )}
-      {rows.length === 0 ? (
-        <p class="dim small tab-empty">{d("no_pairs")}</p>
-      ) : (
-        <table class="pairs">
+      <PlanState rows={rows} />
+      {rows.length > 0 && (
+        <table class="pairs" aria-busy={planning.value}>
           <thead>
             <tr>
               <th scope="col">{d("ignore")}</th>
               <th scope="col">{d("pair")}</th>
-              <th scope="col">{d("touches")}</th>
+              <th scope="col">{d("pair_check")}</th>
             </tr>
           </thead>
           <tbody>
-            {rows.map(({ links: [first, second], kind }, index) => (
-              <tr key={`${first} ${second}`}>
-                <td>
-                  <input
-                    type="checkbox"
-                    data-path={`collision/ignore/${index}`}
-                    aria-label={d("pair_label", { first, second })}
-                    checked={ignored.some((pair) => isSame(pair, [first, second]))}
-                    onChange={(event) => setIgnored([[first, second]], event.currentTarget.checked)}
-                  />
-                </td>
-                <td>
-                  {first} – {second}
-                </td>
-                <td class={`kind ${kind ?? "unknown"}`}>{d(`kind_${kind ?? "unknown"}`)}</td>
-              </tr>
+            {rows.map((row) => (
+              <Row key={row.links.join(" ")} row={row} place={ignore.findIndex((pair) => isSame(pair, row.links))} />
             ))}
           </tbody>
         </table>
       )}
       <ProblemWords path="collision" />
     </>
+  );
+}
+
+/** What the plan comes to, or why there is none yet. */
+function PlanState({ rows }: { rows: readonly PairRow[] }) {
+  if (planFailed.value) {
+    return (
+      <div class="plan-state" role="alert">
+        <p class="problem-word">
+          <span class="shape warning" aria-hidden="true" />
+          {d("plan_failed", { text: planFailed.value })}
+        </p>
+        <button class="quiet" onClick={planAgain}>
+          {d("plan_again")}
+        </button>
+      </div>
+    );
+  }
+  const ignored = rows.filter(({ isIgnored }) => isIgnored).length;
+  const touching = rows.filter(isTouching).length;
+  return (
+    <div class="plan-state" role="status">
+      {isPlanned.value && rows.length === 0 && <p class="dim small">{d("no_pairs")}</p>}
+      {isPlanned.value && rows.length > 0 && (
+        <>
+          <p class={touching ? "problem-word" : "small"}>
+            <span class={`shape ${touching ? "warning" : "info"}`} aria-hidden="true" />
+            {touching === 0 ? d("plan_free") : touching === 1 ? d("plan_touching_one") : d("plan_touching", { count: touching })}
+          </p>
+          <p class="dim small">{d("plan_counts", { checked: rows.length - ignored, ignored })}</p>
+        </>
+      )}
+      {!isPlanned.value && <p class="dim small">{d("planning")}</p>}
+    </div>
+  );
+}
+
+function Row({ row, place }: { row: PairRow; place: number }) {
+  const { links, kind, values, isIgnored, isAutomatic } = row;
+  const [first, second] = links;
+  const reason = REASONS[kind];
+  const said = Object.fromEntries(Object.entries(values).map(([name, value]) => [name, value.toLocaleString("en")]));
+  return (
+    <tr class={isTouching(row) ? "touching" : isIgnored ? "ignored" : ""} data-kind={kind}>
+      <td>
+        <input
+          type="checkbox"
+          {...(place >= 0 && { "data-path": `collision/ignore/${place}` })}
+          aria-label={d("pair_label", { first, second })}
+          checked={isIgnored}
+          disabled={isAutomatic}
+          onChange={(event) => setIgnored(links, event.currentTarget.checked)}
+        />
+      </td>
+      <td>
+        {first} – {second}
+      </td>
+      <td>
+        <span class="way">{d(isIgnored ? "way_ignored" : (WAYS[kind] ?? "way_hulls"))}</span>
+        {reason && <span class="dim"> {d(reason, said)}</span>}
+      </td>
+    </tr>
   );
 }

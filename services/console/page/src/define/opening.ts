@@ -1,7 +1,6 @@
 // Opening a robot to be defined: as it is saved, or its unsaved draft.
 
 import { signal } from "@preact/signals";
-import { forgetPairs } from "./collisions-tab";
 import { complete } from "./description";
 import { begin, bringBack, discard, identity, isOpen, leave } from "./draft";
 import { fileNotices, waitingUrdf } from "./drop";
@@ -17,7 +16,6 @@ export const loading = signal("");
 export async function open(name: string): Promise<void> {
   leave();
   resetWorkbench();
-  forgetPairs();
   outcome.value = null;
   fileNotices.value = [];
   waitingUrdf.value = null;

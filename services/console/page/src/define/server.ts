@@ -60,9 +60,23 @@ export interface Checked {
   links: Record<string, number[][]>;
 }
 
+/** Why a pair of links is ignored (the first three), or as what it is checked: robots/collision/verdicts.py. */
+export type PairKind =
+  | "adjacent"
+  | "description"
+  | "always"
+  | "apart"
+  | "collision_meshes"
+  | "visual_meshes"
+  | "touching"
+  | "no_surface"
+  | "not_studied";
+
 export interface Pair {
   links: [string, string];
-  kind: "adjacent" | "always" | "never" | "sometimes";
+  kind: PairKind;
+  /** What the reason names: positions, seconds, gigabytes. */
+  values: Readonly<Record<string, number>>;
 }
 
 /** A request that was refused, or not answered; the text is for people. */
@@ -160,7 +174,8 @@ export function check(of: Draft, joints: readonly number[] | null, signal: Abort
   return json(withFiles(of.files, () => post("/check", { ...body(of), joints }, signal)));
 }
 
-export function collisions(of: Draft): Promise<{ samples: number; pairs: Pair[] }> {
+/** How each pair is checked; those that the draft ignores are judged like all others. */
+export function collisions(of: Draft): Promise<{ pairs: Pair[] }> {
   return json(withFiles(of.files, () => post("/collisions", body(of))));
 }
 

@@ -1,0 +1,57 @@
+"""How a pair of an arm's own links is checked, or why it is not: the kinds, and their English text."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+
+class Kind(StrEnum):
+    """Why a pair is not checked (the first four), or as what it is checked and why."""
+
+    ADJACENT = "adjacent"
+    DESCRIPTION = "description"
+    SRDF = "srdf"
+    ALWAYS = "always"
+    # Hulls that are apart at home.
+    APART = "apart"
+    COLLISION_MESHES = "collision_meshes"
+    VISUAL_MESHES = "visual_meshes"
+    # Hulls that touch at home.
+    TOUCHING = "touching"
+    NO_SURFACE = "no_surface"
+    NOT_STUDIED = "not_studied"
+
+
+IGNORED = frozenset({Kind.ADJACENT, Kind.DESCRIPTION, Kind.SRDF, Kind.ALWAYS})
+
+_TEXTS: Mapping[Kind, str] = {
+    Kind.ADJACENT: "one joint apart",
+    Kind.DESCRIPTION: "the description says so",
+    Kind.SRDF: "{file} says so",
+    Kind.ALWAYS: "they touch in all of {positions:,} positions, as exact meshes too",
+    Kind.APART: "their hulls are apart at home: hulls are checked",
+    Kind.COLLISION_MESHES: "only their hulls touch at home: checked as exact collision meshes",
+    Kind.VISUAL_MESHES: "only their hulls touch at home: checked as exact visual meshes",
+    Kind.TOUCHING: "they touch at home, as exact meshes too, which is no reason to ignore them",
+    Kind.NO_SURFACE: "they touch at home; one has no surface, so hulls are checked",
+    Kind.NOT_STUDIED: "the study of them failed or took over {seconds} s or {gigabytes} GB: "
+    "hulls are checked",
+}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What is decided of a pair of links.
+
+    Attributes:
+        values: What the text names: the file, the number of positions, limits of the study.
+    """
+
+    links: tuple[str, str]
+    kind: Kind
+    values: Mapping[str, str | int] = field(default_factory=dict)
+
+    @property
+    def text(self) -> str:
+        """The reason in English."""
+        return _TEXTS[self.kind].format(**self.values)
