@@ -35,10 +35,13 @@ def plain_text(data: bytes) -> str:
 
 
 def utf8_xml(data: bytes) -> bytes:
-    """Recode an XML document that is UTF-16 as UTF-8."""
+    """Recode an XML document that is UTF-16 as UTF-8, and begin it with its declaration.
+
+    Some programs write an empty line first, which XML does not allow and other readers accept.
+    """
     text = plain_text(data)
     if data.removeprefix(codecs.BOM_UTF8)[:64] == text[:64].encode():
-        return data
+        return data.lstrip()
     return re.sub(r"^\s*<\?xml[^>]*\?>", "", text).encode()
 
 

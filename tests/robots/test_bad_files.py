@@ -45,6 +45,11 @@ def test_obj_and_collada_in_other_encodings_are_read(tmp_path: Path, encoding: s
     assert (mesh.triangle_count, mesh.unit_m, mesh.up) == (1, 0.001, "z")
 
 
+def test_a_collada_file_may_begin_with_an_empty_line(tmp_path: Path) -> None:
+    mesh = read_mesh(written(tmp_path, "a.dae", "  \n" + dae()))
+    assert (mesh.triangle_count, mesh.unit_m) == (1, 0.001)
+
+
 def test_bomb_in_utf16_is_seen_as_one(tmp_path: Path) -> None:
     bomb = '<?xml version="1.0" encoding="utf-16"?><!DOCTYPE COLLADA [<!ENTITY a "a">]><COLLADA>&a;</COLLADA>'
     with pytest.raises(MeshError, match="DOCTYPE"):
