@@ -17,7 +17,7 @@ from google.protobuf.message import Message
 from bus import keys, pieces, topics
 from bus.errors import BusyError, KeyNameError, MessageError, QuotaError, RefusedError
 from bus.ignored import REQUEST, Ignored
-from bus.intake import RING, Queue, RateLimit, Turns, begin_now, read
+from bus.intake import HELD, RING, Queue, RateLimit, Turns, begin_now, read
 from bus.latencies import Latencies
 from bus.messages import JSON, PROTOBUF, TEXT, decode_request, encode, is_json
 
@@ -126,8 +126,11 @@ class Answerer:
             at_once = zenoh.handlers.Callback(self._hand_over_at_once, indirect=False)
             self._queryable = session.declare_queryable(key, at_once)
         else:
-            ring: zenoh.handlers.RingChannel[zenoh.Query] = zenoh.handlers.RingChannel(RING)
-            self._queryable = session.declare_queryable(key, ring)
+            self._queryable = session.declare_queryable(
+                key,
+                # Alone on its connection it may hold up who asks too much; else the newest count.
+                zenoh.handlers.FifoChannel(HELD) if self._row.own_link else zenoh.handlers.RingChannel(RING),
+            )
             reading = (self._queryable.handler, self._hand_over)
             # No daemon, as in `Subscription`.
             threading.Thread(target=read, args=reading, name=f"read {key}").start()

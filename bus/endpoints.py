@@ -27,11 +27,15 @@ _LEAST_HELD_BYTES = 16_384
 # What Linux grants by default (net.core.wmem_max): a line too quick to be kept busy by so little has the
 # buffers that the system sizes by itself.
 _MOST_HELD_BYTES = 212_992
+# What a requests connection, and the router's end of it, hold: what is too much waits at its sender, not
+# before the requests of others. On loopback no window has to cover a delay; Linux sizes it for one.
+_HELD_LOCALLY_BYTES = 32_768
 # When a machine goes without a word, closing its connections holds the thread that does it for up to 10 s
 # (Zenoh sets SO_LINGER), and by default a process receives with two: a cut line silenced a site's own
-# services for as long. So there are more than can be held at once; a client has four connections.
+# services for as long. So there are more than can be held at once; a client has four connections. A router's
+# thread also waits where a connection takes no more: a flood over as many sessions would hold all of them.
 _THREADS = {
-    "router": "(rx: (worker_threads: 16), tx: (worker_threads: 4), net: (worker_threads: 4), "
+    "router": "(rx: (worker_threads: 64), tx: (worker_threads: 4), net: (worker_threads: 4), "
     "acc: (worker_threads: 2))",
     "client": "(rx: (worker_threads: 6), tx: (worker_threads: 2), net: (worker_threads: 4))",
 }
@@ -70,19 +74,27 @@ class Link:
     site: str = ""
 
 
-def client_config(routers: tuple[str, ...], tls: Tls | None = None) -> zenoh.Config:
+def client_config(
+    routers: tuple[str, ...], tls: Tls | None = None, *, holds_little: bool = False
+) -> zenoh.Config:
     """The configuration of a client of the first router that answers.
 
     Joint states and requests travel on one link of the session, video and other bulk on another:
     on a slow network that keeps the former at 10 ms where one shared link took 350 ms.
 
+    Args:
+        holds_little: Little waits on its connections: who sends more than it reads is held up.
+
     Raises:
         SessionError: If an endpoint is not one of Zenoh's.
     """
+    held_bytes = _HELD_LOCALLY_BYTES if holds_little else None
     return _config(
         {
             "mode": "client",
-            "connect/endpoints": [_two_links(router) for router in routers],
+            "connect/endpoints": [
+                _two_links(router, held_bytes=(held_bytes, held_bytes)) for router in routers
+            ],
             # A router's restart must be over before a lease ends: its clients wait no longer than this.
             "connect/retry": {"period_init_ms": 50, "period_max_ms": 200, "period_increase_factor": 1.5},
             **_shared(tls),
@@ -122,11 +134,11 @@ def router_values(
         held_bytes = None
     return {
         "mode": "router",
-        "listen/endpoints": list(listen),
+        "listen/endpoints": [_with_short_buffers(each) for each in listen],
         "connect/endpoints": [
-            _two_links(each, held_bytes=held_bytes)
+            _two_links(each, held_bytes=(None, held_bytes))
             if isinstance(each, str)
-            else _two_links(each.endpoint, each.tls, held_bytes=held_bytes)
+            else _two_links(each.endpoint, each.tls, held_bytes=(None, held_bytes))
             for each in connect
         ],
         # Nobody is scouted for; the default waits half a second for nobody.
@@ -158,11 +170,23 @@ def settle(session: zenoh.Session, priority: Priority) -> None:
             pass
 
 
-def _two_links(endpoint: str, tls: Tls | None = None, held_bytes: int | None = None) -> dict[str, Any]:
+def _with_short_buffers(endpoint: str) -> str:
+    """An endpoint to listen on, whose connections hold no more to be sent than they need."""
+    address, _, own = endpoint.partition("#")
+    if "so_sndbuf" in own:
+        return endpoint
+    is_local = "/127." in address or "/[::1]" in address or "/localhost" in address
+    sent = f"so_sndbuf={_HELD_LOCALLY_BYTES if is_local else _MOST_HELD_BYTES}"
+    return f"{address}#{own};{sent}" if own else f"{address}#{sent}"
+
+
+def _two_links(
+    endpoint: str, tls: Tls | None = None, held_bytes: tuple[int | None, int | None] = (None, None)
+) -> dict[str, Any]:
     """Both links to a router; certificates that are for it alone stand in the endpoint itself.
 
     Args:
-        held_bytes: How much the second one's buffers hold, either way; None: what the system likes.
+        held_bytes: How much the buffers of each hold, either way; None: what the system likes.
     """
     address, _, own = endpoint.partition("#")
     separator = "&" if "?" in address else "?"
@@ -174,10 +198,10 @@ def _two_links(endpoint: str, tls: Tls | None = None, held_bytes: int | None = N
             f"connect_private_key_file={tls.key}",
         ]
     # Its own sending, and by the window that it offers the other end's.
-    short = [] if held_bytes is None else [f"so_sndbuf={held_bytes}", f"so_rcvbuf={held_bytes}"]
     locators = []
-    for priorities, more in zip(_LINKS, ([], short), strict=True):
-        tail = "#" + ";".join(options + more) if options + more else ""
+    for priorities, held in zip(_LINKS, held_bytes, strict=True):
+        short = [] if held is None else [f"so_sndbuf={held}", f"so_rcvbuf={held}"]
+        tail = "#" + ";".join(options + short) if options + short else ""
         locators.append(f"{address}{separator}prio={priorities}{tail}")
     return {"strategy": "allOf", "locators": locators}
 
@@ -225,7 +249,9 @@ def _config(values: dict[str, Any]) -> zenoh.Config:
 
 
 def _endpoint(value: str | dict[str, Any]) -> str:
-    return value if isinstance(value, str) else str(value["locators"][0]).removesuffix(f"?prio={_LINKS[0]}")
+    if isinstance(value, str):
+        return value.partition("#so_sndbuf=")[0]
+    return str(value["locators"][0]).removesuffix(f"?prio={_LINKS[0]}")
 
 
 def first_line(error: Exception) -> str:

@@ -1,11 +1,14 @@
 """The way of requests from Zenoh to the event loop: a flood of them delays no stop.
 
-    request   ring -> reading thread, a few at a time -> event loop, one at a time
-    stop      Zenoh's thread -> event loop, at once
+    stop             Zenoh's thread -> event loop, at once
+    command, lease   queue -> reading thread, some each millisecond -> event loop, one at a time
+    other requests   ring  -> as those
 
 A plain callback would run Python for each request as fast as they come: the event loop would wait for the
 interpreter's lock each time that it needs it, and Zenoh's queue before the callback blocks the whole
-session when it is full. A ring blocks nothing. Zenoh ends a request that falls out of it without an answer.
+session when it is full. Where a connection is for commands and leases alone that is wanted: what is too much
+then waits at its sender, and takes no processor's time from a stop. A ring blocks nothing. Zenoh ends a
+request that falls out of it without an answer.
 """
 
 import asyncio
@@ -19,9 +22,10 @@ import zenoh
 
 # The reading thread comes back long before a flood has pushed this many through.
 RING = 1024
-# It reads a few, then leaves the interpreter to the event loop. With more at a time, or without a rest, the
-# system often puts this thread aside while it holds the interpreter's lock, and a stop waits for it.
-_AT_ONCE = 8
+HELD = 64
+# It reads some, then leaves the interpreter to the event loop. Without a rest the system often puts this
+# thread aside while it holds the interpreter's lock, and a stop waits for it.
+_AT_ONCE = 32
 _REST_S = 0.001
 # Of one robot's commands, or requests for control, so many begin at once and so many a second. A loop that is
 # idle for most of the time is woken up at once on a busy machine; one that never rests waits for its share.

@@ -48,7 +48,8 @@ class Session:
     """An open session. What is declared on it ends with it."""
 
     zenoh_session: zenoh.Session
-    config: zenoh.Config
+    # Of its further connections.
+    config_apart: zenoh.Config
     # Who it is by its certificate; None: it has none, or one that does not say.
     principal: access.Principal | None = None
     # This process, in presence keys.
@@ -253,7 +254,7 @@ class Session:
             return self.zenoh_session
         if name not in self._apart:
             try:
-                self._apart[name] = zenoh.open(self.config)
+                self._apart[name] = zenoh.open(self.config_apart)
             except zenoh.ZError as error:
                 raise SessionError(f"the router has gone: {first_line(error)}") from None
         return self._apart[name]
@@ -290,13 +291,14 @@ async def open_session(settings: SessionSettings) -> AsyncIterator[Session]:
         log.warning("%s", warning)
     principal = None if identity is None else access.principal_of(identity)
     config = client_config(settings.connect, settings.tls)
+    config_apart = client_config(settings.connect, settings.tls, holds_little=True)
     loop = asyncio.get_running_loop()
     deadline = None if settings.wait_s is None else loop.time() + settings.wait_s
     routers = ", ".join(settings.connect)
     told = False
     while True:
         try:
-            session = Session(await asyncio.to_thread(zenoh.open, config), config, principal)
+            session = Session(await asyncio.to_thread(zenoh.open, config), config_apart, principal)
             break
         except zenoh.ZError:
             last = deadline is not None and loop.time() >= deadline

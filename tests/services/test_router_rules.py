@@ -274,7 +274,7 @@ def test_the_configuration_for_zenohd_is_what_our_router_runs_with(tmp_path):
     out = tmp_path / "zenohd.json5"
     assert "restart it after robomesh keys" in service.write_config(settings_of(folder, endpoint), out)
     config = zenoh.Config.from_file(str(out))
-    assert json.loads(config.get_json("listen/endpoints")) == [endpoint]
+    assert json.loads(config.get_json("listen/endpoints")) == [f"{endpoint}#so_sndbuf=32768"]
     assert json.loads(config.get_json("access_control"))["default_permission"] == "deny"
     with zenoh.open(config):
 
