@@ -27,8 +27,9 @@ _LEAST_HELD_BYTES = 16_384
 # What Linux grants by default (net.core.wmem_max): a line too quick to be kept busy by so little has the
 # buffers that the system sizes by itself.
 _MOST_HELD_BYTES = 212_992
-# What a requests connection, and the router's end of it, hold: what is too much waits at its sender, not
-# before the requests of others. On loopback no window has to cover a delay; Linux sizes it for one.
+# What a connection for requests, and the router's end of it on the same machine, hold: when the service reads
+# slowly, a flood then waits at its sender and not in front of the requests of others. Linux by itself gives a
+# connection on loopback megabytes.
 _HELD_LOCALLY_BYTES = 32_768
 # When a machine goes without a word, closing its connections holds the thread that does it for up to 10 s
 # (Zenoh sets SO_LINGER), and by default a process receives with two: a cut line silenced a site's own
@@ -134,7 +135,7 @@ def router_values(
         held_bytes = None
     return {
         "mode": "router",
-        "listen/endpoints": [_with_short_buffers(each) for each in listen],
+        "listen/endpoints": [_listener(each) for each in listen],
         "connect/endpoints": [
             _two_links(each, held_bytes=(None, held_bytes))
             if isinstance(each, str)
@@ -170,14 +171,14 @@ def settle(session: zenoh.Session, priority: Priority) -> None:
             pass
 
 
-def _with_short_buffers(endpoint: str) -> str:
-    """An endpoint to listen on, whose connections hold no more to be sent than they need."""
-    address, _, own = endpoint.partition("#")
-    if "so_sndbuf" in own:
+def _listener(endpoint: str) -> str:
+    """An endpoint to listen on, whose connections keep little that waits to be sent."""
+    address, _, options = endpoint.partition("#")
+    if "so_sndbuf" in options:
         return endpoint
     is_local = "/127." in address or "/[::1]" in address or "/localhost" in address
     sent = f"so_sndbuf={_HELD_LOCALLY_BYTES if is_local else _MOST_HELD_BYTES}"
-    return f"{address}#{own};{sent}" if own else f"{address}#{sent}"
+    return f"{address}#{options};{sent}" if options else f"{address}#{sent}"
 
 
 def _two_links(
@@ -250,7 +251,7 @@ def _config(values: dict[str, Any]) -> zenoh.Config:
 
 def _endpoint(value: str | dict[str, Any]) -> str:
     if isinstance(value, str):
-        return value.partition("#so_sndbuf=")[0]
+        return value.partition("#")[0]
     return str(value["locators"][0]).removesuffix(f"?prio={_LINKS[0]}")
 
 

@@ -6,9 +6,9 @@
 
 A plain callback would run Python for each request as fast as they come: the event loop would wait for the
 interpreter's lock each time that it needs it, and Zenoh's queue before the callback blocks the whole
-session when it is full. Where a connection is for commands and leases alone that is wanted: what is too much
-then waits at its sender, and takes no processor's time from a stop. A ring blocks nothing. Zenoh ends a
-request that falls out of it without an answer.
+session when it is full. Commands and leases have a connection of their own, so there that is wanted: a flood
+waits at its sender, and takes no processor time from a stop. Other requests share a connection, which nothing
+may block: they wait in a ring, and Zenoh ends a request that falls out of it without an answer.
 """
 
 import asyncio
@@ -22,6 +22,8 @@ import zenoh
 
 # The reading thread comes back long before a flood has pushed this many through.
 RING = 1024
+# Commands and leases wait here; when it is full, Zenoh reads no more of their connection. A request waits for
+# those before it, so it is short.
 HELD = 64
 # It reads some, then leaves the interpreter to the event loop. Without a rest the system often puts this
 # thread aside while it holds the interpreter's lock, and a stop waits for it.

@@ -46,12 +46,11 @@ async def present(
     deadline = time.monotonic() + _TIMEOUT_S
     while (left_s := deadline - time.monotonic()) > 0.0:
         found = await _told(session, key_expr, seen, left_s)
-        # A link that is lost ends the answer early, as if it were whole; Zenoh tells of it a moment later.
         if not found:
-            await asyncio.sleep(_RETRY_S)
+            # A lost link ends the answer early, as if it were whole; Zenoh tells of it a moment later.
+            await asyncio.sleep(min(left_s, _RETRY_S))
         if found is not None and session.info.routers_zid():
             return sorted(found)
-        await asyncio.sleep(min(left_s, _RETRY_S))
     raise NoAnswerError(f"the router did not say within {_TIMEOUT_S:g} s who is alive: ask again")
 
 
