@@ -16,18 +16,23 @@ _HOMES = ("home", "default", "arm_up", "half_sitting", "standing")
 
 
 def srdf_beside(urdf: Path, robot: str) -> Path | None:
-    """The SRDF in a URDF's folder that is of its robot; None: there is none.
+    """The SRDF that is of a URDF's robot: in its folder, or in `srdf` beside its folder `urdf` or `robots`.
 
-    It has the URDF's file name or the robot's name, or is alone with the URDF.
+    It has the URDF's file name or the robot's name, or is alone with the URDF. None: there is none.
     """
-    try:
-        found = sorted(urdf.parent.glob("*.srdf"))
-        alone = len(found) == 1 and len(list(urdf.parent.glob("*.urdf"))) == 1
-    except OSError:
-        return None
-    for path in found:
-        if path.stem == urdf.stem or alone or _robot_name(path) == robot:
-            return path
+    folders = [urdf.parent]
+    # Packages put the two apart; beyond a package nobody's file is read.
+    if urdf.parent.name in ("urdf", "robots"):
+        folders.append(urdf.parent.parent / "srdf")
+    for folder in folders:
+        try:
+            found = sorted(folder.glob("*.srdf"))
+            alone = len(found) == 1 and len(list(urdf.parent.glob("*.urdf"))) == 1
+        except OSError:
+            continue
+        for path in found:
+            if path.stem == urdf.stem or alone or _robot_name(path) == robot:
+                return path
     return None
 
 

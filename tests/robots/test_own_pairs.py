@@ -171,6 +171,18 @@ def test_pairs_that_the_srdf_beside_leaves_out_are_ignored_unless_they_never_tou
     assert (reasons.get(("base", "hand")) == "any.srdf says so") is ignored
 
 
+@pytest.mark.parametrize(("folder", "ignored"), [("urdf", True), ("robots", True), ("elsewhere", False)])
+def test_a_packages_folder_srdf_is_beside_its_folder_of_urdfs(
+    tmp_path: Path, folder: str, ignored: bool
+) -> None:
+    (tmp_path / folder).mkdir()
+    (tmp_path / "srdf").mkdir()
+    disabled = '<disable_collisions link1="hand" link2="base" reason="User"/>'
+    (tmp_path / "srdf" / "hollow.srdf").write_text(f'<robot name="hollow">{disabled}</robot>')
+    plan = cell_of(hollow(tmp_path / folder)).arms["arm"].plan
+    assert (("base", "hand") in dict(plan.ignored)) is ignored
+
+
 def test_the_srdf_of_another_robot_and_a_broken_one_are_not_used(tmp_path: Path) -> None:
     model = hollow(tmp_path)
     (tmp_path / "second.urdf").write_text("<robot/>")
