@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import fcntl
+import logging
 import os
 import random
 import socket
@@ -65,6 +66,15 @@ def run(main: Coroutine[Any, Any, T], *, timeout_s: float = 60.0) -> T:
             return await main
 
     return asyncio.run(with_deadline())
+
+
+@pytest.fixture(autouse=True)
+def _log_levels() -> Iterator[None]:
+    """A command that a test runs in its own process sets what is logged: not for the tests after it."""
+    levels = [(logger, logger.level) for logger in (logging.root, logging.getLogger("bus"))]
+    yield
+    for logger, level in levels:
+        logger.setLevel(level)
 
 
 @pytest.fixture
