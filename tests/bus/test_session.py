@@ -360,6 +360,21 @@ def test_a_router_that_does_not_say_who_is_alive_is_not_taken_for_a_mesh_without
         router.communicate()
 
 
+def test_who_watches_presence_is_always_told_of_all_when_it_asks(mesh):
+    async def main():
+        async with open_session(mesh) as monitor, open_session(mesh) as service:
+            for robot in "abc":
+                service.declare_presence("site", robot, "gateway")
+            watch = monitor.watch_presence()
+            for _ in range(3):
+                await anext(watch)
+            for _ in range(500):
+                assert [who.robot for who in await monitor.present()] == ["a", "b", "c"]
+                await asyncio.sleep(0.001)
+
+    run(main())
+
+
 def test_presence_comes_and_goes(mesh):
     async def main():
         async with open_session(mesh) as monitor:

@@ -15,6 +15,7 @@ JOINTS = "robomesh/plant/arm/joints"
 EVENTS = "robomesh/plant/arm/events"
 STOP = "robomesh/plant/arm/stop"
 GATEWAY = "plant/arm/gateway/"
+HUB = "hub/-/router/"
 DELAY_S = 0.04
 
 
@@ -45,20 +46,22 @@ class Plant:
         self.line.change(delay_ms=1e3 * DELAY_S)
 
     def cut(self) -> None:
-        """Until the routers have given the line up: nothing is kept back any more."""
-        assert self._gateway_is_present(), "so that it is seen to go"
+        """Until both routers have given the line up: nothing is kept back any more."""
+        until(lambda: self._seen() == {GATEWAY, HUB})
         self.line.change(cut=True)
         self.far.until(JOINTS, stale=True, within_s=60.0)
-        until(lambda: not self._gateway_is_present())
+        until(lambda: not self._seen())
 
     def mend(self) -> None:
-        """Until live joints come again, and the gateway is present, which takes longer."""
+        """Until live joints come again, and each router knows who is at the other, which takes longer."""
         self.line.change(cut=False)
         self.far.until(JOINTS, stale=False, within_s=60.0)
-        until(self._gateway_is_present)
+        until(lambda: self._seen() == {GATEWAY, HUB})
 
-    def _gateway_is_present(self) -> bool:
-        return any(who.startswith(GATEWAY) for who in self.far.do("present"))
+    def _seen(self) -> set[str]:
+        """Whom of the other side each sees."""
+        sides = ((self.far, GATEWAY), (self.near, HUB))
+        return {token for probe, token in sides if any(who.startswith(token) for who in probe.do("present"))}
 
     def _count_stops(self) -> None:
         for _ in self.site.processes["controller"].stdout or ():
