@@ -113,8 +113,22 @@ def stand_still(page, seconds):
     page.evaluate("alert()")
 
 
+def answers_of(page):
+    """From the next load on: whether the page gets what the console sends, `answers["come"]`."""
+    answers = {"come": True}
+
+    def connect(socket):
+        console = socket.connect_to_server()
+        console.on_message(lambda message: socket.send(message) if answers["come"] else None)
+
+    page.route_web_socket(re.compile("ws://"), connect)
+    return answers
+
+
 def test_a_browser_that_is_seen_to_be_slow_keeps_control_and_is_told_when_it_is_too_slow(open_page):
     page, other = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
+    answers = answers_of(page)
+    page.reload()
     expect(page.locator(".holder")).to_have_text("Nobody is in control")
     stand_still(page, 0.7)  # as a slow browser is while it loads: from now on its leases are longer
     take(page, "alice")
@@ -122,7 +136,11 @@ def test_a_browser_that_is_seen_to_be_slow_keeps_control_and_is_told_when_it_is_
     stand_still(page, 2.5)  # with what has passed since the last renewal longer than 2 s, shorter than 5
     expect(other.locator(".holder")).to_have_text("alice is in control")
     expect(page.locator(".holder")).to_have_text("You are in control")
+    # A renewal is asked for, and its answer comes too late.
+    answers["come"] = False
+    page.wait_for_timeout(1000)
     stand_still(page, 6.5)
+    answers["come"] = True
     expect(page.locator(".control .notice")).to_contain_text(
         "Control lost: this browser was too slow to renew it in time."
     )

@@ -199,9 +199,11 @@ async function renew(): Promise<void> {
   } catch (error) {
     if (held.value?.lease !== mine.lease) return;
     const slow = askedAt > mine.endsAt || stoodStill(mine.endsAt - mine.askedAt);
-    if (!(error instanceof AskError && error.noAnswer)) lose(slow ? t("lost_slow") : reasonOf(error), slow);
-    else if (performance.now() < mine.endsAt) renewIn(100);
-    else lose(t("lost_no_answer", { seconds: Math.round((mine.endsAt - mine.askedAt) / 1000) }));
+    const silent = error instanceof AskError && error.noAnswer;
+    if (silent && performance.now() < mine.endsAt) renewIn(100);
+    else if (slow) lose(t("lost_slow"), true);
+    else if (silent) lose(t("lost_no_answer", { seconds: Math.round((mine.endsAt - mine.askedAt) / 1000) }));
+    else lose(reasonOf(error));
   }
 }
 
