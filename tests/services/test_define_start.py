@@ -8,6 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from bus.keys import WHOLE_SITE
+from bus.schemas.robomesh_pb2 import ControllerState
+from bus.session import open_session
+from tests.conftest import run
 from tests.services.defining import Page
 from tests.site import alive, kill, robomesh, running_site, wait_until
 
@@ -27,8 +31,17 @@ def processes(site) -> dict[str, int]:
 
 def on_the_mesh(site) -> dict[str, str]:
     """Each robot's link to its controller."""
-    found = json.loads(site.command("list", "--json").stdout)
-    return {robot["robot"]: robot["link"] for robot in found["robots"]}
+
+    async def look():
+        async with open_session(site.mesh) as session:
+            robots = [
+                who.robot for who in await session.present() if who.service == "gateway" and who.robot != "-"
+            ]
+            states = [await session.last(f"robomesh/test/{robot}/controller") for robot in robots]
+            links = [ControllerState.Link.Name(each.link).lower() if each else "" for each in states]
+            return dict(zip(robots, links, strict=True))
+
+    return run(look())
 
 
 def answers(page: Page) -> bool:
