@@ -288,7 +288,7 @@ class _Own:
 
     def _distance(self, gauge: Gauge, one_at: Any, other_at: Any, number: int) -> float:
         one, other = self._arm.own.measured[number]
-        return gauge.distance(one, one_at, other, other_at)
+        return gauge.bound(one, one_at, other, other_at)
 
     def _met(self, gauge: Gauge, at: Placed, number: int, before_m: float, after_m: float) -> float:
         """As `_Around._met`."""

@@ -38,6 +38,8 @@ class Body:
         balls: (k, 3) centres of balls that cover the box.
         radius: Of each ball.
         corners: (n, 3) of its hull.
+        hull: Coal's, about a mesh: never farther from another body than the mesh, and faster; None: there is
+            none, or the geometry is one.
     """
 
     geometry: Any
@@ -46,6 +48,7 @@ class Body:
     balls: FloatArray
     radius: float
     corners: FloatArray
+    hull: Any = None
 
 
 def hull_bodies(shapes: Sequence[Shape]) -> tuple[Body, ...]:

@@ -77,7 +77,7 @@ def build_cell(description: CellDescription, *, exact: bool = False, wait: bool 
 
     Args:
         exact: Check links as their meshes, not as hulls about them: distances are some hundred times slower.
-        wait: Wait for studies of links whose hulls touch at home; else they go on, and the cell is `pending`.
+        wait: Wait for studies of links whose hulls touch; else they go on, and the cell is `pending`.
 
     Raises:
         DescriptionError: If a robot's description cannot be used.

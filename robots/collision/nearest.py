@@ -50,6 +50,15 @@ class Gauge:
         found = coal.distance(one.geometry, one_at, other.geometry, other_at, self._request, self._result)
         return 0.0 if found <= TOUCH_M else float(found)
 
+    def bound(self, one: Body, one_at: Any, other: Body, other_at: Any) -> float:
+        """As `distance`, or less where hulls about two meshes are apart: it is 0 only where they touch."""
+        if one.hull is not None and other.hull is not None:
+            self._result.clear()
+            found = coal.distance(one.hull, one_at, other.hull, other_at, self._request, self._result)
+            if found > TOUCH_M:
+                return float(found)
+        return self.distance(one, one_at, other, other_at)
+
     def points(self, one: Body, one_at: Any, other: Body, other_at: Any) -> tuple[FloatArray, FloatArray]:
         """Where the two bodies of the last `distance` are nearest, or touch: (3,) on each [m]."""
         found = self._result

@@ -22,12 +22,17 @@ class OwnPairs:
     Attributes:
         pairs: Numbers of both bodies among the arm's, in the order of Pinocchio's results.
         measured: What is checked of each pair: the hulls, or the exact meshes.
+        geometry, workspace: Pinocchio's, of what is measured.
+        hulls, hulls_workspace: The same with hulls instead of meshes, for the pairs `meshes`.
     """
 
     pairs: tuple[tuple[int, int], ...]
     measured: tuple[tuple[Body, Body], ...]
     geometry: Any
     workspace: Any
+    hulls: Any
+    hulls_workspace: Any
+    meshes: tuple[int, ...]
 
 
 Pairs = Sequence[tuple[int, int, tuple[Body, Body]]]
@@ -40,22 +45,22 @@ def own_pairs(tree: Tree, bodies: Sequence[tuple[int, Body]], pairs: Pairs) -> O
         bodies: Each with the number of its link.
         pairs: Numbers of two bodies, and what is checked of them: themselves, or their exact meshes.
     """
-    geometry = pin.GeometryModel()
+    geometry, hulls = pin.GeometryModel(), pin.GeometryModel()
     numbers: dict[tuple[int, int], int] = {}
 
     def added(number: int, body: Body) -> int:
         if (number, id(body)) not in numbers:
             link = tree.links[bodies[number][0]]
-            numbers[number, id(body)] = geometry.addGeometryObject(
-                # Pinocchio counts joints from 1; its 0 is the base.
-                pin.GeometryObject(
-                    str(len(numbers)), link.joint + 1, pin.SE3(link.link_to_joint), body.geometry
-                )
-            )
+            # Pinocchio counts joints from 1; its 0 is the base.
+            place = str(len(numbers)), link.joint + 1, pin.SE3(link.link_to_joint)
+            numbers[number, id(body)] = geometry.addGeometryObject(pin.GeometryObject(*place, body.geometry))
+            hulls.addGeometryObject(pin.GeometryObject(*place, body.hull or body.geometry))
         return numbers[number, id(body)]
 
     for one, other, (first, second) in pairs:
-        geometry.addCollisionPair(pin.CollisionPair(added(one, first), added(other, second)))
+        pair = pin.CollisionPair(added(one, first), added(other, second))
+        geometry.addCollisionPair(pair)
+        hulls.addCollisionPair(pair)
     workspace = pin.GeometryData(geometry)
     for request in workspace.collisionRequests:
         request.security_margin = TOUCH_M
@@ -65,6 +70,9 @@ def own_pairs(tree: Tree, bodies: Sequence[tuple[int, Body]], pairs: Pairs) -> O
         tuple(measured for _, _, measured in pairs),
         geometry,
         workspace,
+        hulls,
+        pin.GeometryData(hulls),
+        tuple(number for number, (_, _, (body, _)) in enumerate(pairs) if body.hull is not None),
     )
 
 
@@ -95,12 +103,18 @@ def nearest_pair(own: OwnPairs, model: RobotModel, positions: FloatArray) -> tup
     if not own.pairs:
         return None
     everywhere = all_positions(model, positions)
-    pin.computeDistances(model._pinocchio, model._workspace, own.geometry, own.workspace, everywhere)
-    results = own.workspace.distanceResults
-    distances = [result.min_distance for result in results]
-    least = min(distances)
-    number = distances.index(least)
-    return number, least, _points(results[number])
+    inner, data = model._pinocchio, model._workspace
+    pin.computeDistances(inner, data, own.hulls, own.hulls_workspace, everywhere)
+    results = list(own.hulls_workspace.distanceResults)
+    distances = np.array([result.min_distance for result in results])
+    pin.updateGeometryPlacements(inner, data, own.geometry, own.workspace)
+    # No mesh is nearer than its hull: only pairs whose hulls are nearest are measured as meshes.
+    left = set(own.meshes)
+    while (number := int(distances.argmin())) in left:
+        left.remove(number)
+        results[number] = pin.computeDistance(own.geometry, own.workspace, number)
+        distances[number] = results[number].min_distance
+    return number, float(distances[number]), _points(results[number])
 
 
 def _points(found: Any) -> Points:

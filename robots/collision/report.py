@@ -24,7 +24,8 @@ def collision_report(model: str) -> dict[str, Any]:
 
     Returns:
         `not_checked`: pairs of links and the reason. `touch_at_home`: pairs that touch at home as hulls, and
-        how they are checked. `stands_out`: by link, how far its visual geometry stands out of the hull of its
+        how they are checked. `touch_elsewhere`: the same of pairs that touch only in other positions, but
+        often. `stands_out`: by link, how far its visual geometry stands out of the hull of its
         collision geometry [m], if by more than 5 mm.
 
     Raises:
@@ -36,6 +37,7 @@ def collision_report(model: str) -> dict[str, Any]:
     return {
         "not_checked": [{"links": list(links), "reason": reason} for links, reason in plan.ignored],
         "touch_at_home": [{"links": list(links), "reason": text} for links, text in plan.refined],
+        "touch_elsewhere": [{"links": list(links), "reason": text} for links, text in plan.elsewhere],
         "stands_out": {link: way for link, way in ways.items() if way > _STANDS_OUT_M},
     }
 

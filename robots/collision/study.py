@@ -1,9 +1,10 @@
-"""Pairs of an arm's links whose hulls touch at home: which may be ignored, and what of the others is checked.
+"""Pairs of an arm's links whose hulls touch at home or often: which may be ignored, which checked as meshes.
 
     python -m robots.collision.study KEPT.json < CASE.npz      in a process of its own, with limits
 
-A pair that touches in all sampled positions, as exact meshes too, is ignored. One whose meshes are apart at
-home is checked as meshes. What is found is kept in the user's cache by its content; a failure is not kept.
+A pair that touches in all sampled positions, as exact meshes too, is ignored. A pair is checked as meshes if
+only its hulls touch at home, or if it is apart there and only its hulls touch in at least 1 % of positions.
+What is found is kept in the user's cache by its content; a failure is not.
 """
 
 import contextlib
@@ -21,7 +22,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,13 +31,20 @@ from robots.collision.surfaces import Surface, Touch
 from robots.collision.verdicts import Kind
 from robots.glb import cache_folder
 from robots.joints import FloatArray
+from robots.meshes.mesh import IndexArray
 
 log = logging.getLogger(__name__)
 
 # Part of each name in the cache: counts up when the same case is to give another result.
-_VERSION = 3
+_VERSION = 4
 TIME_LIMIT_S = 120.0
 MEMORY_LIMIT = 4 << 30
+# Positions in which hulls are tried, and the fewest in which they must touch without their meshes: 1 %.
+SURVEYED, FEWEST_FALSE = 400, 4
+# After this share of the time, pairs that are apart at home stay hulls: a study over its limit loses all.
+_SURVEY_ENDS = 0.75
+# Two meshes with more triangles together would make each check too slow.
+MOST_TRIANGLES = 50_000
 # A study that failed is tried again after so long [s], then after twice that, and so on.
 _AGAIN_S, _LATEST_AGAIN_S = 30.0, 3600.0
 # After so many failures also a caller that does not wait gets hulls.
@@ -49,17 +57,28 @@ class Case:
 
     Attributes:
         pairs: Numbers of two links each.
-        checked, drawn: Of each link the triangles (n, 3, 3) of its geometry in its frame [m].
+        checked, drawn: Of each link the triangles (n, 3, 3) of its geometry in its frame [m]; what is drawn
+            only of links that touch another at home.
         placements: (samples, links, 4, 4) of the links, home first.
+        touching: Of each pair that is apart at home, (k,) numbers of the placements in which its hulls touch;
+            empty for a pair whose hulls touch at home.
     """
 
     pairs: tuple[tuple[int, int], ...]
     checked: tuple[FloatArray, ...]
     drawn: tuple[FloatArray, ...]
     placements: FloatArray
+    touching: tuple[IndexArray, ...]
 
 
-def studied(case: Case, *, wait: bool = True) -> tuple[Kind, ...] | None:
+class Found(NamedTuple):
+    """What a study found of a pair: its kind, and the share of positions that the kind's text names."""
+
+    kind: Kind
+    share: float = 0.0
+
+
+def studied(case: Case, *, wait: bool = True) -> tuple[Found, ...] | None:
     """What is found of each pair of a case, from the cache where it was studied before.
 
     Args:
@@ -84,10 +103,11 @@ def studied(case: Case, *, wait: bool = True) -> tuple[Kind, ...] | None:
         pause_s = min(_AGAIN_S * 2**failures, _LATEST_AGAIN_S)
         failures += 1
         _failed[path] = failures, time.monotonic() + pause_s
-        log.warning("the study of links that touch at home failed; it is tried again in %.0f s", pause_s)
+        log.warning("the study of links whose hulls touch failed; it is tried again in %.0f s", pause_s)
     if not wait and failures < _TRIES:
         return None
-    return (Kind.NOT_STUDIED,) * len(case.pairs)
+    # A pair that is apart at home is checked as hulls anyway.
+    return tuple(Found(Kind.APART if len(each) else Kind.NOT_STUDIED) for each in case.touching)
 
 
 class _Study:
@@ -112,7 +132,7 @@ class _Study:
     def ended(self) -> bool:
         return self._process.poll() is not None or time.monotonic() > self._until_s
 
-    def result(self) -> tuple[Kind, ...] | None:
+    def result(self) -> tuple[Found, ...] | None:
         """What was found, when the process has ended; None: it failed."""
         try:
             self._process.wait(max(self._until_s - time.monotonic(), 0.0))
@@ -130,19 +150,31 @@ _running: dict[Path, _Study] = {}
 _failed: dict[Path, tuple[int, float]] = {}
 
 
-def study(case: Case) -> tuple[Kind, ...]:
-    """Study each pair of a case."""
+def study(case: Case) -> tuple[Found, ...]:
+    """Study each pair of a case, those whose hulls touch at home first."""
     touch = Touch()
     checked, drawn = ([Surface(each) for each in some] for some in (case.checked, case.drawn))
-    return tuple(
-        _pair(case, pair, [(some[pair[0]], some[pair[1]]) for some in (checked, drawn)], touch)
-        for pair in case.pairs
-    )
+    found: dict[int, Found] = {}
+    for number in sorted(range(len(case.pairs)), key=lambda number: len(case.touching[number]) > 0):
+        one, other = case.pairs[number]
+        touching = case.touching[number]
+        placements = case.placements[touching] if len(touching) else case.placements[:SAMPLES]
+        places = np.linalg.solve(placements[:, one], placements[:, other]).astype(np.float64, copy=False)
+        if len(touching):
+            found[number] = _apart_at_home(places, checked[one], checked[other], touch)
+        else:
+            levels = [(some[one], some[other]) for some in (checked, drawn)]
+            found[number] = Found(_touching_at_home(places, levels, touch))
+    return tuple(found[number] for number in range(len(case.pairs)))
 
 
-def _pair(case: Case, pair: tuple[int, int], levels: Sequence[tuple[Surface, Surface]], touch: Touch) -> Kind:
-    one, other = (case.placements[:, number] for number in pair)
-    places = np.linalg.solve(one, other)
+def _touching_at_home(places: FloatArray, levels: Sequence[tuple[Surface, Surface]], touch: Touch) -> Kind:
+    """Decide how to check a pair whose hulls touch at home.
+
+    Args:
+        places: (k, 4, 4) of the second in the first's frame, home first.
+        levels: Both surfaces of the collision geometry, then of the visual one.
+    """
     checked = levels[0]
     if not all(len(surface.triangles) for surface in checked):
         return Kind.NO_SURFACE
@@ -154,10 +186,36 @@ def _pair(case: Case, pair: tuple[int, int], levels: Sequence[tuple[Surface, Sur
     return Kind.TOUCHING
 
 
+def _apart_at_home(places: FloatArray, one: Surface, other: Surface, touch: Touch) -> Found:
+    """Decide how to check a pair that is apart at home.
+
+    Visual meshes do not count: if the collision geometry touches, its author may have widened it on purpose.
+
+    Args:
+        places: (k, 4, 4) of the second in the first's frame where their hulls touch.
+    """
+    triangles = len(one.triangles), len(other.triangles)
+    if not all(triangles):
+        return Found(Kind.APART)
+    if sum(triangles) > MOST_TRIANGLES:
+        return Found(Kind.TOO_LARGE, len(places) / SURVEYED)
+    false = 0
+    for place in places:
+        if time.process_time() > _SURVEY_ENDS * TIME_LIMIT_S:
+            return Found(Kind.APART)
+        if touch.surfaces(one, other, place):
+            continue
+        if touch.inside(one, other, place):
+            # A check of surfaces would miss it.
+            return Found(Kind.APART)
+        false += 1
+    return Found(Kind.FALSE_CONTACTS, false / SURVEYED) if false >= FEWEST_FALSE else Found(Kind.APART)
+
+
 def _key(case: Case) -> str:
     digest = hashlib.sha256(f"{_VERSION} {case.pairs} {case.placements.shape}".encode())
     # Rounded: another processor's last digit is no other robot.
-    for array in (*case.checked, *case.drawn, case.placements[:8]):
+    for array in (*case.checked, *case.drawn, case.placements[:8], *case.touching):
         digest.update(f"{array.shape}".encode())
         digest.update((np.round(array, 9) + 0.0).tobytes())
     return digest.hexdigest()
@@ -165,7 +223,7 @@ def _key(case: Case) -> str:
 
 def _stored(case: Case) -> bytes:
     arrays: dict[str, Any] = {"pairs": np.array(case.pairs), "placements": case.placements}
-    for name, some in (("checked", case.checked), ("drawn", case.drawn)):
+    for name, some in (("checked", case.checked), ("drawn", case.drawn), ("touching", case.touching)):
         arrays |= {f"{name}{number}": each for number, each in enumerate(some)}
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
@@ -179,15 +237,16 @@ def _given(data: bytes) -> Case:
             tuple(arrays[f"{name}{number}"] for number in range(count)) for name in ("checked", "drawn")
         )
         pairs = tuple((one, other) for one, other in arrays["pairs"].tolist())
-        return Case(pairs, checked, drawn, arrays["placements"])
+        touching = tuple(arrays[f"touching{number}"] for number in range(len(pairs)))
+        return Case(pairs, checked, drawn, arrays["placements"], touching)
 
 
-def _saved(found: Sequence[Kind]) -> bytes:
+def _saved(found: Sequence[Found]) -> bytes:
     return json.dumps(found).encode()
 
 
-def _loaded(data: bytes) -> tuple[Kind, ...]:
-    return tuple(Kind(kind) for kind in json.loads(data))
+def _loaded(data: bytes) -> tuple[Found, ...]:
+    return tuple(Found(Kind(kind), share) for kind, share in json.loads(data))
 
 
 def _keep(path: Path, data: bytes) -> None:

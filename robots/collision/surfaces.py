@@ -59,12 +59,18 @@ class Touch:
 
     def __call__(self, one: Surface, other: Surface, other_to_one: FloatArray) -> bool:
         """Return whether they touch, with the (4, 4) placement of the other in the one's frame."""
+        return self.surfaces(one, other, other_to_one) or self.inside(one, other, other_to_one)
+
+    def surfaces(self, one: Surface, other: Surface, other_to_one: FloatArray) -> bool:
+        """Return whether their triangles touch."""
         self._result.clear()
         there = transform(other_to_one)
-        if coal.collide(one.exact, _HERE, other.exact, there, self._request, self._result):
-            return True
+        return bool(coal.collide(one.exact, _HERE, other.exact, there, self._request, self._result))
+
+    def inside(self, one: Surface, other: Surface, other_to_one: FloatArray) -> bool:
+        """Return whether a piece of one is inside the other, of two whose triangles are apart."""
         rotation, origin = other_to_one[:3, :3], other_to_one[:3, 3]
-        # Of two whose surfaces are apart, a piece of one is wholly inside the other, or wholly outside.
+        # A piece is then wholly inside, or wholly outside.
         return one.holds(other.points @ rotation.T + origin) or other.holds((one.points - origin) @ rotation)
 
 

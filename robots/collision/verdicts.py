@@ -12,17 +12,24 @@ class Kind(StrEnum):
     DESCRIPTION = "description"
     SRDF = "srdf"
     ALWAYS = "always"
-    # Hulls that are apart at home.
+    # Hulls that are apart at home, and touch elsewhere too seldom to matter, or as the meshes do.
     APART = "apart"
+    # Hulls that are apart at home, and touch in many other positions.
+    FALSE_CONTACTS = "false_contacts"
+    TOO_LARGE = "too_large"
+    # Hulls that touch at home.
     COLLISION_MESHES = "collision_meshes"
     VISUAL_MESHES = "visual_meshes"
-    # Hulls that touch at home.
     TOUCHING = "touching"
     NO_SURFACE = "no_surface"
     NOT_STUDIED = "not_studied"
 
 
 IGNORED = frozenset({Kind.ADJACENT, Kind.DESCRIPTION, Kind.SRDF, Kind.ALWAYS})
+# What is checked as exact meshes.
+EXACT = frozenset({Kind.FALSE_CONTACTS, Kind.COLLISION_MESHES, Kind.VISUAL_MESHES})
+# Hulls are apart at home; the texts name a share of the positions.
+ELSEWHERE = frozenset({Kind.FALSE_CONTACTS, Kind.TOO_LARGE})
 
 _TEXTS: Mapping[Kind, str] = {
     Kind.ADJACENT: "one joint apart",
@@ -30,6 +37,10 @@ _TEXTS: Mapping[Kind, str] = {
     Kind.SRDF: "{file} says so",
     Kind.ALWAYS: "they touch in all of {positions:,} positions, as exact meshes too",
     Kind.APART: "their hulls are apart at home: hulls are checked",
+    Kind.FALSE_CONTACTS: "only their hulls touch in {percent} % of positions: "
+    "checked as exact collision meshes",
+    Kind.TOO_LARGE: "their hulls touch in {percent} % of positions: hulls are checked, for the exact meshes "
+    "have over {triangles:,} triangles",
     Kind.COLLISION_MESHES: "only their hulls touch at home: checked as exact collision meshes",
     Kind.VISUAL_MESHES: "only their hulls touch at home: checked as exact visual meshes",
     Kind.TOUCHING: "they touch at home, as exact meshes too, which is no reason to ignore them",
@@ -44,7 +55,7 @@ class Verdict:
     """What is decided of a pair of links.
 
     Attributes:
-        values: What the text names: the file, the number of positions, limits of the study.
+        values: What the text names: the file, the number or share of positions, limits of the study.
     """
 
     links: tuple[str, str]

@@ -57,6 +57,8 @@ def check(robot: str, as_json: bool) -> None:
             print(f"{name}: {' and '.join(each['links'])} are not checked: {each['reason']}")
         for each in report.get("touch_at_home", []):
             print(f"{name}: {' and '.join(each['links'])} touch at home as hulls: {each['reason']}")
+        for each in report.get("touch_elsewhere", []):
+            print(f"{name}: {' and '.join(each['links'])} are apart at home; {each['reason']}")
         if not problems:
             print(f"{name}: a right description")
     if problems:

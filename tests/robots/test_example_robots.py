@@ -6,6 +6,8 @@ import numpy as np
 import pinocchio
 import pytest
 
+from robots.cells import CellDescription, CellRobot
+from robots.collision import allowed_positions, build_cell, own_contacts
 from robots.description import EXAMPLES, from_values, known_names, library_names, load
 from robots.dh import dh_form
 from robots.errors import DescriptionError
@@ -149,3 +151,17 @@ def test_links_of_an_example_robot_have_bodies(name: str, tmp_path: Path) -> Non
     meshes = link_meshes(load(name), cache=tmp_path)
     assert len(meshes) >= 7
     assert all(glb.startswith(b"glTF") for glb in meshes.values())
+
+
+@installed
+@pytest.mark.slow
+def test_a_ur10_is_not_refused_where_only_hulls_of_its_links_touch() -> None:
+    cell = build_cell(CellDescription((CellRobot("arm", "ur10", np.eye(4)),)))
+    arm = cell.arms["arm"]
+    reasons = dict(arm.plan.elsewhere)
+    for links in (("base_link", "upper_arm_link"), ("forearm_link", "wrist_2_link")):
+        assert "checked as exact collision meshes" in reasons[links]
+    positions = allowed_positions(arm.joints, 300, seed=1)
+    touching = [bool(own_contacts(cell, "arm", each)) for each in positions]
+    # As hulls it touches itself in 41 % of them.
+    assert 0.05 < np.mean(touching) < 0.25

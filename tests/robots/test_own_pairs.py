@@ -1,6 +1,7 @@
 """Which links of an arm are checked against each other, and as what."""
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -10,7 +11,9 @@ import pytest
 from robots.cells import CellDescription, CellRobot
 from robots.collision import build_cell, near_along, own_contacts, own_nearest, pending, study
 from robots.collision.cell import Cell
+from robots.collision.pairs import plan_of
 from robots.collision.surfaces import turns_around
+from robots.description import load
 from robots.importing import imported
 from robots.meshes.solids import ball
 from robots.save import write_folder
@@ -77,6 +80,65 @@ def test_links_whose_hulls_touch_at_home_and_meshes_do_not_are_checked_as_meshes
     ((links, text),) = cell.arms["arm"].plan.refined
     assert links == ("base", "hand")
     assert "exact collision meshes" in text
+
+
+# The hand is clear of both walls at home, fits between them, and goes through each.
+BESIDE = solid(0.12, "0.02 0.4 0.4") + solid(0.3, "0.02 0.4 0.4")
+
+
+def test_links_apart_at_home_whose_hulls_touch_often_and_meshes_do_not_are_checked_as_meshes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = hollow(tmp_path, base=BESIDE)
+    cell = cell_of(model)
+    pair = ("arm/base", "arm/hand")
+    assert [touching(cell, 0.0, x) for x in (0.0, 0.1, 0.21, 0.27)] == [[], [pair], [], [pair]]
+    for x, distance in ((-0.1, 0.16), (0.0, 0.06), (0.21, 0.03), (0.27, 0.0)):
+        nearest = own_nearest(cell, "arm", np.array([0.0, x]))
+        assert nearest is not None
+        assert nearest.distance_m == pytest.approx(distance, abs=0.01)
+    # And along a path: through the first wall, up to the second.
+    path = np.column_stack([np.zeros(200), np.linspace(-0.3, 0.3, 200)])
+    (met,) = (each for each in near_along(cell, "arm", path, {}, within_m=0.01).encounters if each.own)
+    there = path[met.samples, 1]
+    assert there.min() == pytest.approx(0.06, abs=0.006)
+    free = there[np.diff(there, append=there[-1]).argmax() :][:2]
+    assert free == pytest.approx([0.18, 0.24], abs=0.006)
+    assert run(["robot", "check", str(model)]) == 0
+    # A tenth, and a deviation of 1.5 %.
+    said = re.search(
+        r"base and hand are apart at home; only their hulls touch in (\d+) % of", capsys.readouterr().out
+    )
+    assert said is not None
+    assert int(said[1]) == pytest.approx(10, abs=5)
+
+
+@pytest.mark.parametrize(
+    "base",
+    [solid(0.2, "0.2 0.4 0.4"), solid(0.2, "0.02 0.4 0.4")],
+    ids=["its solid holds the hand", "its hull is its mesh"],
+)
+def test_links_apart_at_home_stay_hulls_where_their_meshes_touch_as_often(tmp_path: Path, base: str) -> None:
+    cell = cell_of(hollow(tmp_path, base=base))
+    assert cell.arms["arm"].plan.elsewhere == ()
+    assert touching(cell, 0.0, 0.2) == [("arm/base", "arm/hand")]
+
+
+def test_meshes_too_large_to_check_and_a_study_that_failed_leave_hulls(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(study, "_failed", {})
+    model = hollow(tmp_path, base=BESIDE)
+    with monkeypatch.context() as broken:
+        broken.setattr(study.sys, "executable", "/bin/false")
+        cell = cell_of(model)
+    assert cell.arms["arm"].plan.elsewhere == cell.arms["arm"].plan.refined == ()
+    assert touching(cell, 0.0, 0.21) == [("arm/base", "arm/hand")]
+    monkeypatch.setattr(study, "MOST_TRIANGLES", 30)
+    monkeypatch.setattr("robots.collision.pairs.studied", lambda case, *, wait: study.study(case))
+    ((links, text),) = plan_of(load(model)).elsewhere
+    assert links == ("base", "hand")
+    assert "hulls are checked, for the exact meshes have over" in text
 
 
 def test_a_study_is_made_once_for_the_same_content(

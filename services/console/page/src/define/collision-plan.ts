@@ -24,6 +24,8 @@ const ORDER: readonly PairKind[] = [
   "not_studied",
   "collision_meshes",
   "visual_meshes",
+  "false_contacts",
+  "too_large",
   "description",
   "always",
   "adjacent",

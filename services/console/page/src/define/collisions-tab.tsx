@@ -12,6 +12,7 @@ import type { DefineText } from "./texts";
 const WAYS: Readonly<Partial<Record<PairKind, DefineText>>> = {
   collision_meshes: "way_collision_meshes",
   visual_meshes: "way_visual_meshes",
+  false_contacts: "way_collision_meshes",
 };
 const REASONS: Readonly<Record<PairKind, DefineText | null>> = {
   adjacent: "pair_adjacent",
@@ -20,6 +21,8 @@ const REASONS: Readonly<Record<PairKind, DefineText | null>> = {
   apart: null,
   collision_meshes: "pair_hulls_touch",
   visual_meshes: "pair_hulls_touch",
+  false_contacts: "pair_false_contacts",
+  too_large: "pair_too_large",
   touching: "pair_touching",
   no_surface: "pair_no_surface",
   not_studied: "pair_not_studied",

@@ -66,6 +66,8 @@ export type PairKind =
   | "description"
   | "always"
   | "apart"
+  | "false_contacts"
+  | "too_large"
   | "collision_meshes"
   | "visual_meshes"
   | "touching"
@@ -75,7 +77,7 @@ export type PairKind =
 export interface Pair {
   links: [string, string];
   kind: PairKind;
-  /** What the reason names: positions, seconds, gigabytes. */
+  /** What the reason names: positions, percent, triangles, seconds, gigabytes. */
   values: Readonly<Record<string, number>>;
 }
 
