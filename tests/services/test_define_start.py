@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from bus.keys import WHOLE_SITE
 from bus.schemas.robomesh_pb2 import ControllerState
 from bus.session import open_session
 from tests.conftest import run
