@@ -140,10 +140,6 @@ def pytest_runtest_call() -> Iterator[None]:
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if not config.getoption("--quick"):
-        # What takes longest comes first, so that no worker is left with it at the end.
-        items.sort(
-            key=lambda item: not any(item.get_closest_marker(name) for name in ("browser", "processes"))
-        )
         return
     kept, dropped = [], []
     for item in items:

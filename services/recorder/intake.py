@@ -210,6 +210,10 @@ class _Tap:
             self.lost[key] -= 1
             return True
         if self.row.recovered and number < seen.first:
+            # Those between may be in the same list.
+            between = range(max(number + 1, seen.first - _MOST_MISSING), seen.first)
+            seen.missing.update(between)
+            self.lost[key] += len(between)
             seen.first = number
             return True
         return False

@@ -1,6 +1,7 @@
 """Hands and eyes on a robot's page, for several test modules."""
 
 import re
+import time
 from contextlib import contextmanager, suppress
 
 from playwright.sync_api import Error, expect
@@ -16,7 +17,20 @@ def button(page, name):
     return page.get_by_role("button", name=name, exact=True)
 
 
+def stand_still(page, seconds):
+    """Nothing of the page goes on for so long, as in a browser that is too slow."""
+
+    def close_later(dialog):
+        time.sleep(seconds)
+        dialog.accept()
+
+    page.once("dialog", close_later)
+    page.evaluate("alert()")
+
+
 def take(page, name="li"):
+    # A browser that was seen to be slow gets leases of 5 s: a busy machine may leave it no time within 2.
+    stand_still(page, 0.6)
     page.get_by_label("Your name").fill(name)
     button(page, "Take control").click()
     expect(page.locator(".holder")).to_have_text("You are in control")

@@ -1,12 +1,11 @@
 """What the page tells ends with what it is about: speed, motions, losses of control."""
 
 import re
-import time
 
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.robot_page import ARM, button, move_slowly, ready, set_speed, take
+from tests.browser.robot_page import ARM, button, move_slowly, ready, set_speed, stand_still, take
 
 pytestmark = pytest.mark.browser
 
@@ -102,17 +101,6 @@ def test_a_window_that_is_closed_has_not_given_control_back(open_page):
     button(bob, "Release").click()
 
 
-def stand_still(page, seconds):
-    """Nothing of the page goes on for so long, as in a browser that is too slow."""
-
-    def close_later(dialog):
-        time.sleep(seconds)
-        dialog.accept()
-
-    page.once("dialog", close_later)
-    page.evaluate("alert()")
-
-
 def answers_of(page):
     """From the next load on: whether the page gets what the console sends, `answers["come"]`."""
     answers = {"come": True}
@@ -130,10 +118,9 @@ def test_a_browser_that_is_seen_to_be_slow_keeps_control_and_is_told_when_it_is_
     answers = answers_of(page)
     page.reload()
     expect(page.locator(".holder")).to_have_text("Nobody is in control")
-    stand_still(page, 0.7)  # as a slow browser is while it loads: from now on its leases are longer
     take(page, "alice")
     expect(other.locator(".holder")).to_have_text("alice is in control")
-    stand_still(page, 2.5)  # with what has passed since the last renewal longer than 2 s, shorter than 5
+    stand_still(page, 2.2)  # longer than the lease of a quick browser, shorter than its own
     expect(other.locator(".holder")).to_have_text("alice is in control")
     expect(page.locator(".holder")).to_have_text("You are in control")
     # A renewal is asked for, and its answer comes too late.

@@ -176,7 +176,7 @@ async def stopped_workers(workshop, folder):
 @pytest.mark.slow
 def test_a_small_file_waits_for_no_slow_one(tmp_path):
     kept = store.open_store(tmp_path / "store")
-    files = {"comb.wrl": store.put(kept, comb(teeth=1000)), "box.wrl": store.put(kept, BOX)}
+    files = {"comb.wrl": store.put(kept, comb(teeth=100)), "box.wrl": store.put(kept, BOX)}
     folder = store.lay_out(kept, files)
 
     async def main():
@@ -199,7 +199,7 @@ def test_a_small_file_waits_for_no_slow_one(tmp_path):
 @pytest.mark.slow
 def test_two_slow_files_hold_up_no_third_asker_and_both_are_read(tmp_path):
     kept = store.open_store(tmp_path / "store")
-    files = {"comb.wrl": store.put(kept, comb(teeth=1000)), "box.wrl": store.put(kept, BOX)}
+    files = {"comb.wrl": store.put(kept, comb(teeth=100)), "box.wrl": store.put(kept, BOX)}
     folder = store.lay_out(kept, files)
 
     async def main():

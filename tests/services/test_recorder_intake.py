@@ -222,3 +222,37 @@ def test_an_event_is_recorded_though_its_publishers_clock_is_behind_and_a_list_t
     taken, lost = run(main())
     assert taken == [(EVENTS, 2), (EVENTS, 4)]
     assert lost == {EVENTS: 1}
+
+
+def test_of_a_list_that_tells_what_came_before_the_first_event_all_is_recorded(mesh):
+    async def main():
+        async with open_session(mesh) as own, open_session(mesh) as other:
+
+            def tell(query):
+                events = [Event(code=f"{number}") for number in range(2, 8)]
+                for event in events:
+                    event.timestamp.GetCurrentTime()
+                query.reply(
+                    EVENTS, EventList(events=events).SerializeToString(), attachment=pack(Header(7, 7, 0))
+                )
+
+            taking, sink = intake.Intake(own.zenoh_session, "site", own.ignored), Sink()
+            try:
+                with taking.lock:
+                    robot = taking.robot("arm")
+                    robot.attach(sink, frozenset({"events"}))
+                while not sink.taken:  # until the router knows who listens
+                    other.zenoh_session.put(EVENTS, b"", attachment=pack(Header(7, 7, 0)))
+                    await asyncio.sleep(0.02)
+                queryable = other.zenoh_session.declare_queryable(EVENTS, tell)
+                await asyncio.to_thread(robot.refresh)
+                await until(lambda: len(sink.taken) >= 6)
+                queryable.undeclare()
+                with taking.lock:
+                    return sink.taken, robot.lost(sink)
+            finally:
+                taking.close()
+
+    taken, lost = run(main())
+    assert sorted(number for _, number in taken) == [2, 3, 4, 5, 6, 7]
+    assert not +lost
