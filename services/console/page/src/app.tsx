@@ -76,7 +76,7 @@ export function App() {
   // Control does not outlive the robot's pages; between them it stays.
   useEffect(() => () => void release(), [key]);
   const page = at === "fleet" || at === "robot" ? "" : t(at);
-  const what = [shown?.robot, page].filter(Boolean).join(" · ");
+  const what = [nowhere ? "" : shown?.robot, page].filter(Boolean).join(" · ");
   useEffect(() => void (document.title = what ? `${what} · robomesh` : "robomesh"), [what]);
   useStopKey();
   // Nothing of a replay is live: STOP stays that of the robots that are.

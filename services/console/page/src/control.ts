@@ -57,7 +57,8 @@ export const controlNotice = signal<Notice | null>(null);
 let renewing: ReturnType<typeof setTimeout> | undefined;
 let slowUntil = 0;
 let beatAt = performance.now();
-let gap = { ms: 0, endedAt: 0 };
+/** When this page did nothing for so long, newest last. */
+let gaps: { ms: number; endedAt: number }[] = [];
 let beginning = false;
 let offeredTo = "";
 /** A lease that ended, until the gateway has said why. */
@@ -288,7 +289,7 @@ export function followThisTab(): void {
     const now = performance.now();
     if (now - beatAt > SLOW_GAP_MS) {
       slowUntil = now + SLOW_FOR_MS;
-      gap = { ms: now - beatAt, endedAt: now };
+      gaps = [...gaps.filter((each) => now - each.endedAt < SLOW_TTL_S * 1000), { ms: now - beatAt, endedAt: now }];
     }
     beatAt = now;
   }, 100);
@@ -297,5 +298,6 @@ export function followThisTab(): void {
 /** Whether this page did nothing for most of a lease's time just now: then nobody else was late. */
 function stoodStill(leaseMs: number): boolean {
   const now = performance.now();
-  return now - beatAt > leaseMs / 2 || (gap.ms > leaseMs / 2 && now - gap.endedAt < leaseMs);
+  const recent = gaps.filter((each) => now - each.endedAt < leaseMs);
+  return recent.reduce((total, each) => total + each.ms, now - beatAt) > leaseMs / 2;
 }
