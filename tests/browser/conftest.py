@@ -26,6 +26,7 @@ from tests.cells import arm_alone
 from tests.conftest import free_port
 
 CHROMIUM = Path("/usr/bin/chromium")
+PATIENCE_MS = 60_000
 # What an address bar offers is drawn for each page by two processes more, and a third waits for the next one.
 # The last such list counts: the others are Playwright's that could matter here.
 WITHOUT = (
@@ -212,12 +213,19 @@ def run_plant(running: Plant) -> Iterator[Plant]:
         thread.join(20)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def patient():
+    """What is expected of a page is waited for as long as a busy machine needs: 5 s are too short."""
+    from playwright.sync_api import expect
+
+    expect.set_options(timeout=PATIENCE_MS)
+
+
 @pytest.fixture(scope="module")
 def chromium(plant):
     """A headless Chromium that draws 3-D in software; it ends before the site does."""
-    from playwright.sync_api import expect, sync_playwright
+    from playwright.sync_api import sync_playwright
 
-    expect.set_options(timeout=40_000)  # 5 s are not enough on a busy machine
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS)
         yield browser
@@ -237,7 +245,7 @@ class Contexts:
         if idle := self._idle.get(kind):
             return idle.pop(), kind
         context = self._browser.new_context(**{"locale": "en-GB", "color_scheme": "dark", **settings})
-        context.set_default_timeout(60_000)  # a click waits until nothing moves below it
+        context.set_default_timeout(PATIENCE_MS)  # a click waits until nothing moves below it
         return context, kind
 
     def give_back(self, context, kind, address):

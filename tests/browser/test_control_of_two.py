@@ -53,7 +53,7 @@ def test_one_asks_and_is_handed_control(open_arm):
             re.compile("^bob asks for control: “the gripper must be changed”")
         )
     assert carol.locator(".wish button").count() == 0
-    assert serious(alice) == []
+    assert serious(alice, ".wish") == []
     button(alice, "Hand over to bob").click()
     expect(alice.locator(".wish")).to_contain_text("you are in control until bob accepts")
     expect(carol.locator(".wish")).to_have_text("alice offers control to bob.")
@@ -171,7 +171,7 @@ def test_a_step_beyond_a_limit_is_refused_at_its_row_with_value_and_limit(open_a
     handle = page.get_by_role("slider", name="Target of elbow")
     for key in ("PageDown", "PageDown", "Enter"):
         handle.press(key)
-    expect(page.locator('[data-joint="elbow"]')).to_have_text("−110.00°", timeout=30_000)
+    expect(page.locator('[data-joint="elbow"]')).to_have_text("−110.00°")
     expect(page.locator(".headline .state")).to_have_text("Idle")
     button(page, "5").click()
     button(page, "elbow −5°").click()

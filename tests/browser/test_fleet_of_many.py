@@ -35,12 +35,12 @@ def until(page, holds, *, seconds=30):
 
 def test_of_two_hundred_robots_only_the_tiles_in_sight_are_watched_and_drawn(open_page, many):
     page = open_page()
-    expect(page.locator(".tile")).to_have_count(COUNT + 2, timeout=60_000)
-    expect(tile(page, FIRST).locator("canvas[data-drawn]")).to_have_count(1, timeout=60_000)
+    expect(page.locator(".tile")).to_have_count(COUNT + 2)
+    expect(tile(page, FIRST).locator("canvas[data-drawn]")).to_have_count(1)
     assert page.locator(".tile canvas").count() < COUNT / 4
     until(page, lambda: FIRST in many.watched and len(many.watched) < COUNT / 4)
     tile(page, LAST).scroll_into_view_if_needed()
-    expect(tile(page, LAST).locator("canvas[data-drawn]")).to_have_count(1, timeout=60_000)
+    expect(tile(page, LAST).locator("canvas[data-drawn]")).to_have_count(1)
     expect(tile(page, FIRST).locator("canvas")).to_have_count(0)
     until(page, lambda: LAST in many.watched and FIRST not in many.watched)
     expect(tile(page, LAST)).to_contain_text("slow link")
@@ -49,7 +49,7 @@ def test_of_two_hundred_robots_only_the_tiles_in_sight_are_watched_and_drawn(ope
 def test_what_needs_a_look_is_found_among_many_and_stands_first_when_asked(open_page, many):
     many.mark("faulty", [LAST])
     page = open_page(drawn=False)
-    expect(page.locator(".summary")).to_contain_text("1 Fault", timeout=60_000)
+    expect(page.locator(".summary")).to_contain_text("1 Fault")
     page.get_by_label("Order").select_option(label="Most urgent first")
     yard = page.get_by_role("region", name="Site yard")
     expect(yard.locator(".tile").first).to_have_attribute("data-robot", f"robomesh/{LAST}")

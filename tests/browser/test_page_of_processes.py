@@ -7,7 +7,7 @@ import signal
 import pytest
 from playwright.sync_api import expect, sync_playwright
 
-from tests.browser.conftest import ARGUMENTS, CHROMIUM, NO_WEBGL
+from tests.browser.conftest import ARGUMENTS, CHROMIUM, NO_WEBGL, PATIENCE_MS
 from tests.browser.robot_page import button, degrees, drag, take
 from tests.site import kill, robomesh, running_site, wait_until
 
@@ -26,11 +26,11 @@ def test_home_trace_move_and_stop_from_the_page_reach_the_controller_and_the_rec
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS)
         page = browser.new_page(viewport={"width": 1440, "height": 900})
-        page.set_default_timeout(30_000)
+        page.set_default_timeout(PATIENCE_MS)
         page.goto(f"{site.console}#/test/arm")
         take(page)
         button(page, "Home").click()
-        expect(page.locator(".headline .state")).to_have_text("Idle", timeout=30_000)
+        expect(page.locator(".headline .state")).to_have_text("Idle")
         assert degrees(page, "shoulder") == pytest.approx(90.0, abs=0.02)
 
         button(page, "Trace on").click()
@@ -39,7 +39,7 @@ def test_home_trace_move_and_stop_from_the_page_reach_the_controller_and_the_rec
         before = degrees(page, "waist")
         drag(page, "waist", 60)
         expect(page.locator(".headline .state")).to_have_text("Moving")
-        expect(page.locator(".headline .state")).to_have_text("Idle", timeout=30_000)
+        expect(page.locator(".headline .state")).to_have_text("Idle")
         assert degrees(page, "waist") > before + 5
 
         drag(page, "waist", -120)
@@ -72,14 +72,14 @@ def test_a_gateway_that_answers_no_more_is_told_as_what_it_may_be(site):
         try:
             notice = page.locator(".control .notice.lost")
             expect(notice).to_contain_text(
-                re.compile(r"Control lost: the gateway has not answered for \d s\."), timeout=20_000
+                re.compile(r"Control lost: the gateway has not answered for \d s\.")
             )
             expect(notice).to_contain_text("the arm may still be moving")
             expect(button(page, "Home")).to_be_disabled()
-            expect(page.locator(".holder")).to_have_text("Who is in control is not known", timeout=20_000)
+            expect(page.locator(".holder")).to_have_text("Who is in control is not known")
         finally:
             kill(gateway, signal.SIGCONT)
-        expect(notice).to_contain_text(re.compile(r"not renewed within \d s"), timeout=20_000)
+        expect(notice).to_contain_text(re.compile(r"not renewed within \d s"))
         expect(page.locator(".holder")).to_have_text("Nobody is in control")
         browser.close()
 

@@ -66,7 +66,7 @@ def test_the_page_shows_the_arm_moving_in_3d_and_as_video(open_page, rendered):
     page = open_page("#/hall/pt600")
     page.wait_for_selector('canvas[data-loaded="true"][data-fixtures="2"]')
     page.get_by_role("button", name="Trail").click()
-    expect(page.locator(".camera .picture-word")).to_have_count(0, timeout=30_000)
+    expect(page.locator(".camera .picture-word")).to_have_count(0)
     if WANTED:
         time.sleep(CURVES_S)
     take(page)
@@ -99,10 +99,10 @@ move_joints 60 70 -80 0 0
 @pytest.mark.skipif(not WANTED, reason="makes the picture of the Program page, with ROBOMESH_PICTURES=1")
 def test_the_program_page_shows_where_a_program_collides(open_page):
     page = open_page("#/program/hall/pt600")
-    expect(page.locator("textarea")).not_to_have_value("", timeout=30_000)  # the example stands there first
+    expect(page.locator("textarea")).not_to_have_value("")  # the example stands there first
     page.locator("textarea").fill(COLLIDING)
     row = page.get_by_role("button", name="touches bench").first
-    row.click(timeout=30_000)
+    row.click()
     time.sleep(4.0)
     page.screenshot(path=DOCS / "program-page.png")
     assert (DOCS / "program-page.png").stat().st_size < LARGEST_BYTES

@@ -138,7 +138,7 @@ def test_a_recording_is_listed_and_played_and_a_seek_moves_arm_curves_and_clock(
     expect(page.locator(".player")).to_have_attribute("data-playing", "false")
     page.keyboard.press("Home")
     until(page, lambda: position(page) < 0.5)
-    expect(page.locator(".chart")).to_be_visible(timeout=40_000)
+    expect(page.locator(".chart")).to_be_visible()
     left, at_start = moment_line(page), arm(page)
     page.get_by_label("Moment").fill("1.5")
     until(page, lambda: abs(position(page) - 1.5) < 0.02)
@@ -229,5 +229,5 @@ def test_the_list_and_the_player_fit_a_phone_and_axe_finds_nothing_serious(open_
     expect(page.locator(".stop")).to_be_in_viewport()
     assert page.evaluate(fits)
     assert page.locator(".transport .play").bounding_box()["height"] >= 44
-    expect(page.locator(".chart")).to_be_visible(timeout=40_000)
+    expect(page.locator(".chart")).to_be_visible()
     assert serious(page) == []

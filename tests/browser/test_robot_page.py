@@ -57,9 +57,7 @@ def test_a_slider_moves_the_joint_when_it_is_let_go_and_not_before(open_page, pl
     )
     assert wanted > start + 5
     page.mouse.up()
-    expect(page.locator('[data-joint="waist"]')).to_have_text(
-        f"{wanted:.2f}°".replace("-", "−"), timeout=30_000
-    )
+    expect(page.locator('[data-joint="waist"]')).to_have_text(f"{wanted:.2f}°".replace("-", "−"))
     assert audited(plant, "MOVE_ABSOLUTE") > moves
     # A tap beside the handle sets nothing.
     moves = audited(plant, "MOVE_ABSOLUTE")
@@ -75,11 +73,11 @@ def test_a_target_that_homing_left_behind_moves_no_joint_that_nobody_touched(ope
     drag(page, "waist", 60)
     expect(page.locator(".headline .state")).to_have_text("Moving")
     button(page, "Home").click()
-    expect(page.locator(".headline .state")).to_have_text("Idle", timeout=30_000)
+    expect(page.locator(".headline .state")).to_have_text("Idle")
     home = degrees(page, "waist")
     drag(page, "wrist", 20)
     expect(page.locator(".headline .state")).to_have_text("Moving")
-    expect(page.locator(".headline .state")).to_have_text("Idle", timeout=30_000)
+    expect(page.locator(".headline .state")).to_have_text("Idle")
     assert degrees(page, "waist") == pytest.approx(home, abs=0.02)
 
 
@@ -97,7 +95,7 @@ def test_by_keys_a_target_is_set_and_enter_sends_it_and_escape_takes_it_back(ope
     handle.press("PageUp")
     handle.press("Enter")
     wanted = f"{start + 10:.2f}°".replace("-", "−")
-    expect(page.locator('[data-joint="elbow"]')).to_have_text(wanted, timeout=30_000)
+    expect(page.locator('[data-joint="elbow"]')).to_have_text(wanted)
 
 
 def test_space_asks_for_a_stop_and_only_its_reset_lets_motion_go_on(open_page):
@@ -166,7 +164,7 @@ def test_when_the_controller_falls_silent_nothing_looks_live(open_page, plant):
         expect(late.locator(".scene-stale")).to_be_visible()
     finally:
         plant.call(plant.start_controller("pt600", port, demo=True))
-    expect(page.locator(".scene-stale")).to_have_count(0, timeout=30_000)
+    expect(page.locator(".scene-stale")).to_have_count(0)
 
 
 def test_the_fleet_shows_every_robot_with_its_state_and_leads_to_it(open_page):

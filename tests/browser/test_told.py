@@ -43,7 +43,7 @@ def test_what_was_sent_is_done_when_the_arm_is_there_and_gone_when_it_was_stoppe
     expect(notice).to_contain_text("Done: waist")
     button(page, "Home").click()
     expect(page.locator(".control .notice")).to_have_text("Sent: Home")
-    expect(page.locator(".control .notice")).to_have_text("Done: Home", timeout=30_000)
+    expect(page.locator(".control .notice")).to_have_text("Done: Home")
     handle.press("PageUp")
     handle.press("Enter")
     expect(page.locator(".headline .state")).to_have_text("Moving")
@@ -64,7 +64,7 @@ def test_a_motion_that_another_goes_on_from_has_not_failed(open_page):
     expect(page.locator(".joints .notice")).to_contain_text("Done: waist")
     # As soon as it is there, while the gateway still waits whether it stays there.
     button(page, "Home").click()
-    expect(page.locator('[data-joint="waist"]')).to_have_text("0.00°", timeout=30_000)
+    expect(page.locator('[data-joint="waist"]')).to_have_text("0.00°")
     button(page, "waist +5°").click()
     expect(page.locator(".joints .notice")).to_contain_text("Done: waist")
     expect(page.locator(".headline .state")).to_have_text("Idle")
@@ -143,7 +143,7 @@ def test_an_exact_target_can_be_typed_and_what_is_none_is_refused_in_words(open_
     value.fill("12,5")
     expect(notice).to_have_text("Target waist: 12.50°, not sent yet")
     value.press("Enter")
-    expect(page.locator('[data-joint="waist"]')).to_have_text("12.50°", timeout=30_000)
+    expect(page.locator('[data-joint="waist"]')).to_have_text("12.50°")
     expect(notice).to_have_text("Done: waist 12.50°")
     for text, said in (
         ("200", "joint waist at 200.00° is beyond its limit 150.00°"),

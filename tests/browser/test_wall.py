@@ -63,7 +63,7 @@ def test_a_robot_that_there_is_not_is_said_so_and_a_picture_that_does_not_come_t
 
 def test_a_tile_asks_for_a_picture_of_its_size_which_moves_as_the_arm_does(open_page, rendered):
     page = open_page("#/wall/hall/pt600/close", width=400, height=700, drawn=False)
-    page.wait_for_selector('.wall-tile canvas[data-drawn="true"]', timeout=60_000)
+    page.wait_for_selector('.wall-tile canvas[data-drawn="true"]')
     assert changes(page) in ("320", "480")
     expect(page.locator(".wall-line")).to_contain_text("pt600")
     page.locator(".wall-line a").click()
@@ -72,7 +72,7 @@ def test_a_tile_asks_for_a_picture_of_its_size_which_moves_as_the_arm_does(open_
 
 def test_the_robot_page_shows_live_video_that_can_be_taken_home(open_page, rendered):
     page = open_page("#/hall/pt600", drawn=False)
-    page.wait_for_selector('.camera canvas[data-drawn="true"]', timeout=60_000)
+    page.wait_for_selector('.camera canvas[data-drawn="true"]')
     changes(page, ".camera")
     with page.expect_download() as still:
         page.get_by_role("button", name="Save still").click()

@@ -78,7 +78,7 @@ def held(page, address):
 
 
 def settled(page):
-    expect(page.locator(".tool-at")).to_have_attribute("data-checking", "false", timeout=30_000)
+    expect(page.locator(".tool-at")).to_have_attribute("data-checking", "false")
 
 
 def tools(page):

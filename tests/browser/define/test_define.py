@@ -43,13 +43,13 @@ def test_an_arm_of_dropped_files_gets_rows_and_limits_is_saved_started_and_moves
     for name in ("pt500", "pt600", "puma560"):
         expect(page.locator(f'.robot-card[href="#/define/{name}"]')).to_be_visible()
     drop(page, *map(shape, ("base.wrl", "column.3ds", "forearm.3ds", "upper_arm.wrl", "wrist.wrl")))
-    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "5", timeout=60_000)
+    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "5")
     # The upper arm comes before the forearm, by keys; the flange by a button, with a joint of its own.
     choose(page, 2)
     page.keyboard.press("Alt+ArrowUp")
     button(page, "+ Add joint").click()
     page.locator(".mesh-row input[type=file]").set_input_files(SHAPES / "flange.3ds")
-    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "6", timeout=60_000)
+    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "6")
     assert page.locator(".chain-words .dim").all_inner_texts()[1:6] == [
         "column · column.3ds",
         "upper_arm · upper_arm.wrl",
@@ -70,7 +70,7 @@ def test_an_arm_of_dropped_files_gets_rows_and_limits_is_saved_started_and_moves
     field(page, "name").fill("five")
     field(page, "title").fill("Five joints")
     button(page, "Save and start simulated").click()
-    page.get_by_role("link", name="Watch it").click(timeout=60_000)
+    page.get_by_role("link", name="Watch it").click()
 
     saved = load(plant.robots / "five")
     assert [joint.name for joint in saved.joints] == [row[0] for row in ROWS]
@@ -86,21 +86,21 @@ def test_an_arm_of_dropped_files_gets_rows_and_limits_is_saved_started_and_moves
     page.close()
     page = open_page(f"#{path}", drawn=False)  # drawn by the processor here, it would leave a lease no time
     # It is being started: there is nobody yet to give control.
-    expect(page.locator(".headline .facts")).to_contain_text("remote · not homed", timeout=60_000)
-    expect(page.locator(".holder")).to_have_text("Nobody is in control", timeout=30_000)
+    expect(page.locator(".headline .facts")).to_contain_text("remote · not homed")
+    expect(page.locator(".holder")).to_have_text("Nobody is in control")
     page.get_by_label("Your name").fill("li")
-    button(page, "Take control").click(timeout=60_000)
-    expect(page.locator(".holder")).to_have_text("You are in control", timeout=30_000)
+    button(page, "Take control").click()
+    expect(page.locator(".holder")).to_have_text("You are in control")
     button(page, "Home").click()
-    expect(page.locator(".headline .facts")).to_contain_text("remote · homed", timeout=60_000)
+    expect(page.locator(".headline .facts")).to_contain_text("remote · homed")
     handle = page.get_by_role("slider", name="Target of elbow")
     handle.focus()
     handle.press("PageUp")
     handle.press("Enter")
-    expect(page.locator('[data-joint="elbow"]')).to_have_text("10.00°", timeout=30_000)
+    expect(page.locator('[data-joint="elbow"]')).to_have_text("10.00°")
     # Rows of the table: tool 0.1 m on from an elbow at 10°, base 0.3 m up, two links of 0.25 m.
     reach = 250 + 350 * math.cos(math.radians(10))
-    expect(page.locator(".tool dd").first).to_have_text(f"{reach:.1f}mm", timeout=30_000)
+    expect(page.locator(".tool dd").first).to_have_text(f"{reach:.1f}mm")
     button(page, "Release").click()
     page.goto(f"{plant.address}/#/define/five")
     button(page, "End simulation").click()
@@ -220,7 +220,7 @@ def test_joints_are_reordered_by_dragging_and_removed_by_the_keyboard(open_page)
 def test_a_shape_is_dragged_to_its_place_in_one_step(open_page):
     page = opened(open_page, "pt500")
     canvas = page.locator(".define-scene canvas")
-    expect(canvas).to_have_attribute("data-shapes", "6", timeout=60_000)
+    expect(canvas).to_have_attribute("data-shapes", "6")
     choose(page, "base")
     button(page, "Top").click()
     button(page, "Move").click()
@@ -245,12 +245,12 @@ def test_a_reload_keeps_unsaved_work_and_says_so_until_it_is_discarded(open_page
     page = open_page("#/define")
     drop(page, shape("base.wrl"), shape("column.3ds"))
     canvas = page.locator(".define-scene canvas")
-    expect(canvas).to_have_attribute("data-shapes", "2", timeout=60_000)
+    expect(canvas).to_have_attribute("data-shapes", "2")
     field(page, "joint/0/d").fill("312.5")
     page.reload()
     expect(page.get_by_text(re.compile(r"Unsaved draft from \d\d:\d\d:\d\d brought back"))).to_be_visible()
     expect(field(page, "joint/0/d")).to_have_value("312.5")
-    expect(canvas).to_have_attribute("data-shapes", "2", timeout=60_000)
+    expect(canvas).to_have_attribute("data-shapes", "2")
     button(page, "Discard it").click()
     button(page, "Discard it").click()
     expect(page.get_by_text("From link files")).to_be_visible()
@@ -262,16 +262,16 @@ def test_files_that_the_server_forgot_are_sent_again(open_page, plant):
     page = open_page("#/define", refused=True)
     drop(page, shape("base.wrl"), shape("wrist.wrl"))
     canvas = page.locator(".define-scene canvas")
-    expect(canvas).to_have_attribute("data-shapes", "2", timeout=60_000)
+    expect(canvas).to_have_attribute("data-shapes", "2")
     settled(page)
     for folder in ("files", "drafts"):
         for path in (plant.store / folder).iterdir():
             shutil.rmtree(path) if path.is_dir() else path.unlink()
     field(page, "joint/0/d").fill("77")
     settled(page)
-    expect(page.locator(".check-list")).to_have_text("Nothing is wrong with it.", timeout=30_000)
+    expect(page.locator(".check-list")).to_have_text("Nothing is wrong with it.")
     page.reload()
-    expect(canvas).to_have_attribute("data-shapes", "2", timeout=60_000)
+    expect(canvas).to_have_attribute("data-shapes", "2")
 
 
 def test_a_file_that_another_refers_to_is_asked_for_by_name(open_page):
@@ -279,9 +279,9 @@ def test_a_file_that_another_refers_to_is_asked_for_by_name(open_page):
     outer = b'#VRML V2.0 utf8\nInline { url "part.wrl" }\nShape { geometry Box { } }\n'
     drop(page, ("outer.wrl", outer))
     missing = page.locator(".missing")
-    expect(missing).to_contain_text("meshes/outer.wrl refers to part.wrl", timeout=60_000)
+    expect(missing).to_contain_text("meshes/outer.wrl refers to part.wrl")
     drop(page, ("part.wrl", b"#VRML V2.0 utf8\nShape { geometry Sphere { } }\n"))
-    expect(missing).to_have_count(0, timeout=60_000)
+    expect(missing).to_have_count(0)
     # It is a part of the base, not a link.
     expect(page.locator(".chain-row")).to_have_count(2)
 
@@ -289,7 +289,7 @@ def test_a_file_that_another_refers_to_is_asked_for_by_name(open_page):
 def test_a_file_that_cannot_be_read_is_refused_by_name_and_the_others_are_taken(open_page):
     page = open_page("#/define", drawn=False, refused=True)
     drop(page, shape("base.wrl"), ("bad.3ds", b"MM\x00"))
-    expect(page.locator(".outcome.refused")).to_contain_text("bad.3ds", timeout=60_000)
+    expect(page.locator(".outcome.refused")).to_contain_text("bad.3ds")
     expect(page.locator(".chain-row")).to_have_count(2)
     expect(page.locator(".chain-row").first).to_contain_text("base.wrl")
 
@@ -299,10 +299,10 @@ def test_a_urdf_and_its_shapes_become_rows(open_page, tmp_path):
     shapes = link_meshes(description, cache=tmp_path)
     page = open_page("#/define")
     drop(page, ("pt500.urdf", to_urdf(description).encode()))
-    expect(page.locator(".missing")).to_contain_text("meshes/column.glb", timeout=60_000)
+    expect(page.locator(".missing")).to_contain_text("meshes/column.glb")
     drop(page, *((f"{link}.glb", glb) for link, glb in shapes.items()))
-    expect(page.locator(".dh-table tbody tr")).to_have_count(5, timeout=60_000)
-    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "6", timeout=60_000)
+    expect(page.locator(".dh-table tbody tr")).to_have_count(5)
+    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "6")
     drawn, said = tools(page)
     # The home of a URDF is zero: the arm stretched out.
     assert np.allclose(drawn[:3, 3], [0.6, 0.0, 0.3], atol=1e-6)
@@ -312,8 +312,8 @@ def test_a_urdf_and_its_shapes_become_rows(open_page, tmp_path):
 def test_a_urdf_whose_first_axis_points_down_keeps_its_base_frame(open_page, plant):
     page = open_page("#/define")
     drop(page, ("down.urdf", KUKA_LIKE.encode()))
-    expect(page.locator(".dh-table tbody tr")).to_have_count(6, timeout=60_000)
-    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "7", timeout=60_000)
+    expect(page.locator(".dh-table tbody tr")).to_have_count(6)
+    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "7")
     drawn, said = tools(page)
     # As the URDF adds it up at position zero, in its own base frame.
     assert np.allclose(drawn[:3, 3], [0.1 + 0.025 + 0.56 + 0.515, 0.2, 0.4 + 0.035 + 0.3], atol=1e-6)
@@ -333,7 +333,7 @@ def test_a_urdf_whose_first_axis_points_down_keeps_its_base_frame(open_page, pla
     assert tomllib.loads(saved.read_text())["base"]["pose"]["xyz"] == [0.0, 0.0, 0.1]
     choose(page, "base")
     page.reload()
-    expect(page.locator(".dh-table tbody tr")).to_have_count(6, timeout=60_000)
+    expect(page.locator(".dh-table tbody tr")).to_have_count(6)
     choose(page, "base")
     expect(field(page, "base/pose/xyz/2")).to_have_value("0.1")
 
@@ -357,8 +357,8 @@ def test_a_robot_of_openhrp_is_chosen_as_one(open_page, tmp_path):
     file.write_bytes(OPENHRP)
     page = open_page("#/define")
     page.get_by_label("From a URDF").locator("input[type=file]").set_input_files(file)
-    expect(page.locator(".dh-table tbody tr")).to_have_count(1, timeout=60_000)
-    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "2", timeout=60_000)
+    expect(page.locator(".dh-table tbody tr")).to_have_count(1)
+    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "2")
     choose(page, 0)
     limits = [field(page, f"joint/0/limits/{which}").input_value() for which in (0, 1)]
     # 1.5 rad
@@ -398,7 +398,7 @@ def test_a_zip_holds_the_description_and_its_shapes(open_page, tmp_path):
     again = open_page("#/define")
     drop(again, ("pt500-copy.zip", download.value.path().read_bytes()))
     expect(again.locator(".dh-table")).to_contain_text("shoulder")
-    expect(again.locator('.define-scene canvas[data-shapes="6"]')).to_have_count(1, timeout=30_000)
+    expect(again.locator('.define-scene canvas[data-shapes="6"]')).to_have_count(1)
     drawn, said = tools(again)
     assert np.allclose(drawn, said, atol=1e-9)
 
@@ -422,7 +422,7 @@ def test_ignored_pairs_frames_constraints_and_views_are_kept(open_page, plant):
     field(page, "name").fill("kept")
     settled(page)
     button(page, "Save").click()
-    expect(page.locator(".save-state")).to_have_text("Saved", timeout=30_000)
+    expect(page.locator(".save-state")).to_have_text("Saved")
     saved = load(plant.robots / "kept")
     assert [(frame.name, frame.link, frame.xyz) for frame in saved.frames] == [
         ("camera", "column", (0, 100, 0))
@@ -452,7 +452,7 @@ TOUCHING = """<robot name="touching">
 def test_each_pair_of_links_shows_how_it_is_checked_or_why_it_is_ignored(open_page):
     page = open_page("#/define")
     drop(page, ("touching.urdf", TOUCHING.encode()))
-    expect(page.locator(".dh-table")).to_have_count(1, timeout=60_000)
+    expect(page.locator(".dh-table")).to_have_count(1)
     tab(page, "Collisions")
     state = page.locator(".plan-state")
     expect(state).to_contain_text("One checked pair touches at home", timeout=190_000)

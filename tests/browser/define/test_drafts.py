@@ -38,7 +38,7 @@ def save_new(page, name, title):
 
 def test_a_file_that_is_read_late_is_not_put_into_the_robot_opened_meanwhile(open_page):
     page = opened(open_page, "pt500")
-    expect(page.locator('.define-scene canvas[data-shapes="6"]')).to_have_count(1, timeout=60_000)
+    expect(page.locator('.define-scene canvas[data-shapes="6"]')).to_have_count(1)
     with held(page, "**/define/mesh"):
         with page.expect_request("**/define/mesh"):
             drop(page, ("late.wrl", shape("base.wrl")[1]))
@@ -46,7 +46,7 @@ def test_a_file_that_is_read_late_is_not_put_into_the_robot_opened_meanwhile(ope
         expect(page.locator(".dh-table tbody tr")).to_have_count(6)
     # One drop is read after the other: once this one is there, the first is done with.
     drop(page, ("own.wrl", shape("base.wrl")[1]))
-    expect(page.locator(".dh-table tbody tr")).to_have_count(7, timeout=60_000)
+    expect(page.locator(".dh-table tbody tr")).to_have_count(7)
     assert page.locator(".chain-words .dim").all_inner_texts()[7] == "own · own.wrl"
     button(page, "Undo").click()
     expect(page.locator(".save-state")).to_have_text("No changes")
@@ -74,7 +74,7 @@ def test_two_shapes_chosen_in_a_row_are_both_kept(open_page):
     for part, name in (("base", "base.wrl"), (0, "column.3ds")):
         choose(page, part)
         page.locator(".mesh-row input[type=file]").set_input_files(SHAPES / name)
-    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "2", timeout=60_000)
+    expect(page.locator(".define-scene canvas")).to_have_attribute("data-shapes", "2")
 
 
 def test_a_save_that_is_answered_late_leaves_the_robot_opened_meanwhile_as_it_is(open_page, plant):
@@ -154,7 +154,7 @@ def test_a_shape_that_cannot_be_read_is_among_the_problems(open_page, plant):
     (folder / "robot.toml").write_text(text)
     (folder / "meshes" / "column.3ds").write_bytes(b"MM\x00")
     page = open_page("#/define/broken", drawn=False, refused=True)
-    expect(page.locator(".problem")).to_have_count(1, timeout=60_000)
+    expect(page.locator(".problem")).to_have_count(1)
     expect(page.locator(".problem")).to_contain_text("column.3ds")
     page.locator(".problem").click()
     expect(field(page, "joint/0/link/mesh")).to_be_focused()

@@ -88,7 +88,7 @@ def test_the_arm_and_its_frames_are_drawn(open_page):
     page = opened(open_page, "pt500")
     choose(page, 2)
     settled(page)
-    expect(page.locator('.define-scene canvas[data-shapes="6"]')).to_have_count(1, timeout=30_000)
+    expect(page.locator('.define-scene canvas[data-shapes="6"]')).to_have_count(1)
     picture = page.screenshot()
     if os.environ.get("ROBOMESH_PICTURES") == "1":
         PICTURE.write_bytes(picture)
