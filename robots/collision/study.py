@@ -7,7 +7,6 @@ only its hulls touch at home, or if it is apart there and only its hulls touch i
 What is found is kept in the user's cache by its content; a failure is not.
 """
 
-import contextlib
 import fcntl
 import hashlib
 import io
@@ -18,6 +17,7 @@ import resource
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -86,35 +86,47 @@ def studied(case: Case, *, wait: bool = True) -> tuple[Found, ...] | None:
             something. One that failed is tried again later: until then waiting gives hulls.
     """
     path = cache_folder().parent / "collision" / f"{_key(case)}.json"
-    with contextlib.suppress(OSError, ValueError):
-        return _loaded(path.read_bytes())
-    failures, again_s = _failed.get(path, (0, 0.0))
-    running = _running.get(path)
-    if running is None and time.monotonic() >= again_s:
-        running = _running[path] = _Study(case, path)
+    with _lock:
+        found = _kept(path, case)
+        if found is not None:
+            return found
+        failures, again_s = _failed.get(path, (0, 0.0))
+        running = _running.get(path)
+        if running is None and time.monotonic() >= again_s:
+            running = _running[path] = _Study(case, path)
     if running is not None:
         if not wait and not running.ended:
             return None
-        del _running[path]
-        found = running.result()
+        running.join()
+        with _lock:
+            found = _kept(path, case)
+            # Several threads may wait for one study: the first of them counts its failure.
+            if _running.get(path) is running:
+                del _running[path]
+                _count(path, failed=found is None)
+            failures, _ = _failed.get(path, (0, 0.0))
         if found is not None:
-            _failed.pop(path, None)
             return found
-        pause_s = min(_AGAIN_S * 2**failures, _LATEST_AGAIN_S)
-        failures += 1
-        _failed[path] = failures, time.monotonic() + pause_s
-        log.warning("the study of links whose hulls touch failed; it is tried again in %.0f s", pause_s)
     if not wait and failures < _TRIES:
         return None
     # A pair that is apart at home is checked as hulls anyway.
     return tuple(Found(Kind.APART if len(each) else Kind.NOT_STUDIED) for each in case.touching)
 
 
+def _count(path: Path, *, failed: bool) -> None:
+    if not failed:
+        _failed.pop(path, None)
+        return
+    failures, _ = _failed.get(path, (0, 0.0))
+    pause_s = min(_AGAIN_S * 2**failures, _LATEST_AGAIN_S)
+    _failed[path] = failures + 1, time.monotonic() + pause_s
+    log.warning("the study of links whose hulls touch failed; it is tried again in %.0f s", pause_s)
+
+
 class _Study:
     """A process that studies a case, and ends when it takes too long."""
 
     def __init__(self, case: Case, path: Path) -> None:
-        self._path = path
         with tempfile.TemporaryFile() as given:
             given.write(_stored(case))
             given.seek(0)
@@ -132,19 +144,17 @@ class _Study:
     def ended(self) -> bool:
         return self._process.poll() is not None or time.monotonic() > self._until_s
 
-    def result(self) -> tuple[Found, ...] | None:
-        """What was found, when the process has ended; None: it failed."""
+    def join(self) -> None:
+        """Wait until the process has ended; end it when its time is over."""
         try:
             self._process.wait(max(self._until_s - time.monotonic(), 0.0))
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        try:
-            return _loaded(self._path.read_bytes())
-        except (OSError, ValueError):
-            return None
 
 
+# Held for both dictionaries, not while a study is waited for.
+_lock = threading.Lock()
 _running: dict[Path, _Study] = {}
 # How many times a study failed, and when it is tried again.
 _failed: dict[Path, tuple[int, float]] = {}
@@ -245,17 +255,31 @@ def _saved(found: Sequence[Found]) -> bytes:
     return json.dumps(found).encode()
 
 
-def _loaded(data: bytes) -> tuple[Found, ...]:
-    return tuple(Found(Kind(kind), share) for kind, share in json.loads(data))
+def _kept(path: Path, case: Case) -> tuple[Found, ...] | None:
+    """What was found of each pair before; None: nothing, or the file is damaged."""
+    try:
+        found = tuple(Found(Kind(kind), float(share)) for kind, share in json.loads(path.read_bytes()))
+    except (OSError, ValueError, TypeError):
+        return None
+    return found if len(found) == len(case.pairs) else None
 
 
 def _keep(path: Path, data: bytes) -> None:
-    """Write whole or not at all; a folder that cannot be written costs time later, no more."""
-    with contextlib.suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
+    """Write whole or not at all, also where the machine stops.
+
+    Raises:
+        OSError: If it cannot be written.
+    """
+    with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
+        try:
             file.write(data)
-        Path(file.name).replace(path)
+            file.flush()
+            # Else the name may come to the disk before the content.
+            os.fsync(file.fileno())
+            Path(file.name).replace(path)
+        except OSError:
+            Path(file.name).unlink()
+            raise
 
 
 def main() -> None:
@@ -268,8 +292,9 @@ def main() -> None:
     # The services of a site ask for the same study at the same time.
     with path.with_suffix(".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        if not path.is_file():
-            _keep(path, _saved(study(_given(sys.stdin.buffer.read()))))
+        case = _given(sys.stdin.buffer.read())
+        if _kept(path, case) is None:
+            _keep(path, _saved(study(case)))
 
 
 if __name__ == "__main__":

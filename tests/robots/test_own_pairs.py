@@ -3,6 +3,8 @@
 import json
 import re
 import shutil
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,7 @@ from robots.collision import build_cell, near_along, own_contacts, own_nearest, 
 from robots.collision.cell import Cell
 from robots.collision.pairs import plan_of
 from robots.collision.surfaces import turns_around
+from robots.collision.verdicts import Kind
 from robots.description import load
 from robots.importing import imported
 from robots.meshes.solids import ball
@@ -157,6 +160,51 @@ def test_a_study_is_made_once_for_the_same_content(
     monkeypatch.setattr(study.subprocess, "Popen", refused)
     assert touching(cell_of(other / model.name), 0.0, 0.0) == []
     assert [*own_cache.rglob("*.json")] == [kept]
+
+
+@pytest.mark.parametrize(
+    "damaged",
+    ["", "[", "5", "[]", '[["apart"]]', '[["apart", null]]', '[["nothing", 0.0]]'],
+    ids=["empty", "cut off", "a number", "too few", "too short", "no share", "no kind"],
+)
+def test_a_damaged_result_of_a_study_is_replaced(tmp_path: Path, own_cache: Path, damaged: str) -> None:
+    model = hollow(tmp_path)
+    cell_of(model)
+    (kept,) = own_cache.rglob("*.json")
+    whole = kept.read_text()
+    kept.write_text(damaged)
+    assert touching(cell_of(model), 0.0, 0.0) == []
+    assert kept.read_text() == whole
+
+
+def test_threads_that_ask_for_the_same_study_share_it(
+    own_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(study, "_failed", {})
+    monkeypatch.setattr(study, "_running", {})
+    started, waiting, ended = [], threading.Semaphore(0), threading.Event()
+
+    class Failing:
+        def __init__(self, *_: object, **__: object) -> None:
+            started.append(self)
+
+        def wait(self, _: float) -> None:
+            waiting.release()
+            assert ended.wait(60.0)
+
+    monkeypatch.setattr(study.subprocess, "Popen", Failing)
+    none = np.empty((0, 3, 3))
+    case = study.Case(((0, 1),), (none, none), (none, none), np.eye(4)[None, None], (np.empty(0, int),))
+    with ThreadPoolExecutor(2) as threads:
+        asked = [threads.submit(study.studied, case) for _ in range(2)]
+        for _ in asked:
+            assert waiting.acquire(timeout=60.0)
+        ended.set()
+        for each in asked:
+            assert each.result() == (study.Found(Kind.NOT_STUDIED),)
+    assert len(started) == 1
+    ((failures, _),) = study._failed.values()
+    assert failures == 1
 
 
 def test_a_cell_is_pending_until_the_study_ends(tmp_path: Path) -> None:
