@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from robots.cells import FLOOR
-from robots.collision import Cell, unshaped
+from robots.collision import Cell, pending, unshaped
 from robots.collision.floor import floor_advice
 from robots.errors import ProgramError
 from robots.inverse import InverseSolver, build_solver
@@ -248,6 +248,8 @@ def _cover_notes(cell: Cell, robot: str, others: Mapping[str, FloatArray]) -> tu
         if bare := unshaped(cell, name):
             whose = "" if name == robot else f" of {name}"
             notes.append(f"without a shape, so never found to touch anything: {', '.join(bare)}{whose}")
+    if robot in pending(cell):
+        notes.append("links whose hulls touch are not studied yet; until then they are checked as hulls")
     notes += [
         f"{name} is left out: nobody knows where it is now"
         for name in cell.arms

@@ -8,7 +8,7 @@ import numpy as np
 from bus.schemas import robomesh_pb2 as schema
 from bus.worker import answer_all
 from robots.cells import CellDescription
-from robots.collision import build_cell
+from robots.collision import Cell, build_cell, pending
 from robots.description import load
 from robots.inverse import InverseSolver, build_solver
 from services.kinematics.check import check_answer
@@ -19,7 +19,17 @@ from services.kinematics.questions import InverseQuestion, Question
 def begin(cells: tuple[CellDescription, ...]) -> Callable[[Question], bytes]:
     """What answers for the robots of these cells; of each as much is read as is asked for."""
     cell_of = {robot.name: cell for cell in cells for robot in cell.robots}
-    built = cache(build_cell)
+    ready: dict[tuple[str, bool], Cell] = {}
+
+    def built(robot: str, exact: bool) -> Cell:
+        key = cell_of[robot].robots[0].name, exact
+        if key in ready:
+            return ready[key]
+        # A study may take longer than an answer may: it goes on beside this process.
+        cell = build_cell(cell_of[robot], exact=exact, wait=False)
+        if not pending(cell):
+            ready[key] = cell
+        return cell
 
     @cache
     def solver(robot: str) -> InverseSolver:
@@ -33,7 +43,7 @@ def begin(cells: tuple[CellDescription, ...]) -> Callable[[Question], bytes]:
         request = schema.CheckRequest.FromString(question.request)
         return check_answer(
             request,
-            built(cell_of[question.robot], exact=request.exact),
+            built(question.robot, request.exact),
             question.robot,
             question.start,
             others={name: np.atleast_2d(there) for name, there in question.others.items()},

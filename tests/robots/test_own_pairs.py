@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bus.schemas import robomesh_pb2 as schema
 from robots.cells import CellDescription, CellRobot
 from robots.collision import build_cell, near_along, own_contacts, own_nearest, pending, study
 from robots.collision.cell import Cell
@@ -21,6 +22,8 @@ from robots.importing import imported
 from robots.meshes.solids import ball
 from robots.save import write_folder
 from services.command_line.main import run
+from services.kinematics.questions import CheckQuestion
+from services.kinematics.worker import begin
 
 REAL = Path(__file__).parents[3] / "shared" / "testdata" / "urdf" / "abb_irb2400_support"
 # Studies run in processes of their own.
@@ -240,6 +243,37 @@ def test_a_study_that_fails_leaves_hulls_and_is_tried_again(
     study._failed[path] = (failures, 0.0)
     assert touching(cell_of(model), 0.0, 0.0) == []
     assert study._failed == {}
+
+
+def test_the_services_check_answers_while_a_study_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(study, "_running", {})
+    answer = begin((CellDescription((CellRobot("arm", hollow(tmp_path), np.eye(4)),)),))
+    home = CheckQuestion("arm", schema.CheckRequest(program="home").SerializeToString(), np.zeros(2), {})
+    text = "links whose hulls touch are not studied yet; until then they are checked as hulls"
+
+    class Endless:
+        def __init__(self, *_: object, **__: object) -> None:
+            pass
+
+        def poll(self) -> None:
+            return None
+
+        def wait(self, _: float) -> None:
+            raise AssertionError("somebody waited for the study")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(study.subprocess, "Popen", Endless)
+        for _ in range(2):
+            unready = schema.CheckAnswer.FromString(answer(home))
+            assert text in unready.notes
+            assert not unready.ok
+    study._running.clear()
+    cell_of(tmp_path / "hollow.urdf")
+    ready = schema.CheckAnswer.FromString(answer(home))
+    assert text not in ready.notes
+    assert ready.ok
 
 
 def test_a_link_wholly_inside_another_touches_it_and_one_in_a_hollow_does_not(tmp_path: Path) -> None:
