@@ -15,25 +15,44 @@ _MOST_BYTES = 4_000_000
 _HOMES = ("home", "default", "arm_up", "half_sitting", "standing")
 
 
-def srdf_beside(urdf: Path, robot: str) -> Path | None:
-    """The SRDF that is of a URDF's robot: in its folder, or in `srdf` beside its folder `urdf` or `robots`.
+def srdf_beside(urdf: Path, robot: str) -> tuple[Path | None, str]:
+    """The SRDF of a URDF's robot, and a note if one was passed over: it names another robot.
 
-    It has the URDF's file name or the robot's name, or is alone with the URDF. None: there is none.
+    It is in the URDF's folder, or in `srdf` beside its folder `urdf` or `robots`. It has the URDF's file
+    name; else it names the robot; else it is alone with the URDF, and names the robot's series, or no robot.
     """
     folders = [urdf.parent]
     # Packages put the two apart; beyond a package nobody's file is read.
     if urdf.parent.name in ("urdf", "robots"):
         folders.append(urdf.parent.parent / "srdf")
+    found, alone = [], []
     for folder in folders:
         try:
-            found = sorted(folder.glob("*.srdf"))
-            alone = len(found) == 1 and len(list(urdf.parent.glob("*.urdf"))) == 1
+            here = sorted(folder.glob("*.srdf"))
+            single = len(here) == 1 and len(list(urdf.parent.glob("*.urdf"))) == 1
         except OSError:
             continue
-        for path in found:
-            if path.stem == urdf.stem or alone or _robot_name(path) == robot:
-                return path
-    return None
+        found += here
+        alone += here if single else []
+    for path in found:
+        if path.stem == urdf.stem:
+            return path, ""
+    for path in sorted(found, key=lambda path: path.stem != robot):
+        if _robot_name(path) == robot:
+            return path, ""
+    note = ""
+    for path in alone:
+        named = _robot_name(path)
+        if _may_be(named, robot):
+            return path, ""
+        note = f"{path.name}: is of the robot {named!r}; it is not used"
+    return None, note
+
+
+def _may_be(named: str, robot: str) -> bool:
+    """Whether an SRDF names no robot, this one, or its series: abb_irb2400_12_155 is an abb_irb2400."""
+    named, robot = named.casefold(), robot.casefold()
+    return named in ("", robot) or robot.startswith((f"{named}_", f"{named}-"))
 
 
 def _robot_name(path: Path) -> str:
@@ -45,9 +64,9 @@ def _robot_name(path: Path) -> str:
 
 def ignored_beside(urdf: Path, robot: str, tree: Tree) -> tuple[list[tuple[tuple[str, str], str]], str]:
     """Pairs that the SRDF beside a URDF leaves out, each with its name, and a note if it cannot be used."""
-    path = srdf_beside(urdf, robot)
+    path, note = srdf_beside(urdf, robot)
     if path is None:
-        return [], ""
+        return [], note
     try:
         if path.stat().st_size > _MOST_BYTES:
             return [], f"{path.name}: has more than {_MOST_BYTES:,} bytes, so it is not used"

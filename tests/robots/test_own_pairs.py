@@ -327,6 +327,45 @@ def test_a_packages_folder_srdf_is_beside_its_folder_of_urdfs(
     assert (("base", "hand") in dict(plan.ignored)) is ignored
 
 
+@pytest.mark.parametrize(
+    ("name", "ignored"),
+    [
+        ("hollow_2_5", True),
+        ("hollow", True),
+        ("Hollow-2", False),
+        ("hollow_2", True),
+        ("HOLLOW", True),
+        ("", True),
+        ("hol", False),
+        ("other", False),
+    ],
+)
+def test_an_srdf_alone_with_a_urdf_is_used_unless_it_names_another_robot(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, ignored: bool
+) -> None:
+    model = hollow(tmp_path)
+    model.write_text(model.read_text().replace('"hollow"', '"hollow_2_5"'))
+    disabled = '<disable_collisions link1="hand" link2="base" reason="User"/>'
+    (tmp_path / "any.srdf").write_text(f'<robot name="{name}">{disabled}</robot>')
+    plan = plan_of(load(model))
+    assert (("base", "hand") in dict(plan.ignored)) is ignored
+    assert run(["robot", "check", str(model)]) == 0
+    said = f"any.srdf: is of the robot '{name}'; it is not used"
+    assert (said in capsys.readouterr().out) is not ignored
+
+
+@pytest.mark.parametrize("urdf", ["hollow", "of_another_name"])
+def test_the_srdf_of_the_urdfs_or_robots_name_comes_before_others_of_its_robot(
+    tmp_path: Path, urdf: str
+) -> None:
+    model = hollow(tmp_path)
+    model = model.rename(model.with_stem(urdf))
+    disabled = '<disable_collisions link1="hand" link2="base" reason="User"/>'
+    for name in ("a", "hollow"):
+        (tmp_path / f"{name}.srdf").write_text(f'<robot name="hollow">{disabled}</robot>')
+    assert dict(plan_of(load(model)).ignored)["base", "hand"] == "hollow.srdf says so"
+
+
 def test_the_srdf_of_another_robot_and_a_broken_one_are_not_used(tmp_path: Path) -> None:
     model = hollow(tmp_path)
     (tmp_path / "second.urdf").write_text("<robot/>")
