@@ -146,7 +146,7 @@ class Robot:
             table = code_table(settings.codes)
             self._legacy = LegacyClients(settings.legacy_clients, table, joints, self._control, guarded)
         self._operators = session.watch_presence(presence_key(site, settings.name, Role.OPERATOR.value, "*"))
-        session.answer(site, settings.name, "stop", self._answer_stop)
+        self._stops = session.answer(site, settings.name, "stop", self._answer_stop)
 
         def answer(name: str, handler: Handler, what: str) -> Answerer:
             refused = partial(self._refused, what)
@@ -221,6 +221,9 @@ class Robot:
             await self._legacy.close()
         await self._programs.close()
         await self._control.close()
+        # What nobody could remember must not be answered.
+        for each in (self._stops, *self._asked):
+            each.close()
         await self._audit.close()
 
     async def _go_on(self, work: Callable[[], Awaitable[None]]) -> None:

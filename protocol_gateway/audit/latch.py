@@ -1,8 +1,8 @@
 """The latched stop of one robot in a file of fixed size, so that a full disk takes it and a restart finds it.
 
-    slot 0, slot 1   a line of JSON each, with its SHA-256, filled up with blanks to 4096 bytes
+    slot 0, slot 1   whose it is and its state, a line of JSON with its SHA-256, filled up to 4096 bytes
     a write          goes to the slot that does not hold the newest state, in place
-    a start          takes the newest whole slot; a damaged slot may have been newer, and held a stop
+    a start          takes the newest whole slot; a damaged or empty slot may have been newer, and held a stop
 
 Both slots are allocated and written when the gateway starts, so a later write needs no space. A thread of
 its own writes, another one syncs: a stop and its answer wait for neither. A write is in the kernel's hands
@@ -20,8 +20,9 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from hashlib import sha256
+from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from protocol_gateway.authority.rules import Stop
 from protocol_gateway.texts import one_line
@@ -53,12 +54,16 @@ class LatchState:
 class LatchFile:
     """The latch file of one robot; its audit log's lock keeps other gateways away from it.
 
+    Args:
+        first: Nothing was ever done for this robot, so a file that nothing was written to is no damage: a
+            gateway was killed as it began.
+
     Attributes:
         found: What was there when it was opened; None: nothing.
         damage: What is wrong with it, in words; empty: nothing.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, first: bool = False) -> None:
         self.path = path
         self._file: int | None = None
         self._allocated = False
@@ -68,9 +73,10 @@ class LatchFile:
         self._failure = ""
         self._busy_since_s: float | None = None
         self._syncing = False
+        self._closed = False
         self._writer = ThreadPoolExecutor(1, thread_name_prefix=f"latch-{path.stem}")
         self._syncer = ThreadPoolExecutor(1, thread_name_prefix=f"latch-sync-{path.stem}")
-        self.found, self.damage, self._sequence, self._slot = _read(path)
+        self.found, self.damage, self._sequence, self._slot = _read(path, first=first)
 
     @property
     def problem(self) -> str:
@@ -109,10 +115,13 @@ class LatchFile:
     def _write_soon(self, state: LatchState) -> None:
         with self._lock:
             self._newest = state
+            if self._closed:
+                self._failure = f"the latch file {self.path.name} is closed: its gateway is being ended"
+                return
             if self._busy_since_s is not None:
                 return
             self._busy_since_s = time.monotonic()
-        self._writer.submit(self._write_newest)
+            self._writer.submit(self._write_newest)
 
     def retry(self) -> None:
         """Try again what could not be written; to be called now and then."""
@@ -121,8 +130,11 @@ class LatchFile:
 
     def close(self) -> None:
         """Write that no number beyond those that are known was given out, and close the file."""
-        newest = self._newest
-        self._writer.submit(self._try_to_write, replace(newest, reserved=newest.reserved - RESERVED))
+        with self._lock:
+            self._closed = True
+            newest = self._newest
+            # Behind what is being written.
+            self._writer.submit(self._try_to_write, replace(newest, reserved=newest.reserved - RESERVED))
         self._writer.shutdown()
         self._syncer.shutdown()
         if self._file is not None:
@@ -179,7 +191,7 @@ class LatchFile:
     def _write_slot(self, state: LatchState) -> None:
         assert self._file is not None
         slot = (self._slot + 1) % SLOTS
-        line = _line(state, self._sequence + 1)
+        line = _line(state, self._sequence + 1, owner(self.path))
         if os.pwrite(self._file, line, slot * SLOT_BYTES) != SLOT_BYTES:
             raise OSError(errno.EIO, "Half of it was written")
         self._slot, self._sequence = slot, self._sequence + 1
@@ -206,8 +218,13 @@ def reason_of(error: Exception) -> str:
     return f"{error.strerror}: {'make space on its disk' if full else 'see to its disk'}"
 
 
-def _line(state: LatchState, sequence: int) -> bytes:
-    row: dict[str, Any] = {"sequence": sequence, **asdict(state)}
+def owner(path: Path) -> str:
+    """Return whose a latch file is: site and robot."""
+    return f"{path.parent.name}/{path.stem}"
+
+
+def _line(state: LatchState, sequence: int, of: str) -> bytes:
+    row: dict[str, Any] = {"of": of, "sequence": sequence, **asdict(state)}
     if state.stop is not None:
         # The time of sending is on a monotonic clock, which a restart of the machine resets.
         stop = asdict(replace(state.stop, sent_s=None))
@@ -225,33 +242,42 @@ def _json(row: dict[str, Any]) -> bytes:
     return json.dumps(row, ensure_ascii=False, separators=(",", ":"), sort_keys=True).encode()
 
 
-def _read(path: Path) -> tuple[LatchState | None, str, int, int]:
+class _Slot(NamedTuple):
+    """A whole slot; `of`: whose it is."""
+
+    sequence: int
+    of: str
+    state: LatchState
+
+
+def _read(path: Path, *, first: bool) -> tuple[LatchState | None, str, int, int]:
     """The newest whole state, what is wrong in words, its sequence and its slot."""
+    nothing = 0, SLOTS - 1
     try:
         with path.open("rb") as file:
             data = file.read(SLOTS * SLOT_BYTES)
     except FileNotFoundError:
-        return None, "", 0, SLOTS - 1
+        return None, "", *nothing
     except OSError as error:
-        return None, f"its latch file {path.name} cannot be read ({error.strerror})", 0, SLOTS - 1
-    newest: tuple[int, int, LatchState] | None = None
-    damage = ""
-    for slot in range(SLOTS):
-        part = data[slot * SLOT_BYTES : (slot + 1) * SLOT_BYTES]
-        if not part.strip(b"\0"):
-            continue  # allocated, and never written
-        found = _parsed(part)
-        if found is None:
-            damage = f"its latch file {path.name} is damaged"
-        elif newest is None or found[0] > newest[0]:
-            newest = (found[0], slot, found[1])
-    if newest is None:
-        return None, damage, 0, SLOTS - 1
-    return newest[2], damage, newest[0], newest[1]
+        return None, f"its latch file {path.name} cannot be read ({error.strerror})", *nothing
+    parts = [data[slot * SLOT_BYTES : (slot + 1) * SLOT_BYTES] for slot in range(SLOTS)]
+    if first and not data.strip(b"\0"):
+        return None, "", *nothing
+    slots = [_parsed(part) for part in parts]
+    if any(slot is not None and slot.of not in ("", owner(path)) for slot in slots):
+        return None, f"its latch file {path.name} is another robot's", *nothing
+    found = [(slot.sequence, place, slot.state) for place, slot in enumerate(slots) if slot is not None]
+    # The first write goes to slot 0, the second to slot 1: a gateway was killed between them.
+    begun = slots[0] is not None and slots[0].sequence == 1 and not parts[1].strip(b"\0")
+    damage = "" if len(found) == SLOTS or begun else f"its latch file {path.name} is damaged"
+    if not found:
+        return None, damage, *nothing
+    sequence, place, state = max(found, key=itemgetter(0))
+    return state, damage, sequence, place
 
 
-def _parsed(part: bytes) -> tuple[int, LatchState] | None:
-    """A slot's sequence and state; None: it is not whole."""
+def _parsed(part: bytes) -> _Slot | None:
+    """What a slot holds; None: it is not whole."""
     try:
         row = json.loads(part)
         digest = row.pop(_DIGEST)
@@ -259,6 +285,7 @@ def _parsed(part: bytes) -> tuple[int, LatchState] | None:
             return None
         stop = None if row["stop"] is None else Stop(**row["stop"])
         state = LatchState(stop=stop, last_stop_id=row["last_stop_id"], reserved=row["reserved"])
-        return int(row["sequence"]), state
+        # Files of before 2026-11-23 do not say whose they are.
+        return _Slot(int(row["sequence"]), str(row.get("of", "")), state)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return None

@@ -107,7 +107,7 @@ class AuditLog:
             else:
                 os.ftruncate(self._file, self._end.length)
             os.fsync(self._file)
-            self.latch = LatchFile(path.with_suffix(".latch"))
+            self.latch = LatchFile(path.with_suffix(".latch"), first=start.end.number == 0)
             self._remember_stops(start)
         except OSError as error:
             raise AuditError(
@@ -172,7 +172,7 @@ class AuditLog:
 
     def _remember_stops(self, start: Start) -> None:
         """Take what log and latch file leave behind; where a stop may be lost, latch one."""
-        memory, stop = merged(start.end.memory, self.latch.found)
+        memory, stop, unsent = merged(start.end.memory, self.latch.found)
         self.mended = ", and ".join(filter(None, (start.mended, self.latch.damage)))
         text = (
             f"the gateway was killed before it wrote the entry of stop {stop.id}" if stop is not None else ""
@@ -180,11 +180,20 @@ class AuditLog:
         # A torn line may have held a stop: the one that the latch file knows. Damage may have held any.
         if start.damaged or self.latch.damage or (start.in_doubt and stop is None):
             reason = UNKNOWN if start.in_doubt else LATCH_UNKNOWN
-            memory, stop = with_stop(memory, by=GATEWAY, since_ns=time.time_ns(), reason=reason)
+            now_ns = time.time_ns()
+            number = memory.last_stop_id + 1
+            if self.latch.found is None:
+                # Which numbers were given out is not known: those of no disk are times.
+                number = max(number, now_ns // 1000)
+            memory, stop = with_stop(memory, number=number, by=GATEWAY, since_ns=now_ns, reason=reason)
             text = self.mended
         if stop is not None:
             values = {"stop_id": str(stop.id), "reason": stop.reason}
             entry = replace(_own_entry("STOP", Outcome.ACCEPTED, text, values), operator=stop.by)
+            self._queue.append(_Waiting(entry, None, kept=True))
+        elif unsent is not None:
+            text = "the gateway was killed before it wrote whether this was sent: the stop stays latched"
+            entry = _own_entry("RESET", Outcome.FAILED, text, {"stop_id": str(unsent.id)})
             self._queue.append(_Waiting(entry, None, kept=True))
         self._end = replace(self._end, memory=memory)
         known = self.latch.found

@@ -9,7 +9,7 @@ a start reads one file, however long the log has become.
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from protocol_gateway.audit.entry import Entry, Outcome
 from protocol_gateway.audit.latch import LatchState
@@ -86,25 +86,40 @@ def follow(memory: Memory, entry: Entry) -> Memory:
     return memory
 
 
-def with_stop(memory: Memory, *, by: str, since_ns: int, reason: str = UNKNOWN) -> tuple[Memory, Stop]:
+def with_stop(
+    memory: Memory, *, number: int, by: str, since_ns: int, reason: str = UNKNOWN
+) -> tuple[Memory, Stop]:
     """What a damaged log leaves behind, with the stop that is latched because one may be lost."""
-    stop = Stop(id=memory.last_stop_id + 1, by=by, reason=reason, since_ns=since_ns)
+    stop = Stop(id=number, by=by, reason=reason, since_ns=since_ns)
     return replace(memory, stop=stop, last_stop_id=stop.id), stop
 
 
-def merged(memory: Memory, kept: LatchState | None) -> tuple[Memory, Stop | None]:
-    """Combine what the log's entries say with what the latch file holds.
+class Merged(NamedTuple):
+    """What log and latch file leave behind together.
 
-    Returns:
-        What must be remembered; and the stop that only the latch file knows, because the gateway was killed
-        before its entry was written.
+    Attributes:
+        unwritten: A stop that only the latch file knows: the gateway was killed before its entry was written.
+        unsent: A stop whose RESET is written down, and may not have been sent: the gateway was killed before
+            it wrote either. It stays latched.
     """
+
+    memory: Memory
+    unwritten: Stop | None = None
+    unsent: Stop | None = None
+
+
+def merged(memory: Memory, kept: LatchState | None) -> Merged:
+    """Combine what the log's entries say with what the latch file holds."""
     if kept is None:
-        return memory, None
+        return Merged(memory)
     last = max(memory.last_stop_id, kept.reserved)
-    if kept.last_stop_id <= memory.last_stop_id:
-        return replace(memory, last_stop_id=last), None
-    return replace(memory, stop=kept.stop, cleared=None, last_stop_id=last, mover=""), kept.stop
+    if kept.last_stop_id > memory.last_stop_id:
+        memory = replace(memory, stop=kept.stop, cleared=None, last_stop_id=last, mover="")
+        return Merged(memory, unwritten=kept.stop)
+    if kept.last_stop_id == memory.last_stop_id and kept.stop is not None and memory.stop is None:
+        memory = replace(memory, stop=kept.stop, cleared=None, last_stop_id=last)
+        return Merged(memory, unsent=kept.stop)
+    return Merged(replace(memory, last_stop_id=last))
 
 
 def remembered(entries: Iterable[Entry]) -> Authority:

@@ -31,6 +31,8 @@ def write(live, *entries, rotate_bytes=1 << 20):
         log = AuditLog(live, rotate_bytes=rotate_bytes)
         for each in entries:
             await log.append(each)
+            if each.request == "RESET":  # it was sent
+                log.latch.keep(None, int(each.values.get("stop_id", "0")))
         await log.close()
         return log.mended, log.memory
 

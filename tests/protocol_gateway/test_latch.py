@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from protocol_gateway.audit.latch import RESERVED, SLOT_BYTES, LatchFile
-from protocol_gateway.audit.log import AuditLog, read_entries
+from protocol_gateway.audit.log import AuditLog, Entry, Outcome, read_entries
 from protocol_gateway.audit.restart import LATCH_UNKNOWN
 from protocol_gateway.authority.rules import Stop
 from protocol_gateway.errors import AuditError
@@ -92,11 +92,58 @@ def test_a_damaged_slot_may_have_held_a_stop(path, slot, place):
     assert LatchFile(path).damage == "its latch file arm.latch is damaged"
 
 
-@pytest.mark.parametrize("data", [b"", b"\0" * 2 * SLOT_BYTES])
-def test_a_file_that_was_allocated_and_never_written_says_nothing(path, data):
+EMPTY = b"\0" * SLOT_BYTES
+
+
+@pytest.mark.parametrize("data", [b"", 2 * EMPTY])
+def test_a_file_that_a_first_start_did_not_write_says_nothing_and_a_later_one_is_damaged(path, data):
     path.write_bytes(data)
-    latch = LatchFile(path)
+    latch = LatchFile(path, first=True)
     assert (latch.found, latch.damage) == (None, "")
+    assert LatchFile(path).damage == "its latch file arm.latch is damaged"
+
+
+def test_an_empty_slot_is_damage_but_where_a_first_start_was_killed_between_both(path):
+    data = killed(path, (stop(1), 1), (stop(2), 2))  # in slot 0, in slot 1
+    for left in (data[:SLOT_BYTES], data[:SLOT_BYTES] + EMPTY, EMPTY + data[SLOT_BYTES:]):
+        path.write_bytes(left)
+        assert LatchFile(path).damage == "its latch file arm.latch is damaged"
+    path.unlink()
+    data = killed(path)
+    path.write_bytes(data[:SLOT_BYTES] + EMPTY)
+    latch = LatchFile(path)
+    assert (latch.found.stop, latch.damage) == (None, "")
+
+
+def test_a_file_of_another_robot_is_damage(path):
+    killed(path, (stop(1), 1))
+    path.rename(path.with_name("other.latch"))
+    latch = LatchFile(path.with_name("other.latch"))
+    assert (latch.found, latch.damage) == (None, "its latch file other.latch is another robot's")
+
+
+def test_a_stop_of_the_last_moment_is_the_newest_in_the_file(path, monkeypatch):
+    latch = LatchFile(path)
+    latch.begin(None, 0, given_out=0)
+    goes_on, begun, pwrite = threading.Event(), threading.Event(), os.pwrite
+
+    def slow(*arguments):
+        begun.set()
+        goes_on.wait()
+        return pwrite(*arguments)
+
+    monkeypatch.setattr(os, "pwrite", slow)
+    latch.keep(None, 1)
+    assert begun.wait(30.0)
+    closing = threading.Thread(target=latch.close)
+    closing.start()
+    latch.keep(stop(2), 2)
+    goes_on.set()
+    closing.join()
+    latch.keep(stop(3), 3)  # raises nothing
+    assert (
+        latch.problem.endswith("is closed: its gateway is being ended") or LatchFile(path).found.stop.id == 3
+    )
 
 
 @pytest.mark.parametrize("data", [b"x", b"{}\n", b"[" * 9000, b"\xff" * 8192, b'{"sha256":1}' + b" " * 4084])
@@ -174,6 +221,60 @@ def test_a_stop_that_only_the_latch_file_knows_is_remembered_and_written_down(tm
         memory, _ = await life()
         assert memory.stop.id == 1
         assert len(list(read_entries(log))) == 1
+
+    run(main())
+
+
+def test_a_stop_whose_reset_was_written_down_and_not_sent_stays_latched(tmp_path):
+    log = tmp_path / "arm.jsonl"
+
+    async def life(*requests, latched=None):
+        audit = AuditLog(log)
+        for request in requests:
+            entry = Entry(
+                time_ns=NOW_NS,
+                operator="wang",
+                source="mesh",
+                request=request,
+                outcome=Outcome.ACCEPTED,
+                text="",
+                values={"stop_id": "1"},
+            )
+            await audit.append(entry)
+        if latched is not None:
+            audit.latch.keep(latched, latched.id)
+            settle(audit.latch)
+        found = audit.memory
+        audit.latch.close = lambda: None  # killed
+        await audit.close()
+        return found
+
+    async def main():
+        await life("STOP", "RESET", latched=stop(1))
+        for _ in range(2):
+            memory = await life()
+            assert (memory.stop.id, memory.stop.by) == (1, "wang")
+        *_, entry = read_entries(log)
+        assert (entry.request, entry.outcome, entry.number) == ("RESET", Outcome.FAILED, 3)
+        assert entry.text.endswith("the stop stays latched")
+
+    run(main())
+
+
+def test_the_number_of_a_stop_for_a_damaged_file_was_never_given_out(tmp_path):
+    async def life():
+        audit = AuditLog(tmp_path / "arm.jsonl")
+        found = audit.memory
+        audit.latch.keep(stop(7), 7)  # in no log
+        settle(audit.latch)
+        audit.latch.close = lambda: None  # killed
+        await audit.close()
+        return found
+
+    async def main():
+        await life()
+        (tmp_path / "arm.latch").write_bytes(b"x" * 2 * SLOT_BYTES)
+        assert (await life()).stop.id > 10**15
 
     run(main())
 
