@@ -7,8 +7,9 @@ of one machine can be compared: `earliest_ns` of one is never after `latest_ns` 
 
 import time
 
-# A clock that is set by less than this does not begin another time.
-_SET_NS = 1_000_000
+# A clock that is set by less than this does not begin another time: forward, or back, where stamps that follow
+# each other more closely would change places.
+_SET_FORWARD_NS, _SET_BACK_NS = 1_000_000, 1_000
 _FIRST_READINGS = 30
 
 
@@ -20,14 +21,14 @@ class WallClock:
         self._least_ns, self._most_ns = min(readings, key=lambda reading: reading[1] - reading[0])
 
     def was_set(self) -> bool:
-        """Read both clocks; return whether the wall clock was set since the last reading, by 1 ms or more."""
+        """Read both clocks; return whether the wall clock was set since: forward by 1 ms or more, or back by 1 µs."""
         least_ns, most_ns = _bracket()
         if least_ns <= self._most_ns and self._least_ns <= most_ns:
             self._least_ns, self._most_ns = max(self._least_ns, least_ns), min(self._most_ns, most_ns)
             return False
-        moved_ns = max(least_ns - self._most_ns, self._least_ns - most_ns)
+        forward_ns, back_ns = least_ns - self._most_ns, self._least_ns - most_ns
         self._least_ns, self._most_ns = least_ns, most_ns
-        return moved_ns >= _SET_NS
+        return forward_ns >= _SET_FORWARD_NS or back_ns >= _SET_BACK_NS
 
     def earliest_ns(self, monotonic_ns: int) -> int:
         """Return the wall clock at a monotonic time, ns since the Unix epoch; never too late."""

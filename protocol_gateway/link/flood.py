@@ -90,9 +90,10 @@ class HandOver:
         for event, date in zip(events, dates, strict=True):
             if self.flood.on or (burst and _nobody_dates(event)):
                 older = self.hold(_kind(event), partial(self._on_event, event, date))
-                self.left_out += older and isinstance(event, JointsReceived)
             else:
+                older = self._held.pop(_kind(event), None) is not None
                 self._on_event(event, date)
+            self.left_out += older and isinstance(event, JointsReceived)
 
     def hold(self, kind: Hashable, call: Callable[[], None]) -> bool:
         """Do it soon, unless something newer of its kind comes; whether it is in an older one's place."""

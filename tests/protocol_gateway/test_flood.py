@@ -105,6 +105,11 @@ def test_of_a_burst_what_its_controller_dates_and_what_it_refuses_is_handed_over
     assert handed_over(dated, burst=True) == (dated, [], 0)
 
 
+def test_no_position_that_was_held_back_follows_a_newer_one_with_a_time():
+    undated, dated = joints(1), JointsReceived((2.0,), None, 5.0)
+    assert handed_over([undated], [dated], burst=True) == ([dated], [], 1)
+
+
 def test_of_statuses_held_back_none_that_says_something_else_is_left_out_and_the_newest_is_the_last():
     idle, local = StatusReceived(activity=Activity.IDLE), StatusReceived(mode=Mode.LOCAL)
     assert handed_over([idle, local, idle], [local], burst=True) == ([], [idle, local], 0)
