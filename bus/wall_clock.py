@@ -7,8 +7,8 @@ of one machine can be compared: `earliest_ns` of one is never after `latest_ns` 
 
 import time
 
-# A clock that is set by less than this does not begin another time: forward, or back, where stamps that follow
-# each other more closely would change places.
+# A clock that is set by less than this does not begin another time: forward; and back, where stamps that
+# follow each other closely would change places.
 _SET_FORWARD_NS, _SET_BACK_NS = 1_000_000, 1_000
 _FIRST_READINGS = 30
 
@@ -21,7 +21,7 @@ class WallClock:
         self._least_ns, self._most_ns = min(readings, key=lambda reading: reading[1] - reading[0])
 
     def was_set(self) -> bool:
-        """Read both clocks; return whether the wall clock was set since: forward by 1 ms or more, or back by 1 µs."""
+        """Return whether the wall clock was set since the last call: forward by 1 ms, or back by 1 µs."""
         least_ns, most_ns = _bracket()
         if least_ns <= self._most_ns and self._least_ns <= most_ns:
             self._least_ns, self._most_ns = max(self._least_ns, least_ns), min(self._most_ns, most_ns)
