@@ -127,7 +127,9 @@ def fixture_shape(fixture: Fixture) -> Shape:
     color = None if fixture.color is None else rgb(fixture.color)
     if fixture.mesh is not None:
         scale = fixture.mesh_scale
-        return Shape(fixture.mesh, np.diag([scale, scale, scale, 1.0]), color)
+        # Like every file of a stranger's: what it refers to is read only from its own folder.
+        folder = fixture.mesh.absolute().parent
+        return Shape(fixture.mesh, np.diag([scale, scale, scale, 1.0]), color, within=folder)
     rounder = 1.0 / math.cos(math.pi / _ROUND)
     if fixture.box is not None:
         half = np.array(fixture.box) * _MILLIMETRE / 2
@@ -196,6 +198,22 @@ def fixture_problem(fixtures: tuple[Fixture, ...], links: dict[str, dict[str, bo
         if fixture.mesh is not None:
             try:
                 shapes_glb((fixture_shape(fixture),))
+                missing = _missing_part(fixture.mesh)
             except MeshError as error:
                 return f"fixture {fixture.name}: mesh = {str(fixture.mesh)!r}: {error}"
+            if missing:
+                return (
+                    f"fixture {fixture.name}: mesh = {str(fixture.mesh)!r} refers to {missing!r}, "
+                    "which is not in its folder: a check would not see that part"
+                )
     return None
+
+
+def _missing_part(mesh: Path) -> str:
+    """What a mesh file has in another file that is not there; only VRML does without it."""
+    from robots.meshes.read import READERS, read_mesh
+
+    if READERS.get(mesh.suffix.lower()) is not READERS[".wrl"]:
+        return ""
+    missing = read_mesh(mesh, within=mesh.absolute().parent).missing
+    return next((each for each in missing if Path(each).suffix.lower() in READERS), "")

@@ -71,6 +71,21 @@ def test_a_fixtures_mesh_is_taken_from_the_files_own_folder_in_its_own_unit(tmp_
     assert highest == pytest.approx((0.02, 0.03, 0.0))
 
 
+def test_a_fixture_whose_part_is_outside_of_its_folder_is_refused_for_no_check_would_see_it(tmp_path):
+    (tmp_path / "cad").mkdir()
+    for path in (tmp_path / "part.wrl", tmp_path / "cad" / "part.wrl"):
+        path.write_text("#VRML V2.0 utf8\nShape { geometry Box { size 1 1 1 } }\n")
+    text = f'{IN_A}[[fixture]]\ncell = "a"\nname = "hall"\nmesh = "cad/hall.wrl"\n'
+    hall = tmp_path / "cad" / "hall.wrl"
+    hall.write_text('#VRML V2.0 utf8\nInline { url "part.wrl" }\n')
+    load(tmp_path, text)
+    hall.write_text('#VRML V2.0 utf8\nInline { url "part.wrl" }\nInline { url "../part.wrl" }\n')
+    with pytest.raises(
+        SiteFileError, match=r"fixture hall: .* refers to '../part.wrl', which is not in its folder"
+    ):
+        load(tmp_path, text)
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
