@@ -26,7 +26,7 @@ from robots.meshes.trimesh_formats import read_trimesh
 _DEVIATION_MM = 0.1
 _TURN = 0.35
 TIME_LIMIT_S = 120.0
-_MEMORY_LIMIT = 6 << 30
+MEMORY_LIMIT = 6 << 30
 # It asks for memory in pieces: a failure so near to the limit is for want of it.
 _NEAR = 0.9
 _OUT_OF_MEMORY = 77
@@ -37,11 +37,14 @@ _PREFIXES = {"MILLI": 1e-3, "CENTI": 1e-2, "DECI": 1e-1, "MICRO": 1e-6, "$": 1.0
 _INCHES = {"INCH": 0.0254, "FOOT": 0.3048}
 
 
-def read_step(path: Path, *, time_limit_s: float = TIME_LIMIT_S) -> Mesh:
+def read_step(path: Path, *, time_limit_s: float = TIME_LIMIT_S, memory_limit: int = MEMORY_LIMIT) -> Mesh:
     """The triangles of a .step or .stp file, in its own unit and axes.
 
+    Args:
+        memory_limit: Most bytes of address space that reading may take.
+
     Raises:
-        MeshError: If it is not a STEP file that can be read, or takes longer than the limit.
+        MeshError: If it is not a STEP file that can be read, or takes more time or memory than the limits.
     """
     data = content(path)
     if b"ISO-10303-21" not in data[:1024]:
@@ -51,7 +54,7 @@ def read_step(path: Path, *, time_limit_s: float = TIME_LIMIT_S) -> Mesh:
         glb = Path(folder) / "made.glb"
         try:
             done = subprocess.run(
-                [sys.executable, "-P", "-m", "robots.meshes.step", str(path), str(glb)],
+                [sys.executable, "-P", "-m", "robots.meshes.step", str(path), str(glb), str(memory_limit)],
                 capture_output=True,
                 timeout=time_limit_s,
                 check=False,
@@ -59,7 +62,14 @@ def read_step(path: Path, *, time_limit_s: float = TIME_LIMIT_S) -> Mesh:
         except subprocess.TimeoutExpired as error:
             raise MeshError(path, f"took Open CASCADE over {time_limit_s:.0f} s; it may be broken") from error
         if done.returncode in _ENDED_BY_MEMORY or _NO_MEMORY.search(done.stderr):
-            raise MeshError(path, f"needs more than {_MEMORY_LIMIT / 1024**3:g} GB of memory to read")
+            raise MeshError(path, f"needs more than {memory_limit / 1024**3:g} GB of memory to read")
+        if done.returncode == -signal.SIGSEGV:
+            # It does not look whether it was given the memory that it asked for.
+            raise MeshError(
+                path,
+                f"ended Open CASCADE: it needs more than {memory_limit / 1024**3:g} GB of memory to read, "
+                "or is damaged",
+            )
         if done.returncode or not glb.is_file():
             raise MeshError(path, f"is no STEP that can be read: {_said(done.stdout + done.stderr)}")
         mesh = read_trimesh(glb)
@@ -93,12 +103,12 @@ def _said(output: bytes) -> str:
 
 def main() -> None:
     """Convert one file; exit status 1 when nothing came of it."""
-    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_LIMIT, _MEMORY_LIMIT))
+    source, made, memory_limit = sys.argv[1], sys.argv[2], int(sys.argv[3])
+    resource.setrlimit(resource.RLIMIT_AS, (memory_limit, memory_limit))
     # Whoever started it may be gone by then.
     resource.setrlimit(resource.RLIMIT_CPU, (int(TIME_LIMIT_S), int(TIME_LIMIT_S)))
     import cascadio
 
-    source, made = sys.argv[1:]
     try:
         status = cascadio.step_to_glb(
             source,
@@ -110,15 +120,15 @@ def main() -> None:
         )
     except MemoryError:
         sys.exit(_OUT_OF_MEMORY)
-    if status and not _has_memory():
+    if status and not _has_memory(memory_limit):
         status = _OUT_OF_MEMORY
     sys.exit(status if status in (0, _OUT_OF_MEMORY) else 1)
 
 
-def _has_memory() -> bool:
+def _has_memory(limit: int) -> bool:
     """Return whether Open CASCADE, which says only that it failed, came nowhere near the limit."""
     most = int(Path("/proc/self/status").read_text().split("VmPeak:")[1].split()[0]) * 1024
-    return most < _NEAR * _MEMORY_LIMIT
+    return most < _NEAR * limit
 
 
 if __name__ == "__main__":

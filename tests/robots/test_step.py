@@ -164,6 +164,18 @@ def test_file_that_runs_without_end_is_stopped(tmp_path: Path) -> None:
         read_step(path, time_limit_s=3.0)
 
 
+@pytest.mark.parametrize("megabytes", [150, 300])
+@pytest.mark.slow
+def test_want_of_memory_is_told_as_that_and_not_as_a_file_without_a_model(
+    tmp_path: Path, megabytes: int
+) -> None:
+    path = tmp_path / "box.step"
+    path.write_text(step_box((1, 2, 3)))
+    # With so little it fails as it is loaded, or later and without a word.
+    with pytest.raises(MeshError, match=r"GB of memory|over 20 s"):
+        read_step(path, time_limit_s=20.0, memory_limit=megabytes << 20)
+
+
 @pytest.mark.parametrize("name", ["part.igs", "part.IGES"])
 def test_iges_is_refused_and_step_named(tmp_path: Path, name: str) -> None:
     with pytest.raises(MeshError, match="IGES is not read: export STEP"):
