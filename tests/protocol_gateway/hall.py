@@ -92,6 +92,24 @@ class Plant:
 
 
 @contextlib.asynccontextmanager
+async def kept_control(*plants):
+    """Meanwhile each one's operator renews control: however long the machine takes, it is not lost."""
+
+    async def renew():
+        while True:
+            for plant in plants:
+                await plant.lease(A.RENEW, ttl_s=5)
+            await asyncio.sleep(0.5)
+
+    renewing = asyncio.create_task(renew())
+    try:
+        yield
+    finally:
+        renewing.cancel()
+        await asyncio.gather(renewing, return_exceptions=True)
+
+
+@contextlib.asynccontextmanager
 async def simulator(**settings):
     """The port of a running simulated controller."""
     said = asyncio.get_running_loop().create_future()

@@ -18,7 +18,7 @@ from robots.schema import Pose, Units
 from services import site_fixtures
 from services.watch.rules import RULES
 from tests.conftest import run
-from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
+from tests.protocol_gateway.hall import STATE, A, C, gateway, kept_control, refusal, simulator, until
 from tests.robots.boxes import bar_arm
 
 # Beside the arm, which at home reaches out along x: waist at +90 degrees is in it.
@@ -52,6 +52,16 @@ async def checked(plant):
     """Wait until motions can be checked, and be homed."""
     await until(lambda: not plant.controller.check_text, timeout_s=60)
     await plant.home()
+
+
+@contextlib.asynccontextmanager
+async def all_checked(arm):
+    """The arm and the others of its hall, homed one after the other, and each under control to the end."""
+    async with contextlib.AsyncExitStack() as stack:
+        for plant in (arm, *arm.others):
+            await checked(plant)
+            await stack.enter_async_context(kept_control(plant))
+        yield arm, *arm.others
 
 
 async def move(plant, target):
@@ -224,12 +234,9 @@ def test_robots_of_a_cell_are_checked_where_they_are_and_where_they_have_been_to
         async with (
             simulator() as port,
             simulator() as other_port,
-            gateway(mesh, tmp_path, port, other_port, check="require", each=[{"cell": TWO}] * 2) as arm,
+            gateway(mesh, tmp_path, port, other_port, check="require", each=[{"cell": TWO}] * 2) as hall,
+            all_checked(hall) as (arm, other),
         ):
-            (other,) = arm.others
-            await checked(arm)
-            await checked(other)
-            await arm.lease(A.RENEW, ttl_s=5)
             await move(arm, OUT)
             # While it goes there, and when it is there, the other may not swing through it.
             text = await refusal(move(other, [radians(90), 0, 0, 0, 0]))
@@ -238,11 +245,8 @@ def test_robots_of_a_cell_are_checked_where_they_are_and_where_they_have_been_to
             text = await refusal(move(other, [radians(90), 0, 0, 0, 0]))
             assert "arm/" in text
             assert "arm-2/" in text
-            await arm.lease(A.RENEW, ttl_s=5)
             await move(arm, [radians(-90), 0, 0, 0, 0])
             await standing(arm, [radians(-90), 0, 0, 0, 0])
-            await arm.lease(A.RENEW, ttl_s=5)
-            await other.lease(A.RENEW, ttl_s=5)
             # Asked for at once, each good alone: whichever comes second is told of the first's way.
             answers = await asyncio.gather(
                 move(arm, OUT),

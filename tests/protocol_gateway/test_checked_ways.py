@@ -17,7 +17,7 @@ from robots.joints import joints_of
 from tests.conftest import run
 from tests.protocol_gateway.hall import A, C, gateway, simulator, until
 from tests.protocol_gateway.place import place
-from tests.protocol_gateway.test_checked_motion import OUT, TWO, checked, move, standing
+from tests.protocol_gateway.test_checked_motion import OUT, TWO, all_checked, move, standing
 from tests.protocol_gateway.test_program_runs import RUN, ended, start, states
 
 JOINTS = joints_of(load("pt600"))
@@ -81,16 +81,11 @@ def test_who_is_not_checked_himself_still_meets_nobody_who_is(mesh, tmp_path):
         async with (
             simulator() as port,
             simulator() as other_port,
-            gateway(mesh, tmp_path, port, other_port, each=policies) as arm,
+            gateway(mesh, tmp_path, port, other_port, each=policies) as hall,
+            all_checked(hall) as (arm, other),
         ):
-            (other,) = arm.others
-            await checked(arm)
-            await checked(other)
-            await arm.lease(A.RENEW, ttl_s=5)
             await move(arm, [radians(-90), 0, 0, 0, 0])
             await standing(arm, [radians(-90), 0, 0, 0, 0])
-            await arm.lease(A.RENEW, ttl_s=5)
-            await other.lease(A.RENEW, ttl_s=5)
             answers = await asyncio.gather(
                 move(other, [radians(90), 0, 0, 0, 0]), move(arm, OUT), return_exceptions=True
             )
