@@ -12,6 +12,7 @@ from typing import Protocol
 
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
+from bus.header import Header
 from bus.subscription import Sample
 from bus.topics import History, Topic
 
@@ -85,14 +86,17 @@ class RecentLane:
 
 
 class ListLane:
-    """Entries in order. The list that a publisher answered with stands for all before it."""
+    """Entries in order. The list that a publisher answered with stands for all before it.
+
+    One that the same publisher tells later, after an outage, holds only what is new, and goes on.
+    """
 
     def __init__(self) -> None:
         self._samples: deque[Sample] = deque(maxlen=LIST_LENGTH)
 
     def push(self, sample: Sample) -> None:
-        """Takes an entry, or a list that begins anew."""
-        if not sample.live:
+        """Takes an entry, or a list that begins anew or goes on."""
+        if not sample.live and not (self._samples and _goes_on(self._samples[-1].header, sample.header)):
             self._samples.clear()
         self._samples.append(sample)
 
@@ -103,6 +107,10 @@ class ListLane:
     def held(self) -> tuple[Sample, ...]:
         """All."""
         return tuple(self._samples)
+
+
+def _goes_on(before: Header, header: Header) -> bool:
+    return header.publisher == before.publisher and header.sequence > before.sequence
 
 
 class VideoLane:

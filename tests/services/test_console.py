@@ -232,6 +232,35 @@ def test_events_come_as_a_list_and_then_one_by_one(mesh, page):
     run(main())
 
 
+def test_events_that_an_outage_took_follow_those_before_also_for_who_comes_later(mesh, page):
+    def texts(browser):
+        return [
+            [event.text for event in schema.EventList.FromString(sample.payload).events]
+            for sample in browser.samples
+        ]
+
+    async def main():
+        async with console(mesh, page) as (address, other), browse(address) as browser:
+            publisher = other.declare_publisher("s", "r", "events")
+            for number in range(3):
+                publisher.put(schema.Event(text=f"{number}"))
+            await browser.watch("robomesh/s/r/events")
+            await browser.until(lambda: browser.samples)
+            for number in range(3, 5):  # nobody hears these
+                publisher._sequence += 1
+                header = publisher._history[-1][0]._replace(sequence=publisher._sequence)
+                publisher._history.append((header, schema.Event(text=f"{number}").SerializeToString()))
+            other.declare_presence("s", "r", "gateway")
+            await browser.until(lambda: len(browser.samples) >= 2)
+            assert texts(browser) == [["0", "1", "2"], ["3", "4"]]
+            async with browse(address) as later:
+                await later.watch("robomesh/s/r/events")
+                await later.until(lambda: len(later.samples) >= 2)
+                assert texts(later) == [["0", "1", "2"], ["3", "4"]]
+
+    run(main())
+
+
 def test_requests_are_passed_on_and_answered_and_refusals_come_in_words(mesh, page):
     async def main():
         async with console(mesh, page) as (address, other), browse(address) as browser:

@@ -70,12 +70,20 @@ def test_events_keep_their_order_and_are_bounded():
     assert numbers(lane) == list(range(800, 1000))
 
 
-def test_a_list_that_comes_again_stands_for_all_before_it():
+def test_a_list_of_another_publisher_stands_for_all_before_it():
     lane = lane_for(topics.topic("events"), hold=True)
     for number in range(5):
         lane.push(sample(number, topic="events"))
-    lane.push(sample(5, topic="events", live=False))
+    lane.push(replace(sample(5, topic="events", live=False), header=Header(2, 5, 0)))
     assert [each.header.sequence for each in lane.held()] == [5]
+
+
+def test_a_list_of_what_was_missed_in_an_outage_follows_what_came_before_it():
+    lane = lane_for(topics.topic("events"), hold=True)
+    for number in range(5):
+        lane.push(sample(number, topic="events"))
+    lane.push(sample(7, topic="events", live=False))
+    assert [each.header.sequence for each in lane.held()] == [0, 1, 2, 3, 4, 7]
 
 
 def test_video_begins_with_a_key_frame():

@@ -117,13 +117,20 @@ function useList<M extends Dated>(
 ): readonly M[] {
   const list = useMemo(() => signal<readonly M[]>([]), expressions);
   useEffect(() => {
-    const lists = new Map<string, { entries: readonly M[]; seen: Set<string> }>();
+    const lists = new Map<string, { entries: readonly M[]; seen: Set<string>; last: Sample }>();
     const take = (sample: Sample) => {
-      const told = (sample.live && lists.get(sample.key)) || { entries: [], seen: new Set() };
+      const before = lists.get(sample.key);
+      const entries = decode(sample);
+      const told = (before && goesOn(before.last, sample, entries.length) && before) || {
+        entries: [],
+        seen: new Set(),
+        last: sample,
+      };
       const id = `${sample.publisher}:${sample.sequence}`;
       if (told.seen.has(id)) return; // sent again after a new connection
       if (sample.live) told.seen.add(id);
-      told.entries = [...[...decode(sample)].reverse(), ...told.entries].slice(0, LIST_LENGTH);
+      told.last = sample;
+      told.entries = [...[...entries].reverse(), ...told.entries].slice(0, LIST_LENGTH);
       lists.set(sample.key, told);
       // The sort is stable: what one publisher told keeps its order.
       const merged = [...lists.values()].flatMap(({ entries }) => entries);
@@ -134,6 +141,12 @@ function useList<M extends Dated>(
     return () => stops.forEach((stop) => stop());
   }, [list]);
   return list.value;
+}
+
+/** Whether what a sample holds follows what came last; the list of a new connection has all of it again. */
+function goesOn(last: Sample, sample: Sample, count: number): boolean {
+  const more = sample.sequence - last.sequence;
+  return sample.live || (sample.publisher === last.publisher && more >= BigInt(count) && more > 0n);
 }
 
 /** Age [s] of a sample now; null: not known. */
