@@ -47,7 +47,9 @@ class Plant:
 
     @property
     def joints(self):
-        return [joint.position for joint in self.seen["joints"][-1].joints]
+        """The newest positions; none: nothing has come yet."""
+        states = self.seen.get("joints")
+        return [joint.position for joint in states[-1].joints] if states else []
 
     def events(self, code):
         return [event for event in self.seen["events"] if event.code == code]
@@ -187,6 +189,12 @@ async def watch(session, plant, topic):
             seen.extend(message.entries)
         else:
             seen.append(message)
+
+
+async def none_left_out(session, joints, robot):
+    """Whether all states that its controller sent have come over a subscription, however slow the machine."""
+    state = await session.last(f"robomesh/hall/{robot}/controller")
+    return (joints.lost(f"robomesh/hall/{robot}/joints"), state.counters.units_skipped) == (0, 0)
 
 
 async def refusal(awaitable):
