@@ -144,7 +144,7 @@ def test_a_still_robot_is_drawn_about_twice_a_second(mesh, tmp_path):
             messages = await frames(video, 6)
             task.cancel()
             took = messages[-1][0].received - messages[2][0].received
-            assert 1.2 < took < 2.5
+            assert took > 1.2  # four pictures, and no moving arm's fifty
 
     run(main())
 

@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import threading
-import time
 from types import SimpleNamespace
 
 import pytest
@@ -56,9 +55,7 @@ def test_a_hanging_worker_is_ended_and_the_next_request_is_answered(page):
     )
     asking.start()
     # Whoever types goes on meanwhile.
-    begun = time.monotonic()
     assert page.post("/check", draft).status == 200
-    assert time.monotonic() - begun < LIMITS.slow_s
     assert asking.is_alive()
     asking.join(30.0)
     assert (answers[0].status, answers[0].text) == (422, "this took more than 5 s and was ended")
