@@ -94,6 +94,13 @@ def degrees(page, joint):
     return float(text.replace("°", "").replace("−", "-"))
 
 
+def wait_to_move(page, joint, do):
+    """Do something, and wait until the joint is elsewhere: a short motion may be over before it is seen."""
+    before = page.locator(f'[data-joint="{joint}"]').inner_text()
+    do()
+    expect(page.locator(f'[data-joint="{joint}"]')).not_to_have_text(before)
+
+
 def audited(plant, request):
     """How many such requests the gateway wrote down."""
     text = (plant.audit / "hall" / "arm.jsonl").read_text() if (plant.audit / "hall").exists() else ""

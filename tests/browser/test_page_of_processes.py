@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import expect, sync_playwright
 
 from tests.browser.conftest import ARGUMENTS, CHROMIUM, NO_WEBGL, PATIENCE_MS
-from tests.browser.robot_page import button, degrees, drag, take
+from tests.browser.robot_page import button, degrees, drag, ready, take, wait_to_move
 from tests.site import kill, robomesh, running_site, wait_until
 
 pytestmark = [pytest.mark.browser, pytest.mark.processes]
@@ -28,17 +28,13 @@ def test_home_trace_move_and_stop_from_the_page_reach_the_controller_and_the_rec
         page = browser.new_page(viewport={"width": 1440, "height": 900})
         page.set_default_timeout(PATIENCE_MS)
         page.goto(f"{site.console}#/test/arm")
-        take(page)
-        button(page, "Home").click()
-        expect(page.locator(".headline .state")).to_have_text("Idle")
-        assert degrees(page, "shoulder") == pytest.approx(90.0, abs=0.02)
+        ready(page)
 
         button(page, "Trace on").click()
         expect(button(page, "Trace off")).to_be_visible()
         wait_until(lambda: recordings(site) and recordings(site)[0]["topics"], what="no recording began")
         before = degrees(page, "waist")
-        drag(page, "waist", 60)
-        expect(page.locator(".headline .state")).to_have_text("Moving")
+        wait_to_move(page, "waist", lambda: drag(page, "waist", 60))
         expect(page.locator(".headline .state")).to_have_text("Idle")
         assert degrees(page, "waist") > before + 5
 

@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.robot_page import ARM, audited, button, degrees, drag, ready, take
+from tests.browser.robot_page import ARM, HOME, audited, button, degrees, drag, ready, take, wait_to_move
 
 pytestmark = pytest.mark.browser
 
@@ -70,13 +70,12 @@ def test_a_slider_moves_the_joint_when_it_is_let_go_and_not_before(open_page, pl
 def test_a_target_that_homing_left_behind_moves_no_joint_that_nobody_touched(open_page, plant):
     page = open_page(ARM, drawn=False)
     ready(page)
-    drag(page, "waist", 60)
-    expect(page.locator(".headline .state")).to_have_text("Moving")
+    wait_to_move(page, "waist", lambda: drag(page, "waist", 60))
     button(page, "Home").click()
+    expect(page.locator("[data-joint]")).to_have_text(HOME)
     expect(page.locator(".headline .state")).to_have_text("Idle")
     home = degrees(page, "waist")
-    drag(page, "wrist", 20)
-    expect(page.locator(".headline .state")).to_have_text("Moving")
+    wait_to_move(page, "wrist", lambda: drag(page, "wrist", 20))
     expect(page.locator(".headline .state")).to_have_text("Idle")
     assert degrees(page, "waist") == pytest.approx(home, abs=0.02)
 
