@@ -125,7 +125,9 @@ def test_a_robot_of_another_protocol_is_shown_commanded_and_stopped_like_any_oth
             gateway(mesh, tmp_path, port, protocol="json") as plant,
         ):
             await until(lambda: plant.joints == [0.1] * 5)
-            assert (plant.controller.mode, plant.controller.homed) == (STATE.REMOTE, STATE.YES)
+            # Positions and state are two topics.
+            await until(lambda: plant.controller.mode == STATE.REMOTE)
+            assert plant.controller.homed == STATE.YES
             await plant.lease(A.ACQUIRE, ttl_s=5)
             target = [0.2, 1.0, -0.5, 0.1, 0.3]
             await plant.command(C.MOVE_ABSOLUTE, joint_positions=target)
