@@ -55,8 +55,8 @@ class LatchFile:
     """The latch file of one robot; its audit log's lock keeps other gateways away from it.
 
     Args:
-        first: Nothing was ever done for this robot, so a file that nothing was written to is no damage: a
-            gateway was killed as it began.
+        first: The robot's audit log is empty. An empty latch file is no damage then: a gateway was killed at
+            its first start.
 
     Attributes:
         found: What was there when it was opened; None: nothing.
@@ -191,7 +191,7 @@ class LatchFile:
     def _write_slot(self, state: LatchState) -> None:
         assert self._file is not None
         slot = (self._slot + 1) % SLOTS
-        line = _line(state, self._sequence + 1, owner(self.path))
+        line = _line(state, self._sequence + 1, _owner(self.path))
         if os.pwrite(self._file, line, slot * SLOT_BYTES) != SLOT_BYTES:
             raise OSError(errno.EIO, "Half of it was written")
         self._slot, self._sequence = slot, self._sequence + 1
@@ -218,8 +218,8 @@ def reason_of(error: Exception) -> str:
     return f"{error.strerror}: {'make space on its disk' if full else 'see to its disk'}"
 
 
-def owner(path: Path) -> str:
-    """Return whose a latch file is: site and robot."""
+def _owner(path: Path) -> str:
+    """Return the `site/robot` that the slots of a latch file name."""
     return f"{path.parent.name}/{path.stem}"
 
 
@@ -243,7 +243,7 @@ def _json(row: dict[str, Any]) -> bytes:
 
 
 class _Slot(NamedTuple):
-    """A whole slot; `of`: whose it is."""
+    """The content of an undamaged slot; `of`: its robot, as `site/robot`, empty in old files."""
 
     sequence: int
     of: str
@@ -264,7 +264,7 @@ def _read(path: Path, *, first: bool) -> tuple[LatchState | None, str, int, int]
     if first and not data.strip(b"\0"):
         return None, "", *nothing
     slots = [_parsed(part) for part in parts]
-    if any(slot is not None and slot.of not in ("", owner(path)) for slot in slots):
+    if any(slot is not None and slot.of not in ("", _owner(path)) for slot in slots):
         return None, f"its latch file {path.name} is another robot's", *nothing
     found = [(slot.sequence, place, slot.state) for place, slot in enumerate(slots) if slot is not None]
     # The first write goes to slot 0, the second to slot 1: a gateway was killed between them.
@@ -285,7 +285,7 @@ def _parsed(part: bytes) -> _Slot | None:
             return None
         stop = None if row["stop"] is None else Stop(**row["stop"])
         state = LatchState(stop=stop, last_stop_id=row["last_stop_id"], reserved=row["reserved"])
-        # Files of before 2026-11-23 do not say whose they are.
+        # Files that were written before 2026-11-23 name no robot.
         return _Slot(int(row["sequence"]), str(row.get("of", "")), state)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return None

@@ -183,7 +183,7 @@ class AuditLog:
             now_ns = time.time_ns()
             number = memory.last_stop_id + 1
             if self.latch.found is None:
-                # Which numbers were given out is not known: those of no disk are times.
+                # Which numbers were given out is not known. The time in microseconds is above all of them.
                 number = max(number, now_ns // 1000)
             memory, stop = with_stop(memory, number=number, by=GATEWAY, since_ns=now_ns, reason=reason)
             text = self.mended

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -122,7 +123,7 @@ def test_a_file_of_another_robot_is_damage(path):
     assert (latch.found, latch.damage) == (None, "its latch file other.latch is another robot's")
 
 
-def test_a_stop_of_the_last_moment_is_the_newest_in_the_file(path, monkeypatch):
+def test_a_stop_that_comes_while_the_file_is_closed_is_said_to_be_forgotten(path, monkeypatch):
     latch = LatchFile(path)
     latch.begin(None, 0, given_out=0)
     goes_on, begun, pwrite = threading.Event(), threading.Event(), os.pwrite
@@ -135,15 +136,19 @@ def test_a_stop_of_the_last_moment_is_the_newest_in_the_file(path, monkeypatch):
     monkeypatch.setattr(os, "pwrite", slow)
     latch.keep(None, 1)
     assert begun.wait(30.0)
+    latch.keep(stop(2), 2)
     closing = threading.Thread(target=latch.close)
     closing.start()
-    latch.keep(stop(2), 2)
+    while not latch._closed:
+        time.sleep(0.001)
+    latch.keep(stop(3), 3)
+    said = latch.problem
     goes_on.set()
     closing.join()
-    latch.keep(stop(3), 3)  # raises nothing
-    assert (
-        latch.problem.endswith("is closed: its gateway is being ended") or LatchFile(path).found.stop.id == 3
-    )
+    latch.keep(stop(4), 4)
+    for each in (said, latch.problem):
+        assert each.endswith("is closed: its gateway is being ended")
+    assert LatchFile(path).found.stop.id == 2
 
 
 @pytest.mark.parametrize("data", [b"x", b"{}\n", b"[" * 9000, b"\xff" * 8192, b'{"sha256":1}' + b" " * 4084])
