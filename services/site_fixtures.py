@@ -127,7 +127,7 @@ def fixture_shape(fixture: Fixture) -> Shape:
     color = None if fixture.color is None else rgb(fixture.color)
     if fixture.mesh is not None:
         scale = fixture.mesh_scale
-        # Like every file of a stranger's: what it refers to is read only from its own folder.
+        # Files that it refers to are read from its own folder only, as for every mesh from elsewhere.
         folder = fixture.mesh.absolute().parent
         return Shape(fixture.mesh, np.diag([scale, scale, scale, 1.0]), color, within=folder)
     rounder = 1.0 / math.cos(math.pi / _ROUND)
@@ -196,9 +196,10 @@ def fixture_problem(fixtures: tuple[Fixture, ...], links: dict[str, dict[str, bo
                 hint = nearest(link, links[robot])
                 return f"fixture {fixture.name}: ignore: {robot} has no link {link!r}{hint}"
         if fixture.mesh is not None:
+            shape = fixture_shape(fixture)
             try:
-                shapes_glb((fixture_shape(fixture),))
-                missing = _missing_part(fixture.mesh)
+                shapes_glb((shape,))
+                missing = _missing_part(fixture.mesh, shape.within)
             except MeshError as error:
                 return f"fixture {fixture.name}: mesh = {str(fixture.mesh)!r}: {error}"
             if missing:
@@ -209,11 +210,14 @@ def fixture_problem(fixtures: tuple[Fixture, ...], links: dict[str, dict[str, bo
     return None
 
 
-def _missing_part(mesh: Path) -> str:
-    """What a mesh file has in another file that is not there; only VRML does without it."""
+def _missing_part(mesh: Path, within: Path | None) -> str:
+    """Return a mesh file that this one refers to and that cannot be read; empty: there is none.
+
+    Only the VRML reader goes on without such a file; the others refuse the mesh.
+    """
     from robots.meshes.read import READERS, read_mesh
 
     if READERS.get(mesh.suffix.lower()) is not READERS[".wrl"]:
         return ""
-    missing = read_mesh(mesh, within=mesh.absolute().parent).missing
+    missing = read_mesh(mesh, within=within).missing
     return next((each for each in missing if Path(each).suffix.lower() in READERS), "")

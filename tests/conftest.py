@@ -16,8 +16,10 @@ from typing import Any, TypeVar
 
 import pytest
 import zenoh
+from google.protobuf.message import Message
 
 from bus.endpoints import router_config
+from bus.publisher import Publisher
 from bus.session import SessionSettings
 
 T = TypeVar("T")
@@ -66,6 +68,13 @@ def run(main: Coroutine[Any, Any, T], *, timeout_s: float = 60.0) -> T:
             return await main
 
     return asyncio.run(with_deadline())
+
+
+def put_unheard(publisher: Publisher, message: Message) -> None:
+    """Publish a message that reaches nobody, as in an outage; only the publisher's history has it."""
+    publisher._sequence += 1
+    header = publisher._history[-1][0]._replace(sequence=publisher._sequence)
+    publisher._history.append((header, message.SerializeToString()))
 
 
 @pytest.fixture(autouse=True)

@@ -19,10 +19,10 @@ from services.kinematics.questions import InverseQuestion, Question
 def begin(cells: tuple[CellDescription, ...]) -> Callable[[Question], bytes]:
     """What answers for the robots of these cells; of each as much is read as is asked for."""
     cell_of = {robot.name: cell for cell in cells for robot in cell.robots}
-    ready: dict[tuple[str, bool], Cell] = {}
+    ready: dict[tuple[CellDescription, bool], Cell] = {}
 
     def built(robot: str, exact: bool) -> Cell:
-        key = cell_of[robot].robots[0].name, exact
+        key = cell_of[robot], exact
         if key in ready:
             return ready[key]
         # A study may take longer than an answer may: it goes on beside this process.

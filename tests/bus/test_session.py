@@ -16,7 +16,7 @@ from bus.endpoints import client_config, router_config
 from bus.errors import NoAnswerError, RefusedError, SessionError
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import SessionSettings, open_session
-from tests.conftest import free_port, run
+from tests.conftest import free_port, put_unheard, run
 
 
 def joints(value: float) -> JointStates:
@@ -203,10 +203,8 @@ def test_what_an_outage_took_of_a_list_comes_with_the_answer_and_the_rest_is_cou
             publisher = gateway.declare_publisher("site", "arm", "events")
             publisher.put(schema.Event(code="1"))
             assert (await anext(subscription)).message().code == "1"
-            for number in range(2, 152):  # nobody hears these
-                publisher._sequence += 1
-                header = publisher._history[-1][0]._replace(sequence=publisher._sequence)
-                publisher._history.append((header, schema.Event(code=str(number)).SerializeToString()))
+            for number in range(2, 152):
+                put_unheard(publisher, schema.Event(code=str(number)))
             gateway.declare_presence("site", "arm", "gateway")
             sample = await anext(subscription)
             assert [event.code for event in sample.message().events] == [str(n) for n in range(52, 152)]

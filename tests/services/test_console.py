@@ -20,7 +20,7 @@ from services.console import feeds
 from services.console.console import Settings, serve
 from services.console.errors import PageNotBuiltError
 from services.errors import ListenError
-from tests.conftest import run
+from tests.conftest import put_unheard, run
 
 KEY_FRAME = b"\0\0\0\1\x67\x42\xc0\x1f\0\0\0\1\x65\x88"
 DELTA = b"\0\0\0\1\x41\x9a\x01"
@@ -246,10 +246,8 @@ def test_events_that_an_outage_took_follow_those_before_also_for_who_comes_later
                 publisher.put(schema.Event(text=f"{number}"))
             await browser.watch("robomesh/s/r/events")
             await browser.until(lambda: browser.samples)
-            for number in range(3, 5):  # nobody hears these
-                publisher._sequence += 1
-                header = publisher._history[-1][0]._replace(sequence=publisher._sequence)
-                publisher._history.append((header, schema.Event(text=f"{number}").SerializeToString()))
+            for number in range(3, 5):
+                put_unheard(publisher, schema.Event(text=f"{number}"))
             other.declare_presence("s", "r", "gateway")
             await browser.until(lambda: len(browser.samples) >= 2)
             assert texts(browser) == [["0", "1", "2"], ["3", "4"]]
