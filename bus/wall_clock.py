@@ -7,8 +7,8 @@ of one machine can be compared: `earliest_ns` of one is never after `latest_ns` 
 
 import time
 
-# A clock that is set by less than this does not begin another time: forward; and back, where stamps that
-# follow each other closely would change places.
+# Smaller steps of the wall clock begin no new identity. A step back counts sooner than one forward: stamps
+# that follow each other closely would change order.
 _SET_FORWARD_NS, _SET_BACK_NS = 1_000_000, 1_000
 _FIRST_READINGS = 30
 
@@ -21,7 +21,7 @@ class WallClock:
         self._least_ns, self._most_ns = min(readings, key=lambda reading: reading[1] - reading[0])
 
     def was_set(self) -> bool:
-        """Return whether the wall clock was set since the last call: forward by 1 ms, or back by 1 µs."""
+        """Return whether the wall clock was set since the last call: 1 ms forward or 1 µs back, at least."""
         least_ns, most_ns = _bracket()
         if least_ns <= self._most_ns and self._least_ns <= most_ns:
             self._least_ns, self._most_ns = max(self._least_ns, least_ns), min(self._most_ns, most_ns)

@@ -221,7 +221,7 @@ class Robot:
             await self._legacy.close()
         await self._programs.close()
         await self._control.close()
-        # What nobody could remember must not be answered.
+        # No stop or command is answered that can no longer be written down.
         for each in (self._stops, *self._asked):
             each.close()
         await self._audit.close()

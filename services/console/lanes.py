@@ -86,16 +86,16 @@ class RecentLane:
 
 
 class ListLane:
-    """Entries in order. The list that a publisher answered with stands for all before it.
+    """Entries in order. The list that a publisher answers with replaces all entries before it.
 
-    One that the same publisher tells later, after an outage, holds only what is new, and goes on.
+    After an outage `Subscription` cuts the list of the same publisher to its new entries: these are appended.
     """
 
     def __init__(self) -> None:
         self._samples: deque[Sample] = deque(maxlen=LIST_LENGTH)
 
     def push(self, sample: Sample) -> None:
-        """Takes an entry, or a list that begins anew or goes on."""
+        """Takes an entry, or a list."""
         if not sample.live and not (self._samples and _goes_on(self._samples[-1].header, sample.header)):
             self._samples.clear()
         self._samples.append(sample)
@@ -110,6 +110,7 @@ class ListLane:
 
 
 def _goes_on(before: Header, header: Header) -> bool:
+    """Whether a list holds only entries that are newer than the last sample."""
     return header.publisher == before.publisher and header.sequence > before.sequence
 
 

@@ -57,7 +57,7 @@ export const controlNotice = signal<Notice | null>(null);
 let renewing: ReturnType<typeof setTimeout> | undefined;
 let slowUntil = 0;
 let beatAt = performance.now();
-/** When this page did nothing for so long, newest last. */
+/** Recent gaps in which this page's timers did not run, newest last. */
 let gaps: { ms: number; endedAt: number }[] = [];
 let beginning = false;
 let offeredTo = "";

@@ -143,7 +143,8 @@ function useList<M extends Dated>(
   return list.value;
 }
 
-/** Whether what a sample holds follows what came last; the list of a new connection has all of it again. */
+/** Whether a sample's entries follow the last sample's. A list after an outage holds only new entries; a list over a
+ * new connection holds all of them again. */
 function goesOn(last: Sample, sample: Sample, count: number): boolean {
   const more = sample.sequence - last.sequence;
   return sample.live || (sample.publisher === last.publisher && more >= BigInt(count) && more > 0n);
