@@ -3,6 +3,7 @@
 import asyncio
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -81,6 +82,16 @@ class Plant:
     def call(self, work):
         """What a coroutine returns, run in the plant's thread."""
         return asyncio.run_coroutine_threadsafe(work, self.loop).result(20)
+
+    @contextmanager
+    def standing_still(self):
+        """Nothing of the site goes on."""
+        go_on = threading.Event()
+        self.loop.call_soon_threadsafe(go_on.wait)
+        try:
+            yield
+        finally:
+            go_on.set()
 
     def start_controller(self, name, port=0, **settings):
         async def start():

@@ -103,6 +103,21 @@ def test_taking_over_needs_a_reason_which_the_loser_is_told(open_arm):
     button(bob, "Release").click()
 
 
+def test_a_question_stays_while_it_is_not_known_who_is_in_control(open_arm, plant):
+    alice, bob = open_arm(), open_arm()
+    take(alice, "alice")
+    bob.get_by_label("Your name").fill("bob")
+    button(bob, "Take over…").click()
+    bob.get_by_label("Reason").fill("smoke at the gripper")
+    with plant.standing_still():
+        expect(bob.locator(".holder")).to_have_text("Who is in control is not known")
+        expect(bob.get_by_label("Reason")).to_have_value("smoke at the gripper")
+    expect(bob.locator(".holder")).not_to_have_text("Who is in control is not known")
+    expect(bob.get_by_label("Reason")).to_be_focused()
+    bob.keyboard.press("Escape")
+    expect(button(bob, "Take over…")).to_be_focused()
+
+
 def test_a_running_motion_is_not_handed_over_but_stopped_by_a_take_over(open_arm):
     alice, bob = open_arm(), open_arm()
     ready(alice, "alice")

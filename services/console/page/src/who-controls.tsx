@@ -48,7 +48,8 @@ export function WhoControls(props: {
 }) {
   const { robotKey, lease } = props;
   const mine = holds(robotKey);
-  const other = (!mine && props.holder) || "";
+  // While it is not known who is in control, the buttons stay as they were: none changes under the pointer.
+  const other = (!mine && (props.holder ?? lease?.holder)) || "";
   const [sheet, setSheet] = useState<"ask" | "take" | null>(null);
   // What it says of somebody is not asked of somebody else.
   useEffect(() => setSheet(null), [other, ms(lease?.since)]);
