@@ -40,7 +40,8 @@ class Sample:
 
     Attributes:
         live: Published since we listen; False: an answer to "what is the last value?", whose age
-            nobody knows. It then has the topic's history schema, where there is one.
+            nobody knows. It then has the topic's history schema, where there is one. A value that is
+            published while it is answered may come twice: first as the answer, then live.
         received: When, on this process's monotonic clock [s].
         late_s: How much longer it was on its way than its publisher's quickest: its age when it came [s].
     """
@@ -73,6 +74,7 @@ class _Seen:
     """What is known of one key."""
 
     header: Header
+    answered: bool = False  # the newest sample was an answer
     lateness: Lateness = field(default_factory=Lateness)
     live_at: float | None = None
     came_at: float = 0.0
@@ -281,7 +283,11 @@ class Subscription:
         elif header.publisher != seen.header.publisher:
             if asked_at is not None and seen.live_at is not None and seen.live_at > asked_at:
                 return  # an answer overtaken by what came live meanwhile
-        elif header.sequence <= seen.header.sequence:
+        elif header.sequence == seen.header.sequence:
+            # An answer may overtake the publication of the same value.
+            if not (asked_at is None and seen.answered and self.topic.history is History.LAST):
+                return
+        elif header.sequence < seen.header.sequence:
             return
         else:
             gap = header.sequence - seen.header.sequence
@@ -292,7 +298,7 @@ class Subscription:
                 seen.lost += gap - new
             else:
                 seen.lost += gap - 1
-        seen.header, seen.came_at = header, now
+        seen.header, seen.came_at, seen.answered = header, now, asked_at is not None
         self._received += 1
         late_s = 0.0
         if asked_at is None:

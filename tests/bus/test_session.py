@@ -14,6 +14,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from bus.answering import Request
 from bus.endpoints import client_config, router_config
 from bus.errors import NoAnswerError, RefusedError, SessionError
+from bus.header import pack
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import SessionSettings, open_session
 from tests.conftest import free_port, put_unheard, run
@@ -46,6 +47,30 @@ def test_what_is_put_arrives_with_key_number_and_source_time(mesh):
             assert second.header.sequence == first.header.sequence + 1
             assert second.header.publisher == first.header.publisher
             assert subscription.age_s(first.key) < 5.0
+
+    run(main())
+
+
+def test_a_value_that_is_published_while_it_is_answered_is_live(mesh):
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            publisher = gateway.declare_publisher("site", "arm", "joints")
+            publisher.put(joints(1.0))
+            # As in the middle of `put`: what is about to be published is answered already.
+            put_unheard(publisher, joints(2.0))
+            subscription = monitor.subscribe("robomesh/site/arm/joints")
+            answer = await anext(subscription)
+            assert (answer.live, answer.message()) == (False, joints(2.0))
+            for _ in range(2):
+                publisher._publisher.put(answer.payload, attachment=pack(answer.header))
+            publisher.put(joints(3.0))
+            came = [await anext(subscription) for _ in range(2)]
+            assert [(each.live, each.message()) for each in came] == [
+                (True, joints(2.0)),
+                (True, joints(3.0)),
+            ]
+            assert subscription.age_s(answer.key) is not None
+            assert subscription.lost(answer.key) == 0
 
     run(main())
 
