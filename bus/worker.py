@@ -81,12 +81,15 @@ class Worker:
 
     async def close(self) -> None:
         """End the process."""
-        process, self._process = self._process, None
+        process = self._process
         if process is None:
             return
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
+        # Kept until it has ended: the wait may be cancelled, and then another caller of `close` waits.
         await process.wait()
+        if self._process is process:
+            self._process = None
 
     async def _started(self) -> asyncio.subprocess.Process:
         if self._process is not None and self._process.returncode is None:

@@ -231,6 +231,8 @@ async def _standing_by(program: Program, running: dict[str, _Running]) -> AsyncI
     finally:
         if task is not None:
             task.cancel()
+            # A spare that is being started is killed and waited for.
+            await asyncio.gather(task, return_exceptions=True)
 
 
 def _spare(program: Program) -> str:

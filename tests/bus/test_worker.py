@@ -107,6 +107,22 @@ def test_the_answer_to_somebody_who_is_gone_is_not_given_to_the_next():
 
 
 @pytest.mark.slow
+def test_close_waits_for_a_process_that_another_caller_began_to_end():
+    async def main():
+        async with running() as worker:
+            await worker.start()
+            process = psutil.Process(worker.pid)
+            first = asyncio.create_task(worker.close())
+            await asyncio.sleep(0)
+            first.cancel()
+            await worker.close()
+            assert not process.is_running()  # a zombie runs
+            await asyncio.gather(first, return_exceptions=True)
+
+    run(main())
+
+
+@pytest.mark.slow
 def test_questions_wait_for_each_other_and_waiting_counts():
     async def main():
         async with running() as worker:

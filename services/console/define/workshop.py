@@ -133,14 +133,17 @@ class Worker:
         return process
 
     async def _end(self) -> int | None:
-        process, self._process = self._process, None
+        process, temporary = self._process, self._temporary
         if process is None:
             return None
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
+        # Kept until it has ended: the wait may be cancelled, and then another caller of `close` waits.
         status = await process.wait()
-        if self._temporary is not None:
-            await asyncio.to_thread(shutil.rmtree, self._temporary, ignore_errors=True)
+        if self._process is process:
+            self._process = None
+        if temporary is not None:
+            await asyncio.to_thread(shutil.rmtree, temporary, ignore_errors=True)
         return status
 
 
