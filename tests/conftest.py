@@ -20,7 +20,7 @@ from google.protobuf.message import Message
 
 from bus.endpoints import router_config
 from bus.publisher import Publisher
-from bus.session import SessionSettings
+from bus.session import Session, SessionSettings
 
 T = TypeVar("T")
 
@@ -68,6 +68,13 @@ def run(main: Coroutine[Any, Any, T], *, timeout_s: float = 60.0) -> T:
             return await main
 
     return asyncio.run(with_deadline())
+
+
+async def last_value(session: Session, key: str) -> Any:
+    """Return the last value of a key; ask again where a busy machine did not answer in time."""
+    while (value := await session.last(key)) is None:
+        pass
+    return value
 
 
 def put_unheard(publisher: Publisher, message: Message) -> None:

@@ -13,6 +13,7 @@ from bus.session import open_session
 from services.console import build_page
 from tests.browser.conftest import CHROMIUM
 from tests.browser.robot_page import serious
+from tests.conftest import last_value
 from tests.site import READY_S, running_site
 
 pytestmark = pytest.mark.browser
@@ -64,7 +65,7 @@ def told(plant, topic):
 
     async def heard():
         async with open_session(plant.site.mesh) as session:
-            return await session.last(f"robomesh/test/arm/{topic}")
+            return await last_value(session, f"robomesh/test/arm/{topic}")
 
     # Playwright's own loop runs in this thread.
     with ThreadPoolExecutor() as threads:

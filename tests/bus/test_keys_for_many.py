@@ -11,7 +11,7 @@ from bus.last_values import last_values
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import open_session
 from tests.bus.test_session import joints, until
-from tests.conftest import run
+from tests.conftest import last_value, run
 
 JOINTS = joints(7.0).SerializeToString()
 STOP = schema.StopAnswer(stop_id=666).SerializeToString()
@@ -48,7 +48,7 @@ def test_samples_answers_and_tokens_on_keys_for_many_are_left_out(mesh):
                 assert await last_values(monitor, "robomesh/*/*/joints") == {
                     "robomesh/site/arm/joints": joints(1.0)
                 }
-                assert await monitor.last("robomesh/site/arm/joints") == joints(1.0)
+                assert await last_value(monitor, "robomesh/site/arm/joints") == joints(1.0)
                 token.undeclare()
                 present.undeclare()
 

@@ -10,7 +10,7 @@ from bus.endpoints import Tls, router_config
 from bus.errors import SessionError
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import SessionSettings, open_session
-from tests.conftest import free_port, run
+from tests.conftest import free_port, last_value, run
 
 
 def certificates(authority: trustme.CA, folder: Path, name: str) -> Tls:
@@ -36,7 +36,7 @@ def test_with_certificates_of_one_authority_data_flows_and_without_one_nobody_ge
             async with open_session(settings) as one, open_session(settings) as other:
                 publisher = one.declare_publisher("site", "arm", "description")
                 publisher.put(schema.Description(name="pt600"))
-                message = await other.last("robomesh/site/arm/description")
+                message = await last_value(other, "robomesh/site/arm/description")
                 assert message.name == "pt600"
             stranger = certificates(trustme.CA(), strangers, "stranger")
             for tls, why in ((None, "it needs one"), (stranger, "does not vouch for")):

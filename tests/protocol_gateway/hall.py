@@ -12,6 +12,7 @@ from bus.session import open_session
 from protocol_gateway.gateway import RobotSettings, Settings, serve
 from services.simulator.simulator import Settings as SimulatorSettings
 from services.simulator.simulator import serve as simulate
+from tests.conftest import last_value
 
 C = schema.CommandRequest.Command
 A = schema.LeaseRequest.Action
@@ -193,7 +194,7 @@ async def watch(session, plant, topic):
 
 async def none_left_out(session, joints, robot):
     """Whether all states that its controller sent have come over a subscription, however slow the machine."""
-    state = await session.last(f"robomesh/hall/{robot}/controller")
+    state = await last_value(session, f"robomesh/hall/{robot}/controller")
     return (joints.lost(f"robomesh/hall/{robot}/joints"), state.counters.units_skipped) == (0, 0)
 
 

@@ -10,7 +10,7 @@ from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.log import read_entries, verify
 from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.gateway import RobotSettings, Settings, check
-from tests.conftest import run
+from tests.conftest import last_value, run
 from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
 
 TARGET = [0.3, 0.2, -0.2, 0.1, 0.5]
@@ -284,7 +284,7 @@ def test_a_gateway_that_ends_stops_the_motion_and_one_that_begins_remembers_the_
                 # The stop was sent again, and that is the log's last entry.
                 await until(lambda: [e.request for e in read_entries(plant.audit)][-1] == "STOP_AGAIN")
                 await until(lambda: plant.seen["audit"] and plant.seen["audit"][-1].request == "STOP_AGAIN")
-                told = await plant.session.last(plant.key("audit"))
+                told = await last_value(plant.session, plant.key("audit"))
                 written = [entry.hash for entry in read_entries(plant.audit)]
                 assert [entry.hash.hex() for entry in told.entries] == written
                 assert plant.joints[0] < 2.0

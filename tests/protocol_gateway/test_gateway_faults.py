@@ -14,7 +14,7 @@ from bus.endpoints import router_config
 from bus.session import SessionSettings
 from protocol_gateway.audit.log import read_entries
 from protocol_gateway.robot import Robot
-from tests.conftest import free_port, run
+from tests.conftest import free_port, last_value, run
 from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
 
 FAR = [2.4, 0.2, -0.2, 0.1, 0.5]
@@ -105,7 +105,7 @@ def test_without_its_router_the_gateway_still_stops_a_motion_whose_operator_is_g
 def test_one_robots_dead_controller_does_not_hurt_another(mesh, tmp_path):
     async def main():
         async with simulator(demo=True) as alive, gateway(mesh, tmp_path, alive, free_port()) as plant:
-            other = await plant.session.last("robomesh/hall/arm-2/controller")
+            other = await last_value(plant.session, "robomesh/hall/arm-2/controller")
             assert other.link == STATE.DOWN
             await until(lambda: len(plant.seen["joints"]) > 100)
             assert plant.controller.counters.connections == 1

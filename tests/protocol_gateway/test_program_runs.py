@@ -6,8 +6,8 @@ import json
 import os
 import signal
 from math import radians
-from pathlib import Path
 
+import psutil
 import pytest
 from google.protobuf.timestamp_pb2 import Timestamp
 
@@ -224,7 +224,7 @@ def test_a_program_that_is_given_up_on_hold_between_two_motions_goes_on_no_more(
 @contextlib.contextmanager
 def slow_check():
     """The processes that plan are stopped, so that a check takes as long as the test likes."""
-    workers = children()
+    workers = [each.pid for each in psutil.Process().children()]
     for each in workers:
         os.kill(each, signal.SIGSTOP)
     try:
@@ -232,15 +232,6 @@ def slow_check():
     finally:
         for each in workers:
             os.kill(each, signal.SIGCONT)
-
-
-def children():
-    """Processes that this one has begun."""
-    return [
-        int(number)
-        for thread in Path("/proc/self/task").iterdir()
-        for number in (thread / "children").read_text().split()
-    ]
 
 
 async def planned(plant):

@@ -21,7 +21,7 @@ from robots.cells import Fixture
 from services.site_fixtures import Fixture as FixtureRow
 from services.site_fixtures import fixture_shape
 from tests.cells import arm_alone
-from tests.conftest import run
+from tests.conftest import last_value, run
 from tests.renderer.hall import HOME, SIZE, amber, frames, hall, joints, moving, orange, picture
 
 
@@ -54,7 +54,7 @@ def test_a_joiner_gets_the_frames_since_the_last_key_frame(mesh, tmp_path):
         async with hall(mesh, tmp_path) as (robot, monitor), moving(robot):
             await frames(monitor.subscribe("robomesh/hall/arm/video/front", newest=100, history=False), 10)
             # The last key frame may have been a moment ago.
-            while len((since := await monitor.last("robomesh/hall/arm/video/front")).frames) < 5:
+            while len((since := await last_value(monitor, "robomesh/hall/arm/video/front")).frames) < 5:
                 assert isinstance(since, VideoFrames)
             decoder = av.CodecContext.create("h264", "r")
             decoder.thread_count = 1
@@ -365,7 +365,7 @@ def test_a_robot_that_goes_while_it_is_drawn_leaves_no_encoder_behind(mesh, tmp_
     async def main():
         async with hall(mesh, tmp_path) as (_, monitor), open_session(mesh) as player:
             await picture(monitor)
-            replayed = await monitor.last("robomesh/hall/arm/description")
+            replayed = await last_value(monitor, "robomesh/hall/arm/description")
             replayed.replay.id = "x"
             token = player.declare_presence_of("hall", "replay-x", "player", "1")
             player.declare_publisher("hall", "replay-x", "description").put(replayed)

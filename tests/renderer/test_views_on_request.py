@@ -21,7 +21,7 @@ from bus.schemas.robomesh_pb2 import (
 from bus.session import open_session
 from renderer import service
 from renderer.mp4 import FragmentedMp4
-from tests.conftest import run
+from tests.conftest import last_value, run
 from tests.renderer.hall import frames, hall, moving, picture
 
 ARM = "robomesh/hall/arm"
@@ -135,7 +135,7 @@ def test_a_robot_that_cannot_be_drawn_takes_no_other_robot_s_pictures(mesh, tmp_
     async def main():
         async with hall(mesh, tmp_path) as (robot, monitor), moving(robot):
             await picture(monitor)
-            known = await monitor.last(f"{ARM}/description")
+            known = await last_value(monitor, f"{ARM}/description")
             assert isinstance(known, Description)
             broken = Description()
             broken.CopyFrom(known)
@@ -152,7 +152,7 @@ def test_a_replay_is_drawn_as_one_and_forgotten_with_its_player(mesh, tmp_path, 
     async def main():
         async with hall(mesh, tmp_path) as (robot, monitor), moving(robot), open_session(mesh) as player:
             await picture(monitor)
-            live = await monitor.last(f"{ARM}/description")
+            live = await last_value(monitor, f"{ARM}/description")
             assert isinstance(live, Description)
             live.replay.id = "x"
             token = player.declare_presence_of("hall", "replay-x", "player", "1")

@@ -19,7 +19,7 @@ from robots.poses import rpy_rotation
 from services import kinematics
 from services.kinematics.states import frames_message, kinematic_state, quaternions
 from tests.cells import arm_alone
-from tests.conftest import run
+from tests.conftest import last_value, run
 
 angles = st.floats(-np.pi, np.pi)
 
@@ -138,7 +138,7 @@ def states_of(positions) -> JointStates:
 def test_the_description_names_meshes_that_are_answered_as_glb(mesh):
     async def main():
         async with served(mesh) as session:
-            description = await session.last("robomesh/hall/arm/description")
+            description = await last_value(session, "robomesh/hall/arm/description")
             assert description.joints[0].name == "waist"
             assert description.provenance.startswith("nominal")
             assert "<robot" in description.urdf

@@ -20,7 +20,7 @@ from services.kinematics import answers
 from services.kinematics.place import Place
 from services.site_fixtures import Fixture as FixtureRow
 from services.site_fixtures import fixture_shape
-from tests.conftest import run
+from tests.conftest import last_value, run
 from tests.site import alive
 
 NAMES = ("waist", "shoulder", "elbow", "wrist", "roll")
@@ -97,7 +97,7 @@ def test_the_description_tells_what_stands_in_the_cell_with_meshes_that_are_answ
     async def main():
         async with hall(mesh) as (_, monitor):
             for robot in ("left", "right"):
-                description = await monitor.last(f"robomesh/hall/{robot}/description", timeout_s=10.0)
+                description = await last_value(monitor, f"robomesh/hall/{robot}/description")
                 (fixture,) = description.fixtures
                 assert (fixture.name, fixture.color, description.cell) == ("post", "#c9a227", "a")
                 assert fixture.fixture_to_site == at(0.6, 0.0, 0.5).ravel().tolist()
@@ -153,7 +153,7 @@ def test_an_arm_that_comes_near_a_post_is_an_event_that_late_joiners_hear_of(mes
             await until(monitor, "events/kinematics", lambda m: m.code == "kinematics.clearance.stop")
             places["left"] = HOME
             await until(monitor, "events/kinematics", lambda m: m.code == "kinematics.clearance.stop.over")
-            events = (await monitor.last("robomesh/hall/left/events/kinematics")).events
+            events = (await last_value(monitor, "robomesh/hall/left/events/kinematics")).events
             told = [(event.severity, event.code) for event in events if "clearance" in event.code]
             assert told == [
                 (schema.Event.WARNING, "kinematics.clearance.warning"),

@@ -16,7 +16,7 @@ from bus.schemas import robomesh_pb2 as schema
 from bus.session import open_session
 from services import player, recorder
 from services.command_line import listing, monitor
-from tests.conftest import run
+from tests.conftest import last_value, run
 from tests.recordings import START_NS, Written, joints, write_recording
 
 _Ask, _Record = schema.ReplayRequest, schema.RecorderRequest
@@ -129,8 +129,8 @@ def test_a_late_joiner_learns_what_the_replay_is_and_has_its_meshes(mesh, folder
         async with playing_site(mesh, folder) as session:
             state = await opened(session, paused=True, position_s=2.5)
             robot = f"robomesh/site/{state.robot}"
-            description = await session.last(f"{robot}/description")
-            events = await session.last(f"{robot}/events")
+            description = await last_value(session, f"{robot}/description")
+            events = await last_value(session, f"{robot}/events")
             mesh_bytes = await session.ask_bytes(f"{robot}/mesh/base")
             with pytest.raises(RefusedError, match="it has mesh/base"):
                 await session.ask_bytes(f"{robot}/mesh/none", timeout_s=8.0)
@@ -154,13 +154,13 @@ def test_seeking_shows_what_was_so_then_and_video_from_the_key_frame_before(mesh
             robot = f"robomesh/site/{state.robot}"
             await ask(session, state, _Ask.SEEK, position_s=3.204)
             async with asyncio.timeout(40):
-                while (message := await session.last(f"{robot}/joints")).joints[0].position != 3.2:
+                while (message := await last_value(session, f"{robot}/joints")).joints[0].position != 3.2:
                     await asyncio.sleep(0.02)
-            video = await session.last(f"{robot}/video/recorded-front")
-            events = await session.last(f"{robot}/events")
+            video = await last_value(session, f"{robot}/video/recorded-front")
+            events = await last_value(session, f"{robot}/events")
             await ask(session, state, _Ask.SEEK, position_s=1.0)
             async with asyncio.timeout(40):
-                while len((await session.last(f"{robot}/events")).events) > 2:
+                while len((await last_value(session, f"{robot}/events")).events) > 2:
                     await asyncio.sleep(0.02)
             with pytest.raises(RefusedError, match=r"position 99 s: from 0 to 3\.990 s is right"):
                 await ask(session, state, _Ask.SEEK, position_s=99)

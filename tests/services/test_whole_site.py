@@ -16,7 +16,7 @@ from mcap.reader import make_reader
 from bus.errors import RefusedError
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import open_session
-from tests.conftest import free_port, run
+from tests.conftest import free_port, last_value, run
 from tests.site import ONE_ARM, alive, kill, robomesh, running_site, site_file, wait_until
 
 pytestmark = pytest.mark.processes
@@ -123,7 +123,7 @@ def test_home_brings_the_joints_home(site):
 
     async def main():
         async with open_session(site.mesh) as session:
-            description = await session.last("robomesh/test/arm/description")
+            description = await last_value(session, "robomesh/test/arm/description")
             homes = [degrees(joint.home) for joint in description.joints]
             assert await last_positions(session) == pytest.approx(homes, abs=0.02)
 
@@ -208,7 +208,7 @@ def test_a_move_beyond_a_limit_is_refused_in_words_and_audited(site):
 
     async def main():
         async with open_session(site.mesh) as session:
-            audit = await session.last("robomesh/test/arm/audit")
+            audit = await last_value(session, "robomesh/test/arm/audit")
             entry = next(entry for entry in reversed(audit.entries) if entry.request == "MOVE_ABSOLUTE")
             assert entry.outcome == schema.AuditEntry.REFUSED
             assert "110.00°" in entry.text
