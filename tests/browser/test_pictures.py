@@ -16,6 +16,7 @@ from services.site_fixtures import fixture_shape, fixture_to_site
 from tests.browser.crowd import crowd
 from tests.browser.rendering import rendering
 from tests.browser.robot_page import take
+from tests.site import wait_until
 
 pytestmark = pytest.mark.browser
 
@@ -81,8 +82,9 @@ def test_the_page_shows_the_arm_moving_in_3d_and_as_video(open_page, rendered):
     if WANTED:
         page.screenshot(path=PICTURE)
         assert PICTURE.stat().st_size < LARGEST_BYTES
-    assert orange(page.locator(".canvas-place").screenshot()) > 4000
-    assert orange(page.locator(".camera .picture").screenshot()) > 1000
+    for place, least in ((".canvas-place", 4000), (".camera .picture", 1000)):
+        # What is stale for a moment has no colour.
+        wait_until(lambda place=place, least=least: orange(page.locator(place).screenshot()) > least)
 
 
 COLLIDING = """# Down to the bench, and too far
