@@ -9,6 +9,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import AsyncIterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -29,6 +30,8 @@ from bus.topics import History, Topic, topic
 _ZENOH_RING = 1024
 # Services of one robot come alive together: one question for all of them.
 _ASK_AGAIN_AFTER_S = 0.1
+# So long an answer waits for the live samples that it has overtaken.
+_EARLY_S = 0.5
 # Of rows with a key for each process, or view: whose nothing came for so long has gone.
 _FORGOTTEN_AFTER_S = 3600.0
 _LOOK_EACH_S = 60.0
@@ -223,11 +226,23 @@ class Subscription:
 
         def on_end() -> None:
             with self._lock:
+                early = [reply for reply in replies if self._is_early(reply)]
                 for reply in replies:
-                    self._take(reply, asked_at=asked_at)
+                    if reply not in early:
+                        self._take(reply, asked_at=asked_at)
                 held, self._held = self._held, None
                 for sample in held or ():
                     self._take(sample)
+            self._wake()
+            if early and not self._loop.is_closed():
+                self._loop.call_soon_threadsafe(self._loop.call_later, _EARLY_S, take_late, early)
+
+        def take_late(early: list[zenoh.Sample]) -> None:
+            if self._closed:
+                return
+            with self._lock:
+                for reply in early:
+                    self._take(reply, asked_at=asked_at)
             self._wake()
 
         settle(self._session, self.topic.priority)
@@ -241,6 +256,16 @@ class Subscription:
             priority=getattr(zenoh.Priority, self.topic.priority.value),
             timeout=2.0,
         )
+
+    def _is_early(self, reply: zenoh.Sample) -> bool:
+        """Return whether live samples that an answer has overtaken may still arrive (the lock is held)."""
+        seen = self._seen.get(str(reply.key_expr))
+        if seen is None or seen.live_at is None or self.topic.history is not History.LAST:
+            return False
+        with suppress(MessageError):
+            header = unpack(b"" if reply.attachment is None else reply.attachment.to_bytes())
+            return header.publisher == seen.header.publisher and header.sequence > seen.header.sequence
+        return False
 
     def _read(self) -> None:
         try:

@@ -11,6 +11,7 @@ import pytest
 import zenoh
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
+from bus import subscription as subscription_module
 from bus.answering import Request
 from bus.endpoints import client_config, router_config
 from bus.errors import NoAnswerError, RefusedError, SessionError
@@ -71,6 +72,40 @@ def test_a_value_that_is_published_while_it_is_answered_is_live(mesh):
             ]
             assert subscription.age_s(answer.key) is not None
             assert subscription.lost(answer.key) == 0
+
+    run(main())
+
+
+def test_live_samples_that_an_answer_overtakes_are_not_lost(mesh, monkeypatch):
+    monkeypatch.setattr(subscription_module, "_EARLY_S", 3.0)
+
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            publisher = gateway.declare_publisher("site", "arm", "joints")
+            states = monitor.subscribe("robomesh/site/arm/joints")
+            await until(lambda: publisher.watched)
+            publisher.put(joints(1.0))
+            first = await anext(states)
+            for value in (2.0, 3.0, 4.0):
+                put_unheard(publisher, joints(value))
+            is_early, loop, answered = states._is_early, asyncio.get_running_loop(), asyncio.Event()
+
+            def read_answer(reply):
+                loop.call_soon_threadsafe(answered.set)
+                return is_early(reply)
+
+            states._is_early = read_answer
+            states.refresh("site", "arm")
+            await answered.wait()
+            for more, value in ((1, 2.0), (2, 3.0)):
+                header = first.header._replace(sequence=first.header.sequence + more)
+                publisher._publisher.put(joints(value).SerializeToString(), attachment=pack(header))
+            came = [await anext(states) for _ in range(3)]
+            # The last one never comes live: then the answer counts.
+            assert [(each.live, each.message().joints[0].position) for each in came] == [
+                *((True, 2.0), (True, 3.0), (False, 4.0))
+            ]
+            assert states.lost(first.key) == 0
 
     run(main())
 
