@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import expect, sync_playwright
 
 from tests.browser.conftest import ARGUMENTS, CHROMIUM, NO_WEBGL, PATIENCE_MS
-from tests.browser.robot_page import button, degrees, drag, ready, take, wait_to_move
+from tests.browser.robot_page import button, degrees, drag, ready, sent, take, wait_to_move
 from tests.site import kill, robomesh, running_site, wait_until
 
 pytestmark = [pytest.mark.browser, pytest.mark.processes]
@@ -30,7 +30,7 @@ def test_home_trace_move_and_stop_from_the_page_reach_the_controller_and_the_rec
         page.goto(f"{site.console}#/test/arm")
         ready(page)
 
-        button(page, "Trace on").click()
+        sent(page, button(page, "Trace on").click)
         expect(button(page, "Trace off")).to_be_visible()
         wait_until(lambda: recordings(site) and recordings(site)[0]["topics"], what="no recording began")
         before = degrees(page, "waist")
@@ -44,7 +44,7 @@ def test_home_trace_move_and_stop_from_the_page_reach_the_controller_and_the_rec
         expect(page.locator(".headline .state")).to_have_text("Stopped")
         page.get_by_role("button", name="Reset stop").click()
         expect(page.locator(".stopped")).to_have_count(0)
-        button(page, "Trace off").click()
+        sent(page, button(page, "Trace off").click)
         wait_until(lambda: not recordings(site)[0]["open"], what="the recording did not close")
         button(page, "Release").click()
         browser.close()
