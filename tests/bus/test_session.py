@@ -59,7 +59,7 @@ def test_a_value_that_is_published_while_it_is_answered_is_live(mesh):
             publisher.put(joints(1.0))
             # As in the middle of `put`: what is about to be published is answered already.
             put_unheard(publisher, joints(2.0))
-            subscription = monitor.subscribe("robomesh/site/arm/joints")
+            subscription = monitor.subscribe("robomesh/site/arm/joints", newest=10)
             answer = await anext(subscription)
             assert (answer.live, answer.message()) == (False, joints(2.0))
             for _ in range(2):
@@ -82,7 +82,7 @@ def test_live_samples_that_an_answer_overtakes_are_not_lost(mesh, monkeypatch):
     async def main():
         async with open_session(mesh) as gateway, open_session(mesh) as monitor:
             publisher = gateway.declare_publisher("site", "arm", "joints")
-            states = monitor.subscribe("robomesh/site/arm/joints")
+            states = monitor.subscribe("robomesh/site/arm/joints", newest=10)
             await until(lambda: publisher.watched)
             publisher.put(joints(1.0))
             first = await anext(states)

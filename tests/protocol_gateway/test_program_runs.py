@@ -236,7 +236,8 @@ def slow_check():
 
 async def planned(plant):
     """The process that plans is there: it has planned something."""
-    assert "no statement that does anything" in await refusal(start(plant, "# nothing\n"))
+    while "no statement that does anything" not in (text := await refusal(start(plant, "# nothing\n"))):
+        assert "to plan" in text  # on a busy machine the process takes longer to start
 
 
 async def in_control(plant):
@@ -291,7 +292,7 @@ def test_a_program_whose_asker_gave_up_while_it_was_checked_never_runs(mesh, tmp
             await start(plant, "home\n")
             await ended(plant, RUN.DONE)
 
-    run(main(), timeout_s=90)
+    run(main(), timeout_s=240)
 
 
 def test_a_question_says_until_when_its_asker_waits_and_not_after_wins_where_it_is_earlier():
@@ -334,7 +335,7 @@ def test_a_hold_cancels_a_program_that_is_being_checked_and_leaves_nothing_on_ho
             await start(plant, "home\n")
             await ended(plant, RUN.DONE)
 
-    run(main(), timeout_s=90)
+    run(main(), timeout_s=240)
 
 
 def test_a_stop_ends_a_program_that_is_being_checked_at_once(mesh, tmp_path):
@@ -349,7 +350,7 @@ def test_a_stop_ends_a_program_that_is_being_checked_at_once(mesh, tmp_path):
                 await plant.stop(by="wang", reason="fire")
                 assert "wang" in await asked
 
-    run(main(), timeout_s=90)
+    run(main(), timeout_s=240)
 
 
 def test_a_homing_on_hold_goes_on_with_resume(mesh, tmp_path):
@@ -397,4 +398,4 @@ def test_what_is_warned_of_is_in_the_answer_to_who_runs_the_program(mesh, tmp_pa
             assert answer.text.startswith("RUN_PROGRAM: it runs; mind: line 1: ")
             assert "post" in answer.text
 
-    run(main(), timeout_s=90)
+    run(main(), timeout_s=240)

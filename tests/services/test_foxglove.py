@@ -232,6 +232,12 @@ def test_who_comes_later_gets_the_events_so_far_and_nobody_gets_them_twice(mesh)
     run(main())
 
 
+async def called(client, name, **values):
+    """Call a command, again where a busy machine did not renew the bridge's control in time."""
+    while not (answer := await client.call(f"{ARM}/{name}", **values))["accepted"]:
+        assert "take control first" in answer["text"], answer
+
+
 def test_commands_are_one_operators_and_end_with_the_client_that_gave_them(mesh, tmp_path):
     async def main():
         async with (
@@ -250,12 +256,10 @@ def test_commands_are_one_operators_and_end_with_the_client_that_gave_them(mesh,
                 assert "not finite" in answer["text"]
                 answer = await client.call(f"{ARM}/home", at="once")
                 assert answer["text"] == "home takes no 'at'; it takes nothing: {}"
-                answer = await client.call(f"{ARM}/home")
-                assert answer["accepted"], answer
+                await called(client, "home")
                 await client.until(lambda: plant.controller.homed == STATE.YES)
                 await client.until(lambda: not plant.seen["lease"][-1].holder)
-                answer = await client.call(f"{ARM}/move_absolute", joint_positions=[2.0, 0.5, 0.5, 0.5, 0.5])
-                assert answer["accepted"], answer
+                await called(client, "move_absolute", joint_positions=[2.0, 0.5, 0.5, 0.5, 0.5])
                 await client.until(lambda: plant.controller.activity == STATE.MOVING)
                 assert plant.seen["lease"][-1].holder == "li"
                 # Another client is refused, and takes nothing from the one that moves it.
