@@ -15,19 +15,28 @@ import zenoh
 from google.protobuf.message import Message
 
 from bus import keys, pieces, topics
+from bus import reason_codes as codes
 from bus.errors import BusyError, KeyNameError, MessageError, QuotaError, RefusedError
 from bus.ignored import REQUEST, Ignored
 from bus.intake import HELD, RING, Queue, RateLimit, Turns, begin_now, read
 from bus.latencies import Latencies
 from bus.messages import JSON, PROTOBUF, TEXT, decode_request, encode, is_json
+from bus.reasons import to_parameters
 
 log = logging.getLogger(__name__)
 
-# How a refusal is encoded that may be asked again; behind the second: when [s].
+# How a refusal that may be asked again is encoded for clients that do not ask for codes; behind the second:
+# when to ask again [s].
+OLD_AGAIN_S = "quota"
 BUSY_TEXT = f"{TEXT};busy"
-QUOTA_TEXT = f"{TEXT};quota="
+QUOTA_TEXT = f"{TEXT};{OLD_AGAIN_S}="
 # A parameter of the question: for how many seconds its asker waits. Zenoh does not tell the owner.
 WITHIN = "within"
+# A parameter of the question: its asker reads a refusal's code from the encoding, those two among them.
+CODES = "codes"
+# Parameters before the code: the request may be repeated, at once or after so long [s].
+BUSY = "busy"
+AGAIN_S = "again_s"
 # Of a request that is asked over both links: what marks its two copies, and how many marks are known.
 MARK_BYTES = 8
 _MOST_MARKS = 256
@@ -39,7 +48,6 @@ _BUSY_BURST = 1024
 _BUSY_PER_S = 250.0
 _ANYBODY = "*"
 _OCTETS = "application/octet-stream"
-_BUSY = "too many requests wait for this owner already: ask again, and less often"
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,7 +190,7 @@ class Answerer:
         with query:
             # To answer costs more than to read; Zenoh says to those who are left out that nothing came.
             if self._busy_answers.take(time.monotonic()):
-                query.reply_err(_BUSY.encode(), encoding=BUSY_TEXT)
+                _refuse(query, BusyError(codes.BUSY()))
 
     def _count(self, asker: str, more: int) -> None:
         with self._counting:
@@ -223,19 +231,16 @@ class Answerer:
             try:
                 request = self._read(key, query, encoding, received_ns)
                 answer = await self._handled(request, query)
-            except QuotaError as error:
-                self.over_quota += 1
-                query.reply_err(str(error).encode(), encoding=f"{QUOTA_TEXT}{error.again_s:.3f}")
+            except RefusedError as error:
+                self.over_quota += isinstance(error, QuotaError)
+                _refuse(query, error)
                 return
-            except (RefusedError, MessageError, KeyNameError) as error:
-                encoding = BUSY_TEXT if isinstance(error, BusyError) else TEXT
-                query.reply_err(str(error).encode(), encoding=encoding)
+            except (MessageError, KeyNameError) as error:
+                _refuse(query, RefusedError(codes.INVALID(detail=error)))
                 return
             except Exception:
                 log.exception("%s: a request failed", key)
-                query.reply_err(
-                    f"{self._row.name} failed at its owner; its log says why".encode(), encoding=TEXT
-                )
+                _refuse(query, RefusedError(codes.FAILED(request=self._row.name)))
                 return
             as_json = is_json(encoding)
             if isinstance(answer, bytes):
@@ -271,7 +276,7 @@ class Answerer:
         try:
             if keys.has_wildcard(asked):
                 if not self._row.wildcard:
-                    raise RefusedError(f"{asked} has a wildcard: ask one {self._row.name} by its whole key")
+                    raise RefusedError(codes.WILDCARD(key=asked, request=self._row.name))
             elif self._ignored.key(REQUEST, asked) is None:
                 keys.parse_key(asked)  # says why
             payload = query.payload.to_bytes() if query.payload is not None else b""
@@ -301,6 +306,21 @@ class Answerer:
             return keys.parse_expression(asked)
         last = self._own.topic.rsplit("/", 1)[-1]
         return self._own if not self._row.wildcard or asked.rsplit("/", 1)[-1] == last else None
+
+
+def _refuse(query: zenoh.Query, error: RefusedError) -> None:
+    """Answer with the reason of a refusal."""
+    if isinstance(error, BusyError):
+        when, old = BUSY, BUSY_TEXT
+    elif isinstance(error, QuotaError):
+        when, old = f"{AGAIN_S}={error.again_s:.3f}", f"{QUOTA_TEXT}{error.again_s:.3f}"
+    else:
+        when, old = "", ""
+    if old and query.parameters.get(CODES) is None:
+        encoding = old  # an older client knows nothing else
+    else:
+        encoding = f"{TEXT};{to_parameters(error.reason, when)}"
+    query.reply_err(str(error).encode(), encoding=encoding)
 
 
 def _within_s(query: zenoh.Query) -> float | None:

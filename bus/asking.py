@@ -3,13 +3,14 @@
 import asyncio
 import math
 import secrets
+from contextlib import suppress
 from dataclasses import dataclass
 
 import zenoh
 from google.protobuf.message import Message
 
 from bus import keys, pieces, topics
-from bus.answering import BUSY_TEXT, MARK_BYTES, QUOTA_TEXT, WITHIN
+from bus.answering import AGAIN_S, BUSY, CODES, MARK_BYTES, OLD_AGAIN_S, WITHIN
 from bus.endpoints import ON_THE_SECOND_LINK, first_line, settle
 from bus.errors import (
     BrokenAnswerError,
@@ -21,6 +22,7 @@ from bus.errors import (
     RefusedError,
 )
 from bus.messages import PROTOBUF, TEXT, decode
+from bus.reasons import Reason, pairs_of, reason_of
 
 _AGAIN_S = 0.05
 
@@ -114,7 +116,7 @@ def _get(
             loop.call_soon_threadsafe(finish)
 
     session.get(
-        f"{pieces.selector(key)};{WITHIN}={timeout_s:.3f}",
+        f"{pieces.selector(key)};{WITHIN}={timeout_s:.3f};{CODES}",
         zenoh.handlers.Callback(on_reply, on_end),
         payload=payload,
         encoding=PROTOBUF,
@@ -135,18 +137,18 @@ def _zenoh(priority: topics.Priority) -> zenoh.Priority:
 
 
 def _refused(words: bytes, encoding: str) -> RefusedError:
-    """What an owner's refusal means, by how it is encoded."""
+    """Return an owner's refusal; without a code it is an older owner's, or a stranger's."""
     text = words.decode(errors="replace")
-    if encoding == BUSY_TEXT:
-        return BusyError(text)
-    if encoding.startswith(QUOTA_TEXT):
-        try:
-            again_s = float(encoding.removeprefix(QUOTA_TEXT))
-        except ValueError:
-            again_s = math.nan
-        if math.isfinite(again_s):  # else another's nonsense: a refusal all the same
-            return QuotaError(text, again_s=max(again_s, _AGAIN_S))
-    return RefusedError(text)
+    parameters = pairs_of(encoding.partition(";")[2])
+    reason: Reason | str = reason_of(parameters, text) or text
+    if BUSY in parameters:
+        return BusyError(reason, text=text)
+    for name in (AGAIN_S, OLD_AGAIN_S):
+        with suppress(ValueError):
+            again_s = float(parameters.get(name, ""))
+            if math.isfinite(again_s):
+                return QuotaError(reason, again_s=max(again_s, _AGAIN_S))
+    return RefusedError(reason, text=text)
 
 
 async def ask_bytes(session: zenoh.Session, key: str, payload: bytes, *, timeout_s: float) -> bytes:

@@ -13,6 +13,9 @@ BusError
     └── BrokenAnswerError   a long answer that began, and whose rest did not come
 """
 
+from bus import reason_codes as codes
+from bus.reasons import Reason
+
 
 class BusError(Exception):
     """Base of the bus's errors; its text is one line for people."""
@@ -38,7 +41,18 @@ class RefusedError(BusError):
     """A request that was refused; the text says what was wrong and what would be right.
 
     Raised by a request's handler to refuse it, and by `ask` at the other end.
+
+    Args:
+        reason: Of the table; a bare text is a refusal without a code of its own.
+        text: What people read; the reason's sentence, unless given.
+
+    Attributes:
+        reason: The code and its parameters.
     """
+
+    def __init__(self, reason: Reason | str, *, text: str = "") -> None:
+        super().__init__(text or str(reason))
+        self.reason = codes.OTHER(detail=reason) if isinstance(reason, str) else reason
 
 
 class BusyError(RefusedError):
@@ -52,8 +66,8 @@ class QuotaError(RefusedError):
         again_s: When there is something left again, as far as its owner knows [s].
     """
 
-    def __init__(self, text: str, *, again_s: float) -> None:
-        super().__init__(text)
+    def __init__(self, reason: Reason | str, *, again_s: float) -> None:
+        super().__init__(reason)
         self.again_s = again_s
 
 

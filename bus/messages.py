@@ -16,6 +16,8 @@ from google.protobuf.message import DecodeError, Message
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from bus.errors import MessageError
+from bus.reasons import Reason
+from bus.schemas import robomesh_pb2 as schema
 
 PROTOBUF = "application/protobuf"
 JSON = "application/json"
@@ -48,6 +50,13 @@ def to_json(message: Message, *, indent: int | None = None) -> str:
 def encode(message: Message, *, as_json: bool) -> bytes:
     """A message as protobuf or JSON bytes."""
     return to_json(message).encode() if as_json else message.SerializeToString()
+
+
+def reason_message(reason: Reason) -> schema.Reason:
+    """Return a reason as it is in answers, audit entries and events."""
+    message = schema.Reason(code=reason.code, values=reason.values, text=reason.text)
+    message.causes.extend(map(reason_message, reason.causes))
+    return message
 
 
 def decode(schema: type[AnyMessage], payload: bytes) -> AnyMessage:
@@ -158,6 +167,8 @@ def _dated(schema: Descriptor) -> _Dated:
     for field in schema.fields:
         if field.message_type is None or _is_map(field):
             continue
+        if field.message_type is schema:
+            continue  # of a message that contains itself, only the outermost is searched
         within = None if field.message_type.full_name == _TIME else _dated(field.message_type)
         if within != ():
             found.append((field.name, bool(field.is_repeated), within))

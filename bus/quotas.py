@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from bus import reason_codes as codes
 from bus.errors import QuotaError
 
 _MINUTE_S = 60.0
@@ -76,8 +77,14 @@ class Quota:
             QuotaError: If that is more than the asker may have.
         """
         if self._under_way[asker] >= self._at_once:
-            held = f"{asker} has {self._under_way[asker]} under way already"
-            raise QuotaError(_refusal(held, self._name, self._at_once, _AGAIN_S), again_s=_AGAIN_S)
+            reason = codes.QUOTA_AT_ONCE(
+                asker=asker,
+                count=self._under_way[asker],
+                quota=self._name,
+                most=self._at_once,
+                seconds=_AGAIN_S,
+            )
+            raise QuotaError(reason, again_s=_AGAIN_S)
         self.check(asker, 1.0)
         self.count(asker, 1.0)
         self._under_way[asker] += 1
@@ -97,10 +104,13 @@ class Quota:
         owed_s = max(self._even_at.get(asker, now) - now, 0.0)
         again_s = owed_s + amount * _MINUTE_S / self._a_minute - _MINUTE_S
         if again_s > _ROUNDING_S:
-            had = f"{asker} has had its minute's worth"
-            raise QuotaError(
-                _refusal(had, f"{self._name}_a_minute", self._a_minute, again_s), again_s=again_s
+            reason = codes.OVER_QUOTA(
+                asker=asker,
+                quota=f"{self._name}_a_minute",
+                most=self._a_minute,
+                seconds=max(again_s, 0.1),
             )
+            raise QuotaError(reason, again_s=again_s)
 
     def count(self, asker: str, amount: float) -> None:
         """Count what somebody was given."""
@@ -115,8 +125,3 @@ class Quota:
         if len(owing) >= _MOST_ASKERS:
             del owing[min(owing, key=owing.__getitem__)]
         self._even_at = owing
-
-
-def _refusal(why: str, key: str, most: float, again_s: float) -> str:
-    again = f"ask again in {max(again_s, 0.1):.1f} s"
-    return f"{why}: quota {key} = {most:g} a name (the site file's [quotas]); {again}"

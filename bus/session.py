@@ -13,6 +13,7 @@ import zenoh
 from google.protobuf.message import Message
 
 from bus import access, answering, asking, keys, presence, refused, topics
+from bus import reason_codes as codes
 from bus.endpoints import DEFAULT_ROUTER, Tls, client_config, first_line
 from bus.errors import BrokenAnswerError, NoAnswerError, NoRightError, SessionError
 from bus.ignored import REPLY, Ignored
@@ -223,7 +224,7 @@ class Session:
         """Say at once, and in words, what the router would refuse in silence."""
         who = self.principal
         if who is not None and not access.may(who, who.site, act, key):
-            raise NoRightError(access.refusal(who, act, key))
+            raise NoRightError(codes.NO_RIGHT(detail=access.refusal(who, act, key)))
 
     def measure(self, name: str, text: str, read: Callable[[], float | Mapping[str, float]]) -> None:
         """Tell a number of the service's own in its health and its metrics; see `Measure`."""

@@ -14,6 +14,9 @@ ProtocolGatewayError
 └── GatewaySettingsError    settings that no gateway can run with
 """
 
+from bus import reason_codes as codes
+from bus.reasons import Reason
+
 
 class ProtocolGatewayError(Exception):
     """Base of the gateway's errors; its text is one line for people."""
@@ -32,11 +35,19 @@ class CodeTableError(ProtocolGatewayError):
 
 
 class CommandError(ProtocolGatewayError):
-    """A command that the controller's protocol cannot say."""
+    """A command that the controller's protocol cannot express; `reason` says why."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self.reason = codes.COMMAND_UNSUPPORTED(detail=text)
 
 
 class LinkError(ProtocolGatewayError):
-    """A unit that did not reach the controller's socket."""
+    """A unit that did not reach the controller's socket; `reason` says why."""
+
+    def __init__(self, reason: Reason) -> None:
+        super().__init__(reason.text)
+        self.reason = reason
 
 
 class LinkDownError(LinkError):
@@ -48,7 +59,11 @@ class LinkCloggedError(LinkError):
 
 
 class AuthorityError(ProtocolGatewayError):
-    """A failure of what guards the robot."""
+    """A failure of what guards the robot; `reason` says why."""
+
+    def __init__(self, reason: Reason | str) -> None:
+        super().__init__(str(reason))
+        self.reason = codes.OTHER(detail=reason) if isinstance(reason, str) else reason
 
 
 class AuditError(AuthorityError):

@@ -5,7 +5,9 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from bus.messages import reason_message
 from bus.publisher import Publisher
+from bus.reasons import Reason
 from bus.schemas.robomesh_pb2 import Event
 from protocol_gateway.texts import LONGEST_SENTENCE, one_line
 
@@ -45,12 +47,21 @@ class Journal:
         self._monotonic_s = monotonic_s
         self._kinds: dict[str, _Kind] = {}
 
-    def say(self, severity: Event.Severity, code: str, text: str, **values: object) -> None:
+    def say(
+        self,
+        severity: Event.Severity,
+        code: str,
+        text: str,
+        *,
+        why: Reason | None = None,
+        **values: object,
+    ) -> None:
         """Publish an event; of many of one code one each 5 s, which counts the others.
 
         Args:
             code: Stable, for programs: "unit.malformed".
             text: For people.
+            why: The reason that the text holds.
         """
         now_s = self._monotonic_s()
         kind = self._kinds.setdefault(code, _Kind(now_s))
@@ -67,6 +78,8 @@ class Journal:
         text = one_line(text, LONGEST_SENTENCE)
         event = Event(severity=severity, code=code, text=text, source="gateway")
         event.timestamp.GetCurrentTime()
+        if why is not None:
+            event.reason.CopyFrom(reason_message(why))
         for name, value in values.items():
             event.values[name] = one_line(str(value))
         self._publisher.put(event)

@@ -9,10 +9,12 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from bus import reason_codes as codes
 from bus.answering import Answerer, Handler, Request
 from bus.errors import KeyNameError, RefusedError
 from bus.keys import presence_key
 from bus.publisher import LIST_LENGTH, Publisher
+from bus.reasons import Reason
 from bus.schemas import robomesh_pb2 as schema
 from bus.session import Session
 from bus.topics import Role, check_operator
@@ -209,7 +211,7 @@ class Robot:
         finally:
             try:
                 # While there is a link to stop it over.
-                self._control.leases.end("the gateway is being ended")
+                self._control.leases.end(codes.ENDED_GATEWAY())
             finally:
                 link.cancel()
                 sessions.cancel()
@@ -258,8 +260,10 @@ class Robot:
         turned_away = sum(each.turned_away for each in self._asked)
         if more := turned_away - self._turned_away:
             self._turned_away = turned_away
-            text = "turned away unread: too many requests waited already"
-            entry = entry_of("REQUESTS", operator="", source=MESH, outcome=Outcome.REFUSED, text=text)
+            why = codes.TURNED_AWAY()
+            entry = entry_of(
+                "REQUESTS", operator="", source=MESH, outcome=Outcome.REFUSED, text=why.text, why=why
+            )
             self._ledger.after_later(replace(entry, repeated=more - 1))
 
     async def _watch_sessions(self) -> None:
@@ -305,7 +309,7 @@ class Robot:
             return check_operator(name)
         except KeyNameError as error:
             self._refused(what, name, str(error))
-            raise RefusedError(str(error)) from None
+            raise RefusedError(codes.INVALID(detail=error)) from None
 
     def _refused(self, what: str, name: str, text: str) -> None:
         """Write down what nobody judged, because it cannot be read, or its operator's name is none."""
@@ -394,16 +398,8 @@ class Robot:
         self._program_topic.put(self._programs.state)
 
 
-def _why_read_only(settings: RobotSettings, driver: Driver) -> str:
-    """Why nothing may be sent to the controller, and what would be right; empty: it may be sent to."""
+def _why_read_only(settings: RobotSettings, driver: Driver) -> Reason | None:
+    """Return why no command may be sent to the controller; None: commands may be sent."""
     if not driver.can_stop:
-        return (
-            "the site file's codes have no stop for its controller: "
-            'add the code of "COMMAND:stop", or of "COMMAND"'
-        )
-    if not settings.stop_proven:
-        return (
-            "its stop is not proven: try the stop unit on its controller (docs/safety.md says how), "
-            "then write stop_proven = true at this robot in the site file"
-        )
-    return ""
+        return codes.NO_STOP_CODE()
+    return None if settings.stop_proven else codes.STOP_NOT_PROVEN()

@@ -6,6 +6,9 @@ from foxglove_schemas_protobuf.JointState_pb2 import JointState
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.timestamp_pb2 import Timestamp
 
+from bus import reason_codes as codes
+from bus.messages import reason_message
+from bus.reasons import Reason
 from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.authority.obstacles import Controller
 from protocol_gateway.authority.rules import Authority, Lease, Now, Stop
@@ -78,28 +81,30 @@ def controller_state(
     audit_head: tuple[int, str],
     speed_percent: float | None,
     policy: Policy,
-    unchecked: str,
+    unchecked: Reason | None,
     check_starting: bool,
     now: Now,
 ) -> schema.ControllerState:
     """All that is known of the controller; what it does not tell is "unknown"."""
-    status = controller.status
+    status, reasons = controller.status, _link_reasons(controller)
     state = schema.ControllerState(
         timestamp=timestamp(now.wall_ns),
         link=_LINKS[controller.link.state],
-        link_text=_link_text(controller),
+        link_text="; ".join(map(str, reasons)),
+        link_reasons=map(reason_message, reasons),
         mode=_MODES[status.mode],
         activity=_ACTIVITIES[status.activity],
         homed=_KNOWN[status.homed],
         trace=_KNOWN[status.trace],
         fault=controller.fault,
-        read_only=bool(controller.read_only),
+        read_only=controller.read_only is not None,
         last_unit_age_s=age_s,
         controller_time_s=controller_time_s,
         rate_hz=rate_hz,
         speed_percent=speed_percent,
         check=_CHECKS[policy],
-        check_text=unchecked,
+        check_text="" if unchecked is None else unchecked.text,
+        check_reason=None if unchecked is None else reason_message(unchecked),
         check_starting=check_starting,
         counters=schema.LinkCounters(
             units_received=counters.units_received,
@@ -142,16 +147,22 @@ def _health(health: LinkHealth, *, flooding: bool) -> schema.LinkHealth:
     )
 
 
-def _link_text(controller: Controller) -> str:
-    read_only = controller.read_only and f"read-only: {controller.read_only}"
-    # Of a link that is not up nothing comes: that says it all.
-    gone = controller.positions_gone if controller.link.state is LinkState.UP else ""
-    return "; ".join(filter(None, (controller.link.text, gone, read_only)))
+def _link_reasons(controller: Controller) -> list[Reason]:
+    reasons = [controller.link.reason]
+    # Nothing is received over a link that is not up, so there it says no more.
+    if controller.positions_gone is not None and controller.link.state is LinkState.UP:
+        reasons.append(controller.positions_gone)
+    if controller.read_only is not None:
+        reasons.append(codes.READ_ONLY(controller.read_only))
+    return reasons
 
 
 def lease_state(authority: Authority, now: Now) -> schema.Lease:
     """Who controls, for everybody: never the secret."""
-    message = schema.Lease(timestamp=timestamp(now.wall_ns), ended=authority.ended)
+    message = schema.Lease(timestamp=timestamp(now.wall_ns))
+    if authority.ended is not None:
+        message.ended = authority.ended.text
+        message.ended_reason.CopyFrom(reason_message(authority.ended))
     for asker in authority.asked_by:
         message.asked_by.add(operator=asker.operator, reason=asker.reason, since=timestamp(asker.since_ns))
     lease = authority.lease

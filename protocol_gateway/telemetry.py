@@ -5,7 +5,9 @@
 
 from collections.abc import Callable
 
+from bus import reason_codes as codes
 from bus.publisher import Publisher
+from bus.reasons import Reason
 from bus.schemas.robomesh_pb2 import Event
 from protocol_gateway.beat import STALE_S, Beat
 from protocol_gateway.drivers.driver import (
@@ -109,11 +111,11 @@ class Telemetry:
         """The newest [rad] or [m]; None: not told since the link came up, or not for the stale time."""
         return None if self._positions is None or self.positions_gone(now_s) else self._positions[0]
 
-    def positions_gone(self, now_s: float) -> str:
-        """That positions came and come no more, in words; empty: they come, or never did."""
+    def positions_gone(self, now_s: float) -> Reason | None:
+        """Return that positions are not received any more; None: they are, or never were."""
         if self._positions is None or now_s - self._positions[1] < self._stale_after_s:
-            return ""
-        return f"joint positions have not come for {self._stale_after_s:g} s"
+            return None
+        return codes.POSITIONS_STALE(seconds=self._stale_after_s)
 
     def status(self, now_s: float) -> StatusReceived:
         """The newest; all unknown when it beat and has ceased to."""

@@ -56,12 +56,7 @@ class ViewRequestError(RendererError):
 
 
 class NoRoomError(ViewRequestError):
-    """A view of one's own that there is no room for now; its text begins with `SIGN`, for who asked."""
-
-    SIGN = "no room: "
-
-    def __init__(self, reason: str) -> None:
-        super().__init__(self.SIGN + reason)
+    """A requested view that exceeds what the renderer can draw now."""
 
 
 class CameraError(RendererError):

@@ -5,6 +5,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Protocol
 
+from bus import reason_codes as codes
 from bus.errors import QuotaError
 from renderer.errors import NoRoomError, ViewRequestError
 from renderer.requested import Shot
@@ -76,12 +77,14 @@ class Room:
         while not self._fits(views, shot, asker):
             if not self._passed_on(views, asker):
                 had = len(_had(views, asker))
-                raise QuotaError(
-                    f"{NoRoomError.SIGN}{asker} has {had} views already: quota views = {self.quota} a name, "
-                    f"together {self._share / 1e6:.1f} million pixels a second (the site file's [quotas]); "
-                    f"ask again {self.again_s:g} s after one of them is left, or for a smaller or slower one",
-                    again_s=self.again_s,
+                reason = codes.QUOTA_VIEWS(
+                    asker=asker,
+                    count=had,
+                    most=self.quota,
+                    megapixels=self._share / 1e6,
+                    seconds=self.again_s,
                 )
+                raise QuotaError(reason, again_s=self.again_s)
 
     def _fits(self, views: Collection[AskedFor], shot: Shot, asker: str) -> bool:
         """Whether a view is within somebody's share; one alone always is, whatever its size."""

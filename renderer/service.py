@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
+from bus import reason_codes as codes
 from bus.answering import Answerer, Request
 from bus.errors import RefusedError
 from bus.keys import WHOLE_SITE
@@ -19,7 +20,7 @@ from bus.schemas.robomesh_pb2 import Event, KeyFrameAnswer, ViewAnswer, ViewRequ
 from bus.session import Session
 from renderer.cache import cache_folder
 from renderer.composing import Composition
-from renderer.errors import RendererError, UnknownViewError
+from renderer.errors import NoRoomError, RendererError
 from renderer.finishing import Finished, Finishing, Order
 from renderer.pace import Pace, next_of
 from renderer.requested import FAR, Shot, far, requested, standing
@@ -243,7 +244,7 @@ class _Renderer:
         if stream is None:
             streams = [each for each in self._streams.values() if each.state is state]
             known = [each.shot.name for each in streams if not each.shot.requested]
-            raise RefusedError(str(UnknownViewError(request.chunk, known)))
+            raise RefusedError(codes.VIEW_UNKNOWN(view=request.chunk, views=", ".join(sorted(known))))
         self._key_frames.check(request.asker, 1.0)
         forced = stream.ask_key_frame()
         if forced:
@@ -265,8 +266,10 @@ class _Renderer:
                 asked_for = [each for each in self._streams.values() if each.shot.requested]
                 self._room.check(asked_for, shot, request.asker)
                 stream = self._open(state, shot)
+        except NoRoomError as error:
+            raise RefusedError(codes.VIEW_NO_ROOM(detail=error)) from None
         except RendererError as error:
-            raise RefusedError(str(error)) from None
+            raise RefusedError(codes.VIEW_INVALID(detail=error)) from None
         stream.stay(request.asker)
         shot = stream.shot
         width, height = shot.size

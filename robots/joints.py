@@ -6,6 +6,8 @@ from math import degrees, isfinite, radians
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bus import reason_codes as codes
+from bus.reasons import Reason
 from robots.errors import JointCountError
 from robots.poses import FloatArray
 from robots.schema import DhDescription, JointSettings, JointType, RobotDescription, UrdfDescription
@@ -175,8 +177,8 @@ def constraint_values(joints: Joints, positions: ArrayLike) -> FloatArray:
     return np.array([constraint.coefficients @ array for constraint in joints.constraints], dtype=np.float64)
 
 
-def violations(joints: Joints, positions: ArrayLike) -> tuple[str, ...]:
-    """What forbids these positions: a sentence each, in degrees and millimetres; none: allowed.
+def violations(joints: Joints, positions: ArrayLike) -> tuple[Reason, ...]:
+    """Return what forbids these positions, in degrees and millimetres; none: they are allowed.
 
     Args:
         positions: (n,) joint positions [rad] or [m].
@@ -189,11 +191,11 @@ def violations(joints: Joints, positions: ArrayLike) -> tuple[str, ...]:
     rows = zip(joints.names, joints.types, array.tolist(), joints.lower, joints.upper, strict=True)
     for name, kind, position, lower, upper in rows:
         if not isfinite(position):
-            found.append(f"joint {name} at {position} is not a finite number")
+            found.append(codes.JOINT_NOT_FINITE(name=name, value=position))
             continue
         beyond = _limit_beyond(position, float(lower), float(upper), kind)
         if beyond is not None:
-            found.append(f"joint {name} at {_text(position, kind)} is beyond its limit {_text(beyond, kind)}")
+            found.append(codes.JOINT_LIMIT(name=name, value=_text(position, kind), limit=_text(beyond, kind)))
     if found:
         return tuple(found)
     for constraint, total in zip(joints.constraints, constraint_values(joints, array), strict=True):
@@ -201,7 +203,11 @@ def violations(joints: Joints, positions: ArrayLike) -> tuple[str, ...]:
         beyond = _limit_beyond(float(total), constraint.lower, constraint.upper, kind)
         if beyond is not None:
             terms = _terms(joints, constraint)
-            found.append(f"{terms} at {_text(float(total), kind)} is beyond its limit {_text(beyond, kind)}")
+            found.append(
+                codes.JOINT_CONSTRAINT(
+                    terms=terms, value=_text(float(total), kind), limit=_text(beyond, kind)
+                )
+            )
     return tuple(found)
 
 

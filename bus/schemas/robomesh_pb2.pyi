@@ -12,7 +12,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class ControllerState(_message.Message):
-    __slots__ = ("timestamp", "link", "mode", "activity", "homed", "trace", "fault", "last_unit_age_s", "controller_time_s", "counters", "read_only", "stop", "link_text", "rate_hz", "health", "audit_head", "legacy_clients", "speed_percent", "check", "check_text", "check_starting")
+    __slots__ = ("timestamp", "link", "mode", "activity", "homed", "trace", "fault", "last_unit_age_s", "controller_time_s", "counters", "read_only", "stop", "link_text", "rate_hz", "health", "audit_head", "legacy_clients", "speed_percent", "check", "check_text", "check_starting", "link_reasons", "check_reason")
     class Link(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         LINK_UNSPECIFIED: _ClassVar[ControllerState.Link]
@@ -92,6 +92,8 @@ class ControllerState(_message.Message):
     CHECK_FIELD_NUMBER: _ClassVar[int]
     CHECK_TEXT_FIELD_NUMBER: _ClassVar[int]
     CHECK_STARTING_FIELD_NUMBER: _ClassVar[int]
+    LINK_REASONS_FIELD_NUMBER: _ClassVar[int]
+    CHECK_REASON_FIELD_NUMBER: _ClassVar[int]
     timestamp: _timestamp_pb2.Timestamp
     link: ControllerState.Link
     mode: ControllerState.Mode
@@ -113,7 +115,9 @@ class ControllerState(_message.Message):
     check: ControllerState.Check
     check_text: str
     check_starting: bool
-    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., link: _Optional[_Union[ControllerState.Link, str]] = ..., mode: _Optional[_Union[ControllerState.Mode, str]] = ..., activity: _Optional[_Union[ControllerState.Activity, str]] = ..., homed: _Optional[_Union[ControllerState.Known, str]] = ..., trace: _Optional[_Union[ControllerState.Known, str]] = ..., fault: _Optional[str] = ..., last_unit_age_s: _Optional[float] = ..., controller_time_s: _Optional[float] = ..., counters: _Optional[_Union[LinkCounters, _Mapping]] = ..., read_only: _Optional[bool] = ..., stop: _Optional[_Union[StopState, _Mapping]] = ..., link_text: _Optional[str] = ..., rate_hz: _Optional[float] = ..., health: _Optional[_Union[LinkHealth, _Mapping]] = ..., audit_head: _Optional[_Union[AuditHead, _Mapping]] = ..., legacy_clients: _Optional[_Union[LegacyClients, _Mapping]] = ..., speed_percent: _Optional[float] = ..., check: _Optional[_Union[ControllerState.Check, str]] = ..., check_text: _Optional[str] = ..., check_starting: _Optional[bool] = ...) -> None: ...
+    link_reasons: _containers.RepeatedCompositeFieldContainer[Reason]
+    check_reason: Reason
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., link: _Optional[_Union[ControllerState.Link, str]] = ..., mode: _Optional[_Union[ControllerState.Mode, str]] = ..., activity: _Optional[_Union[ControllerState.Activity, str]] = ..., homed: _Optional[_Union[ControllerState.Known, str]] = ..., trace: _Optional[_Union[ControllerState.Known, str]] = ..., fault: _Optional[str] = ..., last_unit_age_s: _Optional[float] = ..., controller_time_s: _Optional[float] = ..., counters: _Optional[_Union[LinkCounters, _Mapping]] = ..., read_only: _Optional[bool] = ..., stop: _Optional[_Union[StopState, _Mapping]] = ..., link_text: _Optional[str] = ..., rate_hz: _Optional[float] = ..., health: _Optional[_Union[LinkHealth, _Mapping]] = ..., audit_head: _Optional[_Union[AuditHead, _Mapping]] = ..., legacy_clients: _Optional[_Union[LegacyClients, _Mapping]] = ..., speed_percent: _Optional[float] = ..., check: _Optional[_Union[ControllerState.Check, str]] = ..., check_text: _Optional[str] = ..., check_starting: _Optional[bool] = ..., link_reasons: _Optional[_Iterable[_Union[Reason, _Mapping]]] = ..., check_reason: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
 
 class LinkHealth(_message.Message):
     __slots__ = ("jitter_s", "network_round_trip_s", "answer_s", "flooding")
@@ -257,8 +261,27 @@ class Clearance(_message.Message):
     second_point: Vector3
     def __init__(self, distance: _Optional[float] = ..., first: _Optional[str] = ..., second: _Optional[str] = ..., first_point: _Optional[_Union[Vector3, _Mapping]] = ..., second_point: _Optional[_Union[Vector3, _Mapping]] = ...) -> None: ...
 
+class Reason(_message.Message):
+    __slots__ = ("code", "values", "causes", "text")
+    class ValuesEntry(_message.Message):
+        __slots__ = ("key", "value")
+        KEY_FIELD_NUMBER: _ClassVar[int]
+        VALUE_FIELD_NUMBER: _ClassVar[int]
+        key: str
+        value: str
+        def __init__(self, key: _Optional[str] = ..., value: _Optional[str] = ...) -> None: ...
+    CODE_FIELD_NUMBER: _ClassVar[int]
+    VALUES_FIELD_NUMBER: _ClassVar[int]
+    CAUSES_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    code: str
+    values: _containers.ScalarMap[str, str]
+    causes: _containers.RepeatedCompositeFieldContainer[Reason]
+    text: str
+    def __init__(self, code: _Optional[str] = ..., values: _Optional[_Mapping[str, str]] = ..., causes: _Optional[_Iterable[_Union[Reason, _Mapping]]] = ..., text: _Optional[str] = ...) -> None: ...
+
 class Lease(_message.Message):
-    __slots__ = ("timestamp", "holder", "since", "until", "offered_to", "motion", "ended", "asked_by")
+    __slots__ = ("timestamp", "holder", "since", "until", "offered_to", "motion", "ended", "asked_by", "ended_reason")
     class Asker(_message.Message):
         __slots__ = ("operator", "reason", "since")
         OPERATOR_FIELD_NUMBER: _ClassVar[int]
@@ -276,6 +299,7 @@ class Lease(_message.Message):
     MOTION_FIELD_NUMBER: _ClassVar[int]
     ENDED_FIELD_NUMBER: _ClassVar[int]
     ASKED_BY_FIELD_NUMBER: _ClassVar[int]
+    ENDED_REASON_FIELD_NUMBER: _ClassVar[int]
     timestamp: _timestamp_pb2.Timestamp
     holder: str
     since: _timestamp_pb2.Timestamp
@@ -284,7 +308,8 @@ class Lease(_message.Message):
     motion: bool
     ended: str
     asked_by: _containers.RepeatedCompositeFieldContainer[Lease.Asker]
-    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., holder: _Optional[str] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., until: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., offered_to: _Optional[str] = ..., motion: _Optional[bool] = ..., ended: _Optional[str] = ..., asked_by: _Optional[_Iterable[_Union[Lease.Asker, _Mapping]]] = ...) -> None: ...
+    ended_reason: Reason
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., holder: _Optional[str] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., until: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., offered_to: _Optional[str] = ..., motion: _Optional[bool] = ..., ended: _Optional[str] = ..., asked_by: _Optional[_Iterable[_Union[Lease.Asker, _Mapping]]] = ..., ended_reason: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
 
 class LeaseRequest(_message.Message):
     __slots__ = ("action", "lease", "ttl_s", "to", "reason", "session")
@@ -381,7 +406,7 @@ class CommandRequest(_message.Message):
     def __init__(self, lease: _Optional[str] = ..., id: _Optional[int] = ..., not_after: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., command: _Optional[_Union[CommandRequest.Command, str]] = ..., joint_positions: _Optional[_Iterable[float]] = ..., speed_percent: _Optional[float] = ..., stop_id: _Optional[int] = ..., program: _Optional[str] = ..., program_name: _Optional[str] = ...) -> None: ...
 
 class ProgramState(_message.Message):
-    __slots__ = ("timestamp", "outcome", "name", "operator", "since", "line", "statement", "step", "steps", "duration_s", "text")
+    __slots__ = ("timestamp", "outcome", "name", "operator", "since", "line", "statement", "step", "steps", "duration_s", "text", "reason")
     class Outcome(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         OUTCOME_UNSPECIFIED: _ClassVar[ProgramState.Outcome]
@@ -403,6 +428,7 @@ class ProgramState(_message.Message):
     STEPS_FIELD_NUMBER: _ClassVar[int]
     DURATION_S_FIELD_NUMBER: _ClassVar[int]
     TEXT_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
     timestamp: _timestamp_pb2.Timestamp
     outcome: ProgramState.Outcome
     name: str
@@ -414,15 +440,18 @@ class ProgramState(_message.Message):
     steps: int
     duration_s: float
     text: str
-    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., outcome: _Optional[_Union[ProgramState.Outcome, str]] = ..., name: _Optional[str] = ..., operator: _Optional[str] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., line: _Optional[int] = ..., statement: _Optional[str] = ..., step: _Optional[int] = ..., steps: _Optional[int] = ..., duration_s: _Optional[float] = ..., text: _Optional[str] = ...) -> None: ...
+    reason: Reason
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., outcome: _Optional[_Union[ProgramState.Outcome, str]] = ..., name: _Optional[str] = ..., operator: _Optional[str] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., line: _Optional[int] = ..., statement: _Optional[str] = ..., step: _Optional[int] = ..., steps: _Optional[int] = ..., duration_s: _Optional[float] = ..., text: _Optional[str] = ..., reason: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
 
 class CommandAnswer(_message.Message):
-    __slots__ = ("accepted", "text")
+    __slots__ = ("accepted", "text", "warning")
     ACCEPTED_FIELD_NUMBER: _ClassVar[int]
     TEXT_FIELD_NUMBER: _ClassVar[int]
+    WARNING_FIELD_NUMBER: _ClassVar[int]
     accepted: bool
     text: str
-    def __init__(self, accepted: _Optional[bool] = ..., text: _Optional[str] = ...) -> None: ...
+    warning: Reason
+    def __init__(self, accepted: _Optional[bool] = ..., text: _Optional[str] = ..., warning: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
 
 class StopRequest(_message.Message):
     __slots__ = ("reason", "by")
@@ -433,17 +462,19 @@ class StopRequest(_message.Message):
     def __init__(self, reason: _Optional[str] = ..., by: _Optional[str] = ...) -> None: ...
 
 class StopAnswer(_message.Message):
-    __slots__ = ("stop_id", "sent", "text")
+    __slots__ = ("stop_id", "sent", "text", "reason")
     STOP_ID_FIELD_NUMBER: _ClassVar[int]
     SENT_FIELD_NUMBER: _ClassVar[int]
     TEXT_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
     stop_id: int
     sent: bool
     text: str
-    def __init__(self, stop_id: _Optional[int] = ..., sent: _Optional[bool] = ..., text: _Optional[str] = ...) -> None: ...
+    reason: Reason
+    def __init__(self, stop_id: _Optional[int] = ..., sent: _Optional[bool] = ..., text: _Optional[str] = ..., reason: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
 
 class AuditEntry(_message.Message):
-    __slots__ = ("timestamp", "number", "operator", "source", "request", "values", "outcome", "text", "previous", "hash", "repeated_count")
+    __slots__ = ("timestamp", "number", "operator", "source", "request", "values", "outcome", "text", "previous", "hash", "repeated_count", "reason")
     class Outcome(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         OUTCOME_UNSPECIFIED: _ClassVar[AuditEntry.Outcome]
@@ -472,6 +503,7 @@ class AuditEntry(_message.Message):
     PREVIOUS_FIELD_NUMBER: _ClassVar[int]
     HASH_FIELD_NUMBER: _ClassVar[int]
     REPEATED_COUNT_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
     timestamp: _timestamp_pb2.Timestamp
     number: int
     operator: str
@@ -483,7 +515,8 @@ class AuditEntry(_message.Message):
     previous: bytes
     hash: bytes
     repeated_count: int
-    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., number: _Optional[int] = ..., operator: _Optional[str] = ..., source: _Optional[str] = ..., request: _Optional[str] = ..., values: _Optional[_Mapping[str, str]] = ..., outcome: _Optional[_Union[AuditEntry.Outcome, str]] = ..., text: _Optional[str] = ..., previous: _Optional[bytes] = ..., hash: _Optional[bytes] = ..., repeated_count: _Optional[int] = ...) -> None: ...
+    reason: Reason
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., number: _Optional[int] = ..., operator: _Optional[str] = ..., source: _Optional[str] = ..., request: _Optional[str] = ..., values: _Optional[_Mapping[str, str]] = ..., outcome: _Optional[_Union[AuditEntry.Outcome, str]] = ..., text: _Optional[str] = ..., previous: _Optional[bytes] = ..., hash: _Optional[bytes] = ..., repeated_count: _Optional[int] = ..., reason: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
 
 class AuditList(_message.Message):
     __slots__ = ("entries",)
@@ -508,7 +541,7 @@ class AuditQuery(_message.Message):
     def __init__(self, operator: _Optional[str] = ..., request: _Optional[str] = ..., outcome: _Optional[_Union[AuditEntry.Outcome, str]] = ..., since: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., until: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., most: _Optional[int] = ...) -> None: ...
 
 class Event(_message.Message):
-    __slots__ = ("timestamp", "severity", "code", "text", "source", "values")
+    __slots__ = ("timestamp", "severity", "code", "text", "source", "values", "reason")
     class Severity(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         SEVERITY_UNSPECIFIED: _ClassVar[Event.Severity]
@@ -536,13 +569,15 @@ class Event(_message.Message):
     TEXT_FIELD_NUMBER: _ClassVar[int]
     SOURCE_FIELD_NUMBER: _ClassVar[int]
     VALUES_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
     timestamp: _timestamp_pb2.Timestamp
     severity: Event.Severity
     code: str
     text: str
     source: str
     values: _containers.ScalarMap[str, str]
-    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., severity: _Optional[_Union[Event.Severity, str]] = ..., code: _Optional[str] = ..., text: _Optional[str] = ..., source: _Optional[str] = ..., values: _Optional[_Mapping[str, str]] = ...) -> None: ...
+    reason: Reason
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., severity: _Optional[_Union[Event.Severity, str]] = ..., code: _Optional[str] = ..., text: _Optional[str] = ..., source: _Optional[str] = ..., values: _Optional[_Mapping[str, str]] = ..., reason: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
 
 class EventList(_message.Message):
     __slots__ = ("events",)
@@ -807,7 +842,7 @@ class CheckRequest(_message.Message):
 class CheckAnswer(_message.Message):
     __slots__ = ("ok", "duration_s", "violations", "interpolation", "notes", "path", "alone")
     class Violation(_message.Message):
-        __slots__ = ("line", "time_s", "kind", "pair", "points", "text", "until_s", "distance", "refuses")
+        __slots__ = ("line", "time_s", "kind", "pair", "points", "text", "until_s", "distance", "refuses", "reason")
         LINE_FIELD_NUMBER: _ClassVar[int]
         TIME_S_FIELD_NUMBER: _ClassVar[int]
         KIND_FIELD_NUMBER: _ClassVar[int]
@@ -817,6 +852,7 @@ class CheckAnswer(_message.Message):
         UNTIL_S_FIELD_NUMBER: _ClassVar[int]
         DISTANCE_FIELD_NUMBER: _ClassVar[int]
         REFUSES_FIELD_NUMBER: _ClassVar[int]
+        REASON_FIELD_NUMBER: _ClassVar[int]
         line: int
         time_s: float
         kind: str
@@ -826,7 +862,8 @@ class CheckAnswer(_message.Message):
         until_s: float
         distance: float
         refuses: bool
-        def __init__(self, line: _Optional[int] = ..., time_s: _Optional[float] = ..., kind: _Optional[str] = ..., pair: _Optional[_Iterable[str]] = ..., points: _Optional[_Iterable[_Union[Vector3, _Mapping]]] = ..., text: _Optional[str] = ..., until_s: _Optional[float] = ..., distance: _Optional[float] = ..., refuses: _Optional[bool] = ...) -> None: ...
+        reason: Reason
+        def __init__(self, line: _Optional[int] = ..., time_s: _Optional[float] = ..., kind: _Optional[str] = ..., pair: _Optional[_Iterable[str]] = ..., points: _Optional[_Iterable[_Union[Vector3, _Mapping]]] = ..., text: _Optional[str] = ..., until_s: _Optional[float] = ..., distance: _Optional[float] = ..., refuses: _Optional[bool] = ..., reason: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
     class Path(_message.Message):
         __slots__ = ("times_s", "joint_positions", "tool_positions", "clearances", "lines")
         TIMES_S_FIELD_NUMBER: _ClassVar[int]
@@ -1428,18 +1465,20 @@ class ToPage(_message.Message):
         step: int
         def __init__(self, key: _Optional[str] = ..., attachment: _Optional[bytes] = ..., payload: _Optional[bytes] = ..., live: _Optional[bool] = ..., age_s: _Optional[float] = ..., step: _Optional[int] = ...) -> None: ...
     class Answer(_message.Message):
-        __slots__ = ("id", "ok", "payload", "error", "no_answer")
+        __slots__ = ("id", "ok", "payload", "error", "no_answer", "refusal")
         ID_FIELD_NUMBER: _ClassVar[int]
         OK_FIELD_NUMBER: _ClassVar[int]
         PAYLOAD_FIELD_NUMBER: _ClassVar[int]
         ERROR_FIELD_NUMBER: _ClassVar[int]
         NO_ANSWER_FIELD_NUMBER: _ClassVar[int]
+        REFUSAL_FIELD_NUMBER: _ClassVar[int]
         id: int
         ok: bool
         payload: bytes
         error: str
         no_answer: bool
-        def __init__(self, id: _Optional[int] = ..., ok: _Optional[bool] = ..., payload: _Optional[bytes] = ..., error: _Optional[str] = ..., no_answer: _Optional[bool] = ...) -> None: ...
+        refusal: Reason
+        def __init__(self, id: _Optional[int] = ..., ok: _Optional[bool] = ..., payload: _Optional[bytes] = ..., error: _Optional[str] = ..., no_answer: _Optional[bool] = ..., refusal: _Optional[_Union[Reason, _Mapping]] = ...) -> None: ...
     class Presence(_message.Message):
         __slots__ = ("key", "alive")
         KEY_FIELD_NUMBER: _ClassVar[int]

@@ -14,10 +14,12 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from bus.messages import reason_message
+from bus.reasons import Reason
 from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.errors import AuditError
 
@@ -45,6 +47,7 @@ class Entry:
         time_ns: When it was asked, ns since the Unix epoch.
         source: Where it came from: "mesh", "gateway".
         values: What was asked for, as text.
+        reason: Of the text, where it has a code.
         repeated: Of a flood: so many more requests like it, before it, have no entry of their own.
     """
 
@@ -54,6 +57,7 @@ class Entry:
     request: str
     outcome: Outcome
     text: str = ""
+    reason: Reason | None = None
     values: Mapping[str, str] = field(default_factory=dict)
     repeated: int = 0
     number: int = 0
@@ -72,13 +76,16 @@ class Link(NamedTuple):
 
 def chained(entry: Entry, *, number: int, previous: str) -> tuple[Entry, bytes]:
     """The entry in its place in the chain, and its line."""
-    row = {**vars(entry), "values": dict(entry.values), "number": number, "previous": previous}
-    del row["hash"]
+    placed = replace(entry, number=number, previous=previous)
+    row = {**vars(placed), "values": dict(entry.values)}
+    del row["hash"], row["reason"]
+    if entry.reason is not None:
+        row["reason"] = _row_of(entry.reason)
     text = json.dumps(row, ensure_ascii=False, separators=(",", ":"), sort_keys=True)
     # Half a surrogate pair is no character, and must not keep the rest from being written.
     body = text.encode(errors="backslashreplace")
     own = hashlib.sha256(body).hexdigest()
-    return Entry(**row, hash=own), b'{"hash":"%s",%s\n' % (own.encode(), body[1:])
+    return replace(placed, hash=own), b'{"hash":"%s",%s\n' % (own.encode(), body[1:])
 
 
 def link_of(line: bytes) -> Link | None:
@@ -99,11 +106,28 @@ def parse_line(line: bytes) -> Entry:
     """
     try:
         row = json.loads(line)
-        entry = Entry(**{**row, "outcome": Outcome(row["outcome"])})
+        reason = _reason_of(row.pop("reason")) if "reason" in row else None
+        entry = Entry(**{**row, "outcome": Outcome(row["outcome"])}, reason=reason)
         _check(entry)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise AuditError(f"not an audit entry: {line[:80]!r} ({error})") from None
     return entry
+
+
+def _row_of(reason: Reason) -> dict[str, Any]:
+    row: dict[str, Any] = {"code": reason.code}
+    if reason.values:
+        row["values"] = dict(reason.values)
+    if reason.causes:
+        row["causes"] = [_row_of(cause) for cause in reason.causes]
+    return row
+
+
+def _reason_of(row: Mapping[str, Any]) -> Reason:
+    values = row.get("values", {})
+    if not all(isinstance(text, str) for text in (row["code"], *values, *values.values())):
+        raise TypeError("the reason has a value that is no text")
+    return Reason(row["code"], values, tuple(map(_reason_of, row.get("causes", ()))))
 
 
 def _check(entry: Entry) -> None:
@@ -133,4 +157,6 @@ def audit_entry(entry: Entry) -> schema.AuditEntry:
         hash=bytes.fromhex(entry.hash),
     )
     message.timestamp.FromNanoseconds(entry.time_ns)
+    if entry.reason is not None:
+        message.reason.CopyFrom(reason_message(entry.reason))
     return message

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from bus import reason_codes as codes
 from bus.answering import Request
 from bus.errors import RefusedError
 from bus.schemas import robomesh_pb2 as schema
@@ -127,13 +128,13 @@ class Searches:
         assert isinstance(request.message, schema.AuditQuery)
         query = query_of(request.message)
         if self._asked >= _MOST_SEARCHES:
-            raise RefusedError(f"{_MOST_SEARCHES} searches of this log wait already: ask again in a moment")
+            raise RefusedError(codes.AUDIT_SEARCHES(count=_MOST_SEARCHES))
         self._asked += 1
         try:
             async with self._one_at_a_time:
                 return await asyncio.to_thread(self._list, query)
         except OSError as error:
-            raise RefusedError(f"{self._live.name} cannot be read: {error.strerror}") from None
+            raise RefusedError(codes.AUDIT_UNREADABLE(file=self._live.name, detail=error.strerror)) from None
         finally:
             self._asked -= 1
 
@@ -150,7 +151,7 @@ def query_of(message: schema.AuditQuery) -> Query:
         RefusedError: Naming what cannot be meant.
     """
     if message.most > MOST:
-        raise RefusedError(f"most = {message.most}: at most {MOST} entries are given at once")
+        raise RefusedError(codes.AUDIT_TOO_MANY(count=message.most, most=MOST))
     outcomes = schema.AuditEntry.Outcome
     return Query(
         operator=one_line(message.operator),

@@ -12,6 +12,7 @@ counted, stops excepted: any number of them latches the same robot.
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from bus import reason_codes as codes
 from protocol_gateway.audit.entry import Entry, Outcome
 from protocol_gateway.texts import LONGEST_SENTENCE, one_line
 
@@ -80,4 +81,6 @@ def _count(last: Entry, more: int, *, many: bool) -> Entry:
     if not many:
         return replace(last, repeated=more)
     ending = " (the last of many askers)"
-    return replace(last, repeated=more, text=one_line(last.text, LONGEST_SENTENCE - len(ending)) + ending)
+    text = one_line(last.text, LONGEST_SENTENCE - len(ending)) + ending
+    reason = None if last.reason is None else codes.LAST_OF_MANY(last.reason)
+    return replace(last, repeated=more, text=text, reason=reason)

@@ -24,6 +24,8 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from bus import reason_codes as codes
+from bus.reasons import Reason
 from protocol_gateway.authority.rules import Stop
 from protocol_gateway.texts import one_line
 
@@ -70,7 +72,7 @@ class LatchFile:
         self._lock = threading.Lock()
         self._newest = LatchState()
         self._written: LatchState | None = None
-        self._failure = ""
+        self._failure: Reason | None = None
         self._busy_since_s: float | None = None
         self._syncing = False
         self._closed = False
@@ -79,14 +81,14 @@ class LatchFile:
         self.found, self.damage, self._sequence, self._slot = _read(path, first=first)
 
     @property
-    def problem(self) -> str:
-        """Why a stop would be forgotten by a restart now, in words; empty: it would not."""
+    def problem(self) -> Reason | None:
+        """Why a restart would forget a stop now; None: it would not."""
         if self._failure:
             return self._failure
         since_s = self._busy_since_s
         if since_s is not None and time.monotonic() - since_s > LONGEST_WRITE_S:
-            return f"the latch file {self.path.name} takes longer than {LONGEST_WRITE_S:g} s to write"
-        return ""
+            return codes.LATCH_SLOW(name=self.path.name, seconds=LONGEST_WRITE_S)
+        return None
 
     def begin(self, stop: Stop | None, last_stop_id: int, *, given_out: int) -> None:
         """Allocate the file and write both slots; `problem` says if that failed.
@@ -116,7 +118,7 @@ class LatchFile:
         with self._lock:
             self._newest = state
             if self._closed:
-                self._failure = f"the latch file {self.path.name} is closed: its gateway is being ended"
+                self._failure = codes.LATCH_CLOSED(name=self.path.name)
                 return
             if self._busy_since_s is not None:
                 return
@@ -163,10 +165,10 @@ class LatchFile:
             else:
                 self._allocate(state)
         except OSError as error:
-            done = "written" if self._allocated else "allocated"
-            self._failure = f"the latch file {self.path.name} cannot be {done} ({reason_of(error)})"
+            code = codes.LATCH_NOT_WRITABLE if self._allocated else codes.LATCH_NOT_ALLOCATED
+            self._failure = code(name=self.path.name, detail=reason_of(error))
             return
-        self._written, self._failure = state, ""
+        self._written, self._failure = state, None
         with self._lock:
             if self._syncing:
                 return
@@ -203,7 +205,7 @@ class LatchFile:
                 if self._file is not None:
                     os.fdatasync(self._file)
             except OSError as error:
-                self._failure = f"the latch file {self.path.name} cannot be written ({reason_of(error)})"
+                self._failure = codes.LATCH_NOT_WRITABLE(name=self.path.name, detail=reason_of(error))
             with self._lock:
                 if self._sequence == synced or self._failure:
                     self._syncing = False

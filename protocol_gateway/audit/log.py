@@ -23,6 +23,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from bus import reason_codes as codes
+from bus.reasons import Reason
 from protocol_gateway.audit.entry import Entry, Outcome, chained
 from protocol_gateway.audit.files import Verification, older_parts, part_name, read_entries, verify
 from protocol_gateway.audit.latch import LatchFile, reason_of
@@ -63,7 +65,7 @@ class AuditLog:
     Attributes:
         latch: The file that holds the latched stop, beside the log.
         mended: What was found wrong with the files when they were opened, in words; empty: nothing.
-        problem: Why the last write failed, in words; empty: it did not.
+        problem: Why the last write failed; None: it did not.
     """
 
     def __init__(
@@ -83,7 +85,7 @@ class AuditLog:
             AuditError: If the folder or file cannot be written, or another process has it open.
         """
         self.path = path
-        self.problem = ""
+        self.problem: Reason | None = None
         self._on_written = on_written
         self._rotate_bytes = self._rotate_at = rotate_bytes
         self._queue: list[_Waiting] = []
@@ -149,7 +151,7 @@ class AuditLog:
             return self._put(entry, kept=True)
         self._left_out += 1 + entry.repeated
         told: asyncio.Future[Entry] = asyncio.get_running_loop().create_future()
-        told.set_exception(AuditError(self.problem or f"{len(self._queue)} entries wait for the disk"))
+        told.set_exception(AuditError(self.problem or codes.AUDIT_QUEUE_FULL(count=len(self._queue))))
         return told
 
     def pay(self) -> None:
@@ -224,12 +226,12 @@ class AuditLog:
                 # An fsync takes milliseconds, seconds on a busy disk: the joint stream must not wait for it.
                 placed = await loop.run_in_executor(self._disk, self._write, [each.entry for each in batch])
             except Exception as error:
-                self.problem = f"the audit log {self.path.name} cannot be written ({reason_of(error)})"
+                self.problem = codes.AUDIT_NOT_WRITABLE(file=self.path.name, detail=reason_of(error))
                 self._left_out += left_out
                 new = bool(self._queue)
                 self._queue[:0] = self._refuse(batch[:-1] if left_out else batch)
             else:
-                self.problem = ""
+                self.problem = None
                 new = bool(self._queue)
                 # Before them may stand the entry that begins a new file.
                 for each, entry in zip(batch, placed[-len(batch) :], strict=True):
@@ -245,7 +247,7 @@ class AuditLog:
         """Tell who waits that it was not written; those that are kept."""
         for each in batch:
             if each.told is not None and not each.told.done():
-                each.told.set_exception(AuditError(self.problem))
+                each.told.set_exception(AuditError(self.problem or codes.AUDIT_QUEUE_FULL(count=len(batch))))
         return [replace(each, told=None) for each in batch if each.kept]
 
     def _tell(self, entries: list[Entry]) -> None:

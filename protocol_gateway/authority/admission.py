@@ -15,6 +15,8 @@ import hmac
 from dataclasses import replace
 from typing import NamedTuple
 
+from bus import reason_codes as codes
+from bus.reasons import Reason
 from bus.schemas.robomesh_pb2 import CommandRequest
 from protocol_gateway.authority.rules import (
     MOTION_COMMANDS,
@@ -22,8 +24,8 @@ from protocol_gateway.authority.rules import (
     Authority,
     Content,
     Now,
-    Why,
     holds,
+    not_sent,
     why_not_holder,
 )
 
@@ -47,23 +49,15 @@ def admit(authority: Authority, request: CommandRequest, *, operator: str, now: 
     What the controller's state and the joints' limits forbid is for `obstacles` to say.
     """
     if not holds(authority, operator, request.lease) or authority.lease is None:
-        return Verdict(Answer(False, f"Not sent: {why_not_holder(authority, operator)}.", Why.NOT_IN_CONTROL))
+        return Verdict(not_sent(why_not_holder(authority, operator)))
     lease = authority.lease
     if request.id == lease.last_id and lease.last_answer is not None and lease.last_content is not None:
         if content_of(request) == lease.last_content:
             return Verdict(lease.last_answer, repeat=True)
-        used = lease.last_content.in_words()
-        return Verdict(
-            Answer(False, f"Not sent: id {request.id} was used for {used}: count up with each command.")
-        )
+        used = codes.COMMAND_ID_USED(id=request.id, what=lease.last_content.in_words())
+        return Verdict(not_sent(used))
     if request.id <= lease.last_id:
-        return Verdict(
-            Answer(
-                False,
-                f"Not sent: id {request.id} is not higher than {lease.last_id}, the last one under this "
-                "lease: count up with each command.",
-            )
-        )
+        return Verdict(not_sent(codes.COMMAND_ID_OLD(id=request.id, last=lease.last_id)))
     refusal = lateness(request, now) or stop_refusal(authority, request)
     return Verdict(refusal or Answer(True, ""), counted=True)
 
@@ -87,11 +81,7 @@ def lateness(request: CommandRequest, now: Now) -> Answer | None:
     late_s = (now.wall_ns - request.not_after.ToNanoseconds()) * 1e-9
     if late_s <= 0:
         return None
-    return Answer(
-        False,
-        f"Not sent: it came {late_s:.2f} s after its not_after: delayed on the way, or dated by another "
-        "clock than the gateway's (`now` in each lease answer).",
-    )
+    return not_sent(codes.COMMAND_LATE(seconds=late_s))
 
 
 def delay(arrived_s: float, now: Now) -> Answer | None:
@@ -103,37 +93,26 @@ def delay(arrived_s: float, now: Now) -> Answer | None:
     waited_s = now.monotonic_s - arrived_s
     if waited_s <= LONGEST_WAIT_S:
         return None
-    return Answer(
-        False,
-        f"Not sent: it waited {waited_s:.1f} s in the gateway (for the audit log, or others before it); "
-        f"after {LONGEST_WAIT_S:g} s nobody may be waiting for it: send it again.",
-    )
+    return not_sent(codes.COMMAND_WAITED(waited=waited_s, seconds=LONGEST_WAIT_S))
 
 
 def stop_refusal(authority: Authority, request: CommandRequest) -> Answer | None:
     """Why a latched stop, or that there is none, forbids a command; None: it does not."""
-    text = _stopped(authority, request)
-    return Answer(False, f"Not sent: {text}.", Why.STOPPED) if text else None
+    reason = _stopped(authority, request)
+    return None if reason is None else not_sent(reason)
 
 
-def _stopped(authority: Authority, request: CommandRequest) -> str:
+def _stopped(authority: Authority, request: CommandRequest) -> Reason | None:
     stop = authority.stop
     if request.command == _RESET:
-        if stop is None and request.stop_id:
-            return f"stop {request.stop_id} is not latched; nothing is"
-        if stop is not None and stop.id != request.stop_id:
-            return (
-                f"RESET names stop {request.stop_id}, but stop {stop.id} is latched "
-                f"({stop.by}: {stop.reason}): see to it, then send RESET with stop_id {stop.id}"
-            )
-        if stop is not None and authority.moving:
-            return f"the robot still moves after stop {stop.id}: wait until it stands, then RESET"
-    elif stop is not None and request.command in MOTION_COMMANDS:
-        return (
-            f"stop {stop.id} is latched ({stop.by}: {stop.reason}): "
-            f"see to it, then send RESET with stop_id {stop.id}"
-        )
-    return ""
+        if stop is None:
+            return codes.STOP_NOT_LATCHED(id=request.stop_id) if request.stop_id else None
+        if stop.id != request.stop_id:
+            return codes.STOP_OTHER(asked=request.stop_id, id=stop.id, by=stop.by, reason=stop.reason)
+        return codes.STOP_MOVING(id=stop.id) if authority.moving else None
+    if stop is not None and request.command in MOTION_COMMANDS:
+        return codes.STOP_LATCHED(id=stop.id, by=stop.by, reason=stop.reason)
+    return None
 
 
 def remember(authority: Authority, request: CommandRequest, answer: Answer) -> Authority:

@@ -14,10 +14,11 @@ HOLD only ever makes a robot slower, so a mode that nobody knows does not forbid
 """
 
 from dataclasses import dataclass, replace
-from typing import TypeAlias
 
+from bus import reason_codes as codes
+from bus.reasons import Reason
 from bus.schemas.robomesh_pb2 import CommandRequest
-from protocol_gateway.authority.rules import MOTION_COMMANDS, Answer, Why
+from protocol_gateway.authority.rules import MOTION_COMMANDS, Answer, not_sent
 from protocol_gateway.drivers.driver import (
     Activity,
     ControllerCommand,
@@ -37,7 +38,6 @@ from robots.joints import Joints, violations
 
 _C = CommandRequest.Command
 _MOVES = frozenset({_C.MOVE_ABSOLUTE, _C.MOVE_RELATIVE})
-_Obstacle: TypeAlias = tuple[Why, str]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,8 +46,8 @@ class Controller:
 
     Attributes:
         positions: Where its joints are [rad] or [m]; None: not told, or not any more.
-        positions_gone: That they are not told any more, in words; empty: they are, or never were.
-        read_only: Why nothing is ever sent to it, and what would be right; empty: it may be sent to.
+        positions_gone: That they are not received any more; None: they are, or never were.
+        read_only: Why nothing is ever sent to it; None: commands may be sent to it.
         accept_unknown: What it never tells and the site file says to do without: "mode", "homed".
     """
 
@@ -55,8 +55,8 @@ class Controller:
     status: StatusReceived
     fault: str = ""
     positions: tuple[float, ...] | None = None
-    positions_gone: str = ""
-    read_only: str = ""
+    positions_gone: Reason | None = None
+    read_only: Reason | None = None
     accept_unknown: frozenset[str] = frozenset()
 
 
@@ -68,52 +68,47 @@ def obstacle(request: CommandRequest, controller: Controller, joints: Joints) ->
         or _state_obstacle(request, controller)
         or _value_obstacle(request, controller, joints)
     )
-    return None if found is None else Answer(False, f"Not sent: {found[1]}.", found[0])
+    return None if found is None else not_sent(found)
 
 
-def _link_obstacle(controller: Controller) -> _Obstacle | None:
-    if controller.read_only:
-        return Why.READ_ONLY, f"this robot is read-only: {controller.read_only}"
-    text = controller.link.text
+def _link_obstacle(controller: Controller) -> Reason | None:
+    if controller.read_only is not None:
+        return codes.ROBOT_READ_ONLY(controller.read_only)
     match controller.link.state:
         case LinkState.DOWN:
-            return Why.OTHER, f"the link to the controller is down ({text})"
+            return codes.LINK_DOWN(controller.link.reason)
         case LinkState.SILENT:
-            return Why.OTHER, f"the controller is silent, where the robot is now is not known ({text})"
+            return codes.LINK_SILENT(controller.link.reason)
         case LinkState.UP:
             return None
 
 
-def _mode_obstacle(request: CommandRequest, controller: Controller) -> _Obstacle | None:
+def _mode_obstacle(request: CommandRequest, controller: Controller) -> Reason | None:
     match controller.status.mode:
         case Mode.LOCAL:
-            return Why.LOCAL_MODE, "the controller is in local mode: switch it to remote at the controller"
+            return codes.CONTROLLER_LOCAL()
         case None if request.command != _C.HOLD and "mode" not in controller.accept_unknown:
-            return Why.LOCAL_MODE, (
-                "the controller does not tell whether it is in remote or local mode; for one that "
-                'never does, the site file can say accept_unknown = ["mode"]'
-            )
+            return codes.CONTROLLER_MODE_UNKNOWN()
     return None
 
 
-def _state_obstacle(request: CommandRequest, controller: Controller) -> _Obstacle | None:
+def _state_obstacle(request: CommandRequest, controller: Controller) -> Reason | None:
     if request.command not in MOTION_COMMANDS:
         return None
     status = controller.status
     if status.activity is Activity.STOPPED:
-        return Why.STOPPED, "the controller is stopped: see to it, then send RESET"
+        return codes.CONTROLLER_STOPPED()
     if status.activity is Activity.FAULT:
-        fault = controller.fault or "it does not say which"
-        return Why.OTHER, f"the controller has a fault ({fault}): mend it, then send RESET"
+        return codes.CONTROLLER_FAULT(fault=controller.fault or "it does not say which")
     if status.activity is Activity.HOLDING and request.command != _C.RESUME:
-        return Why.STOPPED, "a motion is on hold: RESUME it, or give it up with RESET"
-    if controller.positions_gone:
-        return Why.OTHER, f"where the robot is now is not known ({controller.positions_gone})"
+        return codes.CONTROLLER_HOLDING()
+    if controller.positions_gone is not None:
+        return codes.POSITIONS_UNKNOWN(controller.positions_gone)
     # Many an arm cannot tell where it is before it is homed; one that could and cannot any more is not moved.
     if controller.positions is None and request.command != _C.HOME:
-        return Why.OTHER, "the controller has not told where the joints are"
+        return codes.POSITIONS_NONE()
     if request.command == _C.RESUME and status.activity is Activity.IDLE:
-        return Why.OTHER, "nothing is on hold: there is no motion to resume"
+        return codes.CONTROLLER_NOT_HOLDING()
     # A program may begin with homing; each of its steps is judged when its turn comes.
     if request.command in (_C.HOME, _C.RUN_PROGRAM) or status.homed:
         return None
@@ -121,31 +116,25 @@ def _state_obstacle(request: CommandRequest, controller: Controller) -> _Obstacl
     if request.command == _C.RESUME and status.activity is Activity.HOLDING:
         return None
     if status.homed is False:
-        return Why.OTHER, "the robot is not homed: home it first (HOME)"
-    if "homed" in controller.accept_unknown:
-        return None
-    return Why.OTHER, (
-        "the controller does not tell whether the robot is homed: home it first (HOME); for a controller "
-        'that never tells, the site file can say accept_unknown = ["homed"]'
-    )
+        return codes.ROBOT_NOT_HOMED()
+    return None if "homed" in controller.accept_unknown else codes.ROBOT_HOMED_UNKNOWN()
 
 
-def _value_obstacle(request: CommandRequest, controller: Controller, joints: Joints) -> _Obstacle | None:
+def _value_obstacle(request: CommandRequest, controller: Controller, joints: Joints) -> Reason | None:
     if request.command == _C.SPEED:
         if not request.HasField("speed_percent"):
-            return Why.LIMIT, "SPEED needs speed_percent, from 1 to 100"
+            return codes.SPEED_MISSING()
         if not 1.0 <= request.speed_percent <= 100.0:
-            return Why.LIMIT, f"speed {request.speed_percent:g} % is outside 1 to 100 %"
+            return codes.SPEED_OUTSIDE(value=request.speed_percent)
     if request.command not in _MOVES:
         return None
     count = len(request.joint_positions)
     if count != len(joints):
-        names = ", ".join(joints.names)
-        return Why.OTHER, f"{count} joint positions, but the robot has {len(joints)} joints ({names})"
+        return codes.JOINT_COUNT(count=count, joints=len(joints), names=", ".join(joints.names))
     # Limits and constraints are linear: all of a straight path in joint space is within them when its end is.
     target = target_of(request, controller, joints)
     found = violations(joints, target) if target is not None else ()
-    return (Why.LIMIT, "; ".join(found)) if found else None
+    return codes.JOINTS_OUTSIDE(*found) if found else None
 
 
 def target_of(request: CommandRequest, controller: Controller, joints: Joints) -> tuple[float, ...] | None:

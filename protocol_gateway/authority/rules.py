@@ -29,9 +29,10 @@ had been commanded under the lease: it may be that motion, begun far too late.
 
 import hmac
 from dataclasses import dataclass, field, replace
-from enum import Enum, auto
 from typing import NamedTuple
 
+from bus import reason_codes as codes
+from bus.reasons import Reason
 from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from protocol_gateway.texts import one_line
 
@@ -92,24 +93,35 @@ class Motion:
         return self.rests >= ENDED_AFTER_UNITS
 
 
-class Why(Enum):
-    """The kind of a refusal, for protocols that have numbers for some."""
-
-    NOT_IN_CONTROL = auto()
-    READ_ONLY = auto()
-    LOCAL_MODE = auto()
-    STOPPED = auto()
-    LIMIT = auto()
-    HELD = auto()
-    OTHER = auto()
-
-
 class Answer(NamedTuple):
-    """What became of a request, for its sender; `why`: of one that is refused."""
+    """The outcome of a request, for its sender.
+
+    Attributes:
+        reason: Why it is refused, or what was done.
+    """
 
     accepted: bool
     text: str
-    why: Why = Why.OTHER
+    reason: Reason | None = None
+
+
+def done(reason: Reason) -> Answer:
+    """Return the answer to a request that is accepted."""
+    return Answer(True, reason.text, reason)
+
+
+def refused(reason: Reason, *, what: str = "") -> Answer:
+    """Return the answer to a request that is refused.
+
+    Args:
+        what: Stands before the reason: "Not sent".
+    """
+    return Answer(False, f"{what}: {reason}." if what else reason.text, reason)
+
+
+def not_sent(reason: Reason) -> Answer:
+    """Return the answer to a command that is not sent."""
+    return refused(reason, what="Not sent")
 
 
 class Content(NamedTuple):
@@ -181,7 +193,7 @@ class LeaseEnd:
     """A lease that is over. `stop`: its holder's motion runs, or may, so the robot must be stopped."""
 
     holder: str
-    why: str
+    why: Reason
     renewals: int
     stop: bool
 
@@ -202,14 +214,14 @@ class Authority:
 
     Attributes:
         moving: What was last seen; None before anything was.
-        ended: Why the last lease that is over ended; empty: there was none.
+        ended: Why the last lease that is over ended; None: there was none.
         asked_by: Who asks its holder for control, oldest first.
         stopping_s: When the first of the stops since the last RESET was sent (monotonic): whoever presses
             again must not hide that the robot does not heed them.
     """
 
     lease: Lease | None = None
-    ended: str = ""
+    ended: Reason | None = None
     asked_by: tuple[Asker, ...] = ()
     stop: Stop | None = None
     last_stop_id: int = 0
@@ -240,52 +252,61 @@ def request_lease(
     lease = authority.lease
     action = LeaseRequest.Action
     mine = lease is not None and holds(authority, operator, request.lease)
+    reason = request.reason.strip()
     match request.action:
         case action.ACQUIRE if lease is None:
-            return _grant(authority, request, operator=operator, now=now, secret=secret, text="control taken")
+            return _grant(
+                authority, request, operator=operator, now=now, secret=secret, said=codes.LEASE_TAKEN()
+            )
         case action.ACQUIRE | action.RENEW if mine and lease is not None:
             renewed = replace(
                 _timed(lease, request.ttl_s, now),
                 renewals=lease.renewals + 1,
                 session=request.session or lease.session,
             )
-            return LeaseOutcome(replace(authority, lease=renewed), Answer(True, "control renewed"), renewed)
+            return LeaseOutcome(replace(authority, lease=renewed), done(codes.LEASE_RENEWED()), renewed)
         case action.RELEASE if mine and lease is not None:
-            why = f": {request.reason.strip()}" if request.reason.strip() else ""
-            free, ended = end_lease(authority, f"{operator} gave control back{why}")
-            return LeaseOutcome(free, Answer(True, "control given back"), ended=ended)
+            why = (
+                codes.ENDED_RELEASED_WHY(name=operator, reason=reason)
+                if reason
+                else codes.ENDED_RELEASED(name=operator)
+            )
+            free, ended = end_lease(authority, why)
+            return LeaseOutcome(free, done(codes.LEASE_RELEASED()), ended=ended)
         case action.OFFER if mine and lease is not None:
             offered = replace(lease, offered_to="" if request.to == operator else request.to)
-            text = f"control offered to {offered.offered_to}" if offered.offered_to else "offer withdrawn"
-            return LeaseOutcome(replace(authority, lease=offered), Answer(True, text), offered)
+            said = (
+                codes.LEASE_OFFERED(name=offered.offered_to)
+                if offered.offered_to
+                else codes.LEASE_OFFER_WITHDRAWN()
+            )
+            return LeaseOutcome(replace(authority, lease=offered), done(said), offered)
         case action.ACCEPT if lease is not None and lease.offered_to == operator:
             if _may_run(lease.motion):
-                return _refused(
-                    authority, f"{lease.holder}'s motion still runs: wait until it ends, then accept"
-                )
-            free, ended = end_lease(authority, f"handed over to {operator}")
-            text = f"control taken over from {lease.holder}"
-            granted = _grant(free, request, operator=operator, now=now, secret=secret, text=text)
+                return LeaseOutcome(authority, refused(codes.LEASE_MOVING(holder=lease.holder)))
+            free, ended = end_lease(authority, codes.ENDED_HANDED_OVER(name=operator))
+            said = codes.LEASE_TAKEN_FROM(name=lease.holder)
+            granted = _grant(free, request, operator=operator, now=now, secret=secret, said=said)
             return granted._replace(ended=ended)
-        case action.TAKE if lease is None or mine or request.reason.strip():
-            free, ended = end_lease(authority, f"taken by {operator}: {request.reason.strip()}")
-            granted = _grant(free, request, operator=operator, now=now, secret=secret, text="control taken")
+        case action.TAKE if lease is None or mine or reason:
+            free, ended = end_lease(authority, codes.ENDED_TAKEN(name=operator, reason=reason))
+            said = codes.LEASE_TAKEN()
+            granted = _grant(free, request, operator=operator, now=now, secret=secret, said=said)
             return granted._replace(ended=ended)
         case action.ASK if lease is not None and lease.holder != operator:
             return LeaseOutcome(
-                _asked(authority, operator, request.reason.strip(), now),
-                Answer(True, f"{lease.holder} is told that {operator} asks for control"),
+                _asked(authority, operator, reason, now),
+                done(codes.LEASE_ASKED(holder=lease.holder, name=operator)),
             )
         case action.ASK:
-            return _refused(
-                authority,
-                f"{operator} is in control already" if lease else "nobody is in control: take it (ACQUIRE)",
-            )
+            refusal = codes.LEASE_OWN(name=operator) if lease else codes.LEASE_FREE()
         case action.ACCEPT:
-            return _refused(authority, f"control was not offered to {operator}: ask its holder, or ACQUIRE")
+            refusal = codes.LEASE_NOT_OFFERED(name=operator)
         case action.TAKE:
-            return _refused(authority, "TAKE needs a reason: say in `reason` why control is taken away")
-    return _refused(authority, why_not_holder(authority, operator))
+            refusal = codes.LEASE_NO_REASON()
+        case _:
+            refusal = why_not_holder(authority, operator)
+    return LeaseOutcome(authority, refused(refusal))
 
 
 def holds(authority: Authority, operator: str, secret: str) -> bool:
@@ -306,7 +327,7 @@ def expire(authority: Authority, now: Now) -> tuple[Authority, LeaseEnd | None]:
     lease = authority.lease
     if lease is None or now.monotonic_s < lease.until_s:
         return authority, None
-    return end_lease(authority, f"{lease.holder}'s lease was not renewed within {lease.ttl_s:g} s")
+    return end_lease(authority, codes.ENDED_EXPIRED(name=lease.holder, seconds=lease.ttl_s))
 
 
 def end_session(authority: Authority, session: str) -> tuple[Authority, LeaseEnd | None]:
@@ -314,10 +335,12 @@ def end_session(authority: Authority, session: str) -> tuple[Authority, LeaseEnd
     lease = authority.lease
     if lease is None or not session or lease.session != session:
         return authority, None
-    return end_lease(authority, f"{lease.holder}'s page or program has gone")
+    return end_lease(authority, codes.ENDED_SESSION(name=lease.holder))
 
 
-def end_lease(authority: Authority, why: str, *, foreign: bool = False) -> tuple[Authority, LeaseEnd | None]:
+def end_lease(
+    authority: Authority, why: Reason, *, foreign: bool = False
+) -> tuple[Authority, LeaseEnd | None]:
     """End the lease, if there is one; says whether its holder's motion has to be stopped.
 
     Args:
@@ -336,7 +359,7 @@ def _may_run(motion: Motion | None) -> bool:
 
 
 def _grant(
-    authority: Authority, request: LeaseRequest, *, operator: str, now: Now, secret: str, text: str
+    authority: Authority, request: LeaseRequest, *, operator: str, now: Now, secret: str, said: Reason
 ) -> LeaseOutcome:
     lease = Lease(
         holder=operator,
@@ -351,7 +374,7 @@ def _grant(
     lease = _timed(lease, request.ttl_s, now)
     # Who waited for it and got it waits no more; the others still do.
     asked_by = tuple(each for each in _still_asking(authority, now) if each.operator != operator)
-    return LeaseOutcome(replace(authority, lease=lease, asked_by=asked_by), Answer(True, text), lease)
+    return LeaseOutcome(replace(authority, lease=lease, asked_by=asked_by), done(said), lease)
 
 
 def _asked(authority: Authority, operator: str, reason: str, now: Now) -> Authority:
@@ -377,18 +400,14 @@ def _timed(lease: Lease, ttl_s: float, now: Now) -> Lease:
     )
 
 
-def _refused(authority: Authority, text: str) -> LeaseOutcome:
-    return LeaseOutcome(authority, Answer(False, text))
-
-
-def why_not_holder(authority: Authority, operator: str) -> str:
-    """Why a request in an operator's name is not its lease's holder's, and what to do."""
+def why_not_holder(authority: Authority, operator: str) -> Reason:
+    """Return why a request in an operator's name is not its lease's holder's."""
     lease = authority.lease
     if lease is None:
-        return "nobody is in control, or the lease has ended: take control first (ACQUIRE)"
+        return codes.LEASE_NONE()
     if lease.holder != operator:
-        return f"{lease.holder} is in control: wait until it is given back, or ask for it"
-    return f"{operator} is in control with another lease (another window or program?): this one is not valid"
+        return codes.LEASE_HELD(holder=lease.holder)
+    return codes.LEASE_OTHER(name=operator)
 
 
 def stop(

@@ -4,6 +4,9 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from bus import reason_codes as codes
+from bus.reasons import Reason
+
 
 @dataclass(frozen=True)
 class Whereabouts:
@@ -11,11 +14,11 @@ class Whereabouts:
 
     Attributes:
         path: Where it is, then each place that it has been told to go to, in order [rad] or [m].
-        unknown: Why nobody knows; then `path` is empty.
+        unknown: Why it is not known; then `path` is empty. None: it is known.
     """
 
     path: tuple[tuple[float, ...], ...] = ()
-    unknown: str = ""
+    unknown: Reason | None = None
 
 
 class CellMates:
@@ -36,7 +39,7 @@ class CellMates:
 
     def others(self, name: str, cell: tuple[str, ...]) -> dict[str, Whereabouts]:
         """Where the cell's robots but one are; what no robot of this gateway is, nobody here knows."""
-        nobody = Whereabouts(unknown="this gateway does not serve it")
+        nobody = Whereabouts(unknown=codes.OTHER_NOT_SERVED())
         return {
             other: self._robots[other]() if other in self._robots else nobody
             for other in cell

@@ -6,6 +6,8 @@ import logging
 import time
 from collections.abc import Collection, Mapping
 
+from bus import reason_codes as codes
+from bus.reasons import Reason
 from bus.worker import Worker, WorkerError
 from protocol_gateway.checking.questions import PENDING, Checked, CheckMotion, CheckProgram, Prepare
 from protocol_gateway.errors import CheckError
@@ -24,7 +26,7 @@ _AGAIN_S = 5.0
 _PENDING_S = 1.0
 # For cells of several robots: beyond that, some share one.
 MOST_PROCESSES = 8
-_STARTING = "the check is still getting ready: try again in a few seconds"
+_STARTING = codes.CHECK_STARTING()
 
 
 class Checker:
@@ -44,7 +46,7 @@ class Checker:
         if at_once:
             self._wanted.set()
         self._worker = Worker("protocol_gateway.checking.worker", dict(cells))
-        self._problems = dict.fromkeys(cells, _STARTING)
+        self._problems: dict[str, Reason | None] = dict.fromkeys(cells, _STARTING)
         self._turn = asyncio.Lock()
         self._failed = ""
         self._process: int | None = None
@@ -55,8 +57,8 @@ class Checker:
         """Of the worker process, while there is one."""
         return self._worker.pid
 
-    def problem(self, robot: str) -> str:
-        """Why motions of a robot cannot be checked now; empty: they can."""
+    def problem(self, robot: str) -> Reason | None:
+        """Why motions of a robot cannot be checked now; None: they can."""
         return self._problems[robot]
 
     def starting(self, robot: str) -> bool:
@@ -91,7 +93,7 @@ class Checker:
             if why != self._failed:
                 log.error("motions cannot be checked: %s", why)
             self._failed = why
-            self._problems = dict.fromkeys(self._robots, f"the check does not work: {why}")
+            self._problems = dict.fromkeys(self._robots, codes.CHECK_BROKEN(detail=why))
             return None
         self._failed = ""
         return process
@@ -102,7 +104,7 @@ class Checker:
             text = await self._prepared(robot)
             if text != PENDING:
                 self._pending = tuple(each for each in self._pending if each != robot)
-                self._problems[robot] = text
+                self._problems[robot] = codes.CHECK_IMPOSSIBLE(detail=text) if text else None
 
     async def _prepared(self, robot: str) -> str:
         try:
@@ -137,29 +139,29 @@ class Checker:
         return await self._ask(question, within_s=PROGRAM_WITHIN_S)
 
     async def _ask(self, question: CheckMotion | CheckProgram, *, within_s: float) -> Checked:
-        if self._problems[question.robot]:
-            raise CheckError(self._problems[question.robot])
+        if (problem := self._problems[question.robot]) is not None:
+            raise CheckError(problem)
         began_s = time.monotonic()
         try:
             # What nobody waits for any more is not begun.
             async with asyncio.timeout(within_s):
                 await self._turn.acquire()
         except TimeoutError:
-            raise CheckError(f"the check took longer than {within_s:g} s: others are being checked") from None
+            raise CheckError(codes.CHECK_QUEUED_TOO_LONG(seconds=within_s)) from None
         asked = asyncio.ensure_future(self._answer(question, max(_HANGS_S, within_s)))
         asked.add_done_callback(self._done)
         # What is merely late goes on: ending the process would make the next one late, too.
         done, _ = await asyncio.wait([asked], timeout=max(within_s - (time.monotonic() - began_s), 0.0))
         if not done:
             asked.add_done_callback(_told)
-            raise CheckError(f"the check took longer than {within_s:g} s")
+            raise CheckError(codes.CHECK_TOO_SLOW(seconds=within_s))
         return asked.result()
 
     async def _answer(self, question: CheckMotion | CheckProgram, hangs_s: float) -> Checked:
         try:
             found: Checked = await self._worker.ask(question, timeout_s=hangs_s)
         except Exception as error:
-            raise CheckError(f"the check failed: {_in_words(error)}") from error
+            raise CheckError(codes.CHECK_FAILED(detail=_in_words(error))) from error
         return found
 
     def _done(self, asked: asyncio.Future[Checked]) -> None:

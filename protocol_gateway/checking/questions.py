@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from bus.reasons import Reason
 from robots.cells import CellDescription
 from robots.programs.steps import Step
 
@@ -49,7 +50,7 @@ class CheckProgram:
 
 @dataclass(frozen=True, kw_only=True)
 class Checked:
-    """What a check found, in words.
+    """What a check found.
 
     Attributes:
         refusals: Why the motion must not be made.
@@ -60,9 +61,9 @@ class Checked:
         duration_s: Of a program.
     """
 
-    refusals: tuple[str, ...] = ()
-    uncovered: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    refusals: tuple[Reason, ...] = ()
+    uncovered: tuple[Reason, ...] = ()
+    warnings: tuple[Reason, ...] = ()
     readable: bool = True
     steps: tuple[Step, ...] = ()
     duration_s: float = 0.0

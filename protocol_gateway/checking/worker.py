@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from bus import reason_codes as codes
+from bus.reasons import Reason
 from bus.worker import answer_all
 from protocol_gateway.checking.questions import (
     PENDING,
@@ -68,20 +70,20 @@ def _why_not(cell: Cell, robot: str) -> str:
     return ""
 
 
-def _coverage(cell: Cell) -> tuple[list[str], list[str]]:
+def _coverage(cell: Cell) -> tuple[list[Reason], list[Reason]]:
     """What of a cell no check covers: what moves, and what does not."""
     uncovered, warnings = [], []
     for name, arm in cell.arms.items():
         bare, missing = unshaped(cell, name), missing_meshes(cell, name)
         moving = unshaped_moving(cell, name)
         if len(bare) == len(arm.model.link_names):
-            uncovered.append(f"{name}'s description gives no link a shape, so nothing of it can be checked")
+            uncovered.append(codes.NO_SHAPES(name=name))
         elif missing:
-            uncovered.append(f"{name} cannot be checked whole: no such mesh file: {', '.join(missing)}")
+            uncovered.append(codes.MESH_MISSING(name=name, files=", ".join(missing)))
         elif moving:
-            uncovered.append(f"{name} cannot be checked whole: {', '.join(moving)} moves and has no shape")
+            uncovered.append(codes.LINK_WITHOUT_SHAPE(name=name, links=", ".join(moving)))
         elif bare:
-            warnings.append(f"not checked, for they have no shape: {', '.join(bare)} of {name}")
+            warnings.append(codes.FIXED_WITHOUT_SHAPE(name=name, links=", ".join(bare)))
     return uncovered, warnings
 
 
@@ -92,17 +94,19 @@ def _paths(others: Mapping[str, tuple[Positions, ...]]) -> dict[str, FloatArray]
 def _checked(cell: Cell, result: CheckResult) -> Checked:
     uncovered, warnings = _coverage(cell)
     return Checked(
-        refusals=tuple(_sentence(each) for each in result.violations if each.refuses),
+        refusals=tuple(_reason(each) for each in result.violations if each.refuses),
         uncovered=tuple(uncovered),
-        warnings=(*(_sentence(each) for each in result.violations if not each.refuses), *warnings),
+        warnings=(*(_reason(each) for each in result.violations if not each.refuses), *warnings),
         readable=not any(each.kind in _UNREADABLE for each in result.violations),
         steps=result.steps,
         duration_s=result.duration_s,
     )
 
 
-def _sentence(violation: Violation) -> str:
-    return f"line {violation.line}: {violation.text}" if violation.line else violation.text
+def _reason(violation: Violation) -> Reason:
+    if not violation.line:
+        return violation.reason
+    return codes.PROGRAM_LINE(violation.reason, line=violation.line)
 
 
 if __name__ == "__main__":

@@ -15,9 +15,11 @@ from collections.abc import Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
 from dataclasses import dataclass, replace
 
+from bus import reason_codes as codes
+from bus.reasons import Reason
 from bus.schemas.robomesh_pb2 import CommandRequest
 from protocol_gateway.authority.obstacles import Controller, after, target_of
-from protocol_gateway.authority.rules import MOTION_COMMANDS, Answer
+from protocol_gateway.authority.rules import MOTION_COMMANDS, Answer, not_sent, refused
 from protocol_gateway.checking.cell_mates import CellMates, Whereabouts
 from protocol_gateway.checking.checker import Checker
 from protocol_gateway.checking.policy import Policy
@@ -40,7 +42,7 @@ class Finding:
 
     Attributes:
         refusal: Why they must not be sent; None: they may.
-        warning: What is to be said of them all the same.
+        warning: What is to be said of them all the same; None: nothing.
         code: Of the event that says it. "check.warning": something is close; "check.failed": the check found
             what "require" refuses; "check.skipped": something was not checked.
         start: Where the robot stood, where that must still be so when they are sent.
@@ -48,7 +50,7 @@ class Finding:
     """
 
     refusal: Answer | None = None
-    warning: str = ""
+    warning: Reason | None = None
     code: str = _CLOSE
     start: Positions | None = None
     others: Mapping[str, tuple[Positions, ...]] | None = None
@@ -87,9 +89,9 @@ class Checks:
         mates.join(name, self.whereabouts)
 
     @property
-    def problem(self) -> str:
-        """Why motions cannot be checked now; empty: they can, or need not."""
-        return "" if self.policy is Policy.OFF else self._checker.problem(self._name)
+    def problem(self) -> Reason | None:
+        """Why motions cannot be checked now; None: they can, or need not."""
+        return None if self.policy is Policy.OFF else self._checker.problem(self._name)
 
     @property
     def starting(self) -> bool:
@@ -115,7 +117,7 @@ class Checks:
                 CheckMotion(robot=self._name, start=start, targets=self._targets(requests), others=others)
             )
         except CheckError as error:
-            return self._unchecked(str(error))
+            return self._unchecked(error.reason)
         return self._judged(checked, left_out, start, others)
 
     async def program(self, text: str) -> tuple[Checked, Finding]:
@@ -131,10 +133,9 @@ class Checks:
             CheckProgram(robot=self._name, text=text, start=start, others=others)
         )
         if not checked.readable:
-            text = "; ".join(checked.refusals)
-            return checked, Finding(refusal=Answer(False, f"Not run: {text}."))
+            return checked, Finding(refusal=_refused("Not run", checked.refusals))
         # Each step is checked again, against the others as they are then.
-        finding = self._judged(checked, left_out, start, others, refused="Not run:")
+        finding = self._judged(checked, left_out, start, others, program=True)
         return checked, replace(finding, start=start, others=None)
 
     def whereabouts(self) -> Whereabouts:
@@ -142,27 +143,27 @@ class Checks:
         guarded = self._guarded
         controller, authority = guarded.controller(), guarded.authority
         if controller.positions is None:
-            return Whereabouts(unknown="its controller does not tell where it is")
+            return Whereabouts(unknown=codes.OTHER_NO_POSITION())
         motion = None if authority.lease is None else authority.lease.motion
         ahead = () if guarded.program is None else guarded.program.ahead
         if motion is not None and motion.way:
             ahead = (*motion.way, *ahead)
         elif motion is not None or _moves(controller, authority.moving):
-            return Whereabouts(unknown="it moves, and nobody knows where to")
+            return Whereabouts(unknown=codes.OTHER_MOVES())
         return Whereabouts(path=(controller.positions, *ahead))
 
-    def changed(self, finding: Finding) -> str:
-        """What is not any more as it was when a motion was checked, in words; empty: it all is."""
+    def changed(self, finding: Finding) -> Reason | None:
+        """Return what has changed since a motion was checked; None: nothing has."""
         if finding.start and not self.stands_at(finding.start):
-            return "the robot has moved"
+            return codes.ROBOT_MOVED()
         for name, checked in (finding.others or {}).items():
             now = self._mates.others(self._name, self._cell)[name]
             # On its way it is somewhere on it; one that stood has to stand there.
             stood = len(checked) == 1 and now.path and not self._near(now.path[0], checked[0])
             told = any(not any(self._near(place, was) for was in checked) for place in now.path[1:])
             if now.unknown or stood or told:
-                return f"{name} has moved, or was told to,"
-        return ""
+                return codes.ROBOT_OTHER_MOVED(name=name)
+        return None
 
     def _near(self, one: Positions, other: Positions) -> bool:
         return len(one) == len(other) and all(abs(a - b) <= _STOOD for a, b in zip(one, other, strict=True))
@@ -184,7 +185,7 @@ class Checks:
         """
         controller, authority = self._guarded.controller(), self._guarded.authority
         if controller.positions is None:
-            raise CheckError("its controller does not tell where the robot is")
+            raise CheckError(codes.CHECK_NO_POSITION())
         if standing:
             lease = authority.lease
             motion = None if lease is None else lease.motion
@@ -193,8 +194,8 @@ class Checks:
             )
             if _moves(controller, authority.moving) or (motion and not motion.held and not arrived):
                 # What moves by itself, as a demonstration does, ends with a command.
-                how = "stop it" if self.policy is Policy.REQUIRE else "send it home"
-                raise CheckError(f"the robot moves, or is about to: wait until it stands, or {how}")
+                required = self.policy is Policy.REQUIRE
+                raise CheckError((codes.ROBOT_MOVES_STOP if required else codes.ROBOT_MOVES_HOME)())
         return controller.positions
 
     def _targets(self, requests: Sequence[CommandRequest]) -> tuple[Positions, ...]:
@@ -210,14 +211,14 @@ class Checks:
                 lease = self._guarded.authority.lease
                 way = () if lease is None or lease.motion is None else lease.motion.way
                 if not way:
-                    raise CheckError("where the held motion goes is not known: give it up (RESET), move anew")
+                    raise CheckError(codes.CHECK_HELD_WAY_UNKNOWN())
                 targets += way
             elif (target := target_of(request, controller, self._joints)) is not None:
                 targets.append(target)
             controller = after(request, controller, self._joints)
         return tuple(targets)
 
-    def _others(self) -> tuple[dict[str, tuple[Positions, ...]], str]:
+    def _others(self) -> tuple[dict[str, tuple[Positions, ...]], Reason | None]:
         """Where the cell's other robots are and go; and, where that may be left out, whose is not known.
 
         Raises:
@@ -225,37 +226,40 @@ class Checks:
         """
         others = self._mates.others(self._name, self._cell)
         unknown = [
-            f"where {name} is or goes ({each.unknown})" for name, each in others.items() if each.unknown
+            codes.CHECK_OTHER_UNKNOWN(each.unknown, name=name)
+            for name, each in others.items()
+            if each.unknown is not None
         ]
         if unknown and self.policy is Policy.REQUIRE:
-            raise CheckError(f"nobody knows {' or '.join(unknown)}")
-        known = {name: each.path for name, each in others.items() if not each.unknown}
-        return known, f"not known: {', '.join(unknown)}" if unknown else ""
+            raise CheckError(codes.CHECK_OTHERS_UNKNOWN(*unknown))
+        known = {name: each.path for name, each in others.items() if each.unknown is None}
+        return known, codes.CHECK_OTHERS_LEFT_OUT(*unknown) if unknown else None
 
-    def _unchecked(self, why: str) -> Finding:
+    def _unchecked(self, *why: Reason) -> Finding:
         if self.policy is Policy.REQUIRE:
-            text = f'Not sent: it cannot be checked, and this robot\'s site says check = "require": {why}.'
-            return Finding(refusal=Answer(False, text))
-        return Finding(warning=f"not checked: {why}", code=_SKIPPED)
+            return Finding(refusal=not_sent(codes.CHECK_REQUIRED(*why)))
+        return Finding(warning=codes.CHECK_SKIPPED(*why), code=_SKIPPED)
 
     def _judged(
         self,
         checked: Checked,
-        left_out: str,
+        left_out: Reason | None,
         start: Positions,
         others: Mapping[str, tuple[Positions, ...]],
         *,
-        refused: str = "Not sent: on its way",
+        program: bool = False,
     ) -> Finding:
-        said = [*checked.warnings, *filter(None, [left_out])]
+        said = checked.warnings if left_out is None else (*checked.warnings, left_out)
         if self.policy is Policy.REQUIRE:
             if checked.uncovered:
-                return self._unchecked(_few(checked.uncovered))
+                return self._unchecked(*_few(checked.uncovered))
+            if checked.refusals and program:
+                return Finding(refusal=_refused("Not run", _few(checked.refusals)))
             if checked.refusals:
-                return Finding(refusal=Answer(False, f"{refused} {_few(checked.refusals)}."))
-            return Finding(warning=_few(said), start=start, others=others)
+                return Finding(refusal=not_sent(codes.CHECK_ON_ITS_WAY(*_few(checked.refusals))))
+            return Finding(warning=_together(said), start=start, others=others)
         code = _FAILED if checked.refusals else _SKIPPED if left_out or checked.uncovered else _CLOSE
-        return Finding(warning=_few([*checked.refusals, *checked.uncovered, *said]), code=code)
+        return Finding(warning=_together((*checked.refusals, *checked.uncovered, *said)), code=code)
 
 
 def _moves(controller: Controller, moving: bool | None) -> bool:
@@ -263,7 +267,16 @@ def _moves(controller: Controller, moving: bool | None) -> bool:
     return bool(moving) or controller.status.activity in (Activity.MOVING, Activity.HOMING)
 
 
-def _few(texts: Sequence[str], most: int = 3) -> str:
-    """The first of many findings, and how many more there are."""
-    more = f"; and {len(texts) - most} more" if len(texts) > most else ""
-    return "; ".join(texts[:most]) + more
+def _refused(what: str, reasons: Sequence[Reason]) -> Answer:
+    return refused(reasons[0] if len(reasons) == 1 else codes.SEVERAL(*reasons), what=what)
+
+
+def _together(reasons: Sequence[Reason]) -> Reason | None:
+    few = _few(reasons)
+    return codes.SEVERAL(*few) if len(few) > 1 else few[0] if few else None
+
+
+def _few(reasons: Sequence[Reason], most: int = 3) -> tuple[Reason, ...]:
+    """Return the first reasons, and how many more there are."""
+    more = [codes.CHECK_MORE(count=len(reasons) - most)] if len(reasons) > most else []
+    return (*reasons[:most], *more)

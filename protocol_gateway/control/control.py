@@ -14,7 +14,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+from bus import reason_codes as codes
 from bus.errors import RefusedError
+from bus.messages import reason_message
 from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.log import GATEWAY, Entry, Outcome
 from protocol_gateway.authority import holders_motion, rules
@@ -28,11 +30,11 @@ from protocol_gateway.authority.admission import (
     used_up,
 )
 from protocol_gateway.authority.obstacles import Controller, after, controller_command, obstacle, target_of
-from protocol_gateway.authority.rules import MOTION_COMMANDS, Answer, Authority, Now, Why
+from protocol_gateway.authority.rules import MOTION_COMMANDS, Answer, Authority, Now, not_sent
 from protocol_gateway.control.checks import Checks, Finding
 from protocol_gateway.control.leases import Leases
 from protocol_gateway.control.ledger import command_entry
-from protocol_gateway.control.stops import Guarded, Stops, both_clocks, why_not
+from protocol_gateway.control.stops import Guarded, Stops, both_clocks
 from protocol_gateway.drivers.driver import Activity
 from protocol_gateway.errors import AuditError, CheckError, CommandError, LinkError
 from protocol_gateway.motion import has_arrived, motion_may_be_held
@@ -126,8 +128,8 @@ class Control:
         """
         answer = await self.attempt(requests, operator=operator, source=source)
         if not answer.accepted:
-            raise RefusedError(answer.text)
-        return schema.CommandAnswer(accepted=True, text=answer.text)
+            raise refusal(answer)
+        return command_answer(answer)
 
     async def attempt(
         self,
@@ -136,7 +138,7 @@ class Control:
         operator: str,
         source: str,
         begin: Callable[[], None] | None = None,
-        refused: str = "",
+        refused: Answer | None = None,
     ) -> Answer:
         """What `commands` does, with a refusal as the answer, and its kind.
 
@@ -153,8 +155,8 @@ class Control:
             if verdict.repeat:
                 return verdict.answer
             problem = verdict.answer if not verdict.answer.accepted else None
-            if refused:
-                problem = Answer(False, refused)
+            if refused is not None:
+                problem = refused
             attempt = _Attempt(tuple(requests), entries, arrived_s, counted=verdict.counted, begin=begin)
             if holds and problem is None:
                 attempt = self._cancel_what_has_not_begun(attempt)
@@ -165,7 +167,7 @@ class Control:
 
         A HOLD that is sent to an arm at rest leaves it holding nothing, and it then refuses every motion.
         """
-        cancelled = self._guarded.cancel_preparing("HOLD came while it was being checked: not started")
+        cancelled = self._guarded.cancel_preparing(codes.PROGRAM_HOLD())
         lease = self.authority.lease
         rests = self.authority.moving is False and (lease is None or lease.motion is None)
         if not cancelled or not rests or self._guarded.program is not None:
@@ -180,7 +182,7 @@ class Control:
             self.leases.expire()
             problem = None
             if not rules.holds(self.authority, operator, request.lease):
-                problem = Answer(False, "Not sent: control ended.", Why.NOT_IN_CONTROL)
+                problem = not_sent(codes.COMMAND_CONTROL_ENDED())
             return await self._do(_Attempt((request,), entries, arrived_s, step=True), problem)
 
     def admit(self, requests: Sequence[schema.CommandRequest], operator: str) -> Verdict:
@@ -203,36 +205,39 @@ class Control:
                     unit = self._driver.encode(*map(controller_command, attempt.requests))
                     send = partial(self._guarded.send, unit)
                 except CommandError as error:
-                    problem = Answer(False, f"Not sent: {error}.")
+                    problem = not_sent(error.reason)
             if problem is None and self._checks is not None:
                 finding = await self._checks.find(attempt.requests)
                 problem = finding.refusal
             if problem is not None:
                 self._remember(attempt, problem)
-                self._note(attempt.entries, Outcome.REFUSED, problem.text)
+                self._note(attempt.entries, Outcome.REFUSED, problem)
                 return problem
             assert send is not None
             # Used up before anything is done: whatever happens below, a repeat does not do it again.
-            broken_off = "Not sent: it was broken off while it was being written down."
-            self._remember(attempt, Answer(False, broken_off))
+            self._remember(attempt, not_sent(codes.COMMAND_BROKEN_OFF()))
             answer = await self._write_and_send(attempt, send, finding)
             self._remember(attempt, answer)
             return answer
 
     async def _write_and_send(self, attempt: _Attempt, send: Callable[[], None], finding: Finding) -> Answer:
-        entries = [replace(entry, text=finding.warning) for entry in attempt.entries]
+        warning = finding.warning
+        entries = [
+            replace(entry, text="" if warning is None else warning.text, reason=warning)
+            for entry in attempt.entries
+        ]
         try:
             await self._ledger.before(*entries)
         except AuditError as error:
-            return Answer(False, f"Not sent: {error}, and what is not written down is not done.")
+            return not_sent(codes.COMMAND_NOT_WRITTEN(error.reason))
         problem = self._second_thoughts(attempt, finding)
         if problem is None:
             try:
                 send()
             except (LinkError, CheckError) as error:
-                problem = Answer(False, f"Not sent: {why_not(error)}.")
+                problem = not_sent(error.reason)
         if problem is not None:
-            self._note(attempt.entries, Outcome.FAILED, problem.text)
+            self._note(attempt.entries, Outcome.FAILED, problem)
             return problem
         now = both_clocks()
         alone = now.monotonic_s - self._unit_s >= holders_motion.ANSWERED_WITHIN_S
@@ -247,22 +252,21 @@ class Control:
             text = f"{names} {'is' if len(attempt.requests) == 1 else 'are'} on the controller's socket"
         else:
             text = f"{names}: {attempt.said}"
-        if finding.warning and (finding.serious or not attempt.step):
-            self._journal.say(_S.WARNING, finding.code, f"{names}: {finding.warning}")
-        if finding.warning:
-            text = f"{text}; mind: {finding.warning}"
-        return Answer(True, text)
+        if warning is not None and (finding.serious or not attempt.step):
+            self._journal.say(_S.WARNING, finding.code, f"{names}: {warning}", why=warning, command=names)
+        if warning is not None:
+            text = f"{text}; mind: {warning}"
+        return Answer(True, text, warning)
 
     def _second_thoughts(self, attempt: _Attempt, finding: Finding) -> Answer | None:
         """Why what was allowed before it was written down must not be sent now; None: it may."""
         self.leases.expire()
         if not rules.holds(self.authority, attempt.entries[0].operator, attempt.requests[0].lease):
-            text = "Not sent: control ended while the command was being written down."
-            return Answer(False, text, Why.NOT_IN_CONTROL)
+            return not_sent(codes.COMMAND_CONTROL_ENDED_MEANWHILE())
         if refusal := self._held_up(attempt) or self._refusal(attempt):
             return refusal
-        changed = "" if self._checks is None else self._checks.changed(finding)
-        return Answer(False, f"Not sent: {changed} since the motion was checked.") if changed else None
+        changed = None if self._checks is None else self._checks.changed(finding)
+        return None if changed is None else not_sent(codes.COMMAND_CHANGED(changed))
 
     def _held_up(self, attempt: _Attempt) -> Answer | None:
         """That HOLD, which waits for nothing, has overtaken a motion: whoever held the robot expects none."""
@@ -273,11 +277,11 @@ class Control:
             held = program is not None and (program.held or program.given_up)
         else:
             held = lease is not None and lease.last_id > attempt.requests[-1].id
-        return Answer(False, "Not sent: HOLD came before it could be sent.", Why.HELD) if held else None
+        return not_sent(codes.COMMAND_HELD()) if held else None
 
-    def _note(self, entries: Sequence[Entry], outcome: Outcome, text: str) -> None:
+    def _note(self, entries: Sequence[Entry], outcome: Outcome, answer: Answer) -> None:
         for entry in entries:
-            self._ledger.after_later(replace(entry, outcome=outcome, text=text))
+            self._ledger.after_later(replace(entry, outcome=outcome, text=answer.text, reason=answer.reason))
 
     def _remember(self, attempt: _Attempt, answer: Answer) -> None:
         if attempt.counted:
@@ -290,7 +294,7 @@ class Control:
         motions = [each.command for each in attempt.requests if each.command in MOTION_COMMANDS]
         if len(motions) > 1 and _C.RESUME in motions:
             # Some go on with what is on hold first, some forget it: nobody would know the way.
-            return Answer(False, "Not sent: RESUME and another motion are two units: resume first, or RESET.")
+            return not_sent(codes.COMMAND_TWO_UNITS())
         for request in attempt.requests:
             refusal = (
                 refusal
@@ -307,21 +311,19 @@ class Control:
         return refusal
 
     def _latch_refusal(self, request: schema.CommandRequest) -> Answer | None:
-        problem = self._guarded.latch.problem if request.command in MOTION_COMMANDS else ""
-        return Answer(False, f"Not sent: {problem}, so a restart would forget a stop.") if problem else None
+        problem = self._guarded.latch.problem if request.command in MOTION_COMMANDS else None
+        return None if problem is None else not_sent(codes.COMMAND_NOT_LATCHED(problem))
 
     def _program_refusal(self, request: schema.CommandRequest) -> Answer | None:
         program = self._guarded.program
         # Of its speed its check is true.
         if program is None or request.command not in (MOTION_COMMANDS | {_C.SPEED}) - {_C.RESUME}:
             return None
-        text = f"the program {program.name} runs: stop it, or wait until it has ended"
-        return Answer(False, f"Not sent: {text}.")
+        return not_sent(codes.COMMAND_PROGRAM_RUNS(name=program.name))
 
-    def why_not(self, request: schema.CommandRequest) -> str:
-        """Why the controller as it is now cannot do a command, in words; empty: it can."""
-        found = self._obstacle(request, self._guarded.controller())
-        return "" if found is None else found.text
+    def why_not(self, request: schema.CommandRequest) -> Answer | None:
+        """Return why the controller as it is now cannot do a command; None: it can."""
+        return self._obstacle(request, self._guarded.controller())
 
     def _obstacle(self, request: schema.CommandRequest, controller: Controller) -> Answer | None:
         status = controller.status
@@ -399,7 +401,7 @@ class Control:
                 "the robot began to move, and nobody commanded it through the gateway",
             )
         if foreign and lease is not None and not lease.tolerates_motion:
-            self.leases.end("the robot began to move, and its holder had not commanded it", foreign=True)
+            self.leases.end(codes.ENDED_FOREIGN_MOTION(), foreign=True)
         if (before.lease and before.lease.motion is None) != (lease and lease.motion is None):
             self._guarded.on_change()
         self._stops.check_heeded(moving=moving, now=now)
@@ -429,3 +431,14 @@ class Control:
         """End the lease, if there still is one, and write what is still to be written."""
         self.leases.close()
         await self._ledger.settle()
+
+
+def refusal(answer: Answer) -> RefusedError:
+    """Return the error that refuses a request with an answer."""
+    return RefusedError(answer.reason or answer.text, text=answer.text)
+
+
+def command_answer(answer: Answer) -> schema.CommandAnswer:
+    """Return the answer to a command that is accepted."""
+    warning = None if answer.reason is None else reason_message(answer.reason)
+    return schema.CommandAnswer(accepted=True, text=answer.text, warning=warning)

@@ -11,11 +11,13 @@ import time
 from collections.abc import Callable
 from functools import partial
 
+from bus import reason_codes as codes
 from bus.errors import RefusedError
+from bus.reasons import Reason
 from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.log import GATEWAY, Entry, Outcome
 from protocol_gateway.authority import rules
-from protocol_gateway.authority.rules import Answer, Authority, LeaseEnd, LeaseOutcome
+from protocol_gateway.authority.rules import Authority, LeaseEnd, LeaseOutcome, refused
 from protocol_gateway.control.ledger import entry_of, lease_entry
 from protocol_gateway.control.stops import Guarded, Stops, both_clocks
 from protocol_gateway.errors import AuditError
@@ -53,33 +55,31 @@ class Leases:
             outcome = judge()
             told = request.action == _A.RENEW or (request.action == _A.ASK and asks_again)
             if outcome.answer.accepted and not told:
-                self._ledger.after_later(record(outcome=Outcome.ACCEPTED, text=outcome.answer.text))
+                self._ledger.after_later(record(Outcome.ACCEPTED, outcome.answer))
             return self._take_effect(outcome, record)
         async with self._turn:
             outcome = judge()
             if outcome.answer.accepted:
                 try:
-                    await self._ledger.before(record(outcome=Outcome.ACCEPTED, text=outcome.answer.text))
+                    await self._ledger.before(record(Outcome.ACCEPTED, outcome.answer))
                 except AuditError as error:
-                    raise RefusedError(f"no control: {error}, so it would not be known who had it") from None
+                    raise RefusedError(codes.LEASE_NOT_WRITTEN(error.reason)) from None
                 outcome = judge()
             return self._take_effect(outcome, record)
 
     def _judge_lease(self, request: schema.LeaseRequest, operator: str, secret: str) -> LeaseOutcome:
         self.expire()
         read_only = self._guarded.controller().read_only
-        if read_only and request.action in (_A.ACQUIRE, _A.TAKE):
-            return LeaseOutcome(
-                self._guarded.authority, Answer(False, f"this robot is read-only: {read_only}")
-            )
+        if read_only is not None and request.action in (_A.ACQUIRE, _A.TAKE):
+            return LeaseOutcome(self._guarded.authority, refused(codes.ROBOT_READ_ONLY(read_only)))
         return rules.request_lease(
             self._guarded.authority, request, operator=operator, now=both_clocks(), secret=secret
         )
 
     def _take_effect(self, outcome: LeaseOutcome, record: Callable[..., Entry]) -> schema.LeaseAnswer:
         if not outcome.answer.accepted:
-            self._ledger.after_later(record(outcome=Outcome.REFUSED, text=outcome.answer.text))
-            raise RefusedError(outcome.answer.text)
+            self._ledger.after_later(record(Outcome.REFUSED, outcome.answer))
+            raise RefusedError(outcome.answer.reason or outcome.answer.text)
         self._set_authority(outcome.authority)
         if outcome.ended is not None:
             self._after_lease_end(outcome.ended)
@@ -99,7 +99,7 @@ class Leases:
         if ended is not None:
             self._end(authority, ended, "REVOKE")
 
-    def end(self, why: str, *, foreign: bool = False) -> None:
+    def end(self, why: Reason, *, foreign: bool = False) -> None:
         """End the lease, if there is one, for a reason of the gateway's; `foreign`: of foreign motion."""
         authority, ended = rules.end_lease(self._guarded.authority, why, foreign=foreign)
         if ended is not None:
@@ -114,7 +114,8 @@ class Leases:
                 operator=GATEWAY,
                 source=GATEWAY,
                 outcome=Outcome.ACCEPTED,
-                text=ended.why,
+                text=ended.why.text,
+                why=ended.why,
                 holder=ended.holder,
                 renewals=ended.renewals,
             )
@@ -125,7 +126,7 @@ class Leases:
             self._stops.stop(by=GATEWAY, reason=f"dead-man: {ended.why}", source=GATEWAY)
         severity = _S.WARNING if ended.stop else _S.INFO
         text = f"control ended: {ended.why}{', its motion was stopped' if ended.stop else ''}"
-        self._journal.say(severity, "lease.ended", text, holder=ended.holder)
+        self._journal.say(severity, "lease.ended", text, why=ended.why, holder=ended.holder)
 
     def _set_authority(self, authority: Authority) -> None:
         """Take a new state, and set the alarm clock to its lease's end."""
@@ -142,6 +143,6 @@ class Leases:
 
     def close(self) -> None:
         """End the lease, if there still is one."""
-        self.end("the gateway is being ended")
+        self.end(codes.ENDED_GATEWAY())
         if self._expiry is not None:
             self._expiry.cancel()

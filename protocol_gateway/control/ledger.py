@@ -6,10 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from hashlib import sha256
 
+from bus import reason_codes as codes
+from bus.reasons import Reason
 from bus.schemas.robomesh_pb2 import CommandRequest, Event, LeaseRequest
 from protocol_gateway.audit.floods import STOP, Floods
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome
 from protocol_gateway.authority.admission import LONGEST_WAIT_S
+from protocol_gateway.authority.rules import Answer
 from protocol_gateway.errors import AuditError
 from protocol_gateway.journal import Journal
 from protocol_gateway.texts import LONGEST_SENTENCE, one_line
@@ -33,7 +36,7 @@ class Ledger:
         if any(entry.request == "RESET" for entry in entries):
             # A start reads which stop is latched in the order of the entries.
             self._write_counts(STOP)
-        late = AuditError(f"the audit log's disk takes longer than {LONGEST_WAIT_S:g} s")
+        late = AuditError(codes.AUDIT_SLOW(seconds=LONGEST_WAIT_S))
         if self._audit.stuck_s > LONGEST_WAIT_S:
             self._not_done(entries, late, Outcome.REFUSED)
             raise late
@@ -59,7 +62,7 @@ class Ledger:
         self._audit.pay()
         latch = self._audit.latch
         latch.retry()
-        if latch.problem:
+        if latch.problem is not None:
             if not self._failing:
                 self._say_failed(AuditError(latch.problem))
         elif self._failing and not self._audit.problem and self._audit.stuck_s < LONGEST_WAIT_S:
@@ -85,7 +88,8 @@ class Ledger:
 
     def _not_done(self, entries: Sequence[Entry], error: AuditError, outcome: Outcome) -> None:
         for entry in entries:
-            self.after_later(replace(entry, outcome=outcome, text=f"not done: {error}"))
+            reason = codes.NOT_DONE(error.reason)
+            self.after_later(replace(entry, outcome=outcome, text=reason.text, reason=reason))
         self._say_failed(error)
 
     def _say_failed(self, error: BaseException) -> None:
@@ -95,7 +99,14 @@ class Ledger:
 
 
 def entry_of(
-    request: str, *, operator: str, source: str, outcome: Outcome, text: str, **values: object
+    request: str,
+    *,
+    operator: str,
+    source: str,
+    outcome: Outcome,
+    text: str,
+    why: Reason | None = None,
+    **values: object,
 ) -> Entry:
     """An entry dated now; values that are empty are left out, and long ones cut."""
     return Entry(
@@ -105,6 +116,7 @@ def entry_of(
         request=request,
         outcome=outcome,
         text=text,
+        reason=why,
         values={
             name: one_line(str(value), LONGEST_SENTENCE)
             for name, value in values.items()
@@ -113,14 +125,17 @@ def entry_of(
     )
 
 
-def lease_entry(request: LeaseRequest, *, operator: str, source: str, outcome: Outcome, text: str) -> Entry:
+def lease_entry(
+    request: LeaseRequest, outcome: Outcome, answer: Answer, *, operator: str, source: str
+) -> Entry:
     """The entry of a lease request."""
     return entry_of(
         LeaseRequest.Action.Name(request.action),
         operator=operator,
         source=source,
         outcome=outcome,
-        text=text,
+        text=answer.text,
+        why=answer.reason,
         ttl_s=request.ttl_s,
         to=request.to,
         reason=request.reason,

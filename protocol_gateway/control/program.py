@@ -16,14 +16,16 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from bus.errors import RefusedError
+from bus import reason_codes as codes
+from bus.messages import reason_message
+from bus.reasons import Reason
 from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.log import Outcome
 from protocol_gateway.authority import rules
-from protocol_gateway.authority.rules import Why
+from protocol_gateway.authority.rules import Answer, refused
 from protocol_gateway.checking.questions import Checked
 from protocol_gateway.control.checks import Checks
-from protocol_gateway.control.control import PROGRAM, Control
+from protocol_gateway.control.control import PROGRAM, Control, command_answer, refusal
 from protocol_gateway.control.ledger import entry_of
 from protocol_gateway.control.stops import Guarded, Running
 from protocol_gateway.drivers.driver import Activity
@@ -65,6 +67,21 @@ class _Run:
     checked: Checked
 
 
+@dataclass(frozen=True)
+class _Prepared:
+    """A program that was checked.
+
+    Attributes:
+        refused: Why it must not run; None: it may.
+        warning: What the check warns of.
+        begin: Begins it.
+    """
+
+    refused: Answer | None = None
+    warning: Reason | None = None
+    begin: Callable[[], None] | None = None
+
+
 class Programs:
     """Runs one robot's programs, one at a time.
 
@@ -85,36 +102,38 @@ class Programs:
         Raises:
             RefusedError: With what, why and what next; the robot has not moved.
         """
-        cancelled: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+        cancelled: asyncio.Future[Reason] = asyncio.get_running_loop().create_future()
         try:
             return await self._begin(request, cancelled, operator=operator, source=source)
         finally:
             self._guarded.preparing.discard(cancelled)
 
     async def _begin(
-        self, request: schema.CommandRequest, cancelled: asyncio.Future[str], *, operator: str, source: str
+        self, request: schema.CommandRequest, cancelled: asyncio.Future[Reason], *, operator: str, source: str
     ) -> schema.CommandAnswer:
         verdict = self._control.admit([request], operator)
         name = one_line(request.program_name, LONGEST).strip() or "unnamed"
         # What was refused stays so, though its reason may be gone a moment later: nothing was planned.
-        refused, warning, begin = "" if verdict.answer.accepted else verdict.answer.text, "", None
+        prepared = _Prepared(None if verdict.answer.accepted else verdict.answer)
         if verdict.answer.accepted and not verdict.repeat:
             self._guarded.preparing.add(cancelled)
             try:
-                refused, warning, begin = await self._in_time(request, cancelled, name, operator)
+                prepared = await self._in_time(request, cancelled, name, operator)
             except CheckError as error:
-                refused = f"Not run: {error}."
+                prepared = _Prepared(refused(error.reason, what="Not run"))
         answer = await self._control.attempt(
-            [request], operator=operator, source=source, begin=begin, refused=refused
+            [request], operator=operator, source=source, begin=prepared.begin, refused=prepared.refused
         )
         if not answer.accepted:
-            raise RefusedError(answer.text)
-        mind = f"; mind: {warning}" if warning else ""
-        return schema.CommandAnswer(accepted=True, text=answer.text + mind)
+            raise refusal(answer)
+        if prepared.warning is not None:
+            text = f"{answer.text}; mind: {prepared.warning}"
+            answer = answer._replace(text=text, reason=prepared.warning)
+        return command_answer(answer)
 
     async def _in_time(
-        self, request: schema.CommandRequest, cancelled: asyncio.Future[str], name: str, operator: str
-    ) -> tuple[str, str, Callable[[], None]]:
+        self, request: schema.CommandRequest, cancelled: asyncio.Future[Reason], name: str, operator: str
+    ) -> "_Prepared":
         """As `_prepared`, unless its asker gives up, or HOLD or a stop comes before.
 
         Raises:
@@ -135,34 +154,36 @@ class Programs:
             prepared.cancel()
             await asyncio.gather(prepared, return_exceptions=True)
         if waits_s < WITHIN_S:
-            raise CheckError(
-                "it was not checked before its asker gives up: wait longer (not_after), ask again"
-            )
-        raise CheckError(f"it takes longer than {WITHIN_S:g} s to plan; nobody would wait for it")
+            raise CheckError(codes.PROGRAM_ASKER_GAVE_UP())
+        raise CheckError(codes.PROGRAM_PLAN_TOO_SLOW(seconds=WITHIN_S))
 
-    async def _prepared(
-        self, request: schema.CommandRequest, name: str, operator: str
-    ) -> tuple[str, str, Callable[[], None]]:
-        """Why a program must not be run, or nothing; what to mind; and what begins it."""
+    async def _prepared(self, request: schema.CommandRequest, name: str, operator: str) -> "_Prepared":
+        """Check a program."""
         if len(request.program.encode()) > MOST_BYTES:
-            raise CheckError(f"a program has at most {MOST_BYTES // 1024} KiB")
+            raise CheckError(codes.PROGRAM_TOO_LONG(kib=MOST_BYTES // 1024))
         checked, finding = await self._checks.program(request.program)
         lines = tuple(request.program.split("\n"))
         newest_stop = self._guarded.authority.last_stop_id
         run = _Run(name, operator, request.lease, newest_stop, lines, checked)
         if finding.refusal is not None:
-            return finding.refusal.text, "", lambda: None
+            return _Prepared(finding.refusal)
         first = next((step for step in checked.steps if step.target is not None), None)
         # Whether it is homed, or on hold, is known before its first step.
-        if first is not None and (text := self._control.why_not(_request(first, ""))):
-            return text, "", lambda: None
-        if finding.warning:
-            self._guarded.journal.say(_S.WARNING, finding.code, f"program {name}: {finding.warning}")
+        if first is not None and (problem := self._control.why_not(_request(first, ""))) is not None:
+            return _Prepared(problem)
+        if finding.warning is not None:
+            self._guarded.journal.say(
+                _S.WARNING,
+                finding.code,
+                f"program {name}: {finding.warning}",
+                why=finding.warning,
+                program=name,
+            )
         targets = tuple(tuple(each.target.tolist()) for each in checked.steps if each.target is not None)
 
         def begin() -> None:
             if finding.start and not self._checks.stands_at(finding.start):
-                raise CheckError("the robot has moved since its program was checked")
+                raise CheckError(codes.PROGRAM_MOVED())
             self._guarded.program = Running(name, targets)
             self.state = _STATE(
                 outcome=_STATE.RUNNING,
@@ -174,7 +195,7 @@ class Programs:
             )
             self._task = asyncio.create_task(self._run(run))
 
-        return "", finding.warning, begin
+        return _Prepared(None, finding.warning, begin)
 
     async def close(self) -> None:
         """End what runs."""
@@ -185,44 +206,44 @@ class Programs:
     async def _run(self, run: _Run) -> None:
         said = f"{run.operator} runs program {run.name}"
         self._guarded.journal.say(_S.INFO, "program.started", said, operator=run.operator, program=run.name)
-        text = "the gateway failed at it: its log says why"
+        problem: Reason | None = codes.PROGRAM_FAILED()
         try:
-            text = await self._all_steps(run)
+            problem = await self._all_steps(run)
         except asyncio.CancelledError:
-            text = "the gateway is being ended"
+            problem = codes.ENDED_GATEWAY()
             raise
         except Exception:
             log.exception("program %s failed", run.name)
         finally:
-            self._end(run, text)
+            self._end(run, problem)
 
-    async def _all_steps(self, run: _Run) -> str:
-        """Do a program's steps; why it was broken off, or nothing."""
+    async def _all_steps(self, run: _Run) -> Reason | None:
+        """Do a program's steps; return why it was broken off."""
         for number, step in enumerate(run.checked.steps):
             self.state.step, self.state.line = number + 1, step.line
             self.state.statement = one_line(run.lines[step.line - 1].partition("#")[0].strip(), LONGEST)
             self._guarded.on_change()
             problem = await self._step(run, step)
-            if problem:
+            if problem is not None:
                 return problem
         # Whoever gives control back when it is done ends no motion by that.
         return await self._until(run, self._settled)
 
-    async def _step(self, run: _Run, step: Step) -> str:
+    async def _step(self, run: _Run, step: Step) -> Reason | None:
         begin_s = time.monotonic()
         if step.kind is StepKind.WAIT:
             return await self._until(run, lambda: time.monotonic() - begin_s >= (step.seconds or 0.0))
         while True:
             # On hold between two motions, it waits for RESUME like a motion would.
-            if problem := await self._until(run, self._not_held):
+            if (problem := await self._until(run, self._not_held)) is not None:
                 return problem
             answer = await self._control.step(_request(step, run.secret), operator=run.operator)
-            if answer.accepted or answer.why is not Why.HELD:
+            if answer.accepted or answer.reason is None or answer.reason.code != codes.COMMAND_HELD.name:
                 break
         if not answer.accepted:
-            return answer.text.removeprefix("Not sent: ").rstrip(".")
+            return answer.reason
         if step.target is None:
-            return ""
+            return None
         # From now on the motion itself says where the robot goes.
         if (running := self._guarded.program) is not None:
             self._guarded.program = replace(running, done=running.done + 1)
@@ -237,16 +258,16 @@ class Programs:
 
         return await self._until(run, arrived, moves=True)
 
-    async def _until(self, run: _Run, done: Callable[[], bool], *, moves: bool = False) -> str:
-        """Wait; why the program is broken off, or nothing."""
+    async def _until(self, run: _Run, done: Callable[[], bool], *, moves: bool = False) -> Reason | None:
+        """Wait; return why the program is broken off."""
         while True:
-            if problem := self._broken_off(run):
+            if (problem := self._broken_off(run)) is not None:
                 return problem
             if done():
-                return ""
+                return None
             lease = self._guarded.authority.lease
             if moves and (lease is None or lease.motion is None):
-                return "the robot came to rest before it was where the line goes"
+                return codes.PROGRAM_NOT_ARRIVED()
             await asyncio.sleep(_LOOK_S)
 
     def _settled(self) -> bool:
@@ -258,37 +279,36 @@ class Programs:
         holding = self._guarded.controller().status.activity is Activity.HOLDING
         return not holding and (program is None or not program.held)
 
-    def _broken_off(self, run: _Run) -> str:
+    def _broken_off(self, run: _Run) -> Reason | None:
         authority = self._guarded.authority
         if authority.stop is not None:
-            return f"stopped by {authority.stop.by}: {authority.stop.reason}"
+            return codes.PROGRAM_STOPPED(by=authority.stop.by, reason=authority.stop.reason)
         if authority.last_stop_id != run.last_stop_id:
-            return f"stopped: stop request {authority.last_stop_id}"
+            return codes.PROGRAM_STOPPED_BY_NUMBER(id=authority.last_stop_id)
         if self._guarded.program is not None and self._guarded.program.given_up:
-            return "given up with RESET"
+            return codes.PROGRAM_GIVEN_UP()
         if not rules.holds(authority, run.operator, run.secret):
-            return f"control ended: {authority.ended or 'nobody says why'}"
-        return ""
+            return codes.PROGRAM_CONTROL_ENDED(authority.ended or codes.ENDED_UNKNOWN())
+        return None
 
-    def _end(self, run: _Run, text: str) -> None:
+    def _end(self, run: _Run, problem: Reason | None) -> None:
         self._guarded.program = None
-        self.state.outcome = _STATE.ENDED if text else _STATE.DONE
-        self.state.text = text
-        where = f"line {self.state.line}"
-        said = f"program {run.name} ended at {where}: {text}" if text else f"program {run.name} is done"
-        self._guarded.journal.say(
-            _S.WARNING if text else _S.INFO,
-            "program.ended" if text else "program.done",
-            said,
-            program=run.name,
-        )
+        if problem is None:
+            self.state.outcome, said = _STATE.DONE, codes.PROGRAM_DONE(program=run.name)
+        else:
+            self.state.outcome, self.state.text = _STATE.ENDED, problem.text
+            self.state.reason.CopyFrom(reason_message(problem))
+            said = codes.PROGRAM_ENDED(problem, program=run.name, line=self.state.line)
+        severity = _S.INFO if problem is None else _S.WARNING
+        self._guarded.journal.say(severity, said.code, said.text, why=said, program=run.name)
         self._guarded.ledger.after_later(
             entry_of(
                 "PROGRAM_END",
                 operator=run.operator,
                 source=PROGRAM,
-                outcome=Outcome.FAILED if text else Outcome.ACCEPTED,
-                text=said,
+                outcome=Outcome.ACCEPTED if problem is None else Outcome.FAILED,
+                text=said.text,
+                why=said,
             )
         )
         self._guarded.on_change()

@@ -14,6 +14,9 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from bus import reason_codes as codes
+from bus.messages import reason_message
+from bus.reasons import Reason
 from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.latch import LatchFile
 from protocol_gateway.audit.log import GATEWAY, Outcome
@@ -37,11 +40,6 @@ ON_ITS_WAY_S = 0.1
 def both_clocks() -> Now:
     """Now, on both clocks."""
     return Now(time.monotonic(), time.time_ns())
-
-
-def why_not(error: Exception) -> str:
-    """A link's error without what the sentence around it says already."""
-    return str(error).removeprefix("not sent: ")
 
 
 @dataclass(frozen=True)
@@ -92,10 +90,10 @@ class Guarded:
     controller: Callable[[], Controller]
     on_change: Callable[[], None]
     program: Running | None = None
-    preparing: set[asyncio.Future[str]] = field(default_factory=set)
+    preparing: set[asyncio.Future[Reason]] = field(default_factory=set)
     orphan: str = ""
 
-    def cancel_preparing(self, why: str) -> bool:
+    def cancel_preparing(self, why: Reason) -> bool:
         """Let no program begin that has not yet; whether there was one."""
         for each in self.preparing:
             if not each.done():
@@ -113,7 +111,7 @@ class Stops:
     def __init__(self, guarded: Guarded) -> None:
         self._guarded = guarded
         self._told_disobeyed_s = 0.0
-        self._newest: tuple[str, str, schema.StopAnswer] | None = None  # who asked, from where
+        self._newest: tuple[str, str, Reason, schema.StopAnswer] | None = None  # asked by, from where
 
     def stop(self, *, by: str, reason: str, source: str) -> schema.StopAnswer:
         """Send the stop unit, latch it, and only then say and write down that it was so."""
@@ -122,44 +120,48 @@ class Stops:
             return self._stop_of_read_only(by=by, reason=reason, source=source)
         sent_s = self._on_its_way_since(now)
         if sent_s is not None and self._newest is not None and self._newest[:2] == (by, source):
-            answer = self._newest[2]
-            self._note("STOP", answer, by=by, source=source, reason=reason)
+            _, _, said, answer = self._newest
+            self._note("STOP", said, answer.stop_id, sent=answer.sent, by=by, source=source, reason=reason)
             return answer
-        problem = self._send() if sent_s is None else ""
+        problem = self._send() if sent_s is None else None
         number = guarded.latch.next_number(guarded.authority.last_stop_id, now.wall_ns)
         guarded.authority, latched = rules.stop(
             guarded.authority, by=by, reason=reason, now=now, number=number
         )
         guarded.keep_latch()
-        guarded.cancel_preparing(f"stopped by {by}: {latched.reason}")
-        if not problem:
+        guarded.cancel_preparing(codes.PROGRAM_STOPPED(by=by, reason=latched.reason))
+        if problem is None:
             guarded.authority = rules.stop_sent(guarded.authority, latched.id, sent_s or now.monotonic_s)
-        text = f"stop request {latched.id} is on the controller's socket"
-        if problem:
-            text = f"stop request {latched.id} is latched, but not sent: {problem}"
+            said = codes.STOP_SENT(id=latched.id)
+        else:
+            said = codes.STOP_NOT_SENT(problem, id=latched.id)
         guarded.on_change()
         guarded.journal.say(
             _S.ERROR if problem else _S.WARNING,
             "stop.latched",
-            f"{text} ({by}: {latched.reason})",
+            f"{said} ({by}: {latched.reason})",
+            why=said,
             stop_id=latched.id,
             by=by,
             reason=latched.reason,
             sent=not problem,
         )
-        answer = schema.StopAnswer(stop_id=latched.id, sent=not problem, text=text)
-        self._newest = None if problem else (by, source, answer)
-        self._note("STOP", answer, by=by, source=source, reason=latched.reason)
+        answer = _answer(said, latched.id, sent=problem is None)
+        self._newest = None if problem else (by, source, said, answer)
+        self._note(
+            "STOP", said, latched.id, sent=problem is None, by=by, source=source, reason=latched.reason
+        )
         return answer
 
     def _stop_of_read_only(self, *, by: str, reason: str, source: str) -> schema.StopAnswer:
         """Nothing is sent, and nothing latched: nobody could clear it, and nothing needs it."""
         guarded = self._guarded
         why = guarded.controller().read_only
-        text = f"stop request not sent: stop it at its own panel, for it is read-only: {why}"
-        guarded.journal.say(_S.ERROR, "stop.not_sent", f"{text} ({by}: {reason})", by=by)
-        answer = schema.StopAnswer(sent=False, text=text)
-        self._note("STOP", answer, by=by, source=source, reason=reason)
+        assert why is not None
+        said = codes.STOP_READ_ONLY(why)
+        guarded.journal.say(_S.ERROR, "stop.not_sent", f"{said} ({by}: {reason})", why=said, by=by)
+        answer = _answer(said, 0, sent=False)
+        self._note("STOP", said, 0, sent=False, by=by, source=source, reason=reason)
         return answer
 
     def send_latched_stop(self) -> None:
@@ -168,14 +170,14 @@ class Stops:
         latched = guarded.authority.stop
         if latched is None or guarded.controller().read_only:
             return
-        if not self._send():
+        if self._send() is None:
             guarded.authority = rules.stop_sent(
                 guarded.authority, latched.id, both_clocks().monotonic_s, first=True
             )
             guarded.on_change()
-            text = f"stop request {latched.id} was sent to the controller when its link came back"
-            guarded.journal.say(_S.WARNING, "stop.sent", text, stop_id=latched.id)
-            self._note_again(schema.StopAnswer(stop_id=latched.id, sent=True, text=text))
+            said = codes.STOP_SENT_AGAIN(id=latched.id)
+            guarded.journal.say(_S.WARNING, "stop.sent", said.text, why=said, stop_id=latched.id)
+            self._note_again(said, latched.id, sent=True)
 
     def check_heeded(self, *, moving: bool, now: Now) -> None:
         """A robot that goes on moving after its stop is told of, and told again."""
@@ -187,28 +189,26 @@ class Stops:
             return
         self._told_disobeyed_s = now.monotonic_s
         problem = self._send()
-        text = (
-            f"the robot moves although stop request {latched.id} was sent: use the emergency stop there "
-            f"({problem or 'the stop unit was sent again'})"
-        )
-        guarded.journal.say(_S.CRITICAL, "stop.disobeyed", text, stop_id=latched.id)
-        self._note_again(schema.StopAnswer(stop_id=latched.id, sent=not problem, text=text))
+        said = codes.STOP_DISOBEYED(problem or codes.STOP_UNIT_REPEATED(), id=latched.id)
+        guarded.journal.say(_S.CRITICAL, "stop.disobeyed", said.text, why=said, stop_id=latched.id)
+        self._note_again(said, latched.id, sent=problem is None)
 
-    def _note_again(self, answer: schema.StopAnswer) -> None:
+    def _note_again(self, said: Reason, stop_id: int, *, sent: bool) -> None:
         # By a name of its own: it latches nothing, so a start need not read it.
-        self._note("STOP_AGAIN", answer, by=GATEWAY, source=GATEWAY)
+        self._note("STOP_AGAIN", said, stop_id, sent=sent, by=GATEWAY, source=GATEWAY)
 
     def _note(
-        self, request: str, answer: schema.StopAnswer, *, by: str, source: str, reason: str = ""
+        self, request: str, said: Reason, stop_id: int, *, sent: bool, by: str, source: str, reason: str = ""
     ) -> None:
         self._guarded.ledger.after_later(
             entry_of(
                 request,
                 operator=by,
                 source=source,
-                outcome=Outcome.ACCEPTED if answer.sent else Outcome.FAILED,
-                text=answer.text,
-                stop_id=answer.stop_id,
+                outcome=Outcome.ACCEPTED if sent else Outcome.FAILED,
+                text=said.text,
+                why=said,
+                stop_id=stop_id,
                 reason=reason,
             )
         )
@@ -224,10 +224,14 @@ class Stops:
             return None
         return latched.sent_s if now.monotonic_s - latched.sent_s < ON_ITS_WAY_S else None
 
-    def _send(self) -> str:
-        """Put the stop unit on the socket; why not, or nothing."""
+    def _send(self) -> Reason | None:
+        """Put the stop unit on the socket; return why that failed."""
         try:
             self._guarded.send(self._guarded.driver.encode(Stop()))
         except (LinkError, CommandError) as error:
-            return f"{why_not(error)}; it is sent as soon as the link is back"
-        return ""
+            return codes.STOP_SENT_LATER(error.reason)
+        return None
+
+
+def _answer(said: Reason, stop_id: int, *, sent: bool) -> schema.StopAnswer:
+    return schema.StopAnswer(stop_id=stop_id, sent=sent, text=said.text, reason=reason_message(said))

@@ -13,6 +13,7 @@ Source: Chen, Zhang, Xue 2001, section 5, figures 7 and 8.
 import asyncio
 import os
 
+from bus import reason_codes as codes
 from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.log import Outcome
 from protocol_gateway.control.control import Control
@@ -151,7 +152,7 @@ class LegacyClients:
             commander = self._clients.pop(client)
             self._counts.states_skipped += client.skipped
             if commander is not None:
-                commander.end(f"{commander.operator}'s old client program {client.name} has gone")
+                commander.end(codes.ENDED_CLIENT(name=commander.operator, client=client.name))
                 task = asyncio.create_task(commander.settle())
                 self._ending.add(task)
                 task.add_done_callback(self._ending.discard)

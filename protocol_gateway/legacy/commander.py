@@ -13,13 +13,14 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 from bus.errors import RefusedError
+from bus.reasons import Reason
 from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from protocol_gateway.authority.admission import LONGEST_WAIT_S
 from protocol_gateway.authority.rules import holds
 from protocol_gateway.control.control import Control
 from protocol_gateway.core.records import Error
 from protocol_gateway.core.stream import Unit
-from protocol_gateway.legacy.requests import FAULT, NUMBERS, READ_ONLY, requests_of, stop_to_reset
+from protocol_gateway.legacy.requests import FAULT, READ_ONLY, number_of, requests_of, stop_to_reset
 from robots.joints import Joints
 
 _A = LeaseRequest.Action
@@ -57,7 +58,7 @@ class Commander:
         self._waiting: deque[tuple[Unit, float]] = deque()
         self._work: asyncio.Task[None] | None = None
         self._renewal: asyncio.Task[None] | None = None
-        self._gone = ""
+        self._gone: Reason | None = None
 
     @property
     def in_control(self) -> bool:
@@ -80,7 +81,7 @@ class Commander:
         if self._work is None or self._work.done():
             self._work = asyncio.create_task(self._do_all())
 
-    def end(self, why: str) -> None:
+    def end(self, why: Reason) -> None:
         """Its connection has ended: so has its control."""
         self._gone = why
         self._waiting.clear()
@@ -127,7 +128,7 @@ class Commander:
         except RefusedError as error:
             self._refuse(unit, Error(READ_ONLY, str(error)), True)
             return
-        if self._gone:
+        if self._gone is not None:
             self.end(self._gone)
             return
         for request in requests:
@@ -135,7 +136,7 @@ class Commander:
             request.lease, request.id = self._secret, self._last_id
         answer = await self._control.attempt(requests, operator=self.operator, source=self._source)
         if not answer.accepted:
-            self._refuse(unit, Error(NUMBERS[answer.why], answer.text), True)
+            self._refuse(unit, Error(number_of(answer), answer.text), True)
 
     async def _lease(self, action: LeaseRequest.Action) -> None:
         request = LeaseRequest(action=action, lease=self._secret, ttl_s=_TTL_S)

@@ -7,8 +7,9 @@ anything else                               refused
 
 from collections.abc import Sequence
 
+from bus import reason_codes as codes
 from bus.schemas.robomesh_pb2 import CommandRequest
-from protocol_gateway.authority.rules import Authority, Why
+from protocol_gateway.authority.rules import Answer, Authority
 from protocol_gateway.core.records import (
     AbsolutePositions,
     Command,
@@ -26,15 +27,21 @@ from protocol_gateway.errors import UnitError
 from robots.joints import Joints
 
 TOO_MANY, MALFORMED, UNKNOWN_WORD, JOINT_COUNT, LIMIT, LOCAL_MODE, READ_ONLY, STOPPED, FAULT = range(1, 10)
-# The protocol's number for a refusal of control's.
-NUMBERS = {
-    Why.NOT_IN_CONTROL: READ_ONLY,
-    Why.READ_ONLY: READ_ONLY,
-    Why.LOCAL_MODE: LOCAL_MODE,
-    Why.STOPPED: STOPPED,
-    Why.HELD: STOPPED,
-    Why.LIMIT: LIMIT,
-    Why.OTHER: FAULT,
+_NUMBERS = {
+    code.name: number
+    for number, those in {
+        READ_ONLY: (
+            *(codes.LEASE_NONE, codes.LEASE_HELD, codes.LEASE_OTHER, codes.ROBOT_READ_ONLY),
+            *(codes.COMMAND_CONTROL_ENDED, codes.COMMAND_CONTROL_ENDED_MEANWHILE),
+        ),
+        LOCAL_MODE: (codes.CONTROLLER_LOCAL, codes.CONTROLLER_MODE_UNKNOWN),
+        STOPPED: (
+            *(codes.STOP_LATCHED, codes.STOP_NOT_LATCHED, codes.STOP_OTHER, codes.STOP_MOVING),
+            *(codes.CONTROLLER_STOPPED, codes.CONTROLLER_HOLDING, codes.COMMAND_HELD),
+        ),
+        LIMIT: (codes.SPEED_MISSING, codes.SPEED_OUTSIDE, codes.JOINTS_OUTSIDE),
+    }.items()
+    for code in those
 }
 
 _C = CommandRequest.Command
@@ -50,6 +57,11 @@ _WORDS = {
 _MOST_REQUESTS = 16
 # A reset that crossed a fresh stop on the wire must not clear it: nobody can have seen that stop yet.
 _SEEN_AFTER_S = 1.0
+
+
+def number_of(answer: Answer) -> int:
+    """Return the protocol's number for a refusal of control's."""
+    return FAULT if answer.reason is None else _NUMBERS.get(answer.reason.code, FAULT)
 
 
 def asks_to_stop(records: Sequence[Record]) -> bool:

@@ -7,6 +7,7 @@ import socket
 import struct
 from collections.abc import Callable
 
+from bus import reason_codes as codes
 from protocol_gateway.errors import LinkCloggedError, LinkDownError
 from protocol_gateway.sockets import configure
 
@@ -74,15 +75,15 @@ class Connection(asyncio.BufferedProtocol):
             LinkCloggedError: If the socket does not take it whole; the connection is given up then.
         """
         if self._transport.is_closing():
-            raise LinkDownError("not sent: the connection has just ended")
+            raise LinkDownError(codes.LINK_JUST_ENDED())
         # asyncio writes at once when its buffer is empty, and here it always is: what does not
         # fit ends the connection, so that half a unit can never be completed later.
         self._transport.write(data)
         if self._transport.is_closing():
-            raise LinkDownError("not sent: the connection broke while it was written")
+            raise LinkDownError(codes.LINK_BROKE())
         if self._transport.get_write_buffer_size():
             self._transport.abort()
-            raise LinkCloggedError("not sent: the controller does not read; connecting again")
+            raise LinkCloggedError(codes.LINK_CLOGGED())
 
     def pause(self, seconds: float) -> None:
         """Read nothing for so long; what is written goes out all the same."""

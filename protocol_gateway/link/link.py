@@ -23,6 +23,8 @@ from collections import Counter
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 
+from bus import reason_codes as codes
+from bus.reasons import Reason
 from bus.wall_clock import WallClock
 from protocol_gateway.drivers.driver import (
     ControllerEvent,
@@ -114,11 +116,13 @@ class ControllerLink:
         self._wall_clock = WallClock()
         self._where = f"{settings.host}:{settings.port}"
         self._connection: Connection | None = None
-        self._status = LinkStatus(LinkState.DOWN, f"connecting to {self._where}")
+        self._status = LinkStatus(LinkState.DOWN, codes.LINK_CONNECTING(where=self._where))
         self._counts: Counter[str] = Counter()
         self._last_received: Received | None = None
         self._refusal = ""
-        self._unusable: tuple[float, str, str] | None = None  # when such came last, why, and the event's code
+        self._unusable: tuple[float, Reason, str] | None = (
+            None  # when such came last, why, and the event's code
+        )
         self._dating = Dating()
         self._arrivals = Arrivals()
         self._losses = Losses()
@@ -193,7 +197,7 @@ class ControllerLink:
         """
         self._wanted.set()
         if self._connection is None:
-            raise LinkDownError(f"not sent: {self._status.text}")
+            raise LinkDownError(self._status.reason)
         self._connection.write(data)
         self._wanted.clear()
         self._counts["units_sent"] += 1
@@ -215,25 +219,25 @@ class ControllerLink:
                     lambda: Connection(self._made, self._receive), self._settings.host, self._settings.port
                 )
         except TimeoutError:
-            self._tell(LinkState.DOWN, f"{self._where} does not answer")
+            self._tell(LinkState.DOWN, codes.LINK_NO_ANSWER(where=self._where))
             return False
         except OSError as error:
-            self._tell(LinkState.DOWN, f"cannot connect to {self._where}: {reason_of(error)}")
+            self._tell(LinkState.DOWN, codes.LINK_FAILED(where=self._where, detail=reason_of(error)))
             return False
         units_before = self._driver.units_received
-        text = "the link was closed"
+        reason = codes.LINK_CLOSED()
         try:
-            text = await self._watch(connection)
+            reason = await self._watch(connection)
         finally:
             self._connection = None
             self._handing.forget()
             await connection.end()
-            self._tell(LinkState.DOWN, text)
+            self._tell(LinkState.DOWN, reason)
         came = self._driver.units_received > units_before
         return came and not self._refusal
 
-    async def _watch(self, connection: Connection) -> str:
-        """Wait for the connection's end, telling silence; the reason of the end in words."""
+    async def _watch(self, connection: Connection) -> Reason:
+        """Wait for the connection's end, reporting silence; return the reason of the end."""
         connected_s = self._monotonic_s()
         patience_s, limit_s = self._settings.stale_after_s, self._settings.reconnect_after_s
         while not connection.lost.done():
@@ -242,17 +246,15 @@ class ControllerLink:
             quiet_s = now_s - max(last_s, connected_s)
             mute_s = quiet_s if self._unusable is None else now_s - self._unusable[0]
             if mute_s >= limit_s:
-                return f"{self._where} sends nothing; connecting again"
+                return codes.LINK_RECONNECTS(where=self._where)
             if quiet_s >= patience_s and self._status.state is LinkState.UP:
                 self._fall_silent()
             wait_s = patience_s - quiet_s if quiet_s < patience_s else limit_s - mute_s
             await asyncio.wait([connection.lost], timeout=wait_s)
         end = connection.lost.result()
-        return (
-            f"{self._where} refused the connection: {self._refusal}"
-            if self._refusal
-            else f"{self._where}: {end}"
-        )
+        if self._refusal:
+            return codes.LINK_REFUSED(where=self._where, detail=self._refusal)
+        return codes.LINK_LOST(where=self._where, detail=end)
 
     def _made(self, connection: Connection) -> None:
         self._driver.connected()
@@ -263,7 +265,7 @@ class ControllerLink:
         self._connection = connection
         self._refusal = ""
         self._counts["connections"] += 1
-        self._tell(LinkState.SILENT, f"connected to {self._where}, no unit yet")
+        self._tell(LinkState.SILENT, codes.LINK_NO_UNIT(where=self._where))
 
     def _later(self, seconds: float, call: Callable[[], None]) -> asyncio.TimerHandle:
         assert self._connection is not None
@@ -297,7 +299,7 @@ class ControllerLink:
             self._fall_silent()
             return  # said once, not again for each unit
         if self._handing.flood.on is not self._status.flooding:
-            self._tell(self._status.state, self._status.text, self._status.code)
+            self._tell(self._status.state, self._status.reason, self._status.code)
         self._handing.give(events, dates, burst=self._dating.after_gap(now.monotonic_s))
 
     def _is_deluge(self, length: int, now_s: float) -> bool:
@@ -308,7 +310,7 @@ class ControllerLink:
         if self._handing.flood.deluge:
             assert self._connection is not None
             self._connection.pause(_DELUGE_EACH_S)
-            self._unusable = now_s, f"{self._where} sends far too much: nothing of it is taken", "link.deluge"
+            self._unusable = now_s, codes.LINK_DELUGE(where=self._where), "link.deluge"
             self._fall_silent()
         elif before:
             self._driver.connected()
@@ -324,10 +326,10 @@ class ControllerLink:
     def _fall_silent(self) -> None:
         if self._unusable is None:
             self._handing.flood = Flood()
-            self._tell(LinkState.SILENT, f"{self._where} sends nothing")
+            self._tell(LinkState.SILENT, codes.LINK_NO_DATA(where=self._where))
         else:
-            _, text, code = self._unusable
-            self._tell(LinkState.SILENT, text, code)
+            _, reason, code = self._unusable
+            self._tell(LinkState.SILENT, reason, code)
 
     def _now(self) -> Received:
         if self._wall_clock.was_set():
@@ -346,7 +348,7 @@ class ControllerLink:
         self._last_received = newest
         old = now.monotonic_s - newest.monotonic_s >= self._settings.stale_after_s
         if not old and self._status.state is not LinkState.UP:
-            self._tell(LinkState.UP, f"connected to {self._where}")
+            self._tell(LinkState.UP, codes.LINK_CONNECTED(where=self._where))
 
     def _count(self, event: ControllerEvent, now_s: float) -> None:
         match event:
@@ -355,8 +357,8 @@ class ControllerLink:
             case MalformedReceived():
                 self._counts["units_malformed"] += 1
                 if event.joint_count:
-                    text = f"{self._where} sends {event.reason}"
-                    self._unusable = now_s, text, JOINT_COUNT
+                    reason = codes.LINK_OTHER_JOINTS(where=self._where, detail=event.reason)
+                    self._unusable = now_s, reason, JOINT_COUNT
             case UnknownReceived():
                 self._counts["records_unknown"] += 1
             case Refused(_, text):
@@ -365,13 +367,13 @@ class ControllerLink:
                 if self._status.state is not LinkState.UP:
                     self._refusal = text
 
-    def _tell(self, state: LinkState, text: str, code: str = "") -> None:
+    def _tell(self, state: LinkState, reason: Reason, code: str = "") -> None:
         flooding = self._handing.flood.on and state is not LinkState.DOWN
-        status = LinkStatus(state, text, code, flooding)
+        status = LinkStatus(state, reason, code, flooding)
         if status == self._status:
             return
         self._status = status
-        logger.info("link %s: %s", state.value, text)
+        logger.info("link %s: %s", state.value, reason)
         self._on_status(status)
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from enum import Enum
 
+from bus.reasons import Reason
 from bus.schemas.robomesh_pb2 import Event
 
 _S = Event.Severity
@@ -18,7 +19,7 @@ class LinkState(Enum):
 
 @dataclass(frozen=True, slots=True)
 class LinkStatus:
-    """State of the link and, for people, why.
+    """State of the link, and why.
 
     Attributes:
         code: Of the event that says so; empty: `link.down`, `link.up` or `link.silent`.
@@ -26,9 +27,14 @@ class LinkStatus:
     """
 
     state: LinkState
-    text: str
+    reason: Reason
     code: str = ""
     flooding: bool = False
+
+    @property
+    def text(self) -> str:
+        """The reason's sentence."""
+        return self.reason.text
 
 
 def news(before: LinkStatus, after: LinkStatus) -> list[tuple[Event.Severity, str, str]]:

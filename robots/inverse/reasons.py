@@ -121,7 +121,7 @@ def _forbidden(chain: Chain, solutions: Sequence[FloatArray], around: FloatArray
     if not said:
         positions = around.copy()
         positions[chain.moving] = x
-        said = list(violations(joints, positions))
+        said = [str(each) for each in violations(joints, positions)]
     return " and ".join(said)
 
 

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bus import reason_codes as codes
+from bus.reasons import Reason
 from robots.cells import FLOOR
 from robots.collision import Cell, pending, unshaped
 from robots.collision.floor import floor_advice
@@ -212,14 +214,14 @@ def _standing(start: FloatArray, steps: Sequence[Step]) -> Step:
     return Step(line=line, kind=StepKind.MOVE, target=ends[-1] if ends else start)
 
 
-def _beyond(line: int, limits: Sequence[str], begin_s: float, until_s: float) -> Violation:
+def _beyond(line: int, limits: Sequence[Reason], begin_s: float, until_s: float) -> Violation:
     return Violation(
         line=line,
         time_s=begin_s,
         until_s=until_s,
         kind=ViolationKind.LIMIT,
         points=np.zeros((0, 3)),
-        text="; ".join(limits),
+        reason=codes.JOINTS_OUTSIDE(*limits),
     )
 
 
@@ -238,8 +240,10 @@ def _start_violations(joints: Joints, start: FloatArray) -> tuple[Violation, ...
     found = violations(joints, start)
     if not found:
         return ()
-    text = f"at the start: {'; '.join(found)}"
-    return (Violation(line=0, kind=ViolationKind.LIMIT, points=np.zeros((0, 3)), text=text, refuses=False),)
+    reason = codes.PROGRAM_START_OUTSIDE(*found)
+    return (
+        Violation(line=0, kind=ViolationKind.LIMIT, points=np.zeros((0, 3)), reason=reason, refuses=False),
+    )
 
 
 def _cover_notes(cell: Cell, robot: str, others: Mapping[str, FloatArray]) -> tuple[str, ...]:
@@ -275,7 +279,12 @@ def _untold(runs: Runs) -> tuple[str, ...]:
 
 def _unread(error: ProgramError, start: FloatArray) -> CheckResult:
     found = tuple(
-        Violation(line=line, kind=ViolationKind.PROGRAM, points=np.zeros((0, 3)), text=text)
+        Violation(
+            line=line,
+            kind=ViolationKind.PROGRAM,
+            points=np.zeros((0, 3)),
+            reason=codes.PROGRAM_UNREADABLE(detail=text),
+        )
         for line, text in error.problems
     )
     more = error.found - len(found)

@@ -256,7 +256,7 @@ def _bent_problem(model: RobotModel, pose: FloatArray, positions: FloatArray) ->
     """Why joint positions will not do for a pose on a line with the axis bent; or nothing."""
     beyond = violations(model.joints, positions)
     if beyond:
-        return "; ".join(beyond)
+        return "; ".join(map(str, beyond))
     away, off = tool_misses(tool_placement(model, positions), pose, Task.POSITION_AND_AXIS_5D)
     if away > LINE_M / 100:
         return f"the tool gets no nearer than {away * 1000:.1f} mm from here"

@@ -5,6 +5,7 @@ from math import degrees, radians
 
 import numpy as np
 
+from bus import reason_codes as codes
 from robots.collision import Arm
 from robots.inverse import InverseSolver, natural_task, solve
 from robots.joints import FloatArray
@@ -168,7 +169,13 @@ class _Planner:
 
 
 def _violation(line: int, kind: ViolationKind, text: str, points: FloatArray | None = None) -> Violation:
-    return Violation(line=line, kind=kind, text=text, points=np.zeros((0, 3)) if points is None else points)
+    code = codes.PROGRAM_UNREACHABLE if kind is ViolationKind.UNREACHABLE else codes.PROGRAM_UNREADABLE
+    return Violation(
+        line=line,
+        kind=kind,
+        reason=code(detail=text),
+        points=np.zeros((0, 3)) if points is None else points,
+    )
 
 
 def _rounded(positions: FloatArray) -> FloatArray:

@@ -4,6 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from bus import reason_codes as codes
+from bus.reasons import Reason
 from robots.cells import FLOOR
 from robots.joints import FloatArray
 from robots.programs.steps import Violation, ViolationKind
@@ -133,25 +135,23 @@ class Runs:
                 pair=run.pair,
                 points=run.points,
                 distance_m=max(run.value, 0.0) if run.pair else None,
-                text=_text(run),
+                reason=_reason(run),
                 refuses=run.stops,
             )
             for run in runs
         )
 
 
-def _text(run: _Run) -> str:
+def _reason(run: _Run) -> Reason:
     match run.kind:
         case ViolationKind.COLLISION if FLOOR in run.pair:
-            return f"{run.pair[0]} goes {-run.value * 1000:.1f} mm below the floor"
+            return codes.BELOW_FLOOR(one=run.pair[0], depth_mm=-run.value * 1000)
         case ViolationKind.COLLISION:
-            return f"{run.pair[0]} touches {run.pair[1]}"
+            return codes.TOUCHES(one=run.pair[0], other=run.pair[1])
         case ViolationKind.CLEARANCE:
-            what = "stop" if run.stops else "warning"
-            return (
-                f"{run.pair[0]} comes within {run.value * 1000:.1f} mm of {run.pair[1]}, "
-                f"nearer than its {what} distance of {run.limit * 1000:g} mm"
-            )
+            code = codes.NEARER_THAN_STOP if run.stops else codes.NEARER_THAN_WARNING
+            one, other = run.pair
+            return code(one=one, other=other, distance_mm=run.value * 1000, limit_mm=run.limit * 1000)
         case ViolationKind.SPEED:
-            return f"the tool moves at {-run.value * 1000:.0f} mm/s; {-run.limit * 1000:g} were promised"
-    return f"the arm is nearly singular: {run.value:.4f}, {run.limit:g} is asked for along a line"
+            return codes.TOOL_TOO_FAST(speed=-run.value * 1000, limit=-run.limit * 1000)
+    return codes.NEARLY_SINGULAR(value=run.value, limit=run.limit)

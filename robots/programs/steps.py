@@ -6,6 +6,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from bus.reasons import Reason
 from robots.joints import FloatArray
 
 # How far the tool may leave the line between the joint moves that stand for it.
@@ -76,7 +77,7 @@ class Violation:
         pair: Two of "<robot>/<link>" and fixtures' names; empty where no two are concerned.
         points: (k, 3) in the site's frame [m]: nearest points of the pair; where on a line.
         distance_m: The smallest; 0: they touch; None where it is no matter of distance.
-        text: A sentence for people, in degrees and millimetres.
+        reason: What it is, in degrees and millimetres.
         refuses: Whether a gateway that requires checks refuses the motion for it; else it warns.
     """
 
@@ -87,8 +88,13 @@ class Violation:
     pair: tuple[str, ...] = ()
     points: FloatArray
     distance_m: float | None = None
-    text: str
+    reason: Reason
     refuses: bool = True
+
+    @property
+    def text(self) -> str:
+        """The reason's sentence."""
+        return self.reason.text
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from bus.reasons import Reason
 from robots.collision import Cell, distances
 from robots.collision.along import Encounter, near_along
 from robots.joints import FloatArray, violations
@@ -60,7 +61,7 @@ class Stretch:
         rates: (m,) how far the tool would go in all at its pace there [m].
         clearances: (m,) [m].
         findings: Each with its sample's number, ascending.
-        limits: What its target violates, a sentence each.
+        limits: What its target violates.
     """
 
     positions: FloatArray
@@ -68,7 +69,7 @@ class Stretch:
     rates: FloatArray
     clearances: FloatArray
     findings: tuple[tuple[int, Finding], ...]
-    limits: tuple[str, ...]
+    limits: tuple[Reason, ...]
 
 
 @dataclass(frozen=True, eq=False)

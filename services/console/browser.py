@@ -16,7 +16,10 @@ from google.protobuf.message import DecodeError
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from bus import keys, topics
+from bus import reason_codes as codes
 from bus.errors import BusError, BusyError, NoAnswerError, RefusedError
+from bus.messages import reason_message
+from bus.reasons import Reason
 from bus.schemas.robomesh_pb2 import FromPage, KeyFrameRequest, ToPage, ViewAnswer, ViewRequest
 from bus.session import Session
 from bus.topics import History
@@ -287,10 +290,11 @@ class Browser:
     def _ask(self, ask: FromPage.Ask) -> None:
         most = _MOST_STOPS if ask.key.endswith("/stop") else _MOST_ASKS
         if len(ask.key) > _LONGEST_KEY:
-            text = f"a key of {len(ask.key)} characters: {_LONGEST_KEY} at most"
-            self.tell(refusal(ask.id, text))
+            reason = codes.KEY_TOO_LONG(count=len(ask.key), most=_LONGEST_KEY)
+            self.tell(refusal(ask.id, reason.text, reason))
         elif len(self._asks) >= most:
-            self.tell(refusal(ask.id, f"more than {most} requests wait for an answer: try again later"))
+            reason = codes.PAGE_TOO_MANY(count=most)
+            self.tell(refusal(ask.id, reason.text, reason))
         else:
             self._keep(self._answer(ask))
 
@@ -304,7 +308,8 @@ class Browser:
         except (RefusedError, NoAnswerError) as error:
             # To the page a busy owner is a silent one: it asks again while its lease lasts.
             no_answer = isinstance(error, NoAnswerError | BusyError)
-            self.tell(refusal(ask.id, str(error), no_answer=no_answer))
+            reason = error.reason if isinstance(error, RefusedError) else None
+            self.tell(refusal(ask.id, str(error), reason, no_answer=no_answer))
         else:
             self._learn_view(ask, payload)
             self.tell(ToPage(answer=ToPage.Answer(id=ask.id, ok=True, payload=payload)))
@@ -350,6 +355,9 @@ def _reason(error: Exception) -> str:
     return str(error).encode()[:_LONGEST_REASON].decode(errors="ignore")
 
 
-def refusal(ask_id: int, text: str, *, no_answer: bool = False) -> ToPage:
-    """An answer that says why not."""
-    return ToPage(answer=ToPage.Answer(id=ask_id, ok=False, error=text, no_answer=no_answer))
+def refusal(ask_id: int, text: str, reason: Reason | None = None, *, no_answer: bool = False) -> ToPage:
+    """Return the answer that refuses a page's request."""
+    answer = ToPage.Answer(id=ask_id, ok=False, error=text, no_answer=no_answer)
+    if reason is not None:
+        answer.refusal.CopyFrom(reason_message(reason))
+    return ToPage(answer=answer)

@@ -13,6 +13,7 @@ import zenoh
 from google.protobuf.message import DecodeError
 
 from bus import keys
+from bus import reason_codes as codes
 from bus.errors import BusError, RefusedError
 from bus.presence import OPERATOR, session_of
 from bus.schemas.robomesh_pb2 import LeaseRequest
@@ -60,7 +61,7 @@ class OperatorPresence:
             try:
                 action = LeaseRequest.FromString(payload).action
             except DecodeError:
-                raise RefusedError("this is no LeaseRequest") from None
+                raise RefusedError(codes.INVALID(detail="this is no LeaseRequest")) from None
         new = (topic == _OPENS or action in _GIVES_CONTROL) and (site, robot) not in self._tokens
         if new:
             self._tokens[site, robot] = self._session.declare_presence_of(site, robot, OPERATOR, self.id)

@@ -30,10 +30,11 @@ from starlette.routing import Route
 from starlette.types import Scope
 
 from bus import keys
+from bus import reason_codes as codes
 from bus.errors import BusError, BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError
 from bus.schemas.robomesh_pb2 import VideoFrames, ViewRequest
 from bus.subscription import Sample
-from renderer.errors import Mp4Error, NoRoomError
+from renderer.errors import Mp4Error
 from renderer.mp4 import FragmentedMp4
 from services.console.errors import PictureError
 from services.console.feeds import Feeds
@@ -168,7 +169,7 @@ class Pictures:
         except BusyError as error:
             raise PictureError(503, str(error), again_s=_BUSY_AGAIN_S) from None
         except RefusedError as error:
-            if str(error).startswith(NoRoomError.SIGN):
+            if error.reason.code == codes.VIEW_NO_ROOM.name:
                 raise PictureError(503, str(error)) from None
             # Whether it was the view or the size.
             status = 404

@@ -24,6 +24,7 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
 from starlette.types import Scope
 
+from bus import reason_codes as codes
 from bus.errors import BusError, BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError
 from bus.keys import WHOLE_SITE, robot_key
 from bus.schemas import robomesh_pb2 as schema
@@ -136,7 +137,7 @@ class Recordings:
             assert isinstance(info, schema.Recording)
             topics = {each.topic.split("/", 3)[-1]: each.topic for each in info.topics if each.messages}
             if "joints" not in topics:
-                raise RefusedError(f"{name}: no joints are recorded in it")
+                raise RefusedError(codes.RECORDING_NO_JOINTS(file=name))
         except BusError as error:
             return _refused(error)
         saved = quote(name.removesuffix(".mcap") + ".csv")

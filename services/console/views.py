@@ -3,6 +3,7 @@
 from collections import OrderedDict
 
 from bus import keys
+from bus import reason_codes as codes
 from bus.errors import RefusedError
 from bus.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
 from bus.session import Session
@@ -33,7 +34,7 @@ class Views:
         """
         answer = await self._session.ask(f"{robot_key}/views/{asker}", request, timeout_s=TIMEOUT_S)
         if not isinstance(answer, ViewAnswer) or not answer.topic:
-            raise RefusedError(f"{robot_key}/views was answered with no view")
+            raise RefusedError(codes.VIEW_NO_ANSWER(key=robot_key))
         self.learn(robot_key, request, answer)
         return answer
 

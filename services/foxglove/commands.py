@@ -16,6 +16,7 @@ from typing import Any
 import foxglove
 from foxglove import MessageSchema, Schema, ServiceRequest, ServiceSchema
 
+from bus import reason_codes as codes
 from bus.errors import BusError, MessageError, RefusedError
 from bus.keys import robot_key
 from bus.lease import Control, control
@@ -219,11 +220,15 @@ class Commands:
 
 
 async def _answered(work: Awaitable[tuple[bool, str]]) -> bytes:
+    answer: dict[str, object] = {}
     try:
-        accepted, text = await work
-    except (RefusedError, MessageError) as error:
-        accepted, text = False, str(error)
-    return json.dumps({"accepted": accepted, "text": text}).encode()
+        answer["accepted"], answer["text"] = await work
+    except RefusedError as error:
+        values = dict(error.reason.values)
+        answer = {"accepted": False, "text": str(error), "code": error.reason.code, "values": values}
+    except MessageError as error:
+        answer = {"accepted": False, "text": str(error)}
+    return json.dumps(answer).encode()
 
 
 def _values(name: str, payload: bytes) -> dict[str, Any]:
@@ -235,18 +240,19 @@ def _values(name: str, payload: bytes) -> dict[str, Any]:
     try:
         values = json.loads(payload or b"{}", parse_constant=_not_finite)
     except (ValueError, RecursionError) as error:
-        raise RefusedError(f"not JSON: {error}") from None
+        raise RefusedError(codes.NOT_JSON(detail=error)) from None
     if not isinstance(values, dict):
-        raise RefusedError("a JSON object is right, as in {}")
+        raise RefusedError(codes.NOT_JSON_OBJECT())
     known = _FIELDS.get(name, {})
     for key in values:
         if key not in known:
-            raise RefusedError(f"{name} takes no {key!r}; it takes {', '.join(known) or 'nothing: {}'}")
+            fields = ", ".join(known) or "nothing: {}"
+            raise RefusedError(codes.UNKNOWN_FIELD(request=name, field=key, fields=fields))
     return values
 
 
 def _not_finite(word: str) -> None:
-    raise RefusedError(f"{word} is not finite")
+    raise RefusedError(codes.NOT_FINITE(value=word))
 
 
 def _json(name: str, fields: dict[str, Any]) -> MessageSchema:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bus import reason_codes as codes
 from bus.answering import Request
 from bus.errors import RefusedError
 from bus.quotas import Quota
@@ -56,7 +57,8 @@ def answer_about(
 
     async def answer_mesh(request: Request) -> bytes:
         if request.chunk not in meshes:
-            raise RefusedError(f"no mesh {request.chunk!r}; {robot} has {', '.join(meshes) or 'none'}")
+            have = ", ".join(meshes) or "none"
+            raise RefusedError(codes.MESH_UNKNOWN(name=request.chunk, robot=robot, meshes=have))
         return meshes[request.chunk]
 
     async def answer_forward(request: Request) -> schema.ForwardAnswer:
@@ -78,7 +80,7 @@ def answer_about(
         elif (here := place.positions(robot)) is not None:
             start = here
         else:
-            raise RefusedError(f"start: nobody knows where {robot} is now; give it")
+            raise RefusedError(codes.CHECK_START_UNKNOWN(robot=robot))
         others, _ = place.others(robot)
         question = CheckQuestion(robot, asked.SerializeToString(), start, others)
         with checks.one(request.asker):
@@ -98,8 +100,13 @@ def _positions(model: RobotModel, field: str, given: Sequence[float], robot: str
     """
     if len(given) != len(model.joints):
         raise RefusedError(
-            f"{field}: {len(given)} given, {robot} has "
-            f"{len(model.joints)} joints ({', '.join(model.joints.names)})"
+            codes.JOINT_COUNT_OF_FIELD(
+                field=field,
+                count=len(given),
+                robot=robot,
+                joints=len(model.joints),
+                names=", ".join(model.joints.names),
+            )
         )
     return np.array(given)
 
@@ -114,6 +121,6 @@ async def _asked(worker: Worker, question: Question, timeout_s: float) -> bytes:
         answer: bytes = await worker.ask(question, timeout_s=timeout_s)
         return answer
     except WorkerError as error:
-        raise RefusedError(f"given up: {error}") from None
+        raise RefusedError(codes.WORKER_GAVE_UP(detail=error)) from None
     except RobotError as error:
-        raise RefusedError(str(error)) from None
+        raise RefusedError(codes.INVALID(detail=error)) from None

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from bus.messages import reason_message
 from bus.schemas import robomesh_pb2 as schema
 from robots.collision import Cell
 from robots.inverse import InverseSolver
@@ -56,6 +57,7 @@ def answer_of(result: CheckResult, *, path: bool) -> schema.CheckAnswer:
             kind=str(each.kind),
             pair=each.pair,
             text=each.text,
+            reason=reason_message(each.reason),
             distance=each.distance_m,
             refuses=each.refuses,
         )

@@ -1,5 +1,6 @@
 """Joint positions for a tool's pose as an answer of the mesh: a pure function."""
 
+from bus import reason_codes as codes
 from bus.errors import RefusedError
 from bus.schemas import robomesh_pb2 as schema
 from robots.errors import JointCountError, PoseError
@@ -19,7 +20,7 @@ def inverse_answer(solver: InverseSolver, request: schema.InverseRequest) -> sch
     """
     task = _TASKS.get(request.task)
     if task is None:
-        raise RefusedError(f"task {request.task}: POSE_6D or POSITION_AND_AXIS_5D is right")
+        raise RefusedError(codes.INVERSE_TASK(task=request.task))
     try:
         result = solve(
             solver,
@@ -30,9 +31,9 @@ def inverse_answer(solver: InverseSolver, request: schema.InverseRequest) -> sch
             seed=request.seed,
         )
     except PoseError as error:
-        raise RefusedError(str(error)) from None
+        raise RefusedError(codes.INVERSE_POSE(detail=error)) from None
     except JointCountError as error:
-        raise RefusedError(f"near: {error}") from None
+        raise RefusedError(codes.INVERSE_NEAR(detail=error)) from None
     answer = schema.InverseAnswer(
         residual_m=result.residual_m,
         residual_rad=result.residual_rad,

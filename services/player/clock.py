@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from bus import reason_codes as codes
 from services.player.errors import ReplayError
 
 SLOWEST, FASTEST = 0.1, 100.0
@@ -50,7 +51,7 @@ class Clock:
             ReplayError: If the recording does not go there.
         """
         if not 0.0 <= position_s <= self.duration_s:
-            raise ReplayError(f"position {position_s:g} s: from 0 to {self.duration_s:.3f} s is right")
+            raise ReplayError(codes.REPLAY_POSITION(seconds=position_s, most=self.duration_s))
         self._begin(position_s, now_s)
 
     def set_speed(self, speed: float, now_s: float) -> None:
@@ -60,7 +61,7 @@ class Clock:
             ReplayError: If it is not within 0.1 to 100.
         """
         if not SLOWEST <= speed <= FASTEST:
-            raise ReplayError(f"speed {speed:g}: from {SLOWEST:g} to {FASTEST:g} is right")
+            raise ReplayError(codes.REPLAY_SPEED(speed=speed, least=SLOWEST, most=FASTEST))
         self._begin(self.position_s(now_s), now_s)
         self.speed = speed
 

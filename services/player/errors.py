@@ -4,8 +4,13 @@ ServiceError
 └── ReplayError             what cannot be played, or asked of a replay
 """
 
+from bus.reasons import Reason
 from services.errors import ServiceError
 
 
 class ReplayError(ServiceError):
-    """What cannot be played, or asked of a replay."""
+    """A recording that cannot be played, or a request that a replay cannot do; `reason` says why."""
+
+    def __init__(self, reason: Reason) -> None:
+        super().__init__(reason.text)
+        self.reason = reason

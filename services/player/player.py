@@ -9,6 +9,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
+from bus import reason_codes as codes
 from bus.answering import Request
 from bus.errors import RefusedError
 from bus.keys import WHOLE_SITE
@@ -94,7 +95,7 @@ class _Player:
         if asked.session:
             await self._until_present(asked.session)
         if len(self._replays) + self._opening >= MOST_REPLAYS:
-            raise RefusedError(f"{MOST_REPLAYS} recordings are played already: close one first")
+            raise RefusedError(codes.REPLAY_TOO_MANY(count=MOST_REPLAYS))
         self._opening += 1
         identity = secrets.token_hex(2)
         while identity in self._replays:
@@ -104,8 +105,10 @@ class _Player:
             replay = await asyncio.to_thread(
                 open_replay, self._session, self._settings.site, path, asked, identity=identity
             )
-        except (RecordingsError, ReplayError) as error:
-            raise RefusedError(str(error)) from None
+        except ReplayError as error:
+            raise RefusedError(error.reason) from None
+        except RecordingsError as error:
+            raise RefusedError(codes.RECORDING_UNREADABLE(detail=error)) from None
         finally:
             self._opening -= 1
         self._replays[identity] = replay
@@ -133,9 +136,7 @@ class _Player:
                 while not self._present[session]:
                     await asyncio.sleep(0.02)
         if not self._present[session]:
-            raise RefusedError(
-                f"session {session!r} is not present: the asker's alive/operator/<id> is right"
-            )
+            raise RefusedError(codes.REPLAY_SESSION(session=session))
 
     async def follow_sessions(self) -> None:
         """End the replays of those who go."""

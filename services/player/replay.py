@@ -7,6 +7,7 @@ import time
 from collections import deque
 from dataclasses import dataclass
 
+from bus import reason_codes as codes
 from bus import topics
 from bus.answering import Answerer, Handler, Request
 from bus.errors import BusError, RefusedError
@@ -141,8 +142,10 @@ class Replay:
             self._answerers.append(self._session.answer(self._site, self.robot, name, handler))
 
     async def _refuse(self, request: Request) -> bytes:
-        what = "recorded already" if request.key.topic == "recorder/request" else "nothing here can move"
-        raise RefusedError(f"a replay of {self._tape.file.path.name}: {what}")
+        code = (
+            codes.REPLAY_IS_RECORDED if request.key.topic == "recorder/request" else codes.REPLAY_CANNOT_MOVE
+        )
+        raise RefusedError(code(file=self._tape.file.path.name))
 
     async def _on_mesh(self, request: Request) -> bytes:
         try:
@@ -156,7 +159,7 @@ class Replay:
         with contextlib.suppress(BusError):
             if any((who.site, who.robot) == of for who in await self._session.present()):
                 return await self._session.ask_bytes(robot_key(*of, f"mesh/{name}"), timeout_s=_MESH_WITHIN_S)
-        raise RefusedError(text)
+        raise RefusedError(codes.RECORDING_UNREADABLE(detail=text))
 
     async def _on_request(self, request: Request) -> schema.ReplayState:
         asked = request.message
@@ -182,7 +185,7 @@ class Replay:
                 case _Ask.CLOSE:
                     self.close()
         except ReplayError as error:
-            raise RefusedError(str(error)) from None
+            raise RefusedError(error.reason) from None
         self._text = ""
         self._wake.set()
         return self.describe()

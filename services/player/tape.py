@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from google.protobuf.message import DecodeError
 
+from bus import reason_codes as codes
 from bus import topics
 from bus.errors import BusError
 from bus.keys import Key, parse_key
@@ -65,9 +66,7 @@ class Tape:
         found = _topics_of_robot(self.file)
         if not found:
             self.file.close()
-            raise ReplayError(
-                f"{path.name}: no recording of a robot: it has no topic robomesh/SITE/ROBOT/TOPIC"
-            )
+            raise ReplayError(codes.REPLAY_NO_ROBOT(file=path.name))
         first = next(iter(found.values()))
         self.of_site, self.of_robot = first.site, first.robot
         self._keys = {name: key.topic for name, key in found.items()}

@@ -12,6 +12,7 @@ from functools import partial
 from math import inf
 from pathlib import Path
 
+from bus import reason_codes as codes
 from bus.errors import MessageError, RefusedError
 from bus.messages import decode
 from bus.schemas import robomesh_pb2 as schema
@@ -120,9 +121,7 @@ class FlightRecorder:
         name = check_name(name or f"flight-{datetime.now(UTC):%H%M%S}")
         async with self._lock:
             if self.part is None:
-                raise RefusedError(
-                    f"the flight recorder of {self._files.robot} does not run: is the disk full?"
-                )
+                raise RefusedError(codes.FLIGHT_NOT_RUNNING(robot=self._files.robot))
             now = time.monotonic()
             if not self._about:
                 self._about, self._since = {"name": name, "cause": cause, "started_by": "flight"}, now

@@ -9,6 +9,7 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
+from bus import reason_codes as codes
 from bus.answering import Request
 from bus.errors import MessageError, RefusedError
 from bus.keys import WHOLE_SITE, robot_key
@@ -84,7 +85,7 @@ class _Robot:
         assert isinstance(asked, _Request)
         if asked.action == _Request.SAVE:
             if self.flight is None:
-                raise RefusedError("there is no flight recorder here: [recorder] flight of the site file")
+                raise RefusedError(codes.FLIGHT_NONE())
             return await self.flight.save("asked for", asked.name)
         if asked.action == _Request.TRACE_ON:
             self._check(asked.views)
@@ -152,7 +153,7 @@ class _Robot:
         names = [view.name for view in known.description.views]
         for view in views:
             if view not in (*names, "-", "far") and not view.startswith("free-"):
-                raise RefusedError(f"no view {view!r} of {self.name}: there are {', '.join(names)}")
+                raise RefusedError(codes.VIEW_UNKNOWN_OF(view=view, robot=self.name, views=", ".join(names)))
 
     def _explain(self, part: Part) -> None:
         # A segment of the flight recorder is explained when it is kept.

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
+from bus import reason_codes as codes
 from bus.errors import KeyNameError, RefusedError
 from bus.keys import check_chunk
 from bus.schemas import robomesh_pb2 as schema
@@ -34,10 +35,7 @@ def check_name(name: str) -> str:
         RefusedError: If it cannot.
     """
     if not _NAME.fullmatch(name):
-        raise RefusedError(
-            f"name {name[:100]!r}: at most 81 letters, digits, '_', '.' and '-', "
-            "beginning with a letter or digit"
-        )
+        raise RefusedError(codes.RECORDING_NAME(name=name[:100]))
     return name
 
 
@@ -146,7 +144,7 @@ class RobotRecorder:
         async with self._lock:
             if self.part is not None:
                 now_as = self.part.capture.about["name"]
-                raise RefusedError(f"{self._robot} is being recorded already, as {now_as!r}")
+                raise RefusedError(codes.RECORDING_OPEN(robot=self._robot, name=now_as))
             now = datetime.now(UTC)
             name = check_name(name or now.strftime(f"{self._robot}-%H%M%S"))
             self._names = STATES | _videos(self._settings.views if views is None else views)
@@ -154,7 +152,7 @@ class RobotRecorder:
             try:
                 self.part = await self._files.open(self._path(name, 1), about, self._names)
             except CaptureError as error:
-                raise RefusedError(str(error)) from None
+                raise RefusedError(codes.RECORDING_FAILED(detail=error)) from None
             log.info("%s/%s: recording %s", self._settings.site, self._robot, self.part.capture.path.name)
             return self.describe()
 
@@ -167,7 +165,7 @@ class RobotRecorder:
         async with self._lock:
             part = self.part
             if part is None:
-                raise RefusedError(f"{self._robot} is not being recorded")
+                raise RefusedError(codes.RECORDING_NOT_OPEN(robot=self._robot))
             self.part = None
             problem = await self._end(part, about={})
             self.last = part.describe()
@@ -244,4 +242,4 @@ def _videos(views: tuple[str, ...]) -> frozenset[str]:
     try:
         return frozenset(f"video/{check_chunk(view, 'view')}" for view in views if view != _NO_VIEW)
     except KeyNameError as error:
-        raise RefusedError(str(error)) from None
+        raise RefusedError(codes.INVALID(detail=error)) from None

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from google.protobuf.message import Message
 
+from bus import reason_codes as codes
 from bus.answering import Request
 from bus.errors import BusyError, RefusedError
 from bus.keys import WHOLE_SITE
@@ -123,8 +124,7 @@ class Serving:
             async with asyncio.timeout(patience_s):
                 return await asyncio.shield(task)
         except TimeoutError:
-            text = f"the recorder is busy: its recordings/{name} is not ready yet; ask again"
-            raise BusyError(text) from None
+            raise BusyError(codes.RECORDER_BUSY(request=name)) from None
         finally:
             if task.done():  # the next asker gets what is there then
                 self._forget(key, task)
@@ -148,6 +148,6 @@ class Serving:
         try:
             answer = await worker.ask(Question(name, request.SerializeToString()), timeout_s=within_s)
         except (RecordingError, WorkerError, OSError) as error:
-            raise RefusedError(str(error)) from None
+            raise RefusedError(codes.RECORDING_UNREADABLE(detail=error)) from None
         assert isinstance(answer, bytes)
         return answer

@@ -4,6 +4,7 @@ import asyncio
 import time
 from dataclasses import dataclass
 
+from bus import reason_codes as codes
 from bus.answering import Request
 from bus.errors import RefusedError
 from bus.health import Served, present
@@ -37,7 +38,7 @@ async def answer_requests(mesh: Mesh, faults: Faults) -> None:
             elif message.fault:
                 faults.begin(message.fault, now_s)
         except SimulatorError as error:
-            raise RefusedError(str(error)) from None
+            raise RefusedError(codes.INVALID(detail=error)) from None
         return FaultAnswer(active=sorted(faults.active(now_s)), known=list(FAULTS))
 
     served = Served(service=Role.SIMULATOR.value, present_for=((mesh.site, mesh.robot),))

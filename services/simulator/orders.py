@@ -130,7 +130,7 @@ def _refusal(order: Order, joints: Joints, situation: Situation) -> Error | None
         return Error(STOPPED, "holding, resume or reset first")
     if beyond := violations(joints, order.target):
         # Units are ASCII.
-        return Error(LIMIT, beyond[0].replace("°", " deg"))
+        return Error(LIMIT, beyond[0].text.replace("°", " deg"))
     return None
 
 

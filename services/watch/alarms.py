@@ -23,6 +23,8 @@ more than 10 in 10 minutes, over below 5).
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
+from bus import reason_codes as codes
+from bus.reasons import Reason
 from bus.schemas.robomesh_pb2 import Alarm as AlarmMessage
 
 State = AlarmMessage.State
@@ -35,7 +37,11 @@ _LONGEST_TEXT = 500
 
 
 class AlarmError(ValueError):
-    """Something that cannot be done with an alarm; its text says why."""
+    """Something that cannot be done with an alarm; `reason` says why."""
+
+    def __init__(self, reason: Reason) -> None:
+        super().__init__(reason.text)
+        self.reason = reason
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,11 +170,9 @@ class Alarms:
             AlarmError: Without a reason, for longer than a day, or of no such alarm; nothing is changed then.
         """
         if not reason.strip():
-            raise AlarmError("reason: say why it is put aside, as in 'switched off for service until noon'")
+            raise AlarmError(codes.ALARM_NO_REASON())
         if not 0.0 < for_s <= LONGEST_SHELF_S:
-            raise AlarmError(
-                f"shelve_s: {for_s:g} s: more than 0 and at most {LONGEST_SHELF_S:g} (a day) is right"
-            )
+            raise AlarmError(codes.ALARM_SHELF_TIME(seconds=for_s, most=LONGEST_SHELF_S))
         for alarm in self._named(identities):
             self.held[alarm.id] = replace(
                 alarm, shelved_until=now + for_s, by=by, at=now, reason=reason[:_LONGEST_TEXT]
@@ -183,7 +187,7 @@ class Alarms:
         alarms = self._named(identities)
         for alarm in alarms:
             if alarm.shelved_until is None:
-                raise AlarmError(f"alarm {alarm.id!r} is not shelved")
+                raise AlarmError(codes.ALARM_NOT_SHELVED(id=alarm.id))
         for alarm in alarms:
             self._keep(replace(alarm, shelved_until=None, reason="", by=by, at=now))
 
@@ -198,10 +202,10 @@ class Alarms:
     def _named(self, identities: Iterable[str]) -> list[Alarm]:
         wanted = list(dict.fromkeys(identities))
         if not wanted:
-            raise AlarmError("ids: name at least one alarm")
+            raise AlarmError(codes.ALARM_NONE_NAMED())
         for identity in wanted:
             if identity not in self.held:
-                raise AlarmError(f"no alarm {identity[:80]!r}: it may be over and seen already")
+                raise AlarmError(codes.ALARM_UNKNOWN(id=identity[:80]))
         return [self.held[identity] for identity in wanted]
 
     def _keep(self, alarm: Alarm) -> None:

@@ -23,7 +23,6 @@ SETTLED_S = 6.0
 _CLOCK_S, _CLOCK_OVER_S = 0.5, 0.4
 _LOSS, _LOSS_OVER, _LOSS_LEAST = 5e-3, 1e-3, 20
 _SILENT_S = 10.0
-_IS_GONE = " is gone"
 _UNLINKED_AFTER_S = 20.0
 _DAY_S = 86_400.0
 _EXPIRES_S = 10 * _DAY_S
@@ -50,8 +49,8 @@ class Expected:
             match condition.code:
                 case "service.gone":
                     for robot in values.get("robots", "").split():
-                        name = condition.text.removesuffix(_IS_GONE)
-                        self.expect(values.get("service", ""), robot, name)
+                        service = values.get("service", "")
+                        self.expect(service, robot, values.get("name", service))
                 case "site.gone":
                     self.sites.add(values.get("site", ""))
 
@@ -134,10 +133,10 @@ def _gone(mesh: Mesh, tokens: list[PresenceKey], site: str, expected: Expected) 
         first = sorted(robots)[0]
         condition = Condition(
             code="service.gone",
-            text=name + _IS_GONE,
+            text=f"{name} is gone",
             over=f"{service} is there again",
             each=service if first == WHOLE_SITE else f"{service}.{first}",
-            values=(("service", service), ("robots", " ".join(sorted(robots)[:20]))),
+            values=(("service", service), ("name", name), ("robots", " ".join(sorted(robots)[:20]))),
             latching=True,
         )
         if service == "gateway":

@@ -301,7 +301,7 @@ class _Watch:
         try:
             await self._book.change_by(asked, by, time.time())
         except AlarmError as error:
-            raise RefusedError(str(error)) from None
+            raise RefusedError(error.reason) from None
         message = self._book.message(self._site)
         self._alarms_topic.put(message)
         return message

@@ -2,6 +2,7 @@
 
 from contextlib import asynccontextmanager
 
+from bus import reason_codes as codes
 from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.log import AuditLog, read_entries
 from protocol_gateway.authority.obstacles import Controller
@@ -55,12 +56,14 @@ class Place:
 
     def send(self, unit):
         if self.broken:
-            raise LinkDownError("not sent: the cable is cut")
+            raise LinkDownError(codes.OTHER(detail="the cable is cut"))
         self.socket.append(unit)
 
     def controller(self):
         return self.known or Controller(
-            link=LinkStatus(LinkState.UP, "connected"), status=self.status, positions=self.positions
+            link=LinkStatus(LinkState.UP, codes.LINK_CONNECTED(where="there")),
+            status=self.status,
+            positions=self.positions,
         )
 
     async def lease(self, action, operator="li", **fields):

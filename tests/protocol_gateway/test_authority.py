@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bus import reason_codes as codes
 from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from protocol_gateway.authority.admission import admit, delay, remember
 from protocol_gateway.authority.holders_motion import command_sent, observe, refused
@@ -92,7 +93,7 @@ def test_who_does_not_hold_the_lease_is_refused_with_the_reason(action, operator
 
 @pytest.mark.parametrize("action", [A.RENEW, A.RELEASE, A.OFFER])
 def test_a_lease_that_has_ended_is_not_anybodys(action):
-    free, _ = end_lease(held(), "over")
+    free, _ = end_lease(held(), codes.ENDED_GATEWAY())
     outcome = ask(free, action, lease="s")
     assert "take control first" in outcome.answer.text
 
@@ -112,7 +113,7 @@ def test_an_offer_passes_the_lease_on_but_not_while_its_holders_motion_runs():
         lambda state: expire(state, at(2.0))[1],
         lambda state: ask(state, A.RELEASE, lease="s").ended,
         lambda state: ask(state, A.TAKE, "wang", reason="he left").ended,
-        lambda state: end_lease(state, "session lost")[1],
+        lambda state: end_lease(state, codes.ENDED_SESSION(name="li"))[1],
     ],
 )
 def test_however_a_lease_ends_its_holders_motion_is_stopped(end):
@@ -150,8 +151,8 @@ def test_motion_that_begins_after_all_patience_is_stopped_because_it_may_be_the_
     state, _ = see(moving(), False, 31.0)
     state, foreign = see(state, True, 32.0)
     assert foreign
-    assert end_lease(state, "foreign", foreign=True)[1].stop
-    assert not end_lease(held(), "foreign", foreign=True)[1].stop
+    assert end_lease(state, codes.ENDED_FOREIGN_MOTION(), foreign=True)[1].stop
+    assert not end_lease(held(), codes.ENDED_FOREIGN_MOTION(), foreign=True)[1].stop
 
 
 def test_what_the_controller_refused_does_not_begin():

@@ -4,6 +4,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
+from bus import reason_codes as codes
 from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from protocol_gateway.authority.admission import admit, remember
 from protocol_gateway.authority.holders_motion import command_sent, observe, refused, reported
@@ -154,7 +155,7 @@ class Machine(RuleBasedStateMachine):
             self.rests = 0
         if foreign and self.authority.lease is not None and not self.authority.lease.tolerates_motion:
             lease = self.authority.lease
-            authority, ended = end_lease(self.authority, "foreign", foreign=True)
+            authority, ended = end_lease(self.authority, codes.ENDED_FOREIGN_MOTION(), foreign=True)
             assert ended.stop == lease.commanded
             self.authority = authority
 

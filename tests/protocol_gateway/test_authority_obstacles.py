@@ -5,6 +5,7 @@ from math import radians
 
 import pytest
 
+from bus import reason_codes as codes
 from bus.schemas.robomesh_pb2 import CommandRequest
 from protocol_gateway.authority.obstacles import Controller, controller_command, obstacle
 from protocol_gateway.drivers.driver import Activity, Mode, MoveAbsolute, Speed, StatusReceived, Trace
@@ -18,7 +19,7 @@ JOINTS = joints_of(load("pt600"))
 HOME = tuple(JOINTS.home.tolist())
 TYPES = (JointType.ROTARY, JointType.PRISMATIC)
 READY = Controller(
-    link=LinkStatus(LinkState.UP, ""),
+    link=LinkStatus(LinkState.UP, codes.LINK_CONNECTED(where="there")),
     status=StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=True, trace=False),
     positions=HOME,
 )
@@ -29,7 +30,7 @@ def in_state(**status):
 
 
 def linked(state):
-    return replace(READY, link=LinkStatus(state, "the cable"))
+    return replace(READY, link=LinkStatus(state, codes.LINK_LOST(where="there", detail="the cable")))
 
 
 def command(kind, **fields):
@@ -44,7 +45,7 @@ SITUATIONS = {
     "ready": READY,
     "link down": linked(LinkState.DOWN),
     "silent": linked(LinkState.SILENT),
-    "read only": replace(READY, read_only="its stop is not proven"),
+    "read only": replace(READY, read_only=codes.STOP_NOT_PROVEN()),
     "local": in_state(mode=Mode.LOCAL),
     "mode unknown": in_state(mode=None),
     "mode unknown, accepted": replace(in_state(mode=None), accept_unknown=frozenset({"mode"})),
@@ -132,7 +133,7 @@ def test_a_robot_that_never_told_where_it_is_is_homed_but_not_moved():
 
 
 def test_a_robot_that_tells_no_more_where_it_is_is_not_even_homed():
-    gone = replace(READY, positions=None, positions_gone="joint positions have not come for 1 s")
+    gone = replace(READY, positions=None, positions_gone=codes.POSITIONS_STALE(seconds=1.0))
     for kind in (C.MOVE_RELATIVE, C.MOVE_ABSOLUTE, C.RESUME, C.HOME):
         assert obstacle(command(kind), gone, JOINTS).text == (
             "Not sent: where the robot is now is not known (joint positions have not come for 1 s)."

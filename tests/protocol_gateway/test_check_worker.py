@@ -10,6 +10,7 @@ import sys
 import numpy as np
 import pytest
 
+from bus import reason_codes as codes
 from protocol_gateway.checking.checker import MOST_PROCESSES, Checker, checkers_of
 from protocol_gateway.checking.questions import Checked, CheckMotion
 from protocol_gateway.checking.worker import begin
@@ -116,7 +117,7 @@ def test_an_error_that_nobody_foresaw_is_said_in_words_and_ends_nothing(tmp_path
         checker = Checker(cells, at_once=True)
         async with running(checker) as task:
             await ready(checker, "good")
-            assert "LinAlgError" in checker.problem("bad")
+            assert "LinAlgError" in checker.problem("bad").text
             with pytest.raises(CheckError, match="LinAlgError"):
                 await checker.motion(motion("bad"))
             # Of a mate that its cell has not: a bug, wherever it came from.
@@ -139,7 +140,7 @@ def test_a_mate_without_shapes_or_with_missing_meshes_is_refused(tmp_path):
         )
         answer = begin({"arm": CellDescription(robots)})
         (uncovered,) = answer(motion("arm", others={name: ((0.0,),)})).uncovered
-        assert uncovered.startswith(words)
+        assert uncovered.text.startswith(words)
 
 
 def test_a_moving_link_without_a_shape_is_not_covered_whichever_robot_of_the_cell_has_it(tmp_path):
@@ -148,7 +149,7 @@ def test_a_moving_link_without_a_shape_is_not_covered_whichever_robot_of_the_cel
         cell = CellDescription((CellRobot("arm", arm, placed(0.0)), CellRobot("mate", mate, placed(5.0))))
         checked = begin({"arm": cell})(motion("arm", others={"mate": (STANDING,)}))
         whose = "arm" if arm is half else "mate"
-        assert checked.uncovered == (f"{whose} cannot be checked whole: elbow moves and has no shape",)
+        assert checked.uncovered == (codes.LINK_WITHOUT_SHAPE(name=whose, links="elbow"),)
         assert checked.refusals == checked.warnings == ()
 
 
@@ -156,7 +157,7 @@ def test_what_has_no_shape_and_does_not_move_is_only_said(tmp_path):
     arm = CellRobot("arm", bar_arm(tmp_path, bare=("base",)), placed(0.0))
     checked = begin({"arm": CellDescription((arm,))})(motion("arm"))
     assert checked.uncovered == checked.refusals == ()
-    assert checked.warnings == ("not checked, for they have no shape: base of arm",)
+    assert checked.warnings == (codes.FIXED_WITHOUT_SHAPE(name="arm", links="base"),)
 
 
 def test_a_mates_long_program_is_gone_through_only_where_it_is_near(tmp_path):
@@ -171,7 +172,7 @@ def test_a_mates_long_program_is_gone_through_only_where_it_is_near(tmp_path):
     way = tuple(map(tuple, rng.uniform(-3.0, 3.0, (101, 2)).tolist()))
     swinging = motion("arm", (1.0, 0.0), others={"mate": way})
     # Both reach 0.78 m: they meet, or pass each other 0.1 m apart.
-    assert any("mate/" in each for each in cell(1.2)(swinging).refusals)
+    assert any("mate/" in each.text for each in cell(1.2)(swinging).refusals)
     assert cell(1.66)(swinging).refusals == ()
 
 

@@ -5,6 +5,7 @@ from math import radians
 
 import pytest
 
+from bus import reason_codes as codes
 from bus.errors import RefusedError
 from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.authority.rules import Authority
@@ -129,7 +130,7 @@ def test_a_session_that_is_gone_takes_its_own_lease_with_it_and_stops_its_motion
             await it.commands((C.HOME, {}))
             it.control.leases.end_session("s1")
             assert it.control.authority.lease is None
-            assert it.control.authority.ended == "li's page or program has gone"
+            assert it.control.authority.ended.code == "lease.ended.session"
             assert it.socket[-1] == b"1#COMMAND*stop@"
             assert it.control.authority.stop.reason == "dead-man: li's page or program has gone"
 
@@ -173,7 +174,7 @@ def test_who_asks_for_control_is_shown_to_its_holder_until_he_gets_it(tmp_path):
             ]
             await it.lease(A.OFFER, lease=it.secret, to="wang")
             await it.lease(A.ACCEPT, "wang")
-            assert it.control.authority.ended == "handed over to wang"
+            assert it.control.authority.ended.code == "lease.ended.handed_over"
             assert [each.operator for each in it.control.authority.asked_by] == ["zhao"]
         # Asking again within half a minute is no new entry.
         assert [name for name, outcome in it.entries() if outcome.value == "ACCEPTED"].count("ASK") == 2
@@ -187,7 +188,7 @@ def test_a_lease_that_ends_while_its_command_is_being_written_down_takes_the_com
             await it.lease(A.ACQUIRE)
             command = asyncio.create_task(it.commands((C.HOME, {})))
             await asyncio.sleep(0)  # it waits for the disk now
-            it.control.leases.end("it is over")
+            it.control.leases.end(codes.ENDED_GATEWAY())
             with pytest.raises(RefusedError, match="control ended while"):
                 await command
             assert it.socket == []

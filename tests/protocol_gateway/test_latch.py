@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from bus import reason_codes as codes
 from protocol_gateway.audit.latch import RESERVED, SLOT_BYTES, LatchFile
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome, read_entries
 from protocol_gateway.audit.restart import LATCH_UNKNOWN
@@ -147,7 +148,7 @@ def test_a_stop_that_comes_while_the_file_is_closed_is_said_to_be_forgotten(path
     closing.join()
     latch.keep(stop(4), 4)
     for each in (said, latch.problem):
-        assert each.endswith("is closed: its gateway is being ended")
+        assert each == codes.LATCH_CLOSED(name=path.name)
     assert LatchFile(path).found.stop.id == 2
 
 
@@ -176,11 +177,11 @@ def test_a_disk_that_hangs_holds_up_no_stop_and_is_said(path, monkeypatch):
         latch.keep(stop(1), 1)
         latch.keep(stop(2), 2)  # returns, although the first is still being written
         monkeypatch.setattr("protocol_gateway.audit.latch.LONGEST_WRITE_S", -1.0)
-        assert latch.problem == "the latch file arm.latch takes longer than -1 s to write"
+        assert latch.problem == codes.LATCH_SLOW(name="arm.latch", seconds=-1.0)
     finally:
         goes_on.set()
     settle(latch)
-    assert latch.problem == ""
+    assert latch.problem is None
     assert LatchFile(path).found.stop.id == 2
     latch.close()
 

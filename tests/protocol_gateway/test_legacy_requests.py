@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bus import reason_codes as codes
 from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from protocol_gateway.authority.obstacles import Controller
 from protocol_gateway.authority.rules import Authority, Stop
@@ -15,9 +16,9 @@ from protocol_gateway.core.records import Error, read_records, write_unit
 from protocol_gateway.core.stream import Unit, UnitStream
 from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
 from protocol_gateway.legacy.requests import (
-    NUMBERS,
     asks_for_more,
     asks_to_stop,
+    number_of,
     requests_of,
     stop_to_reset,
 )
@@ -32,7 +33,7 @@ JOINTS = joints_of(load("pt600"))
 A = LeaseRequest.Action
 C = CommandRequest.Command
 READY = Controller(
-    link=LinkStatus(LinkState.UP, "connected"),
+    link=LinkStatus(LinkState.UP, codes.LINK_CONNECTED(where="there")),
     status=StatusReceived(Activity.IDLE, Mode.REMOTE, True, False),
     positions=(0.0,) * 5,
 )
@@ -49,7 +50,7 @@ async def refused(it, unit, *, first_id=1, **fields):
         request.MergeFrom(CommandRequest(lease=it.secret, id=first_id + number, **fields))
     answer = await it.control.attempt(asked, operator="li", source="test")
     assert not answer.accepted
-    return NUMBERS[answer.why]
+    return number_of(answer)
 
 
 def told(**changes):
@@ -113,9 +114,9 @@ def test_a_unit_is_refused_whole_with_its_number(unit, number):
 @pytest.mark.parametrize(
     ("unit", "controller", "number"),
     [
-        ("1#COMMAND*home", replace(READY, read_only="no proven stop"), 7),
-        ("1#COMMAND*home", replace(READY, link=LinkStatus(LinkState.DOWN, "cut")), 9),
-        ("1#COMMAND*home", replace(READY, link=LinkStatus(LinkState.SILENT, "quiet")), 9),
+        ("1#COMMAND*home", replace(READY, read_only=codes.STOP_NOT_PROVEN()), 7),
+        ("1#COMMAND*home", replace(READY, link=LinkStatus(LinkState.DOWN, codes.LINK_CLOSED())), 9),
+        ("1#COMMAND*home", replace(READY, link=LinkStatus(LinkState.SILENT, codes.LINK_CLOSED())), 9),
         ("1#COMMAND*home", told(mode=Mode.LOCAL), 6),
         ("1#COMMAND*home", told(mode=None), 6),
         ("1#COMMAND*home", told(activity=Activity.STOPPED), 8),
@@ -149,7 +150,7 @@ def test_who_is_not_in_control_is_told_to_read_only(tmp_path):
             await it.lease(A.ACQUIRE)
             asked = asyncio.create_task(refused(it, "1#COMMAND*home"))
             await asyncio.sleep(0)  # it is being written down now
-            it.control.leases.end("it is over")
+            it.control.leases.end(codes.ENDED_GATEWAY())
             assert await asked == 7
 
     run(main())

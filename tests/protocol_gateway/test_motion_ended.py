@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from bus import reason_codes as codes
 from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from protocol_gateway.audit.log import GATEWAY
 from protocol_gateway.authority.holders_motion import command_sent, observe, reported
@@ -55,7 +56,7 @@ def at_rest(controlled):
 
 
 def stops(state):
-    return end_lease(state, "over")[1].stop
+    return end_lease(state, codes.ENDED_GATEWAY())[1].stop
 
 
 def test_two_units_that_report_rest_at_the_target_prove_that_a_motion_has_ended(at_rest):

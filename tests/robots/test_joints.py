@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 
+from bus import reason_codes as codes
 from robots.description import load
 from robots.errors import JointCountError
 from robots.joints import JointType, joints_of, violations
@@ -35,13 +36,15 @@ def test_home_and_each_limit_are_allowed(robot: str) -> None:
         for limit in (joints.lower[index], joints.upper[index]):
             positions = joints.home.copy()
             positions[index] = limit
-            assert not [text for text in violations(joints, positions) if text.startswith("joint")]
+            assert codes.JOINT_LIMIT.name not in [each.code for each in violations(joints, positions)]
 
 
 def test_position_beyond_a_limit_is_told_in_degrees() -> None:
     joints = joints_of(load("pt600"))
     positions = np.radians([0, 131, 0, 0, 0])
-    assert violations(joints, positions) == ("joint shoulder at 131.00° is beyond its limit 130.00°",)
+    (found,) = violations(joints, positions)
+    assert found.text == "joint shoulder at 131.00° is beyond its limit 130.00°"
+    assert found == codes.JOINT_LIMIT(name="shoulder", value="131.00°", limit="130.00°")
 
 
 def test_limit_rounded_to_the_protocols_digits_is_no_violation() -> None:
@@ -53,14 +56,13 @@ def test_limit_rounded_to_the_protocols_digits_is_no_violation() -> None:
 def test_coupled_limit_is_checked() -> None:
     joints = joints_of(load("pt600"))
     found = violations(joints, np.radians([0, 100, 100, 0, 0]))
-    assert found == ("shoulder + elbow at 200.00° is beyond its limit 160.00°",)
+    assert [each.text for each in found] == ["shoulder + elbow at 200.00° is beyond its limit 160.00°"]
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_number_that_is_not_finite_is_a_violation(value: float) -> None:
     (found,) = violations(joints_of(load("pt600")), [0, 0, value, 0, 0])
-    assert found.startswith("joint elbow at")
-    assert found.endswith("is not a finite number")
+    assert found == codes.JOINT_NOT_FINITE(name="elbow", value=value)
 
 
 @pytest.mark.parametrize("positions", [[], [0.0] * 4, [0.0] * 6, [[0.0] * 5]])

@@ -11,11 +11,11 @@ import pytest
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
+from bus import reason_codes as codes
 from bus.errors import QuotaError, RefusedError
 from bus.header import Header
 from bus.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
 from bus.subscription import Sample
-from renderer.errors import NoRoomError
 from services.console import pictures
 from services.console.lanes import NewestLane
 from services.console.streamed import Streamed
@@ -64,7 +64,7 @@ async def rendered(mesh, page):  # noqa: F811
             if request.message == ViewRequest(of="front"):
                 return ViewAnswer(topic="video/front", image="image/front", width=160, height=90, fps=20)
             if request.message.width == 1920:
-                raise RefusedError(str(NoRoomError("1 views were asked for already")))
+                raise RefusedError(codes.VIEW_NO_ROOM(detail="1 views were asked for already"))
             return ViewAnswer(topic="video/free-1", image="image/free-1", width=160, height=90, fps=20)
 
         other.answer("s", "r", "views/*", views)

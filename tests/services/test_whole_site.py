@@ -363,8 +363,13 @@ def test_ctrl_c_waits_until_what_moves_is_stopped_and_what_is_recorded_is_closed
     entries = [json.loads(line) for line in log.read_text().splitlines()]
     # The program that moved the arm may have asked for more, which is refused and in the log too.
     own = [each for each in entries if each["operator"] == "gateway"]
-    assert [each["request"] for each in own[-2:]] == ["STOP", "REVOKE"], own
-    assert own[-1]["text"] == "the gateway is being ended"
+    stopped, ended = own[-2:]
+    assert stopped["request"] == "STOP"
+    # On a busy machine the program may not have renewed its lease in time.
+    assert (ended["request"], ended["reason"]["code"]) in (
+        ("REVOKE", "lease.ended.gateway"),
+        ("EXPIRE", "lease.ended.expired"),
+    )
 
 
 def test_ctrl_c_again_ends_a_site_that_still_waits(tmp_path):

@@ -53,8 +53,8 @@ class Gate:
                 await JSONResponse(refusal, status_code=401, headers=headers)(scope, receive, send)
         elif found is not None and scope["path"] in _NEEDS_OPERATOR and not found.may_command:
             account = found.account
-            text = PASSWORD_AGAIN if account.may_command else lacks_right(account, "this")
-            await PlainTextResponse(text, status_code=403)(scope, receive, send)
+            reason = PASSWORD_AGAIN if account.may_command else lacks_right(account, "this")
+            await PlainTextResponse(reason.text, status_code=403)(scope, receive, send)
         elif found is None or scope["type"] == "websocket" or scope["path"].startswith("/account/"):
             await self._app(scope, receive, send)  # a page is told why its connection ends
         else:

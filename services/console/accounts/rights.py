@@ -3,13 +3,15 @@
 from google.protobuf.message import DecodeError
 
 from bus import keys, topics
+from bus import reason_codes as codes
 from bus.errors import BusError, RefusedError
+from bus.reasons import Reason
 from bus.schemas.robomesh_pb2 import StopRequest
 from bus.topics import Role
 from services.console.accounts.file import Account
 from services.console.accounts.sessions import SignedIn
 
-PASSWORD_AGAIN = "give your password again first: the right to command rests"
+PASSWORD_AGAIN = codes.PASSWORD_AGAIN()
 
 
 def operator_name(account: str, site: str) -> str:
@@ -17,9 +19,9 @@ def operator_name(account: str, site: str) -> str:
     return f"{account}.{site}"
 
 
-def lacks_right(account: Account, what: str) -> str:
-    """Why an account that only watches may not ask for something, in words."""
-    return f"{account.name} is a {account.role.value}: {what} needs an operator"
+def lacks_right(account: Account, what: str) -> Reason:
+    """Return why an account that only watches may not ask for something."""
+    return codes.NEEDS_OPERATOR(account=account.name, role=account.role.value, what=what)
 
 
 def check_ask(key: str) -> topics.Request:
@@ -39,9 +41,9 @@ def check_ask(key: str) -> topics.Request:
         if row.in_name:
             topics.check_operator(chunk)
     except BusError as error:
-        raise RefusedError(str(error)) from None
+        raise RefusedError(codes.INVALID(detail=error)) from None
     if Role.CONSOLE not in row.askers:
-        raise RefusedError(f"the console has no right to ask {row.name}")
+        raise RefusedError(codes.CONSOLE_NO_RIGHT(request=row.name))
     return row
 
 
@@ -52,10 +54,11 @@ def check_right(row: topics.Request, key: str, who: SignedIn, site: str) -> None
         RefusedError: Which right is missing.
     """
     if who.ended:
-        raise RefusedError("nobody is signed in here any more")
+        raise RefusedError(codes.SIGNED_OUT())
     account, everybody = who.account, Role.MONITOR in row.askers
     if not everybody and not account.may_command:
-        raise RefusedError(lacks_right(account, row.name.removesuffix("/*")))
+        what = row.name.removesuffix("/*")
+        raise RefusedError(lacks_right(account, what))
     check_own_name(row, key, operator_name(account.name, site), who=account.name)
     if not everybody and who.resting:
         raise RefusedError(PASSWORD_AGAIN)
@@ -69,7 +72,7 @@ def check_own_name(row: topics.Request, key: str, own: str, *, who: str = "this 
     """
     chunk = key.rpartition("/")[2]
     if row.in_name and chunk != own:
-        raise RefusedError(f"{who} asks in the name {own} only, not as {chunk}")
+        raise RefusedError(codes.OWN_NAME_ONLY(who=who, own=own, name=chunk))
 
 
 def in_own_name(key: str, payload: bytes, operator: str) -> bytes:

@@ -4,9 +4,9 @@ import { timestampFromMs } from "@bufbuild/protobuf/wkt";
 import { signal } from "@preact/signals";
 import { controlNotice, held, reasonOf } from "./control";
 import type { Notice } from "./control";
-import { gatewayText } from "./gateway-words";
 import { CommandAnswerSchema, CommandRequestSchema, CommandRequest_Command as Command } from "./gen/robomesh_pb";
 import { ask } from "./mesh";
+import { reasonText } from "./reasons";
 import { t } from "./texts";
 
 /** Values of a command beyond its name. */
@@ -22,8 +22,6 @@ const VALID_MS = 1000;
 const ANSWERED_S = 2;
 // A program is checked before it is answered, and does not begin once nobody waits for the answer.
 const CHECKED_S = 30;
-/** What stands before a warning in the gateway's answer. */
-const MIND = "; mind: ";
 const MOTIONS: readonly Command[] = [Command.HOME, Command.MOVE_ABSOLUTE, Command.MOVE_RELATIVE, Command.RUN_PROGRAM];
 
 // It counts up under each lease, and so it may under all of them.
@@ -62,14 +60,17 @@ export async function command(
     const answer = await ask(key, CommandRequestSchema, request, CommandAnswerSchema, withinS);
     const target = positions && { what, positions, id: request.id };
     if (answer.accepted && MOTIONS.includes(name)) newestMotion.value = request.id;
-    const mind = gatewayText(answer.text.split(MIND)[1] ?? "");
+    const mind = reasonText(answer.warning);
     if (answer.accepted) tell({ kind: "done", text: t("sent", { what }), ...(mind && { mind }), ...(target && { target }) });
     else tell({ kind: "refused", text: t("not_sent", { text: answer.text }) });
     return answer.accepted;
   } catch (error) {
-    tell({ kind: "refused", text: t("not_sent", { text: reasonOf(error) }) });
+    tell({ kind: "refused", text: t("not_sent", { text: ended(reasonOf(error)) }) });
     return false;
   }
 }
+
+/** A sentence with its full stop. */
+const ended = (text: string): string => (/[.。]$/.test(text) ? text : t("sentence", { text }));
 
 export { Command };

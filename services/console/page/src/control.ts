@@ -7,12 +7,12 @@
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { Timestamp } from "@bufbuild/protobuf/wkt";
 import { signal } from "@preact/signals";
-import { gatewayText } from "./gateway-words";
 import { LeaseAnswerSchema, LeaseRequestSchema, LeaseRequest_Action as Action } from "./gen/robomesh_pb";
 import type { Lease, LeaseAnswer } from "./gen/robomesh_pb";
 import { AskError, ask, hello, lostAt } from "./mesh";
 import { t } from "./texts";
 import type { TextName } from "./texts";
+import { reasonText } from "./reasons";
 
 /** What became of an action, in words, shown where the action was. */
 export interface Notice {
@@ -76,8 +76,10 @@ export function holds(robotKey: string): boolean {
 }
 
 export function reasonOf(error: unknown): string {
-  // The gateway says so too.
-  return error instanceof Error ? gatewayText(error.message.replace(/^Not (sent|run): /, "")) : String(error);
+  if (!(error instanceof Error)) return String(error);
+  // Where only the gateway's sentence is there, it says so too.
+  const text = error.message.replace(/^Not (sent|run): /, "");
+  return error instanceof AskError ? reasonText(error.reason, text) : text;
 }
 
 export function ms(stamp: Timestamp | undefined): number {
@@ -255,7 +257,7 @@ function seeLoss(robotKey: string, lease: Lease): void {
   controlNotice.value =
     offeredTo && lease.holder === offeredTo
       ? { kind: "done", text: t("handed_over", { name: offeredTo }) }
-      : { kind: "lost", text: t("control_lost", { text: gatewayText(lease.ended) || t("lost_unknown") }) };
+      : { kind: "lost", text: t("control_lost", { text: reasonText(lease.endedReason, lease.ended) || t("lost_unknown") }) };
 }
 
 /** A loss is told of until somebody else is in control than was right after it. */

@@ -2,7 +2,7 @@
 
 import { useState } from "preact/hooks";
 import { count, stampFull, stampTime } from "./format";
-import { gatewayText } from "./gateway-words";
+import { entryText } from "./events/entry-text";
 import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "./gen/robomesh_pb";
 import type { AuditEntry, ControllerState, Event } from "./gen/robomesh_pb";
 import { eventInChinese } from "./events/event-words";
@@ -107,7 +107,7 @@ export function eventText(event: Event): string {
 }
 
 function AuditLine(entry: AuditEntry) {
-  const text = gatewayText(entry.text);
+  const text = entryText(entry);
   const [word, level] = OUTCOMES[entry.outcome] ?? ["state_unknown", "normal"];
   return (
     <li title={`${stampFull(entry.timestamp)} · ${entry.source}`}>

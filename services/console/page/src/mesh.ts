@@ -5,7 +5,7 @@ import type { DescMessage, MessageInitShape, MessageShape } from "@bufbuild/prot
 import { signal } from "@preact/signals";
 import { ageClock } from "./age-clock";
 import { FromPageSchema, ToPageSchema } from "./gen/robomesh_pb";
-import type { ToPage_Hello } from "./gen/robomesh_pb";
+import type { Reason, ToPage_Hello } from "./gen/robomesh_pb";
 import { lateness } from "./lateness";
 import { t } from "./texts";
 
@@ -29,10 +29,13 @@ export interface Sample {
 export class AskError extends Error {
   /** Nobody answered: it was not refused, and may even have been done. */
   readonly noAnswer: boolean;
+  /** Why it was refused, where its owner says it by a code. */
+  readonly reason: Reason | undefined;
 
-  constructor(text: string, noAnswer: boolean) {
+  constructor(text: string, noAnswer: boolean, reason?: Reason) {
     super(text);
     this.noAnswer = noAnswer;
+    this.reason = reason;
   }
 }
 
@@ -220,7 +223,7 @@ function receive(bytes: Uint8Array): void {
     case "answer": {
       const waiting = settle(message.value.id);
       if (message.value.ok) waiting?.resolve(message.value.payload);
-      else waiting?.reject(new AskError(message.value.error, message.value.noAnswer));
+      else waiting?.reject(new AskError(message.value.error, message.value.noAnswer, message.value.refusal));
       break;
     }
     case "sample": {

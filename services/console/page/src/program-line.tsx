@@ -3,7 +3,7 @@
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { Timestamp } from "@bufbuild/protobuf/wkt";
 import { clock, staleText } from "./format";
-import { gatewayText } from "./gateway-words";
+import { reasonText } from "./reasons";
 import { ProgramState_Outcome as Outcome } from "./gen/robomesh_pb";
 import type { Event, ProgramState } from "./gen/robomesh_pb";
 import { t } from "./texts";
@@ -47,7 +47,7 @@ function programText({ message, sample }: Latest<ProgramState>): string {
     case Outcome.DONE:
       return t("program_done", { name, operator });
     case Outcome.ENDED:
-      return t("program_ended", { name, operator, at, text: gatewayText(text) });
+      return t("program_ended", { name, operator, at, text: reasonText(message.reason, text) });
     default: {
       const told = between(message.since, message.timestamp) / 1000;
       const gone = clock(told + (performance.now() - sample.arrived) / 1000);

@@ -10,7 +10,7 @@ import {
 } from "./gen/robomesh_pb";
 import type { ControllerState, Event } from "./gen/robomesh_pb";
 import { stampTime } from "./format";
-import { gatewayText } from "./gateway-words";
+import { reasonsText } from "./reasons";
 import { ageOf, isStale } from "./topics";
 import type { Latest } from "./topics";
 import { t } from "./texts";
@@ -116,5 +116,5 @@ export function problemOf(state: ControllerState | undefined): string {
   if (disobeys(state)) return t("disobeys");
   if (state?.fault) return state.fault;
   if (state?.stop) return stopText(state);
-  return gatewayText(state?.linkText ?? "");
+  return reasonsText(state?.linkReasons, state?.linkText);
 }

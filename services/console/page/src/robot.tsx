@@ -7,7 +7,7 @@ import type { VideoPlace } from "./camera";
 import { seeLease } from "./control";
 import { ControlPanel } from "./control-panel";
 import { EventsPanel } from "./events-panel";
-import { gatewayText } from "./gateway-words";
+import { reasonText, reasonsText } from "./reasons";
 import {
   ControllerStateSchema,
   ControllerState_Check as Check,
@@ -159,8 +159,9 @@ function Headline(props: {
     if (message.legacyClients?.attached) facts.push(t("legacy_some", { count: message.legacyClients.attached }));
   }
   const flooding = message?.health?.flooding === true;
-  const told = message?.fault || (message?.link !== Link.UP && message?.linkText) || "";
-  const trouble = message?.fault ? told : gatewayText(told);
+  const down = message?.link === Link.UP ? undefined : message;
+  const told = message?.fault || down?.linkText;
+  const trouble = message?.fault || reasonsText(down?.linkReasons, down?.linkText);
   return (
     <div class="headline">
       <h1>{props.name}</h1>
@@ -191,7 +192,7 @@ function Headline(props: {
         <span class="trouble warning">
           <span class="shape warning" aria-hidden="true" />
           {t(message.check === Check.REQUIRE ? "check_refuses" : "check_cannot", {
-            text: message.checkStarting ? t("check_starting") : message.checkText,
+            text: message.checkStarting ? t("check_starting") : reasonText(message.checkReason, message.checkText),
           })}
         </span>
       )}

@@ -235,6 +235,8 @@ const TEXTS = {
   motion_done: ["Done: {what}", "已完成：{what}"],
   motion_ended: ["Ended before its target: {what}", "未到目标即结束：{what}"],
   sending: ["Sending {what}…", "正在发送 {what}…"],
+  sentence: ["{text}.", "{text}。"],
+  list_separator: ["; ", "；"],
   not_sent: ["Not sent: {text}", "未发送：{text}"],
   what_move: ["move to target", "移动到目标"],
   what_speed: ["speed {value} %", "速度 {value} %"],

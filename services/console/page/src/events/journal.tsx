@@ -5,7 +5,7 @@ import { count, stampFull } from "../format";
 import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "../gen/robomesh_pb";
 import { Mark, OUTCOMES, SEVERITIES, eventText } from "../events-panel";
 import { fleetRobots } from "../fleet/known";
-import { gatewayText } from "../gateway-words";
+import { entryText } from "./entry-text";
 import { Choice, NoticeLine, Toggle } from "../parts";
 import type { Notice } from "../control";
 import { alarmTitle } from "./alarm-words";
@@ -158,7 +158,7 @@ function wordsOf(entry: Entry): string {
     return `${entry.site}/${entry.robot} ${source} ${code} ${text} ${eventText(entry.event)} ${alarmTitle(code) ?? ""}`;
   }
   const { operator, source, request, text } = entry.audit;
-  return `${entry.site}/${entry.robot} ${operator} ${source} ${request} ${text} ${gatewayText(text)}`;
+  return `${entry.site}/${entry.robot} ${operator} ${source} ${request} ${text} ${entryText(entry.audit)}`;
 }
 
 function Line({ entry, open, choose }: { entry: Entry; open: boolean; choose: (entry: Entry) => void }) {
@@ -188,7 +188,7 @@ function EventWords({ entry: { event } }: { entry: EventEntry }) {
 function AuditWords({ entry: { audit } }: { entry: AuditLine }) {
   const [word, level] = OUTCOMES[audit.outcome] ?? ["state_unknown", "normal"];
   const repeated = audit.repeatedCount > 0n ? ` × ${count(audit.repeatedCount)}` : "";
-  const text = gatewayText(audit.text);
+  const text = entryText(audit);
   return (
     <>
       <Mark word={word} level={level} /> <strong>{audit.operator || audit.source}</strong> {audit.request}
@@ -212,7 +212,7 @@ function Details({ entry, close }: { entry: Entry; close: () => void }) {
   return (
     <div class="entry-details" role="region" aria-label={wordsOf(entry)}>
       <p>{"event" in entry ? <EventWords entry={entry} /> : <AuditWords entry={entry} />}</p>
-      {told !== (event ? eventText(event) : gatewayText(told)) && (
+      {told !== (event ? eventText(event) : audit ? entryText(audit) : "") && (
         <p class="dim">
           {e("in_its_words")} <span lang="en">{told}</span>
         </p>

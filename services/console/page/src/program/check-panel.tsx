@@ -3,6 +3,7 @@
 import { timeOfDay } from "../format";
 import type { CheckAnswer } from "../gen/robomesh_pb";
 import { Panel } from "../parts";
+import { reasonText } from "../reasons";
 import { t } from "../texts";
 import { checkFailed, checkNow, checked, checking, errorsOf, isCurrent } from "./check";
 import { draft, goToLine } from "./draft";
@@ -121,7 +122,7 @@ function Row({ group: { worst, first, last, fromS, untilS } }: { group: Group })
         {!isText && ` · ${untilS > fromS + 0.05 ? p("from_to", { from: seconds(fromS), to: seconds(untilS) }) : seconds(fromS)}`}
         {distance !== undefined && pair.length > 0 && ` · ${distance > 0 ? distanceText(distance) : p("touch")}`}
       </span>
-      <span class="violation-text">{text || pair.join(" – ") || t("state_unknown")}</span>
+      <span class="violation-text">{reasonText(worst.reason, text) || pair.join(" – ") || t("state_unknown")}</span>
     </button>
   );
 }

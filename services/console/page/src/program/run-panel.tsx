@@ -5,7 +5,7 @@ import { Command, command } from "../command";
 import { holds, ms } from "../control";
 import type { Notice } from "../control";
 import { clock, stampTime } from "../format";
-import { gatewayText } from "../gateway-words";
+import { reasonText } from "../reasons";
 import { ProgramState_Outcome as Outcome } from "../gen/robomesh_pb";
 import type { ControllerState, ProgramState } from "../gen/robomesh_pb";
 import { NoticeLine, Panel } from "../parts";
@@ -86,7 +86,7 @@ function Progress({ state }: { state: ProgramState }) {
           {left > 0 && ` · ${p("time_left", { left: clock(left), all: clock(durationS) })}`}
         </span>
       </p>
-      {text && <p class="progress-text">{gatewayText(text)}</p>}
+      {text && <p class="progress-text">{reasonText(state.reason, text)}</p>}
     </div>
   );
 }

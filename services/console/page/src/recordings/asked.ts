@@ -3,7 +3,7 @@
 import { create, fromBinary } from "@bufbuild/protobuf";
 import { timestampFromMs, timestampMs } from "@bufbuild/protobuf/wkt";
 import { useEffect, useState } from "preact/hooks";
-import { gatewayText } from "../gateway-words";
+import { entryText } from "../events/entry-text";
 import {
   AuditEntrySchema,
   AuditEntry_Outcome as Outcome,
@@ -95,11 +95,12 @@ export function useHappened(name: RecordingName | null, info: Recording | null):
 }
 
 /** What somebody asked of the robot, told as an event. */
-function askedFor({ timestamp, operator, source, request, outcome, text }: AuditEntry): Event {
+function askedFor(entry: AuditEntry): Event {
+  const { timestamp, operator, source, request, outcome, text } = entry;
   const words = outcome === Outcome.REFUSED ? "asked_refused" : outcome === Outcome.FAILED ? "asked_failed" : "asked";
   const said = r(words, { who: operator || source, what: request.toLowerCase().replaceAll("_", " ") });
   const severity = words === "asked" ? Severity.INFO : Severity.WARNING;
-  const event = create(EventSchema, { severity, source, code: request, text: text ? `${said}: ${gatewayText(text)}` : said });
+  const event = create(EventSchema, { severity, source, code: request, text: text ? `${said}: ${entryText(entry)}` : said });
   if (timestamp) event.timestamp = timestamp;
   return event;
 }

@@ -1,0 +1,74 @@
+"""What a gateway refuses has the same code in the reply, the audit log, the events and the state."""
+
+import json
+
+import pytest
+
+from bus.errors import RefusedError
+from protocol_gateway.audit.log import read_entries
+from tests.conftest import run
+from tests.protocol_gateway.hall import A, C, gateway, simulator, until
+
+
+async def code(awaitable):
+    """The reason of a refusal."""
+    with pytest.raises(RefusedError) as refused:
+        await awaitable
+    return refused.value.reason
+
+
+def test_reply_audit_entry_event_and_state_have_the_same_code(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port) as plant:
+            assert (await code(plant.command(C.HOME))).code == "lease.none"
+            assert (await code(plant.lease(A.RENEW))).code == "lease.none"
+            await plant.home()
+            found = await code(plant.lease(A.ACQUIRE, operator="wang"))
+            assert (found.code, found.values) == ("lease.held", {"holder": "li"})
+
+            found = await code(plant.command(C.MOVE_ABSOLUTE, joint_positions=[9.0, 0, 0, 0, 0]))
+            assert (found.code, found.causes[0].code) == ("joints.outside", "joints.limit")
+            assert found.causes[0].values == {"name": "waist", "value": "515.66°", "limit": "150.00°"}
+            assert found.text.startswith("Not sent: joint waist at 515.66°")
+            assert (await code(plant.command(C.MOVE_ABSOLUTE))).values["joints"] == "5"
+            assert (await code(plant.command(C.SPEED, speed_percent=101))).values == {"value": "101"}
+
+            stopped = await plant.stop(by="chen", reason="smoke")
+            assert (stopped.reason.code, stopped.reason.values["id"]) == ("stop.sent", str(stopped.stop_id))
+            found = await code(plant.command(C.HOME))
+            assert (found.code, found.values["reason"]) == ("stop.latched", "smoke")
+
+            await plant.lease(A.RELEASE, reason="lunch")
+            ended = await until(lambda: plant.seen["lease"][-1].ended_reason.code and plant.seen["lease"][-1])
+            assert ended.ended_reason.code == "lease.ended.released_why"
+            assert dict(ended.ended_reason.values) == {"name": "li", "reason": "lunch"}
+            event = await until(lambda: next(iter(plant.events("lease.ended")), None))
+            assert event.reason == ended.ended_reason
+
+            entries = list(read_entries(plant.audit))
+            refused = [each.reason.code for each in entries if each.outcome == "REFUSED"]
+            assert refused == [
+                *("lease.none", "lease.none", "lease.held", "joints.outside", "joints.count"),
+                *("speed.outside", "stop.latched"),
+            ]
+            await until(lambda: len(plant.seen["audit"]) == len(entries))
+            assert [each.reason.code for each in plant.seen["audit"]] == [
+                "" if each.reason is None else each.reason.code for each in entries
+            ]
+            lines = [json.loads(line) for line in plant.audit.read_text().splitlines()]
+            assert [each["reason"]["code"] for each in lines if each["outcome"] == "REFUSED"] == refused
+
+    run(main())
+
+
+def test_a_reason_within_a_reason_comes_with_the_state(mesh, tmp_path):
+    async def main():
+        async with simulator() as port, gateway(mesh, tmp_path, port, stop_proven=False) as plant:
+            await until(lambda: plant.controller.read_only)
+            connected, why = plant.controller.link_reasons
+            assert (connected.code, connected.values["where"]) == ("link.connected", f"127.0.0.1:{port}")
+            assert (why.code, why.causes[0].code) == ("robot.is_read_only", "robot.stop_not_proven")
+            found = await code(plant.lease(A.ACQUIRE))
+            assert (found.code, found.causes[0].code) == ("robot.read_only", "robot.stop_not_proven")
+
+    run(main())

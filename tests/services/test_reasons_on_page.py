@@ -1,0 +1,39 @@
+"""The page has a sentence in each language for every reason of the table."""
+
+import json
+import re
+from pathlib import Path
+
+from bus import reason_codes
+from bus.reasons import Code
+
+SENTENCES = Path(__file__).resolve().parents[2] / "services/console/page/src/reasons.ts"
+ROW = re.compile(r'^  \[("[^"]+"), \[("(?:[^"\\]|\\.)*"), ("(?:[^"\\]|\\.)*")\]\],$', re.MULTILINE)
+ROWS = {
+    json.loads(code): (json.loads(english), json.loads(chinese))
+    for code, english, chinese in ROW.findall(SENTENCES.read_text("utf-8"))
+}
+TABLE = {each.name: each for each in vars(reason_codes).values() if isinstance(each, Code)}
+
+
+def parameters(sentence):
+    return set(re.findall(r"\{(\w+)\}", sentence))
+
+
+def test_the_page_has_the_codes_of_the_table():
+    assert ROWS.keys() == TABLE.keys()
+
+
+def test_its_english_is_the_table_s():
+    wrong = {
+        name: english
+        for name, (english, _) in ROWS.items()
+        if english != re.sub(r"\{(\w+):[^}]*\}", r"{\1}", TABLE[name].sentence)
+    }
+    assert wrong == {}
+
+
+def test_its_chinese_has_the_same_parameters():
+    for name, (english, chinese) in ROWS.items():
+        assert parameters(chinese) == parameters(english), name
+        assert re.search("[\u4e00-\u9fff]", chinese) or re.fullmatch(r"(\{\w+\}|[：，])+", chinese), name
