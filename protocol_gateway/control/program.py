@@ -47,6 +47,10 @@ WITHIN_S = 25.0
 # What the answer takes to its asker: a refusal is to be there before it gives up.
 _ANSWER_S = 0.1
 
+# No client waits for a step, so a busy machine may check it again for so long.
+_CHECKED_WITHIN_S = 10.0
+_TOO_SLOW = frozenset({codes.CHECK_TOO_SLOW.name, codes.CHECK_QUEUED_TOO_LONG.name})
+
 log = logging.getLogger(__name__)
 
 
@@ -238,10 +242,12 @@ class Programs:
             if (problem := await self._until(run, self._not_held)) is not None:
                 return problem
             answer = await self._control.step(_request(step, run.secret), operator=run.operator)
+            if _checked_too_slowly(answer) and time.monotonic() - begin_s < _CHECKED_WITHIN_S:
+                continue
             if answer.accepted or answer.reason is None or answer.reason.code != codes.COMMAND_HELD.name:
                 break
         if not answer.accepted:
-            return answer.reason
+            return answer.reason or codes.OTHER(detail=answer.text)
         if step.target is None:
             return None
         # From now on the motion itself says where the robot goes.
@@ -312,6 +318,16 @@ class Programs:
             )
         )
         self._guarded.on_change()
+
+
+def _checked_too_slowly(answer: Answer) -> bool:
+    reason = answer.reason
+    return (
+        not answer.accepted
+        and reason is not None
+        and reason.code == codes.CHECK_REQUIRED.name
+        and any(cause.code in _TOO_SLOW for cause in reason.causes)
+    )
 
 
 def _request(step: Step, secret: str) -> schema.CommandRequest:

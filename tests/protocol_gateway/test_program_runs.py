@@ -11,10 +11,13 @@ import psutil
 import pytest
 from google.protobuf.timestamp_pb2 import Timestamp
 
+from bus import reason_codes as codes
 from bus.answering import Request
 from bus.errors import RefusedError
 from bus.schemas import robomesh_pb2 as schema
+from protocol_gateway.checking.checker import Checker
 from protocol_gateway.control.waits import date
+from protocol_gateway.errors import CheckError
 from tests.conftest import run
 from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
 from tests.protocol_gateway.test_checked_motion import POST, alone, checked, standing
@@ -35,8 +38,17 @@ LONG = "move_joints -140 90 -90 0 0\nmove_joints 0 90 -90 0 0\n"
 
 
 async def start(plant, text, **fields):
-    """Run a program; the holder's hand stays on it."""
-    await plant.lease(A.RENEW, ttl_s=5)
+    """Run a program, again where a busy machine plans it too slowly; control is renewed meanwhile."""
+    while True:
+        try:
+            return await start_once(plant, text, **fields)
+        except RefusedError as error:
+            if error.reason.code != "program.plan_too_slow":
+                raise
+
+
+async def start_once(plant, text, **fields):
+    await in_control(plant)
     plant.id += 1
     request = schema.CommandRequest(
         command=C.RUN_PROGRAM, lease=plant.secret, id=plant.id, program=text, program_name="weld", **fields
@@ -44,7 +56,7 @@ async def start(plant, text, **fields):
     asked = asyncio.ensure_future(plant.session.ask(plant.key("command/li"), request, timeout_s=60))
     while not asked.done():
         # What checks may still have to begin.
-        await plant.lease(A.RENEW, ttl_s=5)
+        await in_control(plant)
         await asyncio.wait([asked], timeout=0.5)
     return asked.result()
 
@@ -59,6 +71,31 @@ async def ended(plant, outcome, timeout_s=60):
             await plant.lease(A.RENEW, ttl_s=5)
             await asyncio.sleep(0.1)
     return states(plant)[-1]
+
+
+def test_a_step_whose_check_is_late_is_checked_again(mesh, tmp_path, monkeypatch):
+    late, motion = iter([True, True]), Checker.motion
+
+    async def slow(self, question):
+        if next(late, False):
+            raise CheckError(codes.CHECK_TOO_SLOW(seconds=0.8))
+        return await motion(self, question)
+
+    async def main():
+        async with (
+            simulator() as port,
+            gateway(mesh, tmp_path, port, check="require", cell=alone(POST)) as plant,
+        ):
+            await until(lambda: not plant.controller.check_text, timeout_s=60)
+            monkeypatch.setattr(Checker, "motion", slow)
+            await start(plant, "home\n")
+            await ended(plant, RUN.DONE)
+            steps = [each for each in plant.seen["audit"] if each.source == "program"]
+            refused = [each.reason for each in steps if each.outcome == REFUSED]
+            assert {each.code for each in refused} == {"check.required"}
+            assert [each.causes[0].code for each in refused][:2] == ["check.too_slow"] * 2
+
+    run(main(), timeout_s=240)
 
 
 @pytest.mark.parametrize("check", ["off", "require"])
@@ -89,7 +126,7 @@ def test_a_program_runs_step_by_step_to_its_end_and_everybody_sees_where_it_is(m
             await until(lambda: any(each.request == "PROGRAM_END" for each in plant.seen["audit"]))
             assert await plant.event("program.done", 0)
 
-    run(main(), timeout_s=120)
+    run(main(), timeout_s=240)
 
 
 def test_required_a_program_that_collides_is_refused_with_its_line_and_the_arm_has_not_moved(mesh, tmp_path):
@@ -113,7 +150,7 @@ def test_required_a_program_that_collides_is_refused_with_its_line_and_the_arm_h
             assert list(plant.joints) == pytest.approx(before)
             assert states(plant)[-1].outcome == RUN.OUTCOME_UNSPECIFIED
 
-    run(main(), timeout_s=120)
+    run(main(), timeout_s=240)
 
 
 def test_a_stop_ends_a_program_and_no_step_of_it_comes_after_the_reset(mesh, tmp_path):
@@ -134,7 +171,7 @@ def test_a_stop_ends_a_program_and_no_step_of_it_comes_after_the_reset(mesh, tmp
             await asyncio.sleep(1.0)
             assert list(plant.joints) == pytest.approx(where, abs=1e-3)
 
-    run(main(), timeout_s=60)
+    run(main(), timeout_s=240)
 
 
 def test_what_would_hold_up_a_program_is_told_before_it_begins(mesh, tmp_path):
@@ -145,7 +182,7 @@ def test_what_would_hold_up_a_program_is_told_before_it_begins(mesh, tmp_path):
             assert "not homed" in text
             assert plant.controller.counters.units_sent == 0
 
-    run(main(), timeout_s=60)
+    run(main(), timeout_s=240)
 
 
 def test_a_program_ends_with_its_holders_control_even_while_it_waits(mesh, tmp_path):
@@ -162,7 +199,7 @@ def test_a_program_ends_with_its_holders_control_even_while_it_waits(mesh, tmp_p
             await until(lambda: states(plant)[-1].outcome == RUN.ENDED)
             assert states(plant)[-1].text.startswith("control ended: ")
 
-    run(main(), timeout_s=60)
+    run(main(), timeout_s=240)
 
 
 def test_a_program_on_hold_waits_and_goes_on_with_resume(mesh, tmp_path):
@@ -180,7 +217,7 @@ def test_a_program_on_hold_waits_and_goes_on_with_resume(mesh, tmp_path):
             await ended(plant, RUN.DONE)
             await standing(plant, LAST)
 
-    run(main(), timeout_s=60)
+    run(main(), timeout_s=240)
 
 
 def test_a_program_on_hold_between_two_motions_waits_there(mesh, tmp_path):
@@ -198,7 +235,7 @@ def test_a_program_on_hold_between_two_motions_waits_there(mesh, tmp_path):
             await ended(plant, RUN.DONE)
             await standing(plant, LAST)
 
-    run(main(), timeout_s=60)
+    run(main(), timeout_s=240)
 
 
 def test_a_program_that_is_given_up_on_hold_between_two_motions_goes_on_no_more(mesh, tmp_path):
@@ -218,7 +255,7 @@ def test_a_program_that_is_given_up_on_hold_between_two_motions_goes_on_no_more(
             await asyncio.sleep(1.5)
             assert list(plant.joints) == pytest.approx(where, abs=1e-3)
 
-    run(main(), timeout_s=60)
+    run(main(), timeout_s=240)
 
 
 @contextlib.contextmanager
@@ -236,8 +273,7 @@ def slow_check():
 
 async def planned(plant):
     """The process that plans is there: it has planned something."""
-    while "no statement that does anything" not in (text := await refusal(start(plant, "# nothing\n"))):
-        assert "to plan" in text  # on a busy machine the process takes longer to start
+    assert "no statement that does anything" in await refusal(start(plant, "# nothing\n"))
 
 
 async def in_control(plant):
@@ -368,7 +404,7 @@ def test_a_homing_on_hold_goes_on_with_resume(mesh, tmp_path):
                     await plant.lease(A.RENEW, ttl_s=5)
                     await asyncio.sleep(0.2)
 
-    run(main(), timeout_s=60)
+    run(main(), timeout_s=240)
 
 
 def test_a_program_is_not_run_twice_when_it_is_asked_for_twice(mesh, tmp_path):
@@ -383,7 +419,7 @@ def test_a_program_is_not_run_twice_when_it_is_asked_for_twice(mesh, tmp_path):
             asked = [each for each in plant.seen["audit"] if each.request == "RUN_PROGRAM"]
             assert len(asked) == 1
 
-    run(main(), timeout_s=60)
+    run(main(), timeout_s=240)
 
 
 def test_what_is_warned_of_is_in_the_answer_to_who_runs_the_program(mesh, tmp_path):
