@@ -21,7 +21,7 @@ from bus.ignored import REQUEST, Ignored
 from bus.intake import HELD, RING, Queue, RateLimit, Turns, begin_now, read
 from bus.latencies import Latencies
 from bus.messages import JSON, PROTOBUF, TEXT, decode_request, encode, is_json
-from bus.reasons import to_parameters
+from bus.reasons import RETRY, to_parameters
 
 log = logging.getLogger(__name__)
 
@@ -34,9 +34,8 @@ QUOTA_TEXT = f"{TEXT};{OLD_AGAIN_S}="
 WITHIN = "within"
 # A parameter of the question: its asker reads a refusal's code from the encoding, those two among them.
 CODES = "codes"
-# Parameters before the code: the request may be repeated, at once or after so long [s].
-BUSY = "busy"
-AGAIN_S = "again_s"
+BUSY, AGAIN_S = RETRY
+_LONGEST_AGAIN_S = 86_400.0
 # Of a request that is asked over both links: what marks its two copies, and how many marks are known.
 MARK_BYTES = 8
 _MOST_MARKS = 256
@@ -313,7 +312,8 @@ def _refuse(query: zenoh.Query, error: RefusedError) -> None:
     if isinstance(error, BusyError):
         when, old = BUSY, BUSY_TEXT
     elif isinstance(error, QuotaError):
-        when, old = f"{AGAIN_S}={error.again_s:.3f}", f"{QUOTA_TEXT}{error.again_s:.3f}"
+        again_s = min(error.again_s, _LONGEST_AGAIN_S)
+        when, old = f"{AGAIN_S}={again_s:.3f}", f"{QUOTA_TEXT}{again_s:.3f}"
     else:
         when, old = "", ""
     if old and query.parameters.get(CODES) is None:

@@ -12,6 +12,7 @@ BUSY = Code("request.busy", "too many requests wait for this owner already", "as
 TURNED_AWAY = Code("request.turned_away", "turned away unread: too many requests waited already")
 FAILED = Code("request.failed", "{request} failed at its owner", "its log says why")
 INVALID = Code("request.invalid", "{detail}")
+# A refusal without a code of its own; several reasons of one refusal.
 OTHER = Code("other", "{detail}")
 SEVERAL = Code("several", "{cause}")
 WILDCARD = Code("request.wildcard", "{key} has a wildcard", "ask one {request} by its whole key")

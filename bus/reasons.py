@@ -5,7 +5,7 @@ codes and their sentences are in `bus.reason_codes`, and nowhere else.
 
 A refusal is an error reply: its payload is the sentence, its encoding is `text/plain;<parameters>`. The
 parameters are a query string (`code=lease.held&holder=li`). A cause follows with the prefix `cause.`
-(`cause.code=link.unreachable&cause.where=...`). Zenoh 1.10.2 ends the session of a peer that sends more than
+(`cause.code=link.no_answer&cause.where=...`). Zenoh 1.10.2 ends the session of a peer that sends more than
 255 bytes there, so a parameter that does not fit is left out; the code always fits.
 """
 
@@ -14,11 +14,17 @@ from dataclasses import dataclass, field
 from string import Formatter
 from urllib.parse import parse_qsl, quote
 
+from bus.texts import one_line
+
 MOST_PARAMETER_BYTES = 255
 """Bytes of an encoding's parameters."""
 
+RETRY = ("busy", "again_s")
+"""Parameters before the code: the request may be repeated, at once or after so long [s]."""
+
 _CODE = "code"
 _CAUSE = "cause"
+_LONGEST = 800
 _SAFE = " ,:'\"()[]<>/"
 _FORMATTER = Formatter()
 
@@ -31,7 +37,7 @@ class Reason:
         code: From the table, or a newer peer's: "lease.held".
         values: The parameters, as text.
         causes: Reasons of this reason. They stand in its sentence in the place of `{cause}`.
-        text: The sentence in English, without a full stop.
+        text: The sentence in English, without a full stop; of a received refusal its payload.
     """
 
     code: str
@@ -80,10 +86,10 @@ class Code:
             if name == _CAUSE:
                 parts.append("; ".join(cause.text for cause in causes))
             elif name:
-                texts[name] = format(values[name], specification or "")
+                texts[name] = one_line(format(values[name], specification or ""), _LONGEST)
                 parts.append(texts[name])
         for name in values.keys() - texts.keys():
-            texts[name] = str(values[name])
+            texts[name] = one_line(str(values[name]), _LONGEST)
         return Reason(self.name, texts, causes, "".join(parts))
 
 
@@ -91,7 +97,7 @@ def to_parameters(reason: Reason, when: str = "") -> str:
     """Return the parameters of a refusal's encoding, at most 255 bytes of ASCII.
 
     Args:
-        when: Stands before the code: whether, and when, the request may be repeated.
+        when: Parameter before the code that says whether, or when, the request may be repeated.
     """
     written = f"{when}&" if when else ""
     written += f"{_CODE}={quote(reason.code, safe='')[: MOST_PARAMETER_BYTES // 3]}"
@@ -104,7 +110,8 @@ def to_parameters(reason: Reason, when: str = "") -> str:
 
 def _flat(reason: Reason, prefix: str = "") -> list[tuple[str, str]]:
     pairs = [(f"{prefix}{name}", value) for name, value in reason.values.items()]
-    for cause in reason.causes[:1]:
+    # One of several would say less than the sentence, which has them all.
+    for cause in reason.causes if len(reason.causes) == 1 else ():
         pairs += [(f"{prefix}{_CAUSE}.{_CODE}", cause.code), *_flat(cause, f"{prefix}{_CAUSE}.")]
     return pairs
 
@@ -128,6 +135,10 @@ def reason_of(pairs: Mapping[str, str], text: str) -> Reason | None:
         return None
     prefix = f"{_CAUSE}."
     of_cause = {name.removeprefix(prefix): value for name, value in pairs.items() if name.startswith(prefix)}
-    values = {name: value for name, value in pairs.items() if name != _CODE and not name.startswith(prefix)}
+    values = {
+        name: value
+        for name, value in pairs.items()
+        if name not in (_CODE, *RETRY) and not name.startswith(prefix)
+    }
     cause = reason_of(of_cause, "")
     return Reason(pairs[_CODE], values, () if cause is None else (cause,), text)

@@ -24,6 +24,8 @@ from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.errors import AuditError
 
 NOTHING_BEFORE = "0" * 64
+# Reasons within reasons; a longer chain is not one that was written here.
+_DEEPEST = 10
 
 # Keys are sorted and quotes within texts are escaped, so these are the entry's own and not part of a text.
 _CHAIN = re.compile(
@@ -80,7 +82,8 @@ def chained(entry: Entry, *, number: int, previous: str) -> tuple[Entry, bytes]:
     row = {**vars(placed), "values": dict(entry.values)}
     del row["hash"], row["reason"]
     if entry.reason is not None:
-        row["reason"] = _row_of(entry.reason)
+        # The last of the keys, so that a torn line still says what was asked.
+        row["why"] = _row_of(entry.reason)
     text = json.dumps(row, ensure_ascii=False, separators=(",", ":"), sort_keys=True)
     # Half a surrogate pair is no character, and must not keep the rest from being written.
     body = text.encode(errors="backslashreplace")
@@ -106,7 +109,7 @@ def parse_line(line: bytes) -> Entry:
     """
     try:
         row = json.loads(line)
-        reason = _reason_of(row.pop("reason")) if "reason" in row else None
+        reason = _reason_of(row.pop("why"), row["text"]) if "why" in row else None
         entry = Entry(**{**row, "outcome": Outcome(row["outcome"])}, reason=reason)
         _check(entry)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
@@ -119,15 +122,18 @@ def _row_of(reason: Reason) -> dict[str, Any]:
     if reason.values:
         row["values"] = dict(reason.values)
     if reason.causes:
-        row["causes"] = [_row_of(cause) for cause in reason.causes]
+        row["causes"] = [{**_row_of(cause), "text": cause.text} for cause in reason.causes]
     return row
 
 
-def _reason_of(row: Mapping[str, Any]) -> Reason:
+def _reason_of(row: Mapping[str, Any], text: str, depth: int = 1) -> Reason:
+    if depth > _DEEPEST:
+        raise ValueError(f"reasons within reasons, more than {_DEEPEST}")
     values = row.get("values", {})
-    if not all(isinstance(text, str) for text in (row["code"], *values, *values.values())):
-        raise TypeError("the reason has a value that is no text")
-    return Reason(row["code"], values, tuple(map(_reason_of, row.get("causes", ()))))
+    for each in (row["code"], text, *values, *values.values()):
+        each.encode()  # text, without half a surrogate pair
+    causes = (_reason_of(cause, cause["text"], depth + 1) for cause in row.get("causes", ()))
+    return Reason(row["code"], values, tuple(causes), text)
 
 
 def _check(entry: Entry) -> None:

@@ -70,8 +70,9 @@ async def answered(
 
 
 def warning_of(answer: schema.CommandAnswer) -> str:
-    """What an accepted command's answer warns of; or nothing."""
-    return answer.text.partition(_MIND)[2] if answer.accepted else ""
+    """Return what an accepted command's answer warns of; empty: nothing."""
+    # An earlier gateway has the warning in its sentence alone.
+    return answer.warning.text or (answer.text.partition(_MIND)[2] if answer.accepted else "")
 
 
 async def until_done(

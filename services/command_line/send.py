@@ -1,13 +1,13 @@
 """`robomesh send`: one command to a robot, under a lease that lives as long as its motion."""
 
 import asyncio
-import re
 import sys
 from math import radians
 from pathlib import Path
 
 import typer
 
+from bus import reason_codes as codes
 from bus.errors import RefusedError
 from bus.keys import check_chunk, robot_key
 from bus.lease import control
@@ -78,8 +78,8 @@ async def _send(name: str, words: list[str], router: str, operator: str) -> tupl
                 if accepted and request.command == _Command.TRACE_ON:
                     text += await joined(session, robot)
         except RefusedError as error:
-            accepted, text = False, str(error)
-        return accepted, text if accepted else in_words_of_the_command_line(text, robot)
+            accepted, text = False, in_words_of_the_command_line(error, robot)
+        return accepted, text
 
 
 async def _to_its_end(
@@ -116,10 +116,13 @@ async def joined(session: Session, robot: find.Robot) -> str:
     return ""
 
 
-def in_words_of_the_command_line(text: str, robot: find.Robot) -> str:
-    """A refusal, with what to do next as a command to type."""
-    text = re.sub(r"send RESET with stop_id \d+", f"`robomesh send {robot} reset`", text)
-    if "with another lease" in text:
+def in_words_of_the_command_line(error: RefusedError, robot: find.Robot) -> str:
+    """Return a refusal's sentence with what to do next as a command to type."""
+    text, reason = str(error), error.reason
+    if reason.code in (codes.STOP_LATCHED.name, codes.STOP_OTHER.name):
+        advice = f"send RESET with stop_id {reason.values.get('id')}"
+        text = text.replace(advice, f"`robomesh send {robot} reset`")
+    if reason.code == codes.LEASE_OTHER.name:
         text = (
             f"{text.rstrip('.')}. Only that window or program can hold what it moves; "
             f"Ctrl-C there, or `robomesh send {robot} stop`, ends it"

@@ -169,7 +169,8 @@ class Pictures:
         except BusyError as error:
             raise PictureError(503, str(error), again_s=_BUSY_AGAIN_S) from None
         except RefusedError as error:
-            if error.reason.code == codes.VIEW_NO_ROOM.name:
+            # An earlier renderer has no code.
+            if error.reason.code == codes.VIEW_NO_ROOM.name or str(error).startswith("no room: "):
                 raise PictureError(503, str(error)) from None
             # Whether it was the view or the size.
             status = 404

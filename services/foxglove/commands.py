@@ -51,7 +51,12 @@ _FIELDS: dict[str, dict[str, Any]] = {
     "move_absolute": {"joint_positions": _NUMBERS},
     "move_relative": {"joint_positions": _NUMBERS},
 }
-_ANSWER = {"accepted": {"type": "boolean"}, "text": {"type": "string"}}
+_ANSWER = {
+    "accepted": {"type": "boolean"},
+    "text": {"type": "string"},
+    "code": {"type": "string", "description": "of a refusal"},
+    "values": {"type": "object", "description": "of a refusal: the parameters of its sentence"},
+}
 _LATEST_NS = 3_000_000_000
 _ANSWER_S = 5.0
 # `lease` beats each second: without it the gateway is gone.

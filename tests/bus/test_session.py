@@ -336,7 +336,7 @@ def test_a_request_in_json_is_answered_in_json_with_the_protos_names_and_default
                 ):
                     reply = await asyncio.to_thread(get, payload, None)
                     assert words in reply.err.payload.to_string()
-                    assert "code=request.invalid&detail=ttl_s: " in str(reply.err.encoding)
+                    assert "text/plain;code=request.invalid&detail=" in str(reply.err.encoding)
 
     run(main())
 

@@ -10,6 +10,12 @@ from tests.conftest import run
 from tests.protocol_gateway.hall import A, C, gateway, simulator, until
 
 
+async def held_code(plant, command, **values):
+    """The reason of a refusal to the holder, whose control a busy machine may not have renewed."""
+    await plant.lease(A.ACQUIRE, lease=plant.secret, ttl_s=5)
+    return await code(plant.command(command, **values))
+
+
 async def code(awaitable):
     """The reason of a refusal."""
     with pytest.raises(RefusedError) as refused:
@@ -23,27 +29,28 @@ def test_reply_audit_entry_event_and_state_have_the_same_code(mesh, tmp_path):
             assert (await code(plant.command(C.HOME))).code == "lease.none"
             assert (await code(plant.lease(A.RENEW))).code == "lease.none"
             await plant.home()
+            await plant.lease(A.ACQUIRE, lease=plant.secret, ttl_s=5)
             found = await code(plant.lease(A.ACQUIRE, operator="wang"))
             assert (found.code, found.values) == ("lease.held", {"holder": "li"})
 
-            found = await code(plant.command(C.MOVE_ABSOLUTE, joint_positions=[9.0, 0, 0, 0, 0]))
+            found = await held_code(plant, C.MOVE_ABSOLUTE, joint_positions=[9.0, 0, 0, 0, 0])
             assert (found.code, found.causes[0].code) == ("joints.outside", "joints.limit")
             assert found.causes[0].values == {"name": "waist", "value": "515.66°", "limit": "150.00°"}
             assert found.text.startswith("Not sent: joint waist at 515.66°")
-            assert (await code(plant.command(C.MOVE_ABSOLUTE))).values["joints"] == "5"
-            assert (await code(plant.command(C.SPEED, speed_percent=101))).values == {"value": "101"}
+            assert (await held_code(plant, C.MOVE_ABSOLUTE)).values["joints"] == "5"
+            assert (await held_code(plant, C.SPEED, speed_percent=101)).values == {"value": "101"}
 
             stopped = await plant.stop(by="chen", reason="smoke")
             assert (stopped.reason.code, stopped.reason.values["id"]) == ("stop.sent", str(stopped.stop_id))
-            found = await code(plant.command(C.HOME))
+            found = await held_code(plant, C.HOME)
             assert (found.code, found.values["reason"]) == ("stop.latched", "smoke")
 
+            await plant.lease(A.ACQUIRE, lease=plant.secret, ttl_s=5)
             await plant.lease(A.RELEASE, reason="lunch")
             ended = await until(lambda: plant.seen["lease"][-1].ended_reason.code and plant.seen["lease"][-1])
             assert ended.ended_reason.code == "lease.ended.released_why"
             assert dict(ended.ended_reason.values) == {"name": "li", "reason": "lunch"}
-            event = await until(lambda: next(iter(plant.events("lease.ended")), None))
-            assert event.reason == ended.ended_reason
+            await until(lambda: ended.ended_reason in [each.reason for each in plant.events("lease.ended")])
 
             entries = list(read_entries(plant.audit))
             refused = [each.reason.code for each in entries if each.outcome == "REFUSED"]
@@ -56,9 +63,9 @@ def test_reply_audit_entry_event_and_state_have_the_same_code(mesh, tmp_path):
                 "" if each.reason is None else each.reason.code for each in entries
             ]
             lines = [json.loads(line) for line in plant.audit.read_text().splitlines()]
-            assert [each["reason"]["code"] for each in lines if each["outcome"] == "REFUSED"] == refused
+            assert [each["why"]["code"] for each in lines if each["outcome"] == "REFUSED"] == refused
 
-    run(main())
+    run(main(), timeout_s=120)
 
 
 def test_a_reason_within_a_reason_comes_with_the_state(mesh, tmp_path):

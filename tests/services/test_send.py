@@ -3,6 +3,7 @@
 import asyncio
 import signal
 
+from bus import reason_codes as codes
 from bus.asking import ask_all
 from bus.errors import RefusedError
 from bus.lease import control
@@ -144,15 +145,18 @@ def test_a_gateway_that_began_anew_is_told_with_what_to_do_and_warnings_come_bef
 
 
 def test_what_to_do_about_a_refusal_is_told_as_a_command_to_type():
-    def said(text):
-        return send.in_words_of_the_command_line(text, find.Robot("hall", "arm"))
+    def said(reason, text=""):
+        error = RefusedError(reason, text=text)
+        return send.in_words_of_the_command_line(error, find.Robot("hall", "arm"))
 
-    assert said("stop 3 is latched (li: why not): see to it, then send RESET with stop_id 3") == (
-        "stop 3 is latched (li: why not): see to it, then `robomesh send hall/arm reset`"
+    assert said(codes.STOP_LATCHED(id=3, by="li", reason="with another lease")) == (
+        "stop 3 is latched (li: with another lease): see to it, then `robomesh send hall/arm reset`"
     )
-    other = "li is in control with another lease (another window or program?): this one is not valid"
-    assert said(f"{other}.") == (
+    other = codes.LEASE_OTHER(name="li")
+    assert said(other, f"{other}.") == (
         f"{other}. Only that window or program can hold what it moves; Ctrl-C there, or "
         "`robomesh send hall/arm stop`, ends it"
     )
     assert said("link down") == "link down"
+    # An earlier gateway has no codes.
+    assert said(str(other)) == str(other)

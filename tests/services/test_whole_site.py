@@ -366,7 +366,7 @@ def test_ctrl_c_waits_until_what_moves_is_stopped_and_what_is_recorded_is_closed
     stopped, ended = own[-2:]
     assert stopped["request"] == "STOP"
     # On a busy machine the program may not have renewed its lease in time.
-    assert (ended["request"], ended["reason"]["code"]) in (
+    assert (ended["request"], ended["why"]["code"]) in (
         ("REVOKE", "lease.ended.gateway"),
         ("EXPIRE", "lease.ended.expired"),
     )

@@ -60,7 +60,8 @@ export async function command(
     const answer = await ask(key, CommandRequestSchema, request, CommandAnswerSchema, withinS);
     const target = positions && { what, positions, id: request.id };
     if (answer.accepted && MOTIONS.includes(name)) newestMotion.value = request.id;
-    const mind = reasonText(answer.warning);
+    // An earlier gateway has the warning in its sentence alone.
+    const mind = reasonText(answer.warning, answer.text.split("; mind: ")[1]);
     if (answer.accepted) tell({ kind: "done", text: t("sent", { what }), ...(mind && { mind }), ...(target && { target }) });
     else tell({ kind: "refused", text: t("not_sent", { text: answer.text }) });
     return answer.accepted;

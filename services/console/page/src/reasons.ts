@@ -227,7 +227,8 @@ export function reasonsText(reasons: readonly Reason[] = [], text = ""): string 
 function sentence({ code, values, causes }: Reason): string | undefined {
   const pair = SENTENCES.get(code);
   if (!pair) return undefined;
-  const all = causes.length > 0 ? { ...values, cause: reasonsText(causes) } : values;
+  const known = causes.map((cause) => reasonText(cause));
+  const all = known.length > 0 && known.every(Boolean) ? { ...values, cause: known.join(t("list_separator")) } : values;
   const names = [...pair[0].matchAll(/\{(\w+)\}/g)].map((found) => found[1] ?? "");
   return names.every((name) => all[name]) ? inLanguage(pair, all) : undefined;
 }

@@ -5,6 +5,7 @@ import { operator, reasonOf } from "./control";
 import type { Notice } from "./control";
 import { StopAnswerSchema, StopRequestSchema } from "./gen/robomesh_pb";
 import { AskError, ask, reopenIfSilent } from "./mesh";
+import { reasonText } from "./reasons";
 import { t } from "./texts";
 
 const TOLD_MS = 15_000; // how long a stop that went well is told of
@@ -24,7 +25,7 @@ export async function stop(robotKeys: readonly string[]): Promise<void> {
         const answer = await ask(`${key}/stop`, StopRequestSchema, { reason: "the page", by }, StopAnswerSchema);
         return answer.sent
           ? { kind: "done", text: t("stop_done", { robot, id: String(answer.stopId) }) }
-          : { kind: "refused", text: t("stop_latched", { robot, text: answer.text }) };
+          : { kind: "refused", text: t("stop_latched", { robot, text: reasonText(answer.reason, answer.text) }) };
       } catch (error) {
         // The next one must not go the same way.
         if (error instanceof AskError && error.noAnswer) reopenIfSilent(askedAt);

@@ -212,7 +212,7 @@ function Details({ entry, close }: { entry: Entry; close: () => void }) {
   return (
     <div class="entry-details" role="region" aria-label={wordsOf(entry)}>
       <p>{"event" in entry ? <EventWords entry={entry} /> : <AuditWords entry={entry} />}</p>
-      {told !== (event ? eventText(event) : audit ? entryText(audit) : "") && (
+      {!told.includes(event ? eventText(event) : audit ? entryText(audit) : "") && (
         <p class="dim">
           {e("in_its_words")} <span lang="en">{told}</span>
         </p>
