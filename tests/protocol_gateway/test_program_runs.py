@@ -284,6 +284,11 @@ async def in_control(plant):
         return await plant.lease(A.ACQUIRE, ttl_s=5)
 
 
+def gave_up(plant):
+    """Whether a program was not run because its asker gave up."""
+    return any(each.reason.code == "program.asker_gave_up" for each in not_run(plant))
+
+
 def not_run(plant):
     return [each for each in plant.seen["audit"] if each.request == "RUN_PROGRAM" and each.outcome == REFUSED]
 
@@ -317,11 +322,11 @@ def test_a_program_whose_asker_gave_up_while_it_was_checked_never_runs(mesh, tmp
                     # Zenoh's own words for nobody's answer, if anything; the gateway's come later.
                     replies = await plain_run(plant, 0.5)
                     assert not [each for each in replies if each.ok is not None]
-                    await until(lambda: len(not_run(plant)) == 2)
+                    await until(lambda: gave_up(plant))
             await in_control(plant)
             # What the process that plans had begun is over when this is planned.
             await planned(plant)
-            assert "before its asker gives up" in not_run(plant)[1].text
+            assert gave_up(plant)
             assert plant.controller.counters.units_sent == 0
             assert states(plant)[-1].outcome == RUN.OUTCOME_UNSPECIFIED
             # Who waits is served.
@@ -417,7 +422,8 @@ def test_a_program_is_not_run_twice_when_it_is_asked_for_twice(mesh, tmp_path):
             assert again.accepted
             await ended(plant, RUN.DONE)
             asked = [each for each in plant.seen["audit"] if each.request == "RUN_PROGRAM"]
-            assert len(asked) == 1
+            # A busy machine may have planned it too slowly before.
+            assert len([each for each in asked if each.outcome != REFUSED]) == 1
 
     run(main(), timeout_s=240)
 
