@@ -15,7 +15,7 @@ RUN python3 -m pip install --quiet --root-user-action=ignore --target /opt/uv uv
 FROM base AS wheel
 WORKDIR /source
 COPY pyproject.toml requirements.lock README.md LICENSE ./
-COPY bus bus
+COPY robomesh robomesh
 COPY robots robots
 COPY protocol_gateway protocol_gateway
 COPY mcap_files mcap_files

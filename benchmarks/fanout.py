@@ -4,7 +4,7 @@
         [--arms NAMES] [--peers-python PYTHON] [--nats-server FILE] [--json]
 
 Arms: `robomesh` (our publishers, our router, plain Zenoh clients), `zenoh` (a bare router, the same payloads
-without our bus), `page` (our console, clients that speak the page's protocol), `pyzmq` (no broker), `nats`,
+without our code), `page` (our console, clients that speak the page's protocol), `pyzmq` (no broker), `nats`,
 `foxglove` (foxglove-sdk's server); `-plain` behind a name: without TLS, which all others have (pyzmq: CURVE).
 The peers need a Python with pyzmq, nats-py and foxglove-sdk, and a nats-server. Each arm has the same
 publisher, at most four processes of monitors, and notes only the age of what came; the arms take turns,

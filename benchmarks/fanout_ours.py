@@ -22,8 +22,8 @@ if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[1])
 
 from benchmarks.fanout_parts import HEADER, ROBOTS, Ages, chosen, publish, told_when, watch_console
-from bus.endpoints import Tls, client_config
-from bus.session import SessionSettings, open_session
+from robomesh.endpoints import Tls, client_config
+from robomesh.session import SessionSettings, open_session
 
 JOINTS, VIDEO = "robomesh/bench/*/joints", "robomesh/bench/arm-0/video/free"
 
@@ -122,7 +122,7 @@ def publish_zenoh(address: str, folder: Path) -> None:
 
 def receive_role(kind: str, address: str, folder: str, count: str) -> None:
     if kind == "page":
-        from bus.schemas.robomesh_pb2 import FromPage
+        from robomesh.schemas.robomesh_pb2 import FromPage
 
         watches = [FromPage(watch=FromPage.Watch(key=key)).SerializeToString() for key in (JOINTS, VIDEO)]
         coded = [base64.b64encode(each).decode() for each in watches]

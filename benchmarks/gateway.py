@@ -28,9 +28,9 @@ from latency import STEP_DEG, process, summary
 from legacy_clients import serve_old_programs
 from plant import RATE_HZ, cpu_s, paced, rss_mib, running_controllers, running_site, until
 
-from bus.endpoints import client_config
-from bus.header import unpack
 from protocol_gateway.drivers.unit import UnitDriver
+from robomesh.endpoints import client_config
+from robomesh.header import unpack
 from robots.joints import JointType
 
 DEGREES = 180 / 3.141592653589793

@@ -17,12 +17,12 @@ import zenoh
 from latency import free_port
 from prometheus_client import CollectorRegistry, generate_latest
 
-from bus.answering import Request
-from bus.endpoints import router_config
-from bus.health import Served, health_of
-from bus.metrics import SessionMetrics
-from bus.schemas.robomesh_pb2 import LeaseAnswer
-from bus.session import Session, SessionSettings, open_session
+from robomesh.answering import Request
+from robomesh.endpoints import router_config
+from robomesh.health import Served, health_of
+from robomesh.metrics import SessionMetrics
+from robomesh.schemas.robomesh_pb2 import LeaseAnswer
+from robomesh.session import Session, SessionSettings, open_session
 
 _TOPICS = ("joints", "joints/slow", "controller", "raw", "lease", "events", "audit", "program")
 _REQUESTS = ("lease/request/*", "command/*", "audit/find")

@@ -28,8 +28,8 @@ if __name__ == "__main__":
     # A program beside this one has a room's name: what is imported is looked for from the root.
     sys.path[0] = str(Path(__file__).parents[1])
 
-from bus.endpoints import client_config, router_config
-from bus.topics import REQUESTS, TOPICS
+from robomesh.endpoints import client_config, router_config
+from robomesh.topics import REQUESTS, TOPICS
 from tests.conftest import free_port
 
 SERVICES = ("gateway", "kinematics", "renderer", "recorder")

@@ -27,9 +27,9 @@ from typing import Any
 
 import zenoh
 
-from bus.endpoints import client_config
-from bus.session import SessionSettings, open_session
-from bus.subscription import Subscription
+from robomesh.endpoints import client_config
+from robomesh.session import SessionSettings, open_session
+from robomesh.subscription import Subscription
 from robots.description import load
 from robots.joints import joints_of
 

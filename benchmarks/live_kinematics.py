@@ -25,10 +25,10 @@ from typing import Any
 from latency import free_port, service, summary, until_connectable
 from plant import RATE_HZ, cpu_s, rss_mib, running_controllers, until
 
-from bus.errors import BusError
-from bus.schemas.robomesh_pb2 import CheckRequest, KinematicState
-from bus.session import Session, SessionSettings, open_session
-from bus.subscription import Sample, Subscription
+from robomesh.errors import BusError
+from robomesh.schemas.robomesh_pb2 import CheckRequest, KinematicState
+from robomesh.session import Session, SessionSettings, open_session
+from robomesh.subscription import Sample, Subscription
 
 WARM_UP_S = 3.0
 PROGRAM = "repeat 3\n  move_joints 30 60 -60 20 0\n  move_joints -30 80 -40 -20 0\nend\n"

@@ -39,17 +39,17 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from latency import free_port, service, until_connectable
 from plant import cpu_s, rss_mib
 
-from bus import topics
-from bus.endpoints import client_config
-from bus.errors import NoAnswerError
-from bus.header import Header, pack
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import SessionSettings, open_session
 from mcap_files.capture import Capture
 from mcap_files.files import describe_file
 from mcap_files.finish import index
 from mcap_files.reading import RecordingFile
 from mcap_files.recover import State, state_of
+from robomesh import topics
+from robomesh.endpoints import client_config
+from robomesh.errors import NoAnswerError
+from robomesh.header import Header, pack
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import SessionSettings, open_session
 
 SITE = "bench"
 WITHIN_S = 60.0

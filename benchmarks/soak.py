@@ -35,8 +35,8 @@ if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[1])
 
 from benchmarks.fanout_parts import HEADER, WebSocketReader, connected
-from bus.schemas.robomesh_pb2 import FromPage
-from bus.session import Session, SessionSettings, open_session
+from robomesh.schemas.robomesh_pb2 import FromPage
+from robomesh.session import Session, SessionSettings, open_session
 from tests.conftest import free_port
 
 SITE = "soak"

@@ -37,8 +37,8 @@ if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[1])
 
 from benchmarks.soak import ROBOMESH, SITE, Ports, site_file, up
-from bus.schemas.robomesh_pb2 import RecorderRequest, Recording
-from bus.session import Session, SessionSettings, open_session
+from robomesh.schemas.robomesh_pb2 import RecorderRequest, Recording
+from robomesh.session import Session, SessionSettings, open_session
 from tests.conftest import free_port
 
 RECORDED = "arm-0"

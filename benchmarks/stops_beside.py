@@ -41,9 +41,9 @@ if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[1])
 
 from benchmarks.latency import process, service, until_connectable
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import SessionSettings, open_session
-from bus.topics import Role
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import SessionSettings, open_session
+from robomesh.topics import Role
 from services.keys import Folder, deeds
 from tests.conftest import free_port
 
@@ -303,7 +303,7 @@ def plain_client(where: Site, pipe: Any) -> None:
 
 def our_client(where: Site, pipe: Any) -> None:
     """Send stops as the command line does."""
-    from bus.endpoints import bundle
+    from robomesh.endpoints import bundle
 
     async def main() -> None:
         tls = None if where.bundle is None else bundle(where.bundle)

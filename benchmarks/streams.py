@@ -27,10 +27,10 @@ if __name__ == "__main__":
 import zenoh
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from bus.endpoints import router_config
-from bus.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
-from bus.session import Session, SessionSettings, open_session
 from renderer import service
+from robomesh.endpoints import router_config
+from robomesh.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
+from robomesh.session import Session, SessionSettings, open_session
 from services import kinematics
 from tests.cells import arm_alone
 from tests.conftest import free_port

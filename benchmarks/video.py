@@ -31,8 +31,8 @@ from latency import free_port, process, service, summary, until_connectable, wai
 from playwright.async_api import async_playwright
 from websockets.asyncio.client import connect
 
-from bus.schemas.robomesh_pb2 import FromPage, ToPage
-from bus.session import SessionSettings, open_session
+from robomesh.schemas.robomesh_pb2 import FromPage, ToPage
+from robomesh.session import SessionSettings, open_session
 from robots.description import load
 from robots.joints import joints_of
 from services.console import build_page

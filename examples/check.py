@@ -10,8 +10,8 @@ import signal
 import sys
 from pathlib import Path
 
-from bus.schemas.robomesh_pb2 import CheckRequest
-from bus.session import SessionSettings, open_session
+from robomesh.schemas.robomesh_pb2 import CheckRequest
+from robomesh.session import SessionSettings, open_session
 
 if len(sys.argv) < 2:
     sys.exit("usage: ./dev run python examples/check.py FILE.program [ROBOT] [ROUTER]")

@@ -9,9 +9,9 @@ import asyncio
 import signal
 import sys
 
-from bus.lease import control
-from bus.schemas.robomesh_pb2 import CommandRequest
-from bus.session import SessionSettings, open_session
+from robomesh.lease import control
+from robomesh.schemas.robomesh_pb2 import CommandRequest
+from robomesh.session import SessionSettings, open_session
 
 ROBOT = sys.argv[1] if len(sys.argv) > 1 else "demo/pt600"
 ROUTER = sys.argv[2] if len(sys.argv) > 2 else "tcp/127.0.0.1:7447"

@@ -10,8 +10,8 @@ import signal
 import sys
 from math import degrees
 
-from bus.schemas.robomesh_pb2 import Description, InverseRequest
-from bus.session import SessionSettings, open_session
+from robomesh.schemas.robomesh_pb2 import Description, InverseRequest
+from robomesh.session import SessionSettings, open_session
 
 try:
     X, Y, Z = (float(word) / 1000 for word in sys.argv[1:4])

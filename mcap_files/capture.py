@@ -19,11 +19,11 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata, Schema
 from mcap_protobuf.schema import build_file_descriptor_set
 
-from bus.header import Header
-from bus.topics import Topic
 from mcap_files import records
 from mcap_files.errors import CaptureError
 from mcap_files.names import ABOUT, INDEXING, LOST
+from robomesh.header import Header
+from robomesh.topics import Topic
 
 __all__ = ["ABOUT", "INDEXING", "LOST", "Capture", "is_being_written"]
 

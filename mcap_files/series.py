@@ -11,13 +11,13 @@ import numpy as np
 from google.protobuf.message import DecodeError
 from numpy.typing import NDArray
 
-from bus import keys
-from bus.errors import KeyNameError
-from bus.schemas.robomesh_pb2 import Description
 from mcap_files.errors import RecordingError
 from mcap_files.reading import RecordingFile
 from mcap_files.times import PublisherTimes
 from mcap_files.values import has_values, unit_of, values_of
+from robomesh import keys
+from robomesh.errors import KeyNameError
+from robomesh.schemas.robomesh_pb2 import Description
 
 POINTS, MOST_POINTS = 1000, 10_000
 MOST_VALUES = 64

@@ -14,8 +14,8 @@ ProtocolGatewayError
 └── GatewaySettingsError    settings that no gateway can run with
 """
 
-from bus import reason_codes as codes
-from bus.reasons import Reason
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
 
 
 class ProtocolGatewayError(Exception):

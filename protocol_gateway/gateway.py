@@ -5,13 +5,13 @@ import gc
 import logging
 from contextlib import AsyncExitStack
 
-from bus.session import Session
 from protocol_gateway.checking.cell_mates import CellMates
 from protocol_gateway.checking.checker import checkers_of
 from protocol_gateway.checking.policy import Policy
 from protocol_gateway.link.measures import measure_links
 from protocol_gateway.robot import Robot
 from protocol_gateway.settings import RobotSettings, Settings, check
+from robomesh.session import Session
 
 __all__ = ["RobotSettings", "Settings", "serve"]
 

@@ -5,11 +5,11 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from bus.messages import reason_message
-from bus.publisher import Publisher
-from bus.reasons import Reason
-from bus.schemas.robomesh_pb2 import Event
 from protocol_gateway.texts import LONGEST_SENTENCE, one_line
+from robomesh.messages import reason_message
+from robomesh.publisher import Publisher
+from robomesh.reasons import Reason
+from robomesh.schemas.robomesh_pb2 import Event
 
 log = logging.getLogger(__name__)
 

@@ -9,15 +9,6 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from bus import reason_codes as codes
-from bus.answering import Answerer, Handler, Request
-from bus.errors import KeyNameError, RefusedError
-from bus.keys import presence_key
-from bus.publisher import LIST_LENGTH, Publisher
-from bus.reasons import Reason
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
-from bus.topics import Role, check_operator
 from protocol_gateway.audit.entry import audit_entry
 from protocol_gateway.audit.find import Query, Searches, find
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome
@@ -45,6 +36,15 @@ from protocol_gateway.settings import RobotSettings
 from protocol_gateway.states import controller_state, lease_state, timestamp
 from protocol_gateway.telemetry import Telemetry
 from protocol_gateway.texts import LONGEST, LONGEST_SENTENCE, one_line
+from robomesh import reason_codes as codes
+from robomesh.answering import Answerer, Handler, Request
+from robomesh.errors import KeyNameError, RefusedError
+from robomesh.keys import presence_key
+from robomesh.publisher import LIST_LENGTH, Publisher
+from robomesh.reasons import Reason
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
+from robomesh.topics import Role, check_operator
 from robots.description import load
 from robots.joints import joints_of
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from bus.keys import check_name
 from protocol_gateway.audit.log import ROTATE_BYTES
 from protocol_gateway.checking.policy import Policy
 from protocol_gateway.drivers.registry import DRIVERS
 from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.legacy.settings import LegacySettings
+from robomesh.keys import check_name
 from robots.cells import CellDescription, CellRobot
 
 _KNOWN_UNKNOWNS = frozenset({"mode", "homed"})

@@ -6,16 +6,16 @@ from foxglove_schemas_protobuf.JointState_pb2 import JointState
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from bus import reason_codes as codes
-from bus.messages import reason_message
-from bus.reasons import Reason
-from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.authority.obstacles import Controller
 from protocol_gateway.authority.rules import Authority, Lease, Now, Stop
 from protocol_gateway.checking.policy import Policy
 from protocol_gateway.drivers.driver import Activity, JointsReceived, Mode, UnknownReceived
 from protocol_gateway.link.health import LinkHealth
 from protocol_gateway.link.link import LinkCounters, LinkState
+from robomesh import reason_codes as codes
+from robomesh.messages import reason_message
+from robomesh.reasons import Reason
+from robomesh.schemas import robomesh_pb2 as schema
 
 _S = schema.ControllerState
 _LINKS = {LinkState.DOWN: _S.DOWN, LinkState.UP: _S.UP, LinkState.SILENT: _S.SILENT}

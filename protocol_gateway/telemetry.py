@@ -5,10 +5,6 @@
 
 from collections.abc import Callable
 
-from bus import reason_codes as codes
-from bus.publisher import Publisher
-from bus.reasons import Reason
-from bus.schemas.robomesh_pb2 import Event
 from protocol_gateway.beat import STALE_S, Beat
 from protocol_gateway.drivers.driver import (
     Activity,
@@ -24,6 +20,10 @@ from protocol_gateway.journal import Journal
 from protocol_gateway.link.link import Received
 from protocol_gateway.motion import PositionWatch, is_moving
 from protocol_gateway.states import JointStatesMessage, raw_record
+from robomesh import reason_codes as codes
+from robomesh.publisher import Publisher
+from robomesh.reasons import Reason
+from robomesh.schemas.robomesh_pb2 import Event
 from robots.joints import Joints
 
 _SLOW_S = 0.1

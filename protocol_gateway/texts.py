@@ -1,6 +1,6 @@
 """Texts of others, as the gateway shows them, publishes them and writes them down."""
 
-from bus.texts import one_line
+from robomesh.texts import one_line
 
 __all__ = ["LONGEST", "LONGEST_SENTENCE", "one_line"]
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bus.schemas.robomesh_pb2 import ViewRequest
 from renderer.cameras import Camera
 from renderer.look import Look, placements_at
 from renderer.overlay import Overlay
@@ -26,6 +25,7 @@ from renderer.state import (
     warning_of,
 )
 from renderer.views import CLOSE, camera_from, camera_of
+from robomesh.schemas.robomesh_pb2 import ViewRequest
 
 FloatArray = NDArray[np.float64]
 _NOTHING = ViewRequest.Show()

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bus.schemas.robomesh_pb2 import Description
 from renderer.chain import Chain, placements, reach, read_chain
 from renderer.scene import Part, square_m
+from robomesh.schemas.robomesh_pb2 import Description
 
 FloatArray = NDArray[np.float64]
 

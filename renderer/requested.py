@@ -7,10 +7,10 @@ import hashlib
 import math
 from dataclasses import dataclass
 
-from bus.schemas.robomesh_pb2 import View, ViewRequest
 from renderer.errors import UnknownViewError, ViewRequestError
 from renderer.look import Look
 from renderer.views import camera_from, camera_of, view_names
+from robomesh.schemas.robomesh_pb2 import View, ViewRequest
 
 # A standing view for slow links.
 FAR = "far"

@@ -10,15 +10,15 @@ from typing import Protocol
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from bus.errors import BusError, MessageError
-from bus.keys import ROOT, robot_key
-from bus.schemas.robomesh_pb2 import ControllerState, Description, KinematicState
-from bus.session import Session
-from bus.subscription import Sample, Subscription
 from renderer.cache import store_glb, stored_glb
 from renderer.errors import RendererError
 from renderer.look import look_of, mesh_name
 from renderer.state import Ages, RobotState
+from robomesh.errors import BusError, MessageError
+from robomesh.keys import ROOT, robot_key
+from robomesh.schemas.robomesh_pb2 import ControllerState, Description, KinematicState
+from robomesh.session import Session
+from robomesh.subscription import Sample, Subscription
 
 log = logging.getLogger(__name__)
 

@@ -5,10 +5,10 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Protocol
 
-from bus import reason_codes as codes
-from bus.errors import QuotaError
 from renderer.errors import NoRoomError, ViewRequestError
 from renderer.requested import Shot
+from robomesh import reason_codes as codes
+from robomesh.errors import QuotaError
 
 # Of as many views as may be asked for, so many may be as large and fast as the renderer's own, or as this.
 _FULL_VIEWS = 0.125

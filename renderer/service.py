@@ -11,13 +11,6 @@ from functools import partial
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
-from bus import reason_codes as codes
-from bus.answering import Answerer, Request
-from bus.errors import RefusedError
-from bus.keys import WHOLE_SITE
-from bus.quotas import DEFAULT_QUOTAS, Quota, Quotas
-from bus.schemas.robomesh_pb2 import Event, KeyFrameAnswer, ViewAnswer, ViewRequest
-from bus.session import Session
 from renderer.cache import cache_folder
 from renderer.composing import Composition
 from renderer.errors import NoRoomError, RendererError
@@ -30,6 +23,13 @@ from renderer.state import Ages, RobotState
 from renderer.stream import Stream
 from renderer.studio import Drawn, Studio, open_thread
 from renderer.views import CLOSE, FREE, camera_of, view_names
+from robomesh import reason_codes as codes
+from robomesh.answering import Answerer, Request
+from robomesh.errors import RefusedError
+from robomesh.keys import WHOLE_SITE
+from robomesh.quotas import DEFAULT_QUOTAS, Quota, Quotas
+from robomesh.schemas.robomesh_pb2 import Event, KeyFrameAnswer, ViewAnswer, ViewRequest
+from robomesh.session import Session
 
 log = logging.getLogger(__name__)
 

@@ -7,9 +7,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bus.schemas.robomesh_pb2 import Clearance, Description
 from renderer.cameras import Camera, pixels
 from renderer.overlay import AMBER, FAINT, INK, Color, Picture, write_label
+from robomesh.schemas.robomesh_pb2 import Clearance, Description
 from robots.cells import FLOOR
 
 FloatArray = NDArray[np.float64]

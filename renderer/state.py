@@ -12,11 +12,11 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from numpy.typing import NDArray
 
-from bus.schemas.robomesh_pb2 import ControllerState, Description, KinematicState
-from bus.topics import topic
 from renderer.look import Look, home_placements
 from renderer.overlay import Overlay, Row
 from renderer.span import Span, same_span, span_of
+from robomesh.schemas.robomesh_pb2 import ControllerState, Description, KinematicState
+from robomesh.topics import topic
 
 FloatArray = NDArray[np.float64]
 

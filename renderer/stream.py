@@ -10,7 +10,6 @@ from typing import Any, Protocol
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from bus.session import Session
 from renderer.composing import Composition, Known, composed
 from renderer.errors import RendererError
 from renderer.finishing import Finished, Order
@@ -20,6 +19,7 @@ from renderer.pace import next_due
 from renderer.requested import IMAGE_HZ, Shot
 from renderer.state import Ages, RobotState
 from renderer.studio import Drawn
+from robomesh.session import Session
 
 log = logging.getLogger(__name__)
 

@@ -6,8 +6,8 @@ from math import degrees, isfinite, radians
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bus import reason_codes as codes
-from bus.reasons import Reason
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
 from robots.errors import JointCountError
 from robots.poses import FloatArray
 from robots.schema import DhDescription, JointSettings, JointType, RobotDescription, UrdfDescription

@@ -19,12 +19,12 @@ from pydantic import (
     model_validator,
 )
 
-from bus import keys
-from bus.access import NOBODYS_ROBOT
-from bus.errors import KeyNameError
 from protocol_gateway.core.codes import code_table
 from protocol_gateway.drivers.registry import DRIVERS
 from protocol_gateway.errors import CodeTableError
+from robomesh import keys
+from robomesh.access import NOBODYS_ROBOT
+from robomesh.errors import KeyNameError
 from robots import description
 from robots.bounded_toml import read_toml
 from robots.description import Pose

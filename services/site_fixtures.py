@@ -11,8 +11,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, Field, StrictBool, field_validator, model_validator
 
-from bus import keys
-from bus.errors import KeyNameError
+from robomesh import keys
+from robomesh.errors import KeyNameError
 from robots.errors import MeshError
 from robots.joints import FloatArray
 from robots.meshes.mesh import Material, Mesh, Part

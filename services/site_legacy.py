@@ -4,10 +4,10 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, StrictBool, field_validator, model_validator
 
-from bus import keys
-from bus.errors import KeyNameError
 from protocol_gateway.legacy.settings import LegacySettings, plain_address
 from protocol_gateway.texts import LONGEST
+from robomesh import keys
+from robomesh.errors import KeyNameError
 from services.errors import ListenError
 from services.listen import check_reach, is_loopback, split_address
 from services.site_part import Quiet

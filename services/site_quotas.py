@@ -4,13 +4,13 @@ from typing import Annotated
 
 from pydantic import BaseModel, Field
 
-from bus.quotas import DEFAULT_QUOTAS as DEFAULT
-from bus.quotas import Quotas as QuotaSettings
+from robomesh.quotas import DEFAULT_QUOTAS as DEFAULT
+from robomesh.quotas import Quotas as QuotaSettings
 from services.site_part import Quiet
 
 
 class Quotas(BaseModel):
-    """Of each asker; `bus/quotas.py` says of what."""
+    """Of each asker; `robomesh/quotas.py` says of what."""
 
     model_config = Quiet
     views: Annotated[int, Field(ge=1, le=256)] = DEFAULT.views

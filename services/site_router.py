@@ -6,11 +6,11 @@ from typing import Annotated
 
 from pydantic import BaseModel, Field, StrictBool, ValidationError, field_validator
 
-from bus.access import Border
-from bus.endpoints import Link, Tls
-from bus.errors import KeyNameError
-from bus.identity import read_identity
-from bus.keys import check_name
+from robomesh.access import Border
+from robomesh.endpoints import Link, Tls
+from robomesh.errors import KeyNameError
+from robomesh.identity import read_identity
+from robomesh.keys import check_name
 from robots.bounded_toml import read_toml
 from services.keys import Folder
 from services.keys.errors import KeysError

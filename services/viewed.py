@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from bus.schemas.robomesh_pb2 import Description
 from renderer.look import floor_of
+from robomesh.schemas.robomesh_pb2 import Description
 from robots.urdf.viewers import Fixture, Viewed
 
 

@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-SCHEMAS = ROOT / "bus" / "schemas"
+SCHEMAS = ROOT / "robomesh" / "schemas"
 PACKAGE_LOCK = ROOT / "services" / "console" / "page" / "package-lock.json"
 LOCK = ROOT / "requirements.lock"
 EXAMPLE_ROBOTS_LOCK = ROOT / "example-robots.lock"
@@ -24,9 +24,9 @@ def generated_modules() -> list[str]:
         if subprocess.run([*protoc, *outputs, "robomesh.proto"]).returncode:
             return ["robomesh.proto: protoc refuses it"]
         return [
-            f"bus/schemas/{new.name} is not what robomesh.proto makes: run "
-            "./dev run python -m grpc_tools.protoc -Ibus/schemas --python_out=bus/schemas "
-            "--pyi_out=bus/schemas robomesh.proto"
+            f"robomesh/schemas/{new.name} is not what robomesh.proto makes: run "
+            "./dev run python -m grpc_tools.protoc -Irobomesh/schemas --python_out=robomesh/schemas "
+            "--pyi_out=robomesh/schemas robomesh.proto"
             for new in Path(folder).iterdir()
             if new.read_bytes() != (SCHEMAS / new.name).read_bytes()
         ]

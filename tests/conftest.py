@@ -18,9 +18,9 @@ import pytest
 import zenoh
 from google.protobuf.message import Message
 
-from bus.endpoints import router_config
-from bus.publisher import Publisher
-from bus.session import Session, SessionSettings
+from robomesh.endpoints import router_config
+from robomesh.publisher import Publisher
+from robomesh.session import Session, SessionSettings
 
 T = TypeVar("T")
 
@@ -87,7 +87,7 @@ def put_unheard(publisher: Publisher, message: Message) -> None:
 @pytest.fixture(autouse=True)
 def _log_levels() -> Iterator[None]:
     """A command that a test runs in its own process sets what is logged: not for the tests after it."""
-    levels = [(logger, logger.level) for logger in (logging.root, logging.getLogger("bus"))]
+    levels = [(logger, logger.level) for logger in (logging.root, logging.getLogger("robomesh"))]
     yield
     for logger, level in levels:
         logger.setLevel(level)

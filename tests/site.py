@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bus.session import SessionSettings
+from robomesh.session import SessionSettings
 from tests.conftest import free_port
 
 READY_S = 60.0

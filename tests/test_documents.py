@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from bus.topics import REQUESTS, TOPICS, History
+from robomesh.topics import REQUESTS, TOPICS, History
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -18,10 +18,10 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from bus.messages import reason_message
-from bus.reasons import Reason
-from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.errors import AuditError
+from robomesh.messages import reason_message
+from robomesh.reasons import Reason
+from robomesh.schemas import robomesh_pb2 as schema
 
 NOTHING_BEFORE = "0" * 64
 # Reasons within reasons; a longer chain is not one that was written here.

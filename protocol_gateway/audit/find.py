@@ -9,14 +9,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from bus import reason_codes as codes
-from bus.answering import Request
-from bus.errors import RefusedError
-from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.entry import Entry, Outcome, audit_entry, parse_line
 from protocol_gateway.audit.files import lines_of, open_files
 from protocol_gateway.errors import AuditError
 from protocol_gateway.texts import one_line
+from robomesh import reason_codes as codes
+from robomesh.answering import Request
+from robomesh.errors import RefusedError
+from robomesh.schemas import robomesh_pb2 as schema
 
 MOST = 10_000
 MOST_UNLESS_ASKED = 1000

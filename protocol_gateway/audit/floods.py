@@ -12,9 +12,9 @@ counted, stops excepted: any number of them latches the same robot.
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from bus import reason_codes as codes
 from protocol_gateway.audit.entry import Entry, Outcome
 from protocol_gateway.texts import LONGEST_SENTENCE, one_line
+from robomesh import reason_codes as codes
 
 IN_FULL = 5
 WINDOW_S = 1.0

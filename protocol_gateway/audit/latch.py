@@ -24,10 +24,10 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from bus import reason_codes as codes
-from bus.reasons import Reason
 from protocol_gateway.authority.rules import Stop
 from protocol_gateway.texts import one_line
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
 
 SLOT_BYTES = 4096
 SLOTS = 2

@@ -23,8 +23,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from bus import reason_codes as codes
-from bus.reasons import Reason
 from protocol_gateway.audit.entry import Entry, Outcome, chained
 from protocol_gateway.audit.files import Verification, older_parts, part_name, read_entries, verify
 from protocol_gateway.audit.latch import LatchFile, reason_of
@@ -40,6 +38,8 @@ from protocol_gateway.audit.restart import (
 )
 from protocol_gateway.audit.start import Start, find_end
 from protocol_gateway.errors import AuditError
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
 
 __all__ = ["AuditLog", "Entry", "Outcome", "Verification", "read_entries", "verify"]
 

@@ -15,9 +15,6 @@ import hmac
 from dataclasses import replace
 from typing import NamedTuple
 
-from bus import reason_codes as codes
-from bus.reasons import Reason
-from bus.schemas.robomesh_pb2 import CommandRequest
 from protocol_gateway.authority.rules import (
     MOTION_COMMANDS,
     Answer,
@@ -28,6 +25,9 @@ from protocol_gateway.authority.rules import (
     not_sent,
     why_not_holder,
 )
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
+from robomesh.schemas.robomesh_pb2 import CommandRequest
 
 _RESET = CommandRequest.Command.RESET
 

@@ -14,8 +14,8 @@ whether new motion is the holder's.
 
 from dataclasses import replace
 
-from bus.schemas.robomesh_pb2 import CommandRequest
 from protocol_gateway.authority.rules import ENDED_AFTER_UNITS, MOTION_COMMANDS, Authority, Motion, Now
+from robomesh.schemas.robomesh_pb2 import CommandRequest
 
 # Servos and brakes take their time: this long even a robot that is at its target already may begin to move.
 START_S = 2.0

@@ -15,9 +15,6 @@ HOLD only ever makes a robot slower, so a mode that nobody knows does not forbid
 
 from dataclasses import dataclass, replace
 
-from bus import reason_codes as codes
-from bus.reasons import Reason
-from bus.schemas.robomesh_pb2 import CommandRequest
 from protocol_gateway.authority.rules import MOTION_COMMANDS, Answer, not_sent
 from protocol_gateway.drivers.driver import (
     Activity,
@@ -34,6 +31,9 @@ from protocol_gateway.drivers.driver import (
     Trace,
 )
 from protocol_gateway.link.link import LinkState, LinkStatus
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
+from robomesh.schemas.robomesh_pb2 import CommandRequest
 from robots.joints import Joints, violations
 
 _C = CommandRequest.Command

@@ -31,10 +31,10 @@ import hmac
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
-from bus import reason_codes as codes
-from bus.reasons import Reason
-from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from protocol_gateway.texts import one_line
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
+from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 
 DEFAULT_TTL_S = 2.0
 SHORTEST_TTL_S = 0.5

@@ -4,8 +4,8 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from bus import reason_codes as codes
-from bus.reasons import Reason
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
 
 
 @dataclass(frozen=True)

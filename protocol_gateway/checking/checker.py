@@ -6,11 +6,11 @@ import logging
 import time
 from collections.abc import Collection, Mapping
 
-from bus import reason_codes as codes
-from bus.reasons import Reason
-from bus.worker import Worker, WorkerError
 from protocol_gateway.checking.questions import PENDING, Checked, CheckMotion, CheckProgram, Prepare
 from protocol_gateway.errors import CheckError
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
+from robomesh.worker import Worker, WorkerError
 from robots.cells import CellDescription
 from robots.errors import RobotError
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from bus.reasons import Reason
+from robomesh.reasons import Reason
 from robots.cells import CellDescription
 from robots.programs.steps import Step
 

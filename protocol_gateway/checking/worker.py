@@ -5,9 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from bus import reason_codes as codes
-from bus.reasons import Reason
-from bus.worker import answer_all
 from protocol_gateway.checking.questions import (
     PENDING,
     Cells,
@@ -17,6 +14,9 @@ from protocol_gateway.checking.questions import (
     Positions,
     Prepare,
 )
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
+from robomesh.worker import answer_all
 from robots.collision import Cell, build_cell, missing_meshes, pending, unshaped, unshaped_moving
 from robots.joints import FloatArray
 from robots.programs.check import check_plan, check_program

@@ -15,9 +15,6 @@ from collections.abc import Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
 from dataclasses import dataclass, replace
 
-from bus import reason_codes as codes
-from bus.reasons import Reason
-from bus.schemas.robomesh_pb2 import CommandRequest
 from protocol_gateway.authority.obstacles import Controller, after, target_of
 from protocol_gateway.authority.rules import MOTION_COMMANDS, Answer, not_sent, refused
 from protocol_gateway.checking.cell_mates import CellMates, Whereabouts
@@ -28,6 +25,9 @@ from protocol_gateway.control.stops import Guarded
 from protocol_gateway.drivers.driver import Activity
 from protocol_gateway.errors import CheckError
 from protocol_gateway.motion import has_arrived
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
+from robomesh.schemas.robomesh_pb2 import CommandRequest
 from robots.joints import Joints
 
 _C = CommandRequest.Command

@@ -14,10 +14,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from bus import reason_codes as codes
-from bus.errors import RefusedError
-from bus.messages import reason_message
-from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.log import GATEWAY, Entry, Outcome
 from protocol_gateway.authority import holders_motion, rules
 from protocol_gateway.authority.admission import (
@@ -38,6 +34,10 @@ from protocol_gateway.control.stops import Guarded, Stops, both_clocks
 from protocol_gateway.drivers.driver import Activity
 from protocol_gateway.errors import AuditError, CheckError, CommandError, LinkError
 from protocol_gateway.motion import has_arrived, motion_may_be_held
+from robomesh import reason_codes as codes
+from robomesh.errors import RefusedError
+from robomesh.messages import reason_message
+from robomesh.schemas import robomesh_pb2 as schema
 from robots.joints import Joints
 
 _C = schema.CommandRequest.Command

@@ -11,10 +11,6 @@ import time
 from collections.abc import Callable
 from functools import partial
 
-from bus import reason_codes as codes
-from bus.errors import RefusedError
-from bus.reasons import Reason
-from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.log import GATEWAY, Entry, Outcome
 from protocol_gateway.authority import rules
 from protocol_gateway.authority.rules import Authority, LeaseEnd, LeaseOutcome, refused
@@ -22,6 +18,10 @@ from protocol_gateway.control.ledger import entry_of, lease_entry
 from protocol_gateway.control.stops import Guarded, Stops, both_clocks
 from protocol_gateway.errors import AuditError
 from protocol_gateway.states import lease_answer
+from robomesh import reason_codes as codes
+from robomesh.errors import RefusedError
+from robomesh.reasons import Reason
+from robomesh.schemas import robomesh_pb2 as schema
 
 _A = schema.LeaseRequest.Action
 _S = schema.Event.Severity

@@ -6,9 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from hashlib import sha256
 
-from bus import reason_codes as codes
-from bus.reasons import Reason
-from bus.schemas.robomesh_pb2 import CommandRequest, Event, LeaseRequest
 from protocol_gateway.audit.floods import STOP, Floods
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome
 from protocol_gateway.authority.admission import LONGEST_WAIT_S
@@ -16,6 +13,9 @@ from protocol_gateway.authority.rules import Answer
 from protocol_gateway.errors import AuditError
 from protocol_gateway.journal import Journal
 from protocol_gateway.texts import LONGEST_SENTENCE, one_line
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
+from robomesh.schemas.robomesh_pb2 import CommandRequest, Event, LeaseRequest
 
 
 class Ledger:

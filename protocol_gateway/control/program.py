@@ -16,10 +16,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from bus import reason_codes as codes
-from bus.messages import reason_message
-from bus.reasons import Reason
-from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.log import Outcome
 from protocol_gateway.authority import rules
 from protocol_gateway.authority.rules import Answer, refused
@@ -32,6 +28,10 @@ from protocol_gateway.drivers.driver import Activity
 from protocol_gateway.errors import CheckError
 from protocol_gateway.states import timestamp
 from protocol_gateway.texts import LONGEST, one_line
+from robomesh import reason_codes as codes
+from robomesh.messages import reason_message
+from robomesh.reasons import Reason
+from robomesh.schemas import robomesh_pb2 as schema
 from robots.programs.steps import Step, StepKind
 from robots.programs.text import MOST_BYTES
 

@@ -14,10 +14,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from bus import reason_codes as codes
-from bus.messages import reason_message
-from bus.reasons import Reason
-from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.latch import LatchFile
 from protocol_gateway.audit.log import GATEWAY, Outcome
 from protocol_gateway.authority import rules
@@ -28,6 +24,10 @@ from protocol_gateway.drivers.driver import Driver, Stop
 from protocol_gateway.errors import CommandError, LinkError
 from protocol_gateway.journal import Journal
 from protocol_gateway.link.link import LinkState
+from robomesh import reason_codes as codes
+from robomesh.messages import reason_message
+from robomesh.reasons import Reason
+from robomesh.schemas import robomesh_pb2 as schema
 
 _S = schema.Event.Severity
 

@@ -7,8 +7,8 @@ neither, RUN_PROGRAM       UNTOLD_S, for Zenoh does not tell the gateway an aske
 neither, another command   `admission.LONGEST_WAIT_S` in the gateway, as for every command
 """
 
-from bus.answering import Request
-from bus.schemas.robomesh_pb2 import CommandRequest
+from robomesh.answering import Request
+from robomesh.schemas.robomesh_pb2 import CommandRequest
 
 # The default time-out of a robomesh client.
 UNTOLD_S = 2.0

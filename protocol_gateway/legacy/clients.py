@@ -13,8 +13,6 @@ Source: Chen, Zhang, Xue 2001, section 5, figures 7 and 8.
 import asyncio
 import os
 
-from bus import reason_codes as codes
-from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.log import Outcome
 from protocol_gateway.control.control import Control
 from protocol_gateway.control.ledger import entry_of
@@ -34,6 +32,8 @@ from protocol_gateway.legacy.requests import (
 )
 from protocol_gateway.legacy.settings import LegacySettings, plain_address
 from protocol_gateway.serving.client import Client
+from robomesh import reason_codes as codes
+from robomesh.schemas import robomesh_pb2 as schema
 from robots.joints import Joints
 
 _S = schema.Event.Severity

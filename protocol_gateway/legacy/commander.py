@@ -12,15 +12,15 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
-from bus.errors import RefusedError
-from bus.reasons import Reason
-from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from protocol_gateway.authority.admission import LONGEST_WAIT_S
 from protocol_gateway.authority.rules import holds
 from protocol_gateway.control.control import Control
 from protocol_gateway.core.records import Error
 from protocol_gateway.core.stream import Unit
 from protocol_gateway.legacy.requests import FAULT, READ_ONLY, number_of, requests_of, stop_to_reset
+from robomesh.errors import RefusedError
+from robomesh.reasons import Reason
+from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from robots.joints import Joints
 
 _A = LeaseRequest.Action

@@ -7,8 +7,6 @@ anything else                               refused
 
 from collections.abc import Sequence
 
-from bus import reason_codes as codes
-from bus.schemas.robomesh_pb2 import CommandRequest
 from protocol_gateway.authority.rules import Answer, Authority
 from protocol_gateway.core.records import (
     AbsolutePositions,
@@ -24,6 +22,8 @@ from protocol_gateway.core.records import (
 )
 from protocol_gateway.core.scales import si_scales
 from protocol_gateway.errors import UnitError
+from robomesh import reason_codes as codes
+from robomesh.schemas.robomesh_pb2 import CommandRequest
 from robots.joints import Joints
 
 TOO_MANY, MALFORMED, UNKNOWN_WORD, JOINT_COUNT, LIMIT, LOCAL_MODE, READ_ONLY, STOPPED, FAULT = range(1, 10)

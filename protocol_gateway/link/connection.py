@@ -7,9 +7,9 @@ import socket
 import struct
 from collections.abc import Callable
 
-from bus import reason_codes as codes
 from protocol_gateway.errors import LinkCloggedError, LinkDownError
 from protocol_gateway.sockets import configure
+from robomesh import reason_codes as codes
 
 # A unit is some hundred bytes. A small send buffer makes a controller that does not read an
 # error at once instead of kilobytes of commands that it would obey late.

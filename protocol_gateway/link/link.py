@@ -23,9 +23,6 @@ from collections import Counter
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 
-from bus import reason_codes as codes
-from bus.reasons import Reason
-from bus.wall_clock import WallClock
 from protocol_gateway.drivers.driver import (
     ControllerEvent,
     Driver,
@@ -41,6 +38,9 @@ from protocol_gateway.link.dating import Dating, Received
 from protocol_gateway.link.flood import Flood, HandOver
 from protocol_gateway.link.health import Answers, Arrivals, LinkHealth, Losses
 from protocol_gateway.link.status import LinkState, LinkStatus
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
+from robomesh.wall_clock import WallClock
 
 __all__ = [
     "ControllerLink",

@@ -4,8 +4,8 @@ import time
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from bus.session import Session
 from protocol_gateway.link.link import ControllerLink, LinkState
+from robomesh.session import Session
 
 
 def measure_links(session: Session, links: Mapping[str, ControllerLink]) -> None:

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from enum import Enum
 
-from bus.reasons import Reason
-from bus.schemas.robomesh_pb2 import Event
+from robomesh.reasons import Reason
+from robomesh.schemas.robomesh_pb2 import Event
 
 _S = Event.Severity
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bus import reason_codes as codes
-from bus.reasons import Reason
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
 from robots.cells import FLOOR
 from robots.collision import Cell, pending, unshaped
 from robots.collision.floor import floor_advice

@@ -5,7 +5,7 @@ from math import degrees, radians
 
 import numpy as np
 
-from bus import reason_codes as codes
+from robomesh import reason_codes as codes
 from robots.collision import Arm
 from robots.inverse import InverseSolver, natural_task, solve
 from robots.joints import FloatArray

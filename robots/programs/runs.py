@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bus import reason_codes as codes
-from bus.reasons import Reason
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
 from robots.cells import FLOOR
 from robots.joints import FloatArray
 from robots.programs.steps import Violation, ViolationKind

@@ -6,7 +6,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from bus.reasons import Reason
+from robomesh.reasons import Reason
 from robots.joints import FloatArray
 
 # How far the tool may leave the line between the joint moves that stand for it.

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from bus.reasons import Reason
+from robomesh.reasons import Reason
 from robots.collision import Cell, distances
 from robots.collision.along import Encounter, near_along
 from robots.joints import FloatArray, violations

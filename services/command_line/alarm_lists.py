@@ -2,10 +2,10 @@
 
 from collections.abc import Iterable
 
-from bus.keys import ROOT, WHOLE_SITE
-from bus.last_values import last_values
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
+from robomesh.keys import ROOT, WHOLE_SITE
+from robomesh.last_values import last_values
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
 
 _GONE = "site.gone"
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from bus.keys import WHOLE_SITE, check_chunk, robot_key
-from bus.messages import to_json
-from bus.schemas import robomesh_pb2 as schema
+from robomesh.keys import WHOLE_SITE, check_chunk, robot_key
+from robomesh.messages import to_json
+from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line import find
 from services.command_line.alarm_lists import lists
 from services.command_line.listing_words import since

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from bus.endpoints import DEFAULT_ROUTER
+from robomesh.endpoints import DEFAULT_ROUTER
 from services.command_line.options import Connect, Json
 
 alarms_app = typer.Typer(help="Alarms: list, acknowledge, shelve.", no_args_is_help=True)

@@ -2,11 +2,11 @@
 
 import asyncio
 
-from bus import keys, presence
-from bus.errors import BusError
-from bus.keys import PresenceKey
-from bus.schemas.robomesh_pb2 import ClockRequest
-from bus.session import Session
+from robomesh import keys, presence
+from robomesh.errors import BusError
+from robomesh.keys import PresenceKey
+from robomesh.schemas.robomesh_pb2 import ClockRequest
+from robomesh.session import Session
 from services.command_line import find
 
 _ROUTER = "router"

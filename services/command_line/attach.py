@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from bus.endpoints import DEFAULT_ROUTER
+from robomesh.endpoints import DEFAULT_ROUTER
 from services.command_line.attaching import attachment, own_identity
 from services.command_line.options import Connect, Metrics
 from services.listen import check_reach, split_address
@@ -42,7 +42,7 @@ def foxglove(
     metrics: Metrics = "",
 ) -> None:
     """Serve Foxglove and Lichtblick: open a Foxglove WebSocket connection to ws://127.0.0.1:8765."""
-    from bus import service
+    from robomesh import service
     from services import foxglove as role
 
     service.log_to_stderr()
@@ -77,7 +77,7 @@ def ros2(
     metrics: Metrics = "",
 ) -> None:
     """Show the robots to ROS 2 nodes with rmw_zenoh: /joint_states, /tf, /robot_description."""
-    from bus import service
+    from robomesh import service
     from services import ros2 as role
 
     service.log_to_stderr()

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.main import get_command
 
-from bus.endpoints import DEFAULT_ROUTER, bundle
-from bus.errors import SessionError
-from bus.identity import Identity, read_identity
+from robomesh.endpoints import DEFAULT_ROUTER, bundle
+from robomesh.errors import SessionError
+from robomesh.identity import Identity, read_identity
 
 if TYPE_CHECKING:
-    from bus.session import SessionSettings
+    from robomesh.session import SessionSettings
 
 _KEYS: ContextVar[Path | None] = ContextVar("keys", default=None)
 
@@ -79,7 +79,7 @@ def with_keys(connect: str, *, wait_s: float | None = None) -> "SessionSettings 
     Raises:
         SessionError: If the file is no bundle, or no router takes it there.
     """
-    from bus.session import SessionSettings
+    from robomesh.session import SessionSettings
 
     identity, file = own_identity(), _KEYS.get()
     if identity is None or file is None:
@@ -95,6 +95,6 @@ def with_keys(connect: str, *, wait_s: float | None = None) -> "SessionSettings 
 
 def attachment(connect: str, *, wait_s: float | None = None) -> "SessionSettings":
     """A session for one command, in the name of its certificate where one was given."""
-    from bus.session import SessionSettings
+    from robomesh.session import SessionSettings
 
     return with_keys(connect, wait_s=wait_s) or SessionSettings(connect=addresses(connect), wait_s=wait_s)

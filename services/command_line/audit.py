@@ -11,15 +11,15 @@ from typing import Any, NamedTuple
 
 import typer
 
-from bus.errors import NoAnswerError
-from bus.keys import WHOLE_SITE, robot_key
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
 from protocol_gateway.audit import find as audit_find
 from protocol_gateway.audit.entry import audit_entry
 from protocol_gateway.audit.log import Outcome
 from protocol_gateway.audit.log import verify as verify_log
 from protocol_gateway.states import timestamp
+from robomesh.errors import NoAnswerError
+from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
 from services.command_line import find
 from services.command_line.find import print_json
 from services.errors import ServiceError

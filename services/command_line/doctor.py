@@ -116,7 +116,7 @@ def _ports() -> list[Finding]:
 
 def _is_router(port: int) -> bool:
     """Return whether a Zenoh router answers there, by TCP or, with this person's keys, by TLS."""
-    from bus.errors import BusError
+    from robomesh.errors import BusError
     from services.command_line import find
 
     async def answers() -> bool:

@@ -1,7 +1,7 @@
 """`robomesh fault`: a simulated controller misbehaves on request, and behaves again."""
 
-from bus.keys import robot_key
-from bus.schemas.robomesh_pb2 import FaultAnswer, FaultRequest
+from robomesh.keys import robot_key
+from robomesh.schemas.robomesh_pb2 import FaultAnswer, FaultRequest
 from services.command_line import find
 from services.simulator.fault_table import FAULTS
 

@@ -8,10 +8,10 @@ from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
 from typing import Any, NamedTuple, TypeVar
 
-from bus.errors import SessionError
-from bus.keys import WHOLE_SITE
-from bus.session import Session, open_session
-from bus.texts import DIRECTION
+from robomesh.errors import SessionError
+from robomesh.keys import WHOLE_SITE
+from robomesh.session import Session, open_session
+from robomesh.texts import DIRECTION
 from services.command_line.alarm_lists import gone_sites, lists
 from services.command_line.attaching import attachment, own_identity
 from services.errors import ServiceError

@@ -6,9 +6,9 @@ import signal
 import sys
 from collections.abc import Iterator
 
-from bus.keys import robot_key
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
+from robomesh.keys import robot_key
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
 from services.command_line import find
 
 # `lease` and `program` beat each second: without them the gateway is gone.

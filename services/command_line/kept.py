@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from bus.endpoints import DEFAULT_ROUTER
+from robomesh.endpoints import DEFAULT_ROUTER
 from services.command_line.options import Connect, Json
 
 recordings_app = typer.Typer(help="What is recorded.", no_args_is_help=True)
@@ -54,7 +54,7 @@ def recordings_play(
     connect: Connect = DEFAULT_ROUTER,
 ) -> None:
     """Play a recording back as a robot of its own, replay-..., until Ctrl-C."""
-    from bus.schemas.robomesh_pb2 import PlayRequest
+    from robomesh.schemas.robomesh_pb2 import PlayRequest
     from services.command_line.recordings import play
 
     play.run(what, PlayRequest(speed=speed, position_s=at, loop=loop), connect)

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from bus.topic_rows import Role
+from robomesh.topic_rows import Role
 from robots.bounded_toml import read_toml
 from services.command_line.keys_folder import KeysFolder, keys_folder
 from services.command_line.options import Json

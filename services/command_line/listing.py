@@ -7,13 +7,13 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-from bus.clock import Clock, Reading, read_clock
-from bus.errors import NoAnswerError
-from bus.keys import ROOT, WHOLE_SITE, PresenceKey, robot_key
-from bus.last_values import last_values
-from bus.presence import SILENT
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
+from robomesh.clock import Clock, Reading, read_clock
+from robomesh.errors import NoAnswerError
+from robomesh.keys import ROOT, WHOLE_SITE, PresenceKey, robot_key
+from robomesh.last_values import last_values
+from robomesh.presence import SILENT
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
 from services.command_line import find
 from services.command_line.alarm_lists import gone_sites, lists
 from services.command_line.listing_words import picture

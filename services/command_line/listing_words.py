@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
-from bus.keys import WHOLE_SITE
+from robomesh.keys import WHOLE_SITE
 
 if TYPE_CHECKING:
     from rich.console import Group

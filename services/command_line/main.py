@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 from typer.main import get_command
 
-from bus.endpoints import DEFAULT_ROUTER
+from robomesh.endpoints import DEFAULT_ROUTER
 from services.command_line import attach, running
 from services.command_line.accounts_app import accounts_app
 from services.command_line.alarms_app import alarms_app
@@ -312,10 +312,10 @@ def _could_not(text: str) -> int:
 
 
 def _known_errors() -> tuple[type[Exception], ...]:
-    from bus.errors import BusError
     from mcap_files.errors import RecordingsError
     from protocol_gateway.errors import ProtocolGatewayError
     from renderer.errors import RendererError
+    from robomesh.errors import BusError
     from robots.errors import RobotError
     from services.errors import ServiceError
 

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from bus.keys import WHOLE_SITE, robot_key
-from bus.presence import MONITOR
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
-from bus.subscription import Sample, Subscription
-from bus.topics import topic
+from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.presence import MONITOR
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
+from robomesh.subscription import Sample, Subscription
+from robomesh.topics import topic
 from services.command_line import find
 from services.command_line.monitor_words import (
     OLD,

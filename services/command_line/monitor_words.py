@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from datetime import datetime
 from typing import Any
 
-from bus.keys import WHOLE_SITE
-from bus.schemas import robomesh_pb2 as schema
+from robomesh.keys import WHOLE_SITE
+from robomesh.schemas import robomesh_pb2 as schema
 
 _State = schema.ControllerState
 _Program = schema.ProgramState

@@ -3,7 +3,7 @@
 import io
 import sys
 
-from bus.texts import show_direction
+from robomesh.texts import show_direction
 
 
 class _Shown(io.TextIOWrapper):

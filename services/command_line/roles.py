@@ -6,11 +6,11 @@ from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bus import service
-from bus.endpoints import DEFAULT_ROUTER
-from bus.keys import WHOLE_SITE, check_name
-from bus.session import SessionSettings
 from protocol_gateway.legacy.settings import LegacySettings
+from robomesh import service
+from robomesh.endpoints import DEFAULT_ROUTER
+from robomesh.keys import WHOLE_SITE, check_name
+from robomesh.session import SessionSettings
 from services import site as site_file
 from services.command_line.attaching import addresses, with_keys
 from services.command_line.routing import metrics_address

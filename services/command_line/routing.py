@@ -3,7 +3,7 @@
 import logging
 from pathlib import Path
 
-from bus import service
+from robomesh import service
 from services import router as role
 from services.keys import Folder
 from services.listen import check_reach, split_address

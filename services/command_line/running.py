@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from bus.endpoints import DEFAULT_ROUTER
+from robomesh.endpoints import DEFAULT_ROUTER
 from services.command_line.options import Connect, Metrics, SiteFile, Started
 from services.simulator.fault_table import FAULTS
 

@@ -17,9 +17,9 @@ from itertools import chain, product
 
 import zenoh
 
-from bus.access import NOBODYS_ROBOT, Act, Principal
-from bus.keys import has_wildcard
-from bus.topics import Role, Topic
+from robomesh.access import NOBODYS_ROBOT, Act, Principal
+from robomesh.keys import has_wildcard
+from robomesh.topics import Role, Topic
 from services.command_line.security_people import (
     Person,
     Trial,

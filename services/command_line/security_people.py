@@ -9,9 +9,9 @@ from threading import Condition
 
 import zenoh
 
-from bus.access import NOBODYS_ROBOT, Act, Principal
-from bus.endpoints import bundle, client_config, first_line
-from bus.messages import PROTOBUF
+from robomesh.access import NOBODYS_ROBOT, Act, Principal
+from robomesh.endpoints import bundle, client_config, first_line
+from robomesh.messages import PROTOBUF
 from services.keys import Folder, deeds
 from services.keys.errors import KeysError
 from services.keys.principals import Principals

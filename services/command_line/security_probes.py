@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import zenoh
 
-from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
+from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from services.command_line.security_people import TIMEOUT_S, Person, Trial, ask_all, settle, wait_until
 from services.command_line.security_table import ROUTERS_OWN, names_of_operators, should
 

@@ -1,15 +1,15 @@
 """What the table of topics gives a certificate, act by act: what `doctor --security` expects.
 
-Written apart from the rules' generator (`bus/access.py`), which it judges.
+Written apart from the rules' generator (`robomesh/access.py`), which it judges.
 """
 
 from collections.abc import Iterable
 
-from bus import topics
-from bus.access import NOBODYS_ROBOT, Act, Principal
-from bus.errors import UnknownTopicError
-from bus.keys import REPLAY, has_wildcard, parse_expression
-from bus.topics import REQUESTS, TOPICS, Request, Role, Topic
+from robomesh import topics
+from robomesh.access import NOBODYS_ROBOT, Act, Principal
+from robomesh.errors import UnknownTopicError
+from robomesh.keys import REPLAY, has_wildcard, parse_expression
+from robomesh.topics import REQUESTS, TOPICS, Request, Role, Topic
 
 ROWS: tuple[Topic | Request, ...] = (*TOPICS.values(), *REQUESTS.values())
 # Means the robot that nobody has, and would mean another's whose name begins so.

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import typer
 
-from bus import reason_codes as codes
-from bus.errors import RefusedError
-from bus.keys import check_chunk, robot_key
-from bus.lease import control
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
+from robomesh import reason_codes as codes
+from robomesh.errors import RefusedError
+from robomesh.keys import check_chunk, robot_key
+from robomesh.lease import control
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
 from services.command_line import find
 from services.command_line.following import Interrupted, answered, interrupt, stop, until_done, warning_of
 from services.errors import ServiceError

@@ -11,9 +11,9 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from bus import service
-from bus.keys import robot_key
-from bus.session import SessionSettings, open_session
+from robomesh import service
+from robomesh.keys import robot_key
+from robomesh.session import SessionSettings, open_session
 from services import site as site_file
 from services.command_line.metering import following_with_metrics, with_metrics
 from services.command_line.routing import metrics_address
@@ -39,7 +39,7 @@ def run(path: Path | None, metrics: str = "") -> None:
     """
     _say_lines_as_they_are()
     # The services say themselves that they wait for their router.
-    logging.getLogger("bus").setLevel(logging.ERROR)
+    logging.getLogger("robomesh").setLevel(logging.ERROR)
     site = site_file.load(path)
     endpoint = reachable(site.listened[0])
     metered = metrics_address(site, metrics)

@@ -10,10 +10,10 @@ from typing import BinaryIO
 
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from bus.errors import MessageError
-from bus.subscription import Subscription
 from renderer.errors import Mp4Error
 from renderer.mp4 import FragmentedMp4, is_key_frame
+from robomesh.errors import MessageError
+from robomesh.subscription import Subscription
 from services.command_line import find
 from services.command_line.views import view_of
 from services.errors import ServiceError

@@ -3,10 +3,10 @@
 import contextlib
 from typing import NamedTuple
 
-from bus.errors import BusError, NoAnswerError
-from bus.keys import check_chunk, robot_key
-from bus.schemas.robomesh_pb2 import KeyFrameRequest, ViewAnswer, ViewRequest
-from bus.session import Session
+from robomesh.errors import BusError, NoAnswerError
+from robomesh.keys import check_chunk, robot_key
+from robomesh.schemas.robomesh_pb2 import KeyFrameRequest, ViewAnswer, ViewRequest
+from robomesh.session import Session
 from services.command_line import find
 from services.errors import ServiceError
 

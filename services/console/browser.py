@@ -15,14 +15,14 @@ from typing import Any
 from google.protobuf.message import DecodeError
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from bus import keys, topics
-from bus import reason_codes as codes
-from bus.errors import BusError, BusyError, NoAnswerError, RefusedError
-from bus.messages import reason_message
-from bus.reasons import Reason
-from bus.schemas.robomesh_pb2 import FromPage, KeyFrameRequest, ToPage, ViewAnswer, ViewRequest
-from bus.session import Session
-from bus.topics import History
+from robomesh import keys, topics
+from robomesh import reason_codes as codes
+from robomesh.errors import BusError, BusyError, NoAnswerError, RefusedError
+from robomesh.messages import reason_message
+from robomesh.reasons import Reason
+from robomesh.schemas.robomesh_pb2 import FromPage, KeyFrameRequest, ToPage, ViewAnswer, ViewRequest
+from robomesh.session import Session
+from robomesh.topics import History
 from services.console.accounts.rights import check_ask, check_own_name, check_right, in_own_name
 from services.console.accounts.sessions import SignedIn
 from services.console.errors import WatchError

@@ -20,7 +20,7 @@ GENERATED = PAGE / "src" / "gen"
 MODULES = PAGE / "node_modules"
 
 # Schemas and the table that names them: a change there is a change of the page.
-_SCHEMAS = (ROOT / "bus" / "topics.py", ROOT / "bus" / "schemas" / "robomesh_pb2.py")
+_SCHEMAS = (ROOT / "robomesh" / "topics.py", ROOT / "robomesh" / "schemas" / "robomesh_pb2.py")
 
 
 class PageBuildError(Exception):
@@ -106,10 +106,10 @@ def write_types() -> None:
 
 def _schema_files() -> list[Any]:
     """Descriptors of the files that the topic table's schemas and requests stand in."""
-    sys.path.insert(0, str(ROOT))  # the build has no installed `bus`
+    sys.path.insert(0, str(ROOT))  # the build has no installed `robomesh`
     try:
-        from bus import topics
-        from bus.schemas import robomesh_pb2
+        from robomesh import topics
+        from robomesh.schemas import robomesh_pb2
     finally:
         sys.path.remove(str(ROOT))
     return [robomesh_pb2.DESCRIPTOR, *(row.schema.DESCRIPTOR.file for row in topics.TOPICS.values())]

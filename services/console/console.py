@@ -20,10 +20,10 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Scope
 from starlette.websockets import WebSocket
 
-from bus import keys, topics
-from bus.keys import PresenceKey
-from bus.schemas.robomesh_pb2 import Event, ToPage
-from bus.session import Session
+from robomesh import keys, topics
+from robomesh.keys import PresenceKey
+from robomesh.schemas.robomesh_pb2 import Event, ToPage
+from robomesh.session import Session
 from services.console import stills
 from services.console.accounts.desk import Desk
 from services.console.accounts.gate import SIGNED_OUT, Gate, cookie_name

@@ -4,11 +4,11 @@ import asyncio
 import logging
 from collections.abc import Callable
 
-from bus import keys, topics
-from bus.errors import BusError
-from bus.session import Session
-from bus.subscription import Sample
-from bus.topics import History
+from robomesh import keys, topics
+from robomesh.errors import BusError
+from robomesh.session import Session
+from robomesh.subscription import Sample
+from robomesh.topics import History
 from services.console.errors import WatchError
 from services.console.lanes import Lane, lane_for, thinned
 from services.console.turns import Turns

@@ -12,9 +12,9 @@ from typing import Protocol
 
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from bus.header import Header
-from bus.subscription import Sample
-from bus.topics import History, Topic
+from robomesh.header import Header
+from robomesh.subscription import Sample
+from robomesh.topics import History, Topic
 
 LIST_LENGTH = 200
 # About two seconds of video: longer than the interval of key frames is late for ever.

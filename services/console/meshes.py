@@ -8,9 +8,9 @@ from collections import OrderedDict
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
-from bus import keys
-from bus.errors import BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError
-from bus.session import Session
+from robomesh import keys
+from robomesh.errors import BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError
+from robomesh.session import Session
 
 _MOST_BYTES = 256 * 1024 * 1024
 # On a busy machine an answer can be lost: asking again costs less than an arm without a link.

@@ -12,12 +12,12 @@ from contextlib import contextmanager
 import zenoh
 from google.protobuf.message import DecodeError
 
-from bus import keys
-from bus import reason_codes as codes
-from bus.errors import BusError, RefusedError
-from bus.presence import OPERATOR, session_of
-from bus.schemas.robomesh_pb2 import LeaseRequest
-from bus.session import Session
+from robomesh import keys
+from robomesh import reason_codes as codes
+from robomesh.errors import BusError, RefusedError
+from robomesh.presence import OPERATOR, session_of
+from robomesh.schemas.robomesh_pb2 import LeaseRequest
+from robomesh.session import Session
 
 _ACTION = LeaseRequest.Action
 _GIVES_CONTROL = frozenset({_ACTION.ACQUIRE, _ACTION.ACCEPT, _ACTION.TAKE})

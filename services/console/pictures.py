@@ -29,13 +29,13 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
 from starlette.types import Scope
 
-from bus import keys
-from bus import reason_codes as codes
-from bus.errors import BusError, BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError
-from bus.schemas.robomesh_pb2 import VideoFrames, ViewRequest
-from bus.subscription import Sample
 from renderer.errors import Mp4Error
 from renderer.mp4 import FragmentedMp4
+from robomesh import keys
+from robomesh import reason_codes as codes
+from robomesh.errors import BusError, BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError
+from robomesh.schemas.robomesh_pb2 import VideoFrames, ViewRequest
+from robomesh.subscription import Sample
 from services.console.errors import PictureError
 from services.console.feeds import Feeds
 from services.console.lanes import Lane, NewestLane, VideoLane

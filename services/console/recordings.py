@@ -24,12 +24,12 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
 from starlette.types import Scope
 
-from bus import reason_codes as codes
-from bus.errors import BusError, BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError
-from bus.keys import WHOLE_SITE, robot_key
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
 from mcap_files.table import Table, is_due, table_of
+from robomesh import reason_codes as codes
+from robomesh.errors import BusError, BusyError, KeyNameError, NoAnswerError, QuotaError, RefusedError
+from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
 from services.console.errors import RecordingChangedError
 from services.console.streamed import Streamed
 

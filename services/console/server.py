@@ -53,7 +53,7 @@ class Server(uvicorn.Server):
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Leaves the signals to `bus.service.run`."""
+        """Leaves the signals to `robomesh.service.run`."""
         yield
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:

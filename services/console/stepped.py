@@ -12,8 +12,8 @@ import math
 import time
 from collections.abc import AsyncIterator, Callable
 
-from bus.errors import BusError
-from bus.subscription import Sample
+from robomesh.errors import BusError
+from robomesh.subscription import Sample
 from services.console.feeds import Feeds
 from services.console.lanes import VideoLane, begins_video
 from services.console.views import LOWEST_STEP, Views

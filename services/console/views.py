@@ -2,11 +2,11 @@
 
 from collections import OrderedDict
 
-from bus import keys
-from bus import reason_codes as codes
-from bus.errors import RefusedError
-from bus.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
-from bus.session import Session
+from robomesh import keys
+from robomesh import reason_codes as codes
+from robomesh.errors import RefusedError
+from robomesh.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
+from robomesh.session import Session
 
 TIMEOUT_S = 3.0
 _MOST_KNOWN = 512

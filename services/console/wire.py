@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 
 from websockets.frames import Frame, Opcode
 
-from bus.header import pack
-from bus.schemas.robomesh_pb2 import ToPage
-from bus.subscription import Sample
+from robomesh.header import pack
+from robomesh.schemas.robomesh_pb2 import ToPage
+from robomesh.subscription import Sample
 
 # Field 1 of ToPage, a message; field 5 of its Sample, a double: fields of a message may come in any order.
 _SAMPLE, _AGE = 0x0A, 0x29

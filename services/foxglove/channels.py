@@ -7,10 +7,10 @@ from functools import partial
 import foxglove
 from foxglove_schemas_protobuf.Log_pb2 import Log
 
-from bus.keys import WHOLE_SITE, robot_key
-from bus.schemas.robomesh_pb2 import Description
-from bus.session import Session
-from bus.topics import topic
+from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.schemas.robomesh_pb2 import Description
+from robomesh.session import Session
+from robomesh.topics import topic
 from robots.urdf.viewers import together
 from services.foxglove.lanes import Lane, Told
 from services.foxglove.messages import TEXT_SCHEMA, log_of, protobuf_schema, text_message

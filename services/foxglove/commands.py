@@ -16,12 +16,12 @@ from typing import Any
 import foxglove
 from foxglove import MessageSchema, Schema, ServiceRequest, ServiceSchema
 
-from bus import reason_codes as codes
-from bus.errors import BusError, MessageError, RefusedError
-from bus.keys import robot_key
-from bus.lease import Control, control
-from bus.messages import JSON, decode_request
-from bus.schemas.robomesh_pb2 import (
+from robomesh import reason_codes as codes
+from robomesh.errors import BusError, MessageError, RefusedError
+from robomesh.keys import robot_key
+from robomesh.lease import Control, control
+from robomesh.messages import JSON, decode_request
+from robomesh.schemas.robomesh_pb2 import (
     CommandAnswer,
     CommandRequest,
     ControllerState,
@@ -29,7 +29,7 @@ from bus.schemas.robomesh_pb2 import (
     StopAnswer,
     StopRequest,
 )
-from bus.session import Session
+from robomesh.session import Session
 
 log = logging.getLogger(__name__)
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import foxglove
 
-from bus.errors import BusError
-from bus.keys import parse_expression
-from bus.schemas.robomesh_pb2 import KeyFrameRequest
-from bus.session import Session
-from bus.subscription import Subscription
-from bus.topics import History, topic
+from robomesh.errors import BusError
+from robomesh.keys import parse_expression
+from robomesh.schemas.robomesh_pb2 import KeyFrameRequest
+from robomesh.session import Session
+from robomesh.subscription import Subscription
+from robomesh.topics import History, topic
 from services.foxglove.messages import Timed, timed
 
 log = logging.getLogger(__name__)

@@ -8,9 +8,9 @@ from foxglove_schemas_protobuf.Log_pb2 import Log
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from google.protobuf.message import Message
 
-from bus.schemas import robomesh_pb2 as schema
-from bus.subscription import Sample
-from bus.topics import History, Topic
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.subscription import Sample
+from robomesh.topics import History, Topic
 
 # A message's bytes, and when what it tells was so [ns since the Unix epoch].
 Timed = tuple[bytes, int]

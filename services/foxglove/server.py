@@ -5,9 +5,9 @@ import logging
 import ssl
 from collections.abc import Callable
 
-from bus.guest import be_present
-from bus.keys import check_chunk
-from bus.session import Session
+from robomesh.guest import be_present
+from robomesh.keys import check_chunk
+from robomesh.session import Session
 from services.errors import ListenError
 from services.foxglove.bridge import Bridge
 from services.foxglove.commands import Commands

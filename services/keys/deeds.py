@@ -11,11 +11,11 @@ from functools import wraps
 from itertools import count
 from typing import Concatenate, ParamSpec, TypeVar
 
-from bus.access import Border, access_sections
-from bus.errors import KeyNameError
-from bus.identity import Identity, header
-from bus.keys import check_name
-from bus.topics import PEOPLE, SERVICES, Role
+from robomesh.access import Border, access_sections
+from robomesh.errors import KeyNameError
+from robomesh.identity import Identity, header
+from robomesh.keys import check_name
+from robomesh.topics import PEOPLE, SERVICES, Role
 from services.keys import certificates
 from services.keys.errors import KeysError
 from services.keys.folder import Folder, locked, read, write

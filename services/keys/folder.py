@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from bus.endpoints import Tls, bundle
+from robomesh.endpoints import Tls, bundle
 from services.keys.errors import KeysError
 from services.whole_file import write_whole
 

@@ -9,8 +9,8 @@ from typing import Annotated
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError
 
-from bus.access import Border, Principal
-from bus.topics import Role
+from robomesh.access import Border, Principal
+from robomesh.topics import Role
 from robots.bounded_toml import parse_toml
 from services.keys.errors import KeysError
 

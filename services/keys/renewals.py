@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from datetime import timedelta
 
-from bus.topics import PEOPLE
+from robomesh.topics import PEOPLE
 from services.keys.deeds import alone, issued, now, principals_of, save
 from services.keys.errors import KeysError
 from services.keys.folder import Folder

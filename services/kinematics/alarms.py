@@ -9,7 +9,7 @@ Source: ANSI/ISA-18.2 (an alarm asks somebody to act; deadbands and delays again
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from bus.schemas.robomesh_pb2 import Event
+from robomesh.schemas.robomesh_pb2 import Event
 
 OVER = ".over"
 

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bus import reason_codes as codes
-from bus.answering import Request
-from bus.errors import RefusedError
-from bus.quotas import Quota
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
-from bus.worker import Worker, WorkerError
+from robomesh import reason_codes as codes
+from robomesh.answering import Request
+from robomesh.errors import RefusedError
+from robomesh.quotas import Quota
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
+from robomesh.worker import Worker, WorkerError
 from robots.errors import RobotError
 from robots.joints import FloatArray
 from robots.model import RobotModel

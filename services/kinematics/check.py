@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from bus.messages import reason_message
-from bus.schemas import robomesh_pb2 as schema
+from robomesh.messages import reason_message
+from robomesh.schemas import robomesh_pb2 as schema
 from robots.collision import Cell
 from robots.inverse import InverseSolver
 from robots.joints import FloatArray

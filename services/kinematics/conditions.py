@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from bus.schemas.robomesh_pb2 import Event
+from robomesh.schemas.robomesh_pb2 import Event
 from robots.collision import Nearest
 from robots.joints import FloatArray, Joints, JointType, constraint_values
 from services.kinematics.alarms import Condition

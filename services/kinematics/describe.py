@@ -4,7 +4,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from bus.schemas import robomesh_pb2 as schema
+from robomesh.schemas import robomesh_pb2 as schema
 from robots.cells import CellDescription, CellRobot, Fixture
 from robots.description import RobotDescription
 from robots.glb import shapes_glb

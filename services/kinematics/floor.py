@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from bus.schemas.robomesh_pb2 import Event
+from robomesh.schemas.robomesh_pb2 import Event
 from robots.collision import Cell
 from robots.collision.floor import floor_advice, heights_above
 from robots.collision.path import placements_along

@@ -9,10 +9,10 @@ from functools import partial
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from bus.errors import MessageError
-from bus.keys import robot_key
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
+from robomesh.errors import MessageError
+from robomesh.keys import robot_key
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
 from robots.collision import Cell, distances
 from robots.joints import FloatArray
 from robots.model import RobotModel

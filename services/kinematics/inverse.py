@@ -1,8 +1,8 @@
 """Joint positions for a tool's pose as an answer of the mesh: a pure function."""
 
-from bus import reason_codes as codes
-from bus.errors import RefusedError
-from bus.schemas import robomesh_pb2 as schema
+from robomesh import reason_codes as codes
+from robomesh.errors import RefusedError
+from robomesh.schemas import robomesh_pb2 as schema
 from robots.errors import JointCountError, PoseError
 from robots.inverse import InverseSolver, Task, solve
 

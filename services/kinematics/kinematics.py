@@ -6,9 +6,9 @@ import logging
 import time
 from collections.abc import Sequence
 
-from bus.quotas import Quota
-from bus.session import Session
-from bus.worker import Worker
+from robomesh.quotas import Quota
+from robomesh.session import Session
+from robomesh.worker import Worker
 from robots.cells import CellDescription
 from robots.collision import Cell, build_cell
 from robots.description import load

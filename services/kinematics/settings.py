@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from bus.quotas import DEFAULT_QUOTAS, Quotas
+from robomesh.quotas import DEFAULT_QUOTAS, Quotas
 from robots.cells import CellDescription
 
 

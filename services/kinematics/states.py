@@ -7,7 +7,7 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from bus.schemas import robomesh_pb2 as schema
+from robomesh.schemas import robomesh_pb2 as schema
 from robots.joints import FloatArray, Joints, constraint_values
 from robots.model import RobotModel, frame_placements, link_placements, manipulability, tool_jacobian
 from robots.singularity import singularity_margin

@@ -1,12 +1,12 @@
-"""What takes long, in a process of its own: `python -m services.kinematics.worker`, asked by `bus.worker`."""
+"""What takes long, in a process of its own: `python -m services.kinematics.worker`, asked by a `Worker`."""
 
 from collections.abc import Callable
 from functools import cache
 
 import numpy as np
 
-from bus.schemas import robomesh_pb2 as schema
-from bus.worker import answer_all
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.worker import answer_all
 from robots.cells import CellDescription
 from robots.collision import Cell, build_cell, pending
 from robots.description import load

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from bus import reason_codes as codes
+from robomesh import reason_codes as codes
 from services.player.errors import ReplayError
 
 SLOWEST, FASTEST = 0.1, 100.0

@@ -4,7 +4,7 @@ ServiceError
 └── ReplayError             what cannot be played, or asked of a replay
 """
 
-from bus.reasons import Reason
+from robomesh.reasons import Reason
 from services.errors import ServiceError
 
 

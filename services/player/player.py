@@ -9,15 +9,15 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from bus import reason_codes as codes
-from bus.answering import Request
-from bus.errors import RefusedError
-from bus.keys import WHOLE_SITE
-from bus.presence import OPERATOR
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
 from mcap_files.errors import RecordingsError
 from mcap_files.folder import find_file
+from robomesh import reason_codes as codes
+from robomesh.answering import Request
+from robomesh.errors import RefusedError
+from robomesh.keys import WHOLE_SITE
+from robomesh.presence import OPERATOR
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
 from services.player.clock import Clock
 from services.player.errors import ReplayError
 from services.player.replay import Replay

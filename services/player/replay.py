@@ -7,16 +7,16 @@ import time
 from collections import deque
 from dataclasses import dataclass
 
-from bus import reason_codes as codes
-from bus import topics
-from bus.answering import Answerer, Handler, Request
-from bus.errors import BusError, RefusedError
-from bus.keys import robot_key
-from bus.publisher import Publisher
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
-from bus.topics import History
 from mcap_files.errors import RecordingsError
+from robomesh import reason_codes as codes
+from robomesh import topics
+from robomesh.answering import Answerer, Handler, Request
+from robomesh.errors import BusError, RefusedError
+from robomesh.keys import robot_key
+from robomesh.publisher import Publisher
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
+from robomesh.topics import History
 from services.player.clock import Clock
 from services.player.errors import ReplayError
 from services.player.tape import Played, Scene, Tape

@@ -7,16 +7,16 @@ from typing import NamedTuple
 
 from google.protobuf.message import DecodeError
 
-from bus import reason_codes as codes
-from bus import topics
-from bus.errors import BusError
-from bus.keys import Key, parse_key
-from bus.publisher import LIST_LENGTH
-from bus.schemas import robomesh_pb2 as schema
-from bus.topics import History
 from mcap_files.reading import RecordedMessage, RecordingFile
 from mcap_files.times import PublisherTimes
 from mcap_files.video import is_key_frame
+from robomesh import reason_codes as codes
+from robomesh import topics
+from robomesh.errors import BusError
+from robomesh.keys import Key, parse_key
+from robomesh.publisher import LIST_LENGTH
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.topics import History
 from services.player.errors import ReplayError
 from services.player.renamed import Names, renamed
 

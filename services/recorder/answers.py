@@ -10,7 +10,6 @@ from typing import Any
 from google.protobuf.message import Message
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from bus.schemas import robomesh_pb2 as schema
 from mcap_files.errors import RecordingError
 from mcap_files.files import describe_file, describe_unreadable
 from mcap_files.folder import find_file
@@ -18,6 +17,7 @@ from mcap_files.names import SUFFIX
 from mcap_files.reading import RecordingFile
 from mcap_files.series import MOST_POINTS, POINTS, SeriesReader, known_values
 from mcap_files.video import is_key_frame
+from robomesh.schemas import robomesh_pb2 as schema
 
 _MESSAGES, _MOST_MESSAGES, _MOST_BYTES = 1000, 10_000, 4 << 20
 _PIECE, _MOST_PIECE = 1 << 20, 4 << 20

@@ -13,10 +13,10 @@ from collections.abc import Callable, Mapping
 from enum import IntEnum
 from pathlib import Path
 
-from bus.topics import History, Topic
 from mcap_files import records
 from mcap_files.capture import Capture
 from mcap_files.recover import mend
+from robomesh.topics import History, Topic
 from services.recorder.settings import MIB, Marks
 
 _WRITE_EVERY_S = 0.05

@@ -8,11 +8,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from bus.errors import BusError
-from bus.header import Header
-from bus.keys import WHOLE_SITE, robot_key
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
+from robomesh.errors import BusError
+from robomesh.header import Header
+from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
 from robots.urdf.viewers import prefixed
 
 _MESH_WITHIN_S = 10.0

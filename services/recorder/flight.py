@@ -12,15 +12,15 @@ from functools import partial
 from math import inf
 from pathlib import Path
 
-from bus import reason_codes as codes
-from bus.errors import MessageError, RefusedError
-from bus.messages import decode
-from bus.schemas import robomesh_pb2 as schema
-from bus.topics import Topic
 from mcap_files.capture import Capture, is_being_written
 from mcap_files.errors import CaptureError
 from mcap_files.names import SUFFIX
 from mcap_files.recover import State, state_of
+from robomesh import reason_codes as codes
+from robomesh.errors import MessageError, RefusedError
+from robomesh.messages import decode
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.topics import Topic
 from services.recorder.disk import words
 from services.recorder.finishing import Finisher, Job
 from services.recorder.part import STATES, Part

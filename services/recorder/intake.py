@@ -14,15 +14,15 @@ from typing import Any, Protocol
 import zenoh
 import zenoh.ext
 
-from bus.endpoints import settle
-from bus.errors import MessageError
-from bus.header import Header, unpack
-from bus.ignored import PUBLICATION, REPLY, Ignored
-from bus.keys import robot_key
-from bus.messages import decode
-from bus.schemas import robomesh_pb2 as schema
-from bus.topics import History, Topic, topic
 from mcap_files.video import is_key_frame
+from robomesh.endpoints import settle
+from robomesh.errors import MessageError
+from robomesh.header import Header, unpack
+from robomesh.ignored import PUBLICATION, REPLY, Ignored
+from robomesh.keys import robot_key
+from robomesh.messages import decode
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.topics import History, Topic, topic
 
 log = logging.getLogger(__name__)
 

@@ -2,10 +2,10 @@
 
 import logging
 
-from bus.keys import WHOLE_SITE
-from bus.publisher import Publisher
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
+from robomesh.keys import WHOLE_SITE
+from robomesh.publisher import Publisher
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
 from services.recorder.disk import Disk, Taken
 
 log = logging.getLogger(__name__)

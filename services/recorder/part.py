@@ -4,11 +4,11 @@ import time
 from collections import Counter
 from collections.abc import Callable
 
-from bus.header import Header
-from bus.schemas import robomesh_pb2 as schema
-from bus.topics import TOPICS, Topic
-from bus.wall_clock import WallClock
 from mcap_files.capture import Capture
+from robomesh.header import Header
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.topics import TOPICS, Topic
+from robomesh.wall_clock import WallClock
 from services.recorder.disk import Disk, Taken, takes
 
 Saw = Callable[[Topic, bytes], None]

@@ -9,16 +9,16 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
-from bus import reason_codes as codes
-from bus.answering import Request
-from bus.errors import MessageError, RefusedError
-from bus.keys import WHOLE_SITE, robot_key
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
 from mcap_files.capture import Capture
 from mcap_files.errors import RecordingsError
 from mcap_files.names import INDEXING, SUFFIX
 from mcap_files.recover import State
+from robomesh import reason_codes as codes
+from robomesh.answering import Request
+from robomesh.errors import MessageError, RefusedError
+from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
 from services.recorder.disk import Disk, words
 from services.recorder.explain import Explainer, for_viewers, picture
 from services.recorder.finishing import Finisher, Job

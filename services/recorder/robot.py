@@ -8,14 +8,14 @@ from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
-from bus import reason_codes as codes
-from bus.errors import KeyNameError, RefusedError
-from bus.keys import check_chunk
-from bus.schemas import robomesh_pb2 as schema
-from bus.wall_clock import WallClock
 from mcap_files.capture import Capture
 from mcap_files.errors import CaptureError
 from mcap_files.names import SUFFIX
+from robomesh import reason_codes as codes
+from robomesh.errors import KeyNameError, RefusedError
+from robomesh.keys import check_chunk
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.wall_clock import WallClock
 from services.recorder.disk import Disk, words
 from services.recorder.finishing import Finisher, Job
 from services.recorder.intake import Intake

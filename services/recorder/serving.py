@@ -6,15 +6,15 @@ from pathlib import Path
 
 from google.protobuf.message import Message
 
-from bus import reason_codes as codes
-from bus.answering import Request
-from bus.errors import BusyError, RefusedError
-from bus.keys import WHOLE_SITE
-from bus.quotas import DEFAULT_QUOTAS, Quota, Quotas
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
-from bus.worker import Worker, WorkerError
 from mcap_files.errors import RecordingError
+from robomesh import reason_codes as codes
+from robomesh.answering import Request
+from robomesh.errors import BusyError, RefusedError
+from robomesh.keys import WHOLE_SITE
+from robomesh.quotas import DEFAULT_QUOTAS, Quota, Quotas
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
+from robomesh.worker import Worker, WorkerError
 from services.recorder.answers import Question
 from services.recorder.settings import MIB
 

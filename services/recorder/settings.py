@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bus.quotas import DEFAULT_QUOTAS, Quotas
-from bus.schemas.robomesh_pb2 import Event
+from robomesh.quotas import DEFAULT_QUOTAS, Quotas
+from robomesh.schemas.robomesh_pb2 import Event
 
 MIB = 1 << 20
 

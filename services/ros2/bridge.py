@@ -10,12 +10,12 @@ import numpy as np
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from bus.errors import BusError
-from bus.keys import Key, every_robot
-from bus.schemas.robomesh_pb2 import Description
-from bus.session import Session
-from bus.subscription import Sample
-from bus.topics import Priority
+from robomesh.errors import BusError
+from robomesh.keys import Key, every_robot
+from robomesh.schemas.robomesh_pb2 import Description
+from robomesh.session import Session
+from robomesh.subscription import Sample
+from robomesh.topics import Priority
 from robots.urdf.viewers import WORLD, Viewed, together
 from services.ros2.meshes import Meshes
 from services.ros2.settings import Settings

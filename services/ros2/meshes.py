@@ -5,10 +5,10 @@ import hashlib
 import logging
 from pathlib import Path
 
-from bus.errors import BusError
-from bus.keys import robot_key
-from bus.schemas.robomesh_pb2 import Description
-from bus.session import Session
+from robomesh.errors import BusError
+from robomesh.keys import robot_key
+from robomesh.schemas.robomesh_pb2 import Description
+from robomesh.session import Session
 from services.viewed import meshes_of
 
 log = logging.getLogger(__name__)

@@ -2,8 +2,8 @@
 
 import asyncio
 
-from bus.guest import be_present
-from bus.session import Session
+from robomesh.guest import be_present
+from robomesh.session import Session
 from services.ros2.bridge import Bridge
 from services.ros2.settings import Settings
 

@@ -18,11 +18,11 @@ from typing import Any
 
 import zenoh
 
-from bus.endpoints import Link, Tls, first_line, router_config, router_values
-from bus.errors import BusError
-from bus.identity import read_identity
-from bus.schemas.robomesh_pb2 import Event
-from bus.session import SessionSettings
+from robomesh.endpoints import Link, Tls, first_line, router_config, router_values
+from robomesh.errors import BusError
+from robomesh.identity import read_identity
+from robomesh.schemas.robomesh_pb2 import Event
+from robomesh.session import SessionSettings
 from services.errors import ListenError, ServiceError
 from services.listen import check_reach, reachable, split_address
 from services.router.shown import imposters, to_other_sites, without_rights

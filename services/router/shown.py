@@ -12,8 +12,8 @@ from typing import Any
 
 import zenoh
 
-from bus.endpoints import Link
-from bus.topics import Role
+from robomesh.endpoints import Link
+from robomesh.topics import Role
 
 _ADDRESS = re.compile(r"/\[?([^\]/?#]*)\]?:(\d+)(?:[?#]|$)")
 

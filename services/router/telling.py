@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import zenoh
 
-from bus.errors import BusError
-from bus.health import Served, present
-from bus.keys import WHOLE_SITE
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import SessionSettings, open_session
+from robomesh.errors import BusError
+from robomesh.health import Served, present
+from robomesh.keys import WHOLE_SITE
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import SessionSettings, open_session
 
 log = logging.getLogger(__name__)
 

@@ -4,8 +4,8 @@ import asyncio
 
 import zenoh
 
-from bus.endpoints import Tls
-from bus.identity import read_identity
+from robomesh.endpoints import Tls
+from robomesh.identity import read_identity
 
 _LONGEST_S = 10.0
 # Its clients come back to it within this.

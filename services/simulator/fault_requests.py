@@ -4,13 +4,13 @@ import asyncio
 import time
 from dataclasses import dataclass
 
-from bus import reason_codes as codes
-from bus.answering import Request
-from bus.errors import RefusedError
-from bus.health import Served, present
-from bus.schemas.robomesh_pb2 import FaultAnswer, FaultRequest
-from bus.session import SessionSettings, open_session
-from bus.topics import Role
+from robomesh import reason_codes as codes
+from robomesh.answering import Request
+from robomesh.errors import RefusedError
+from robomesh.health import Served, present
+from robomesh.schemas.robomesh_pb2 import FaultAnswer, FaultRequest
+from robomesh.session import SessionSettings, open_session
+from robomesh.topics import Role
 from services.simulator.errors import SimulatorError
 from services.simulator.fault_table import FAULTS
 from services.simulator.faults import Faults

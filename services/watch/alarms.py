@@ -23,9 +23,9 @@ more than 10 in 10 minutes, over below 5).
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
-from bus import reason_codes as codes
-from bus.reasons import Reason
-from bus.schemas.robomesh_pb2 import Alarm as AlarmMessage
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
+from robomesh.schemas.robomesh_pb2 import Alarm as AlarmMessage
 
 State = AlarmMessage.State
 

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from bus.schemas import robomesh_pb2 as schema
+from robomesh.schemas import robomesh_pb2 as schema
 from services.watch import kept
 from services.watch.alarms import Alarm, Alarms
 from services.watch.conditions import Condition

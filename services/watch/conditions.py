@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from bus.keys import WHOLE_SITE
-from bus.schemas.robomesh_pb2 import ControllerState
+from robomesh.keys import WHOLE_SITE
+from robomesh.schemas.robomesh_pb2 import ControllerState
 
 # When a site starts, its parts come one after the other.
 _LINK_AFTER_S = 1.0

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from bus.keys import Key
-from bus.schemas.robomesh_pb2 import Event
+from robomesh.keys import Key
+from robomesh.schemas.robomesh_pb2 import Event
 from services.watch.alarms import Alarm, Alarms
 from services.watch.conditions import Condition, alarm_id
 from services.watch.rules import LOW, RULES, ends, rule_of

@@ -6,7 +6,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
-from bus.schemas.robomesh_pb2 import Alarm as AlarmMessage
+from robomesh.schemas.robomesh_pb2 import Alarm as AlarmMessage
 from services.watch.alarms import Alarm
 from services.whole_file import write_whole
 

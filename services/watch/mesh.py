@@ -5,10 +5,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from statistics import quantiles
 
-from bus.clock import Clock, Reading
-from bus.keys import WHOLE_SITE, PresenceKey
-from bus.presence import SILENT
-from bus.schemas.robomesh_pb2 import MeshState, ServiceHealth
+from robomesh.clock import Clock, Reading
+from robomesh.keys import WHOLE_SITE, PresenceKey
+from robomesh.presence import SILENT
+from robomesh.schemas.robomesh_pb2 import MeshState, ServiceHealth
 
 _LOSS_OVER = 30  # health messages: a minute
 _HOPS_KEPT = 200

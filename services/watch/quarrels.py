@@ -8,8 +8,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 
-from bus.keys import REPLAY, WHOLE_SITE, PresenceKey
-from bus.session import CERTIFICATE
+from robomesh.keys import REPLAY, WHOLE_SITE, PresenceKey
+from robomesh.session import CERTIFICATE
 from services.watch.conditions import Condition
 from services.watch.mesh import Mesh, Process
 

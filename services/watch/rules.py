@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from bus.schemas.robomesh_pb2 import Alarm, Event
+from robomesh.schemas.robomesh_pb2 import Alarm, Event
 
 LOW, MEDIUM, HIGH, CRITICAL = Alarm.LOW, Alarm.MEDIUM, Alarm.HIGH, Alarm.CRITICAL
 _MINUTE_S = 60.0

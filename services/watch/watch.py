@@ -8,16 +8,16 @@ from collections.abc import Coroutine, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from bus.answering import Request
-from bus.clock import read_clock
-from bus.errors import MessageError, NoAnswerError, RefusedError
-from bus.ignored import PUBLICATION
-from bus.keys import REPLAY, ROOT, WHOLE_SITE, check_name
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
-from bus.subscription import Subscription
-from bus.texts import one_line
-from bus.topics import check_operator
+from robomesh.answering import Request
+from robomesh.clock import read_clock
+from robomesh.errors import MessageError, NoAnswerError, RefusedError
+from robomesh.ignored import PUBLICATION
+from robomesh.keys import REPLAY, ROOT, WHOLE_SITE, check_name
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
+from robomesh.subscription import Subscription
+from robomesh.texts import one_line
+from robomesh.topics import check_operator
 from services.watch.alarms import AlarmError
 from services.watch.book import Book
 from services.watch.conditions import Condition, Judge, robot_conditions

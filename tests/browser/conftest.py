@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from bus.endpoints import router_config
-from bus.keys import WHOLE_SITE
-from bus.schemas.robomesh_pb2 import Event
-from bus.session import Session, SessionSettings, open_session
 from protocol_gateway import gateway
 from protocol_gateway.legacy.settings import LegacySettings
 from protocol_gateway.settings import RobotSettings
+from robomesh.endpoints import router_config
+from robomesh.keys import WHOLE_SITE
+from robomesh.schemas.robomesh_pb2 import Event
+from robomesh.session import Session, SessionSettings, open_session
 from robots.cells import Fixture
 from services.console import build_page, console
 from services.kinematics import kinematics

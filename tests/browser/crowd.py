@@ -19,9 +19,9 @@ if __name__ == "__main__":
 import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from bus.answering import Request
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session, SessionSettings, open_session
+from robomesh.answering import Request
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session, SessionSettings, open_session
 from robots.description import load
 from robots.glb import link_meshes
 from robots.joints import Joints

@@ -6,7 +6,7 @@ from contextlib import contextmanager, suppress
 
 from playwright.sync_api import Error, expect
 
-from bus.schemas.robomesh_pb2 import FaultRequest
+from robomesh.schemas.robomesh_pb2 import FaultRequest
 from services.console import build_page
 
 ARM = "#/hall/arm"

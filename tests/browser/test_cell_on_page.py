@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 from playwright.sync_api import expect
 
-from bus.session import open_session
+from robomesh.session import open_session
 from services.console import build_page
 from tests.browser.conftest import CHROMIUM
 from tests.browser.robot_page import serious

@@ -5,10 +5,10 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from bus.errors import RefusedError
-from bus.keys import WHOLE_SITE
-from bus.schemas import robomesh_pb2 as schema
-from bus.texts import DIRECTION
+from robomesh.errors import RefusedError
+from robomesh.keys import WHOLE_SITE
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.texts import DIRECTION
 from tests.browser.robot_page import button
 
 pytestmark = pytest.mark.browser

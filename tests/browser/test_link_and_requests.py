@@ -7,8 +7,8 @@ import socket
 import pytest
 from playwright.sync_api import expect
 
-from bus.errors import RefusedError
-from bus.schemas.robomesh_pb2 import LeaseRequest
+from robomesh.errors import RefusedError
+from robomesh.schemas.robomesh_pb2 import LeaseRequest
 from tests.browser.robot_page import ARM, button, serious
 
 pytestmark = pytest.mark.browser

@@ -8,9 +8,9 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 from playwright.sync_api import expect
 
-from bus.errors import RefusedError
-from bus.keys import WHOLE_SITE
-from bus.schemas import robomesh_pb2 as schema
+from robomesh.errors import RefusedError
+from robomesh.keys import WHOLE_SITE
+from robomesh.schemas import robomesh_pb2 as schema
 from services import player, recorder
 from tests.browser.robot_page import button, serious
 

@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from bus.schemas.robomesh_pb2 import AuditQuery
+from robomesh.schemas.robomesh_pb2 import AuditQuery
 from services.console.accounts import sessions
 from services.console.accounts.desk import change_account
 from tests.browser.conftest import NO_WEBGL, Plant, run_plant

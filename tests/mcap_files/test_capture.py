@@ -7,8 +7,6 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
-from bus.header import Header
-from bus.topics import topic
 from mcap_files import indexed
 from mcap_files.capture import Capture
 from mcap_files.errors import CaptureError
@@ -16,6 +14,8 @@ from mcap_files.files import describe_file
 from mcap_files.finish import index, rewrite
 from mcap_files.layout import layout_of
 from mcap_files.recover import State, is_ours, mend, recover, state_of
+from robomesh.header import Header
+from robomesh.topics import topic
 from tests.recordings import write_recording
 
 ABOUT = {"site": "site", "robot": "arm", "name": "trial", "started_by": "request"}

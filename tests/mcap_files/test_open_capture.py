@@ -4,9 +4,9 @@ import errno
 
 import pytest
 
-from bus.header import Header
-from bus.topics import topic
 from mcap_files.capture import Capture, is_being_written
+from robomesh.header import Header
+from robomesh.topics import topic
 
 KEY = "robomesh/site/arm/joints"
 

@@ -8,10 +8,10 @@ import pytest
 from mcap.writer import Writer
 from mcap_protobuf.schema import register_schema
 
-from bus.schemas import robomesh_pb2 as schema
 from mcap_files.reading import RecordedMessage, RecordingFile
 from mcap_files.series import SeriesReader
 from mcap_files.times import PublisherTimes
+from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.recordings.export import Wanted
 from services.command_line.recordings.export import run as export
 from services.player.tape import Tape

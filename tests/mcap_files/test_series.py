@@ -5,11 +5,11 @@ import math
 import pytest
 from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorProto
 
-from bus.schemas import robomesh_pb2 as schema
 from mcap_files.errors import RecordingError
 from mcap_files.reading import RecordingFile
 from mcap_files.series import SeriesReader, known_values
 from mcap_files.values import unit_of, values_of
+from robomesh.schemas import robomesh_pb2 as schema
 from tests.recordings import START_NS, Written, joints, write_recording
 
 

@@ -2,7 +2,7 @@
 
 import contextlib
 
-from bus.schemas import robomesh_pb2 as schema
+from robomesh.schemas import robomesh_pb2 as schema
 from services.simulator.fault_requests import Mesh
 from tests.protocol_gateway.hall import gateway, simulator
 

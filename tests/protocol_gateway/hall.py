@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from bus.errors import RefusedError
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import open_session
 from protocol_gateway.gateway import RobotSettings, Settings, serve
+from robomesh.errors import RefusedError
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import open_session
 from services.simulator.simulator import Settings as SimulatorSettings
 from services.simulator.simulator import serve as simulate
 from tests.conftest import last_value

@@ -2,8 +2,6 @@
 
 from contextlib import asynccontextmanager
 
-from bus import reason_codes as codes
-from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.log import AuditLog, read_entries
 from protocol_gateway.authority.obstacles import Controller
 from protocol_gateway.authority.rules import Authority
@@ -15,6 +13,8 @@ from protocol_gateway.drivers.unit import UnitDriver
 from protocol_gateway.errors import LinkDownError
 from protocol_gateway.journal import Journal
 from protocol_gateway.link.link import LinkState, LinkStatus
+from robomesh import reason_codes as codes
+from robomesh.schemas import robomesh_pb2 as schema
 from robots.description import load
 from robots.joints import joints_of
 

@@ -4,9 +4,9 @@ import asyncio
 import json
 import math
 
-from bus.messages import JSON, PROTOBUF
-from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.log import read_entries, verify
+from robomesh.messages import JSON, PROTOBUF
+from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
 from tests.protocol_gateway.hall import C, gateway, simulator, until
 

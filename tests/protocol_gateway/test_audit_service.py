@@ -14,10 +14,10 @@ from pathlib import Path
 
 import pytest
 
-from bus.errors import RefusedError
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import open_session
 from protocol_gateway.audit.log import read_entries, verify
+from robomesh.errors import RefusedError
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import open_session
 from tests.conftest import run
 from tests.protocol_gateway.hall import STATE, A, C, Plant, gateway, refusal, simulator, until, watch
 from tests.site import robomesh

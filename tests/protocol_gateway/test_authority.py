@@ -6,8 +6,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bus import reason_codes as codes
-from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from protocol_gateway.authority.admission import admit, delay, remember
 from protocol_gateway.authority.holders_motion import command_sent, observe, refused
 from protocol_gateway.authority.rules import (
@@ -21,6 +19,8 @@ from protocol_gateway.authority.rules import (
     stop,
     stop_sent,
 )
+from robomesh import reason_codes as codes
+from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 
 A = LeaseRequest.Action
 C = CommandRequest.Command

@@ -4,8 +4,6 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from bus import reason_codes as codes
-from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from protocol_gateway.authority.admission import admit, remember
 from protocol_gateway.authority.holders_motion import command_sent, observe, refused, reported
 from protocol_gateway.authority.rules import (
@@ -20,6 +18,8 @@ from protocol_gateway.authority.rules import (
     request_lease,
     stop,
 )
+from robomesh import reason_codes as codes
+from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 
 A = LeaseRequest.Action
 C = CommandRequest.Command

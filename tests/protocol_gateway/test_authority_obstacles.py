@@ -5,12 +5,12 @@ from math import radians
 
 import pytest
 
-from bus import reason_codes as codes
-from bus.schemas.robomesh_pb2 import CommandRequest
 from protocol_gateway.authority.obstacles import Controller, controller_command, obstacle
 from protocol_gateway.drivers.driver import Activity, Mode, MoveAbsolute, Speed, StatusReceived, Trace
 from protocol_gateway.link.link import LinkState, LinkStatus
 from protocol_gateway.motion import PositionWatch, has_arrived, is_moving, motion_may_be_held
+from robomesh import reason_codes as codes
+from robomesh.schemas.robomesh_pb2 import CommandRequest
 from robots.description import load
 from robots.joints import JointType, joints_of
 

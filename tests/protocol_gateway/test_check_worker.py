@@ -10,11 +10,11 @@ import sys
 import numpy as np
 import pytest
 
-from bus import reason_codes as codes
 from protocol_gateway.checking.checker import MOST_PROCESSES, Checker, checkers_of
 from protocol_gateway.checking.questions import Checked, CheckMotion
 from protocol_gateway.checking.worker import begin
 from protocol_gateway.errors import CheckError
+from robomesh import reason_codes as codes
 from robots.cells import CellDescription, CellRobot, Fixture
 from robots.meshes.mesh import Material, Mesh, Part
 from robots.tree import Shape

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bus.errors import RefusedError
-from bus.schemas import robomesh_pb2 as schema
+from robomesh.errors import RefusedError
+from robomesh.schemas import robomesh_pb2 as schema
 from robots.cells import CellDescription, CellRobot, Fixture
 from robots.poses import pose_matrix
 from robots.schema import Pose, Units

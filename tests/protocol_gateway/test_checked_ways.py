@@ -7,12 +7,12 @@ from math import radians
 
 import pytest
 
-from bus.errors import RefusedError
-from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.checking.cell_mates import CellMates
 from protocol_gateway.checking.policy import Policy
 from protocol_gateway.control.checks import Checks
 from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
+from robomesh.errors import RefusedError
+from robomesh.schemas import robomesh_pb2 as schema
 from robots.description import load
 from robots.joints import joints_of
 from tests.conftest import run

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from bus.session import SessionSettings
+from robomesh.session import SessionSettings
 from services.simulator.errors import SimulatorError
 from services.simulator.fault_requests import Mesh
 from tests.conftest import run

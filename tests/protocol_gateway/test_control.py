@@ -5,11 +5,11 @@ from math import radians
 
 import pytest
 
-from bus import reason_codes as codes
-from bus.errors import RefusedError
-from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.authority.rules import Authority
 from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
+from robomesh import reason_codes as codes
+from robomesh.errors import RefusedError
+from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
 from tests.protocol_gateway.hall import until
 from tests.protocol_gateway.place import place

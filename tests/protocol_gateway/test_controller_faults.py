@@ -1,6 +1,6 @@
 """Controllers in local mode, with a fault, that move by themselves or ignore a stop."""
 
-from bus.schemas import robomesh_pb2 as schema
+from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
 from tests.protocol_gateway.faulty import faulty
 from tests.protocol_gateway.hall import STATE, A, C, refusal, until

@@ -7,10 +7,10 @@ import time
 
 import pytest
 
-from bus.keys import robot_key
 from protocol_gateway.drivers.driver import Activity, JointsReceived, Mode, Refused, StatusReceived
 from protocol_gateway.link.dating import Received
 from protocol_gateway.link.flood import Flood, HandOver
+from robomesh.keys import robot_key
 from tests.conftest import run
 from tests.protocol_gateway.bare import bare_controller, repeated
 from tests.protocol_gateway.hall import STATE, A, C, gateway, none_left_out, refusal, simulator, until

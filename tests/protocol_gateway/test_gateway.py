@@ -6,10 +6,10 @@ import time
 
 import pytest
 
-from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.log import read_entries, verify
 from protocol_gateway.errors import GatewaySettingsError
 from protocol_gateway.gateway import RobotSettings, Settings, check
+from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import last_value, run
 from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from bus.endpoints import router_config
-from bus.session import SessionSettings
 from protocol_gateway.audit.log import read_entries
 from protocol_gateway.robot import Robot
+from robomesh.endpoints import router_config
+from robomesh.session import SessionSettings
 from tests.conftest import free_port, last_value, run
 from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
 

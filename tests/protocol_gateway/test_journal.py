@@ -1,7 +1,7 @@
 """Events of a kind that comes again and again."""
 
-from bus.schemas.robomesh_pb2 import Event
 from protocol_gateway.journal import Journal
+from robomesh.schemas.robomesh_pb2 import Event
 
 
 class Heard:

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from bus import reason_codes as codes
 from protocol_gateway.audit.latch import RESERVED, SLOT_BYTES, LatchFile
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome, read_entries
 from protocol_gateway.audit.restart import LATCH_UNKNOWN
 from protocol_gateway.authority.rules import Stop
 from protocol_gateway.errors import AuditError
+from robomesh import reason_codes as codes
 from tests.conftest import run
 from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
 from tests.soak import latch_kills

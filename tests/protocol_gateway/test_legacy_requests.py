@@ -8,8 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bus import reason_codes as codes
-from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from protocol_gateway.authority.obstacles import Controller
 from protocol_gateway.authority.rules import Authority, Stop
 from protocol_gateway.core.records import Error, read_records, write_unit
@@ -24,6 +22,8 @@ from protocol_gateway.legacy.requests import (
 )
 from protocol_gateway.legacy.settings import plain_address
 from protocol_gateway.link.link import LinkState, LinkStatus
+from robomesh import reason_codes as codes
+from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from robots.description import load
 from robots.joints import joints_of
 from tests.conftest import run

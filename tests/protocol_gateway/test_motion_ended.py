@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from bus import reason_codes as codes
-from bus.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from protocol_gateway.audit.log import GATEWAY
 from protocol_gateway.authority.holders_motion import command_sent, observe, reported
 from protocol_gateway.authority.rules import Authority, Now, end_lease, request_lease
 from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
+from robomesh import reason_codes as codes
+from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from robots.description import load
 from robots.joints import joints_of
 from tests.conftest import run

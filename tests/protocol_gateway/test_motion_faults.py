@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from bus.schemas import robomesh_pb2 as schema
+from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
 from tests.protocol_gateway.bare import bare_controller, repeated, slow_starter
 from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, until

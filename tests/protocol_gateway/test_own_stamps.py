@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import pytest
 
-from bus.session import open_session
+from robomesh.session import open_session
 from tests.conftest import run
 from tests.protocol_gateway.hall import gateway, until
 

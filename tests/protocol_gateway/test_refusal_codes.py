@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from bus.errors import RefusedError
 from protocol_gateway.audit.log import read_entries
+from robomesh.errors import RefusedError
 from tests.conftest import run
 from tests.protocol_gateway.hall import A, C, gateway, simulator, until
 

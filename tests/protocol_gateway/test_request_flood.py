@@ -2,10 +2,10 @@
 
 import asyncio
 
-from bus.asking import ask_all
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import open_session
 from protocol_gateway.audit.log import read_entries
+from robomesh.asking import ask_all
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import open_session
 from tests.conftest import run
 from tests.protocol_gateway.hall import STATE, A, C, gateway, simulator, until
 

@@ -6,10 +6,10 @@ import threading
 import pytest
 import zenoh
 
-from bus.errors import NoAnswerError, RefusedError
-from bus.schemas import robomesh_pb2 as schema
 from protocol_gateway.audit.log import Outcome, read_entries
 from protocol_gateway.audit.restart import remembered
+from robomesh.errors import NoAnswerError, RefusedError
+from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
 from tests.protocol_gateway.hall import gateway, simulator
 from tests.protocol_gateway.place import place

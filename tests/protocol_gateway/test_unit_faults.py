@@ -3,7 +3,7 @@
 import asyncio
 import time
 
-from bus.keys import robot_key
+from robomesh.keys import robot_key
 from tests.conftest import run
 from tests.protocol_gateway.bare import bare_controller, repeated
 from tests.protocol_gateway.faulty import faulty

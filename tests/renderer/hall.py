@@ -10,10 +10,10 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from bus.session import open_session
 from renderer import service
 from renderer.overlay import AMBER
 from renderer.service import Settings
+from robomesh.session import open_session
 from services import kinematics
 from tests.cells import arm_alone
 from tests.renderer.bodies import context_or_skip

@@ -15,13 +15,13 @@ import numpy as np
 if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[2])
 
-from bus.schemas.robomesh_pb2 import Vector3, View
 from renderer.cache import cache_folder
 from renderer.cameras import fitted
 from renderer.look import frame_placements, placements_at
 from renderer.overlay import Overlay, Row, _write_badge, write_over
 from renderer.staging import Placed, scene_of
 from renderer.views import camera_from, camera_of
+from robomesh.schemas.robomesh_pb2 import Vector3, View
 from tests.renderer.stage import cell, drawing_of, posed, robot
 
 ROOT = Path(__file__).parents[2]

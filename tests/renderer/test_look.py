@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from bus.schemas.robomesh_pb2 import Description, Vector3, View
 from renderer.cameras import pixels
 from renderer.chain import placements, reach, read_chain
 from renderer.errors import ChainError, UnknownViewError
 from renderer.look import home_placements, look_of
 from renderer.views import camera_of
+from robomesh.schemas.robomesh_pb2 import Description, Vector3, View
 from robots.description import load
 from robots.model import build_model, frame_placements, link_placements
 from robots.urdf.write import to_urdf

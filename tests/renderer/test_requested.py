@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from bus.schemas.robomesh_pb2 import Vector3, View, ViewRequest
 from renderer.errors import RendererError
 from renderer.look import look_of
 from renderer.requested import far, requested
+from robomesh.schemas.robomesh_pb2 import Vector3, View, ViewRequest
 from tests.renderer.test_look import described
 
 SIZE = (1280, 720)

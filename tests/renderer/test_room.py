@@ -4,11 +4,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from bus.errors import QuotaError
 from renderer.errors import NoRoomError, ViewRequestError
 from renderer.requested import Shot
 from renderer.room import Room
 from renderer.service import Settings
+from robomesh.errors import QuotaError
 
 
 def room(**changed):

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from bus.errors import NoAnswerError, RefusedError
-from bus.schemas.robomesh_pb2 import ControllerState, Event, KeyFrameRequest, VideoFrames
-from bus.session import open_session
 from renderer import finishing, pace, robots, service, stream
 from renderer.encoder import H264Encoder
 from renderer.errors import NoEncoderError, RendererError
 from renderer.service import Settings
+from robomesh.errors import NoAnswerError, RefusedError
+from robomesh.schemas.robomesh_pb2 import ControllerState, Event, KeyFrameRequest, VideoFrames
+from robomesh.session import open_session
 from robots.cells import Fixture
 from services.site_fixtures import Fixture as FixtureRow
 from services.site_fixtures import fixture_shape

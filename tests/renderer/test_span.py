@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from bus.schemas.robomesh_pb2 import Clearance, Description, KinematicState, Vector3
 from renderer.cameras import Camera, pixels
 from renderer.overlay import AMBER, FAINT
 from renderer.span import RED, Span, draw_span, same_span, span_of
 from renderer.state import Ages, RobotState, span_now
+from robomesh.schemas.robomesh_pb2 import Clearance, Description, KinematicState, Vector3
 
 DESCRIPTION = Description(warning_distance=0.05, stop_distance=0.01)
 ASIDE = Camera(np.array([0.0, -3.0, 0.5]), np.array([0.0, 0.0, 0.5]), np.array([0.0, 0.0, 1.0]))

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from bus.schemas.robomesh_pb2 import Vector3, View
 from renderer.cameras import pixels
 from renderer.errors import CameraError, UnknownViewError
 from renderer.look import frame_placements, look_of, placements_at
 from renderer.views import camera_from, camera_of, view_names
+from robomesh.schemas.robomesh_pb2 import Vector3, View
 from tests.renderer.test_look import described
 
 SIZE = (640, 360)

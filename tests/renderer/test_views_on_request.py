@@ -8,19 +8,12 @@ import numpy as np
 import pytest
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from bus.errors import QuotaError, RefusedError
-from bus.quotas import Quotas
-from bus.schemas.robomesh_pb2 import (
-    Description,
-    KeyFrameRequest,
-    Vector3,
-    View,
-    ViewAnswer,
-    ViewRequest,
-)
-from bus.session import open_session
 from renderer import service
 from renderer.mp4 import FragmentedMp4
+from robomesh.errors import QuotaError, RefusedError
+from robomesh.quotas import Quotas
+from robomesh.schemas.robomesh_pb2 import Description, KeyFrameRequest, Vector3, View, ViewAnswer, ViewRequest
+from robomesh.session import open_session
 from tests.conftest import last_value, run
 from tests.renderer.hall import frames, hall, moving, picture
 

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from bus import reason_codes as codes
+from robomesh import reason_codes as codes
 from robots.description import load
 from robots.errors import JointCountError
 from robots.joints import JointType, joints_of, violations

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bus.schemas import robomesh_pb2 as schema
+from robomesh.schemas import robomesh_pb2 as schema
 from robots.cells import CellDescription, CellRobot
 from robots.collision import build_cell, near_along, own_contacts, own_nearest, pending, study
 from robots.collision.cell import Cell

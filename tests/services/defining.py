@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bus.session import SessionSettings, open_session
+from robomesh.session import SessionSettings, open_session
 from services.console.console import Settings, serve
 from services.console.define.settings import DefineSettings
 from services.site import Define, Robot, Site

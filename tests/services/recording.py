@@ -5,9 +5,9 @@ from contextlib import asynccontextmanager
 
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import open_session
 from mcap_files.recover import State, state_of
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import open_session
 from services import recorder
 from services.recorder.settings import Settings
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bus.keys import parse_key
-from bus.schemas.robomesh_pb2 import Alarm as Message
-from bus.schemas.robomesh_pb2 import Event
+from robomesh.keys import parse_key
+from robomesh.schemas.robomesh_pb2 import Alarm as Message
+from robomesh.schemas.robomesh_pb2 import Event
 from services.watch import kept
 from services.watch.alarms import LONGEST_SHELF_S, Alarm, AlarmError, Alarms
 from services.watch.intake import Intake

@@ -7,11 +7,11 @@ import pytest
 import zenoh
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from bus.endpoints import bundle, client_config, router_config
-from bus.presence import MONITOR
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import SessionSettings, open_session
-from bus.topics import Role
+from robomesh.endpoints import bundle, client_config, router_config
+from robomesh.presence import MONITOR
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import SessionSettings, open_session
+from robomesh.topics import Role
 from services.keys import Folder, deeds
 from services.ros2 import Settings as Ros2Settings
 from services.ros2 import serve as serve_ros2

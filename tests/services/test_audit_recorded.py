@@ -4,9 +4,9 @@ import asyncio
 import contextlib
 import json
 
-from bus.session import open_session
 from mcap_files.files import describe_file
 from protocol_gateway.audit.log import read_entries
+from robomesh.session import open_session
 from services.recorder.recorder import Settings, serve
 from tests.conftest import run
 from tests.protocol_gateway.hall import A, C, gateway, simulator, until

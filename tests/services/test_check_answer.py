@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bus.schemas import robomesh_pb2 as schema
+from robomesh.schemas import robomesh_pb2 as schema
 from robots.cells import CellDescription, CellRobot
 from robots.collision import Cell, build_cell
 from services.kinematics.check import check_answer

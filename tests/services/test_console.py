@@ -12,10 +12,10 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from bus.errors import RefusedError
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import open_session
-from bus.subscription import Subscription
+from robomesh.errors import RefusedError
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import open_session
+from robomesh.subscription import Subscription
 from services.console import feeds
 from services.console.console import Settings, serve
 from services.console.errors import PageNotBuiltError

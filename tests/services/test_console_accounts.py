@@ -6,7 +6,7 @@ import json
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from bus.schemas import robomesh_pb2 as schema
+from robomesh.schemas import robomesh_pb2 as schema
 from services.console.accounts.desk import change_account
 from services.console.accounts.file import AccountRole
 from services.console.accounts.gate import SIGNED_OUT

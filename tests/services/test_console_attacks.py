@@ -10,7 +10,7 @@ import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
-from bus.schemas.robomesh_pb2 import FromPage
+from robomesh.schemas.robomesh_pb2 import FromPage
 from services.console import line, meshes, recordings, server
 from services.console.connection import Connection
 from services.console.listener import Listener

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bus.errors import RefusedError
+from robomesh.errors import RefusedError
 from services.console.browser import check_ask
 from services.console.errors import WatchError
 from services.console.feeds import check_expression

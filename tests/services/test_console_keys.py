@@ -1,6 +1,6 @@
 """A console with a certificate and no accounts: whoever opens its page asks in the console's name alone."""
 
-from bus.schemas import robomesh_pb2 as schema
+from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
 from tests.services.test_attach_keys import hall, mesh_of, secured
 from tests.services.test_console import browse, console, page

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from bus import topics
-from bus.header import Header
-from bus.subscription import Sample
+from robomesh import topics
+from robomesh.header import Header
+from robomesh.subscription import Sample
 from services.console.lanes import is_key_frame, lane_for, thinned
 
 KEY = b"\0\0\0\1\x67\x42\xc0\x1f\0\0\0\1\x68\xce\0\0\0\1\x65\x88"

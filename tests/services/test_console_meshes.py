@@ -3,7 +3,7 @@
 import pytest
 from starlette.requests import Request
 
-from bus.errors import BusyError, NoAnswerError, QuotaError, RefusedError
+from robomesh.errors import BusyError, NoAnswerError, QuotaError, RefusedError
 from services.console import meshes
 from services.console.meshes import MeshCache, mesh_response
 from tests.conftest import run

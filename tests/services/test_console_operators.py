@@ -2,9 +2,9 @@
 
 import asyncio
 
-from bus.asking import ask_all
-from bus.errors import RefusedError
-from bus.schemas.robomesh_pb2 import LeaseAnswer, LeaseRequest, ReplayState
+from robomesh.asking import ask_all
+from robomesh.errors import RefusedError
+from robomesh.schemas.robomesh_pb2 import LeaseAnswer, LeaseRequest, ReplayState
 from tests.conftest import run
 from tests.services.test_console import browse, console, page
 

@@ -11,11 +11,11 @@ import pytest
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from bus import reason_codes as codes
-from bus.errors import QuotaError, RefusedError
-from bus.header import Header
-from bus.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
-from bus.subscription import Sample
+from robomesh import reason_codes as codes
+from robomesh.errors import QuotaError, RefusedError
+from robomesh.header import Header
+from robomesh.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
+from robomesh.subscription import Sample
 from services.console import pictures
 from services.console.lanes import NewestLane
 from services.console.streamed import Streamed

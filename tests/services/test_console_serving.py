@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from bus.header import Header
-from bus.schemas.robomesh_pb2 import FromPage, ToPage
-from bus.subscription import Sample
+from robomesh.header import Header
+from robomesh.schemas.robomesh_pb2 import FromPage, ToPage
+from robomesh.subscription import Sample
 from services.console.browser import Browser
 from services.console.turns import Turns
 from services.console.wire import Moment, frame, moments, state_frame

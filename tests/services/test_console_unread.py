@@ -3,8 +3,8 @@
 import asyncio
 from dataclasses import dataclass, field
 
-from bus.schemas.robomesh_pb2 import FromPage, ToPage
-from bus.session import open_session
+from robomesh.schemas.robomesh_pb2 import FromPage, ToPage
+from robomesh.session import open_session
 from services.console.browser import Browser
 from services.console.feeds import Feeds
 from services.console.views import Views

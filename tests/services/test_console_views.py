@@ -6,11 +6,11 @@ from types import SimpleNamespace
 import pytest
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from bus.errors import RefusedError
-from bus.header import Header
-from bus.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
-from bus.session import open_session
-from bus.subscription import Sample
+from robomesh.errors import RefusedError
+from robomesh.header import Header
+from robomesh.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
+from robomesh.session import open_session
+from robomesh.subscription import Sample
 from services.console import lanes, stepped
 from services.console.stepped import SteppedVideo
 from services.console.views import LOWEST_STEP, Views, less

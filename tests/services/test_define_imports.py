@@ -10,8 +10,8 @@ import pytest
 import trimesh
 import zenoh
 
-from bus.endpoints import router_config
-from bus.session import SessionSettings
+from robomesh.endpoints import router_config
+from robomesh.session import SessionSettings
 from robots.collision.pairs import plan_of
 from robots.collision.verdicts import IGNORED
 from robots.description import load

@@ -12,8 +12,8 @@ import pytest
 import zenoh
 from starlette.requests import Request
 
-from bus.endpoints import router_config
-from bus.session import SessionSettings
+from robomesh.endpoints import router_config
+from robomesh.session import SessionSettings
 from robots.description import LIBRARY, load
 from robots.save import read_robot, write_folder
 from services.command_line import roles

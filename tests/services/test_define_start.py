@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from bus.schemas.robomesh_pb2 import ControllerState
-from bus.session import open_session
+from robomesh.schemas.robomesh_pb2 import ControllerState
+from robomesh.session import open_session
 from tests.conftest import run
 from tests.services.defining import Page
 from tests.site import alive, kill, robomesh, running_site, wait_until

@@ -10,13 +10,13 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from bus.errors import RefusedError
-from bus.header import Header
-from bus.schemas import robomesh_pb2 as schema
-from bus.topics import topic
 from mcap_files.capture import Capture
 from mcap_files.files import describe_file
 from mcap_files.finish import rewrite
+from robomesh.errors import RefusedError
+from robomesh.header import Header
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.topics import topic
 from services.recorder import flight
 from services.recorder.settings import Flight
 from tests.conftest import run

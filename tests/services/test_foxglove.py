@@ -12,10 +12,10 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from foxglove_schemas_protobuf.Log_pb2 import Log
 
-from bus.endpoints import router_config
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import SessionSettings, open_session
 from renderer.encoder import H264Encoder
+from robomesh.endpoints import router_config
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import SessionSettings, open_session
 from services.foxglove import Settings, serve
 from tests.conftest import free_port, run
 from tests.protocol_gateway.hall import STATE, gateway, simulator

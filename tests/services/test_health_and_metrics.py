@@ -11,14 +11,14 @@ import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from prometheus_client.parser import text_string_to_metric_families
 
-import bus.subscription
-from bus.clock import Clock, Reading, hops_of, read_clock, reading_of
-from bus.errors import NoAnswerError, SessionError
-from bus.health import Served, own_version, present
-from bus.latencies import Latencies
-from bus.metrics import SessionMetrics, serve_metrics
-from bus.schemas.robomesh_pb2 import ServiceHealth
-from bus.session import open_session
+import robomesh.subscription
+from robomesh.clock import Clock, Reading, hops_of, read_clock, reading_of
+from robomesh.errors import NoAnswerError, SessionError
+from robomesh.health import Served, own_version, present
+from robomesh.latencies import Latencies
+from robomesh.metrics import SessionMetrics, serve_metrics
+from robomesh.schemas.robomesh_pb2 import ServiceHealth
+from robomesh.session import open_session
 from services.watch.rules import RULES
 from tests.conftest import free_port, run
 from tests.site import robomesh
@@ -114,8 +114,8 @@ def test_prometheus_reads_counts_ages_latencies_and_the_services_own(mesh):
 
 
 def test_processes_that_come_and_go_leave_neither_series_nor_keys(mesh, monkeypatch):
-    monkeypatch.setattr(bus.subscription, "_LOOK_EACH_S", 0.0)
-    monkeypatch.setattr(bus.subscription, "_FORGOTTEN_AFTER_S", 0.0)
+    monkeypatch.setattr(robomesh.subscription, "_LOOK_EACH_S", 0.0)
+    monkeypatch.setattr(robomesh.subscription, "_FORGOTTEN_AFTER_S", 0.0)
 
     async def main():
         async with open_session(mesh) as service, open_session(mesh) as monitor:

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bus.errors import RefusedError
-from bus.schemas import robomesh_pb2 as schema
+from robomesh.errors import RefusedError
+from robomesh.schemas import robomesh_pb2 as schema
 from robots.description import load
 from robots.inverse import build_solver
 from robots.model import build_model, tool_placement

@@ -11,10 +11,10 @@ from itertools import chain
 import pytest
 import zenoh
 
-from bus.access import NOBODYS_ROBOT
-from bus.endpoints import router_config
-from bus.identity import read_identity
-from bus.topics import Role
+from robomesh.access import NOBODYS_ROBOT
+from robomesh.endpoints import router_config
+from robomesh.identity import read_identity
+from robomesh.topics import Role
 from robots.description import library_names
 from services.command_line import main, up
 from services.keys import Folder, deeds

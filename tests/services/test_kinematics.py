@@ -10,9 +10,9 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bus.errors import NoAnswerError, RefusedError
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import open_session
+from robomesh.errors import NoAnswerError, RefusedError
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import open_session
 from robots.description import library_names, load
 from robots.model import build_model, tool_placement
 from robots.poses import rpy_rotation

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bus.schemas.robomesh_pb2 import Event
+from robomesh.schemas.robomesh_pb2 import Event
 from robots.collision import Nearest
 from robots.description import load
 from robots.joints import joints_of

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from bus import quotas
-from bus.errors import QuotaError, RefusedError
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import open_session
-from bus.worker import Worker
+from robomesh import quotas
+from robomesh.errors import QuotaError, RefusedError
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import open_session
+from robomesh.worker import Worker
 from robots.cells import CellDescription, CellRobot, Fixture
 from robots.collision import build_cell, outside_clearance, own_nearest
 from robots.model import tool_placement

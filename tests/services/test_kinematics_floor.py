@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bus.schemas import robomesh_pb2 as schema
 from renderer.look import floor_of
+from robomesh.schemas import robomesh_pb2 as schema
 from robots.cells import CellDescription, CellRobot, Floor
 from robots.collision import build_cell
 from services.kinematics.describe import add_surroundings

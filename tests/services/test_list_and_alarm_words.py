@@ -4,9 +4,9 @@ import asyncio
 
 import pytest
 
-from bus.keys import PresenceKey
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import open_session
+from robomesh.keys import PresenceKey
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import open_session
 from services.command_line import alarms, find, listing, listing_words
 from services.command_line.alarm_lists import gone_sites, lists
 from tests.conftest import run

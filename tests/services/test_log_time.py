@@ -5,10 +5,10 @@ import time
 
 from mcap.reader import make_reader
 
-from bus.header import Header, pack
-from bus.session import open_session
-from bus.wall_clock import WallClock
 from mcap_files.capture import Capture
+from robomesh.header import Header, pack
+from robomesh.session import open_session
+from robomesh.wall_clock import WallClock
 from services.recorder import intake
 from services.recorder import robot as recorder_robot
 from tests.conftest import run

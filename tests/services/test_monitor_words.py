@@ -3,7 +3,13 @@
 import pytest
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from bus.schemas.robomesh_pb2 import Clearance, ControllerState, Description, KinematicState, ProgramState
+from robomesh.schemas.robomesh_pb2 import (
+    Clearance,
+    ControllerState,
+    Description,
+    KinematicState,
+    ProgramState,
+)
 from services.command_line.monitor_words import (
     check_words,
     clearance_record,

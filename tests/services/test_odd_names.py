@@ -15,16 +15,16 @@ from hypothesis import strategies as st
 from websockets.asyncio.client import connect
 
 import renderer.service
-from bus.endpoints import bundle, client_config, router_config
-from bus.errors import KeyNameError
-from bus.header import Header, pack
-from bus.health import Served, present
-from bus.keys import parse_key
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import SessionSettings, open_session
-from bus.topics import REQUESTS, TOPICS, Role
 from protocol_gateway import gateway
 from renderer.errors import RendererError
+from robomesh.endpoints import bundle, client_config, router_config
+from robomesh.errors import KeyNameError
+from robomesh.header import Header, pack
+from robomesh.health import Served, present
+from robomesh.keys import parse_key
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import SessionSettings, open_session
+from robomesh.topics import REQUESTS, TOPICS, Role
 from services import foxglove, kinematics, player, recorder, ros2, watch
 from services.command_line.listing import _Around, _collect
 from services.console import console

@@ -11,9 +11,9 @@ import pytest
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 
-from bus.errors import NoAnswerError, RefusedError
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import open_session
+from robomesh.errors import NoAnswerError, RefusedError
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import open_session
 from services import player, recorder
 from services.command_line import listing, monitor
 from tests.conftest import last_value, run

@@ -2,9 +2,9 @@
 
 import pytest
 
-from bus.clock import Reading
-from bus.keys import PresenceKey
-from bus.schemas.robomesh_pb2 import ControllerState, ServiceHealth
+from robomesh.clock import Reading
+from robomesh.keys import PresenceKey
+from robomesh.schemas.robomesh_pb2 import ControllerState, ServiceHealth
 from services import site as site_file
 from services.errors import SiteFileError
 from services.watch.conditions import Condition, Judge, robot_conditions

@@ -4,8 +4,8 @@ import json
 import re
 from pathlib import Path
 
-from bus import reason_codes
-from bus.reasons import Code
+from robomesh import reason_codes
+from robomesh.reasons import Code
 
 SENTENCES = Path(__file__).resolve().parents[2] / "services/console/page/src/reasons.ts"
 ROW = re.compile(r'^  \[("[^"]+"), \[("(?:[^"\\]|\\.)*"), ("(?:[^"\\]|\\.)*")\]\],$', re.MULTILINE)

@@ -10,12 +10,12 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from bus.errors import RefusedError
-from bus.schemas import robomesh_pb2 as schema
 from mcap_files import records
 from mcap_files.capture import Capture
 from mcap_files.files import RecordingError, describe_file
 from mcap_files.recover import State, state_of
+from robomesh.errors import RefusedError
+from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
 from tests.services.recording import (
     WITHIN_S,

@@ -5,10 +5,10 @@ import threading
 
 import pytest
 
-from bus.header import Header
-from bus.topics import topic
 from mcap_files.capture import Capture
 from mcap_files.recover import State, state_of
+from robomesh.header import Header
+from robomesh.topics import topic
 from services.recorder.disk import Disk
 from services.recorder.settings import Marks
 

@@ -6,12 +6,12 @@ from types import SimpleNamespace
 
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from bus.header import Header, pack
-from bus.schemas.robomesh_pb2 import Event, EventList, RecordingQuery
-from bus.session import open_session
-from bus.topics import TOPICS, topic
 from mcap_files.capture import Capture
 from mcap_files.reading import RecordingFile
+from robomesh.header import Header, pack
+from robomesh.schemas.robomesh_pb2 import Event, EventList, RecordingQuery
+from robomesh.session import open_session
+from robomesh.topics import TOPICS, topic
 from services.recorder import intake
 from services.recorder.disk import Taken
 from services.recorder.part import Part

@@ -7,11 +7,11 @@ import zenoh
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from mcap.reader import make_reader
 
-from bus.endpoints import router_config
-from bus.errors import RefusedError
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import SessionSettings
 from mcap_files.files import describe_file
+from robomesh.endpoints import router_config
+from robomesh.errors import RefusedError
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import SessionSettings
 from services.recorder.settings import Marks, Split
 from tests.conftest import free_port, run
 from tests.services.recording import put_states, recording_site, trace_off, trace_on, until, until_indexed

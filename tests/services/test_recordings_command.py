@@ -11,10 +11,10 @@ import av
 import numpy as np
 import pytest
 
-from bus.errors import QuotaError
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import open_session
 from mcap_files.capture import Capture
+from robomesh.errors import QuotaError
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import open_session
 from robots.description import load
 from robots.glb import link_meshes
 from robots.urdf.write import to_urdf

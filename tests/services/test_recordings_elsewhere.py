@@ -12,10 +12,10 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from bus.endpoints import router_config
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import SessionSettings
 from renderer.encoder import H264Encoder
+from robomesh.endpoints import router_config
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import SessionSettings
 from services.recorder.explain import without_secrets
 from tests.conftest import free_port, run
 from tests.services.recording import put_states, recording_site, trace_off, trace_on, until, until_indexed

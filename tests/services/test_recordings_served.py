@@ -14,11 +14,11 @@ import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from starlette.applications import Starlette
 
-from bus.errors import BrokenAnswerError, BusyError, QuotaError, RefusedError
-from bus.quotas import DEFAULT_QUOTAS, Quotas
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import open_session
 from mcap_files.errors import RecordingError
+from robomesh.errors import BrokenAnswerError, BusyError, QuotaError, RefusedError
+from robomesh.quotas import DEFAULT_QUOTAS, Quotas
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import open_session
 from services.console.recordings import Recordings
 from services.recorder.answers import Answers
 from services.recorder.serving import Serving

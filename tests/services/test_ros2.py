@@ -13,8 +13,8 @@ from rosbags.typesys import Stores, get_typestore
 from zenoh_ros2_sdk import ROS2Subscriber, ZenohSession, get_topic_names_and_types
 from zenoh_ros2_sdk.qos import QosDurability, QosProfile
 
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import open_session
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import open_session
 from services.ros2 import Settings, serve
 from services.ros2.bridge import JOINT_STATES, ROBOT_DESCRIPTION, TF
 from services.ros2.wire import Topic

@@ -7,9 +7,9 @@ from datetime import timedelta
 import pytest
 import zenoh
 
-from bus.endpoints import Link, bundle, client_config, router_config
-from bus.keys import robot_key
-from bus.topics import Role
+from robomesh.endpoints import Link, bundle, client_config, router_config
+from robomesh.keys import robot_key
+from robomesh.topics import Role
 from services.keys import certificates, deeds
 from services.router.router import read_access
 from services.router.turn import neighbours, our_turn
@@ -57,7 +57,7 @@ def test_two_sites_meet_and_each_speaks_for_itself_alone(tmp_path):
             await li.ask(robot_key("here", "arm", "command/li.there"), command(), timeout_s=20.0)
             assert asked == ["li.there"]
 
-    from bus.schemas.robomesh_pb2 import CommandAnswer, CommandRequest
+    from robomesh.schemas.robomesh_pb2 import CommandAnswer, CommandRequest
 
     def deeds_answer():
         return CommandAnswer(accepted=True)

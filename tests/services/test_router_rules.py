@@ -8,11 +8,11 @@ from datetime import timedelta
 import pytest
 import zenoh
 
-from bus.endpoints import bundle, router_config
-from bus.errors import NoAnswerError, NoRightError, SessionError
-from bus.keys import robot_key
-from bus.session import CERTIFICATE, SessionSettings, open_session
-from bus.topics import Role
+from robomesh.endpoints import bundle, router_config
+from robomesh.errors import NoAnswerError, NoRightError, SessionError
+from robomesh.keys import robot_key
+from robomesh.session import CERTIFICATE, SessionSettings, open_session
+from robomesh.topics import Role
 from services import router as service
 from services.keys import Folder, certificates, deeds, renewals
 from services.router.router import AccessError, read_access

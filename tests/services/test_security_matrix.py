@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from bus.endpoints import Tls, bundle, client_config, router_config
-from bus.errors import KeyNameError
-from bus.keys import parse_presence_key
-from bus.topics import PEOPLE, REQUESTS, SERVICES, TOPICS, Role
+from robomesh.endpoints import Tls, bundle, client_config, router_config
+from robomesh.errors import KeyNameError
+from robomesh.keys import parse_presence_key
+from robomesh.topics import PEOPLE, REQUESTS, SERVICES, TOPICS, Role
 from services.keys import Folder, deeds
 from services.router.router import read_access
 from tests.conftest import free_port

@@ -7,13 +7,13 @@ import json
 import pytest
 import zenoh
 
-from bus.endpoints import bundle, router_config
-from bus.lease import control
-from bus.session import SessionSettings, open_session
-from bus.topics import Role
 from protocol_gateway import gateway
 from protocol_gateway.audit.find import Query, find
 from protocol_gateway.audit.log import Outcome
+from robomesh.endpoints import bundle, router_config
+from robomesh.lease import control
+from robomesh.session import SessionSettings, open_session
+from robomesh.topics import Role
 from services.command_line import security
 from services.keys import Folder, deeds
 from services.router.router import read_access

@@ -3,12 +3,12 @@
 import asyncio
 import signal
 
-from bus import reason_codes as codes
-from bus.asking import ask_all
-from bus.errors import RefusedError
-from bus.lease import control
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import open_session
+from robomesh import reason_codes as codes
+from robomesh.asking import ask_all
+from robomesh.errors import RefusedError
+from robomesh.lease import control
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import open_session
 from services.command_line import find, send
 from tests.conftest import run
 from tests.protocol_gateway.hall import A, until

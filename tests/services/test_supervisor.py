@@ -102,7 +102,7 @@ def test_a_held_terminal_holds_no_service():
     # Nobody reads the pipe: what does not fit is dropped.
     program = (
         "import logging, time\n"
-        "from bus.service import log_to_stderr\n"
+        "from robomesh.service import log_to_stderr\n"
         "log_to_stderr()\n"
         "begun = time.monotonic()\n"
         "for number in range(20000): logging.getLogger('x').info('a line of some length %d', number)\n"

@@ -7,12 +7,12 @@ from contextlib import asynccontextmanager
 import pytest
 import zenoh
 
-from bus.clock import answer_clock
-from bus.endpoints import router_config
-from bus.errors import RefusedError
-from bus.health import Served, present
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import SessionSettings, open_session
+from robomesh.clock import answer_clock
+from robomesh.endpoints import router_config
+from robomesh.errors import RefusedError
+from robomesh.health import Served, present
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import SessionSettings, open_session
 from services.watch import Settings, serve
 from tests.conftest import free_port, run
 

@@ -13,9 +13,9 @@ from math import degrees, radians
 import pytest
 from mcap.reader import make_reader
 
-from bus.errors import RefusedError
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import open_session
+from robomesh.errors import RefusedError
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import open_session
 from tests.conftest import free_port, last_value, run
 from tests.site import ONE_ARM, alive, kill, robomesh, running_site, site_file, wait_until
 

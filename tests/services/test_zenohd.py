@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from bus.session import SessionSettings, open_session
+from robomesh.session import SessionSettings, open_session
 from services import router as service
 from services.keys import Folder, deeds
 from tests.conftest import free_port, run

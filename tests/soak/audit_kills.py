@@ -26,12 +26,12 @@ from pathlib import Path
 
 import zenoh
 
-from bus.endpoints import router_config
-from bus.errors import NoAnswerError, RefusedError
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session, SessionSettings, open_session
 from protocol_gateway.audit.log import read_entries, verify
 from protocol_gateway.audit.restart import remembered
+from robomesh.endpoints import router_config
+from robomesh.errors import NoAnswerError, RefusedError
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session, SessionSettings, open_session
 from tests.conftest import free_port
 
 C = schema.CommandRequest.Command

@@ -29,10 +29,10 @@ from pathlib import Path
 
 import zenoh
 
-from bus.endpoints import router_config
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session, SessionSettings, open_session
 from protocol_gateway.audit.log import read_entries, verify
+from robomesh.endpoints import router_config
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session, SessionSettings, open_session
 from tests.conftest import free_port
 from tests.soak.audit_kills import Controller
 

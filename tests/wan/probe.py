@@ -18,14 +18,14 @@ from typing import Any
 import zenoh
 from google.protobuf import json_format
 
-from bus import messages
-from bus.answering import Request
-from bus.endpoints import bundle
-from bus.errors import BusError, NoAnswerError
-from bus.messages import PROTOBUF
-from bus.session import Session, SessionSettings, open_session
-from bus.subscription import Subscription
-from bus.topics import request
+from robomesh import messages
+from robomesh.answering import Request
+from robomesh.endpoints import bundle
+from robomesh.errors import BusError, NoAnswerError
+from robomesh.messages import PROTOBUF
+from robomesh.session import Session, SessionSettings, open_session
+from robomesh.subscription import Subscription
+from robomesh.topics import request
 
 
 class Probe:

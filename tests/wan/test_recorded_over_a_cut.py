@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from bus.schemas.robomesh_pb2 import Recording
 from mcap_files.errors import RecordingError
 from mcap_files.files import describe_file
 from mcap_files.reading import RecordingFile
+from robomesh.schemas.robomesh_pb2 import Recording
 from tests.wan.network import Network, missing
 from tests.wan.sites import ARM, PORT, Probe, Site, stop
 

@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from bus.errors import NoAnswerError, QuotaError
-from bus.keys import WHOLE_SITE, robot_key
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
+from robomesh.errors import NoAnswerError, QuotaError
+from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
 from services.command_line import find
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.listing import attached_for, found

@@ -8,10 +8,10 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from bus.errors import BusError, SessionError
-from bus.keys import WHOLE_SITE, robot_key
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
+from robomesh.errors import BusError, SessionError
+from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
 from services.command_line import find
 from services.command_line.recordings.errors import ExportError
 

@@ -8,11 +8,11 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
-from bus.errors import BusError
-from bus.keys import WHOLE_SITE, robot_key
-from bus.presence import OPERATOR, session_of
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
+from robomesh.errors import BusError
+from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.presence import OPERATOR, session_of
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
 from services.command_line import find
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.listing import attached_for, found

@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 import typer
 
-from bus.errors import NoAnswerError, RefusedError
-from bus.keys import robot_key
-from bus.schemas import robomesh_pb2 as schema
-from bus.session import Session
-from bus.subscription import Subscription
+from robomesh.errors import NoAnswerError, RefusedError
+from robomesh.keys import robot_key
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
+from robomesh.subscription import Subscription
 from services.command_line import find
 from services.command_line.recordings.listing import show, summary
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from bus.schemas import robomesh_pb2 as schema
 from mcap_files.errors import RecordingError
 from mcap_files.reading import RecordedMessage, RecordingFile
 from mcap_files.times import PublisherTimes
@@ -21,6 +20,7 @@ from renderer.requested import Shot
 from renderer.span import draw_span
 from renderer.state import Ages, RobotState
 from renderer.studio import Studio
+from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.output import progress
 from services.command_line.recordings.span import Span, decoded, needed, topics_of

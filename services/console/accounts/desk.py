@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
-from bus.schemas.robomesh_pb2 import Event
+from robomesh.schemas.robomesh_pb2 import Event
 from services.console.accounts.attempts import SignInLimits, network
 from services.console.accounts.file import (
     Account,

@@ -22,8 +22,8 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
-from bus import keys
-from bus.errors import KeyNameError
+from robomesh import keys
+from robomesh.errors import KeyNameError
 from robots.bounded_toml import read_toml
 from services.console.errors import AccountsError
 from services.whole_file import write_whole

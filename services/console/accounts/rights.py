@@ -2,12 +2,12 @@
 
 from google.protobuf.message import DecodeError
 
-from bus import keys, topics
-from bus import reason_codes as codes
-from bus.errors import BusError, RefusedError
-from bus.reasons import Reason
-from bus.schemas.robomesh_pb2 import StopRequest
-from bus.topics import Role
+from robomesh import keys, topics
+from robomesh import reason_codes as codes
+from robomesh.errors import BusError, RefusedError
+from robomesh.reasons import Reason
+from robomesh.schemas.robomesh_pb2 import StopRequest
+from robomesh.topics import Role
 from services.console.accounts.file import Account
 from services.console.accounts.sessions import SignedIn
 

@@ -23,7 +23,7 @@ def confine(folder: Path) -> None:
     """
     own = (os.path.realpath(folder),)
     packages = Path(__file__).parents[3]
-    ours = [str(packages / name) for name in ("bus", "robots", "services")]
+    ours = [str(packages / name) for name in ("robomesh", "robots", "services")]
     code = tuple(map(os.path.realpath, [sys.prefix, sys.base_prefix, sys.base_exec_prefix, *ours]))
 
     def hook(event: str, arguments: tuple[Any, ...]) -> None:

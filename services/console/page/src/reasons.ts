@@ -3,7 +3,7 @@
 import type { Reason } from "./gen/robomesh_pb";
 import { inLanguage, t } from "./texts";
 
-/** Sentences by code, English and Chinese, with the parameters of bus/reason_codes.py; {cause}: the causes. */
+/** Sentences by code, English and Chinese, with the parameters of robomesh/reason_codes.py; {cause}: the causes. */
 const SENTENCES: ReadonlyMap<string, readonly [english: string, chinese: string]> = new Map([
   ["request.busy", ["too many requests wait for this owner already: ask again, and less often", "等待的请求过多：请稍后再试，并降低频率"]],
   ["request.turned_away", ["turned away unread: too many requests waited already", "未读取即拒绝：等待的请求过多"]],

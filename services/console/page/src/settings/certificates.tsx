@@ -6,7 +6,7 @@ import { useMesh } from "../site-health";
 import { Marked } from "./this-console";
 import { s } from "./texts";
 
-/** As bus/session.py names it in a process's health. */
+/** As robomesh/session.py names it in a process's health. */
 const SECONDS = "certificate_seconds";
 const SOON_S = 10 * 86_400;
 const DAY_S = 86_400;

@@ -1,0 +1,181 @@
+"""How far another process's clock is from ours, how long the way to it is, and where on it time goes.
+
+NTP's four times: asked (our clock), received and answered (its clock), came back (ours). What the owner
+does between the middle two is no part of the way. Each node that the question and its answer pass stamps
+them too (Zenoh's instrumentation): of two neighbours the way there and the way back are halved, so that
+clocks that differ cancel out.
+
+Source: RFC 5905, sections 8 (offset and delay) and 10 (of several samples the quickest is the truest).
+"""
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import zenoh
+
+from robomesh.answering import Answerer, Request
+from robomesh.endpoints import first_line
+from robomesh.errors import MessageError, NoAnswerError
+from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.messages import PROTOBUF, decode
+from robomesh.schemas.robomesh_pb2 import ClockAnswer, ClockRequest
+from robomesh.session import Session
+
+_KEPT = 8
+# Everything but what it was asked for stays out of the way.
+_PRIORITY = zenoh.Priority.INTERACTIVE_HIGH
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One question and its answer.
+
+    Attributes:
+        offset_s: Its clock minus ours [s], give or take half the round trip.
+        round_trip_s: There and back, without what its owner took [s].
+        hops: Zenoh ids of neighbours on the way, and the time from one to the other [s].
+    """
+
+    offset_s: float
+    round_trip_s: float
+    hops: tuple[tuple[str, str, float], ...] = ()
+
+
+@dataclass
+class Clock:
+    """The newest readings of one clock."""
+
+    readings: deque[Reading] = field(default_factory=lambda: deque(maxlen=_KEPT))
+
+    @property
+    def best(self) -> Reading | None:
+        """The quickest of them, which waited least; None: there is none."""
+        return min(self.readings, key=lambda reading: reading.round_trip_s, default=None)
+
+
+def answer_clock(session: Session, site: str, *, wall_ns: Callable[[], int] = time.time_ns) -> Answerer:
+    """Tell the time to whoever asks for it at this process's own key.
+
+    Args:
+        wall_ns: The clock that is told [ns since the Unix epoch].
+    """
+
+    async def answer(request: Request) -> ClockAnswer:
+        # Answered by the loop, where a service that hangs shows; its wait is between the two times.
+        waited_ns = time.time_ns() - request.received_ns
+        answered = ClockAnswer()
+        now_ns = wall_ns()
+        answered.received.FromNanoseconds(now_ns - waited_ns)
+        answered.answered.FromNanoseconds(now_ns)
+        return answered
+
+    return session.answer(site, WHOLE_SITE, f"clock/{session.identity}", answer)
+
+
+async def read_clock(
+    session: Session, site: str, identity: str, *, timeout_s: float = 1.0, hops: bool = False
+) -> Reading:
+    """Ask a process for its time, once.
+
+    Args:
+        identity: As in its presence.
+        hops: Have every node on the way stamp it.
+
+    Raises:
+        NoAnswerError: If no answer came in time.
+    """
+    loop = asyncio.get_running_loop()
+    done: asyncio.Future[None] = loop.create_future()
+    came: list[tuple[int, zenoh.Sample]] = []
+
+    def on_reply(reply: zenoh.Reply) -> None:
+        if reply.ok is not None:
+            came.append((time.time_ns(), reply.ok))
+
+    def finish() -> None:
+        if not done.done():
+            done.set_result(None)
+
+    def on_end() -> None:
+        if not loop.is_closed():
+            loop.call_soon_threadsafe(finish)
+
+    key = robot_key(site, WHOLE_SITE, f"clock/{identity}")
+    request = ClockRequest()
+    asked_ns = time.time_ns()
+    request.asked.FromNanoseconds(asked_ns)
+    try:
+        session.zenoh_session.get(
+            key,
+            zenoh.handlers.Callback(on_reply, on_end),
+            payload=request.SerializeToString(),
+            encoding=PROTOBUF,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            congestion_control=zenoh.CongestionControl.DROP,
+            priority=_PRIORITY,
+            timeout=timeout_s,
+            timestamp_instrumentation=_INSTRUMENTED if hops else None,
+        )
+    except zenoh.ZError as error:
+        raise NoAnswerError(f"{key} could not be asked: {first_line(error)}") from None
+    await done
+    for came_ns, sample in came:
+        try:
+            answer = decode(ClockAnswer, sample.payload.to_bytes())
+        except MessageError:
+            continue
+        received_ns, answered_ns = answer.received.ToNanoseconds(), answer.answered.ToNanoseconds()
+        reading = reading_of(asked_ns, received_ns, answered_ns, came_ns)
+        return Reading(reading.offset_s, reading.round_trip_s, hops_of(_stamps(sample)))
+    raise NoAnswerError(f"nobody answered {key} within {timeout_s:g} s: is that process running?")
+
+
+def reading_of(asked_ns: int, received_ns: int, answered_ns: int, came_ns: int) -> Reading:
+    """Offset and round trip from the four times; a round trip is never negative."""
+    offset_ns = ((received_ns - asked_ns) + (answered_ns - came_ns)) / 2
+    round_trip_ns = (came_ns - asked_ns) - (answered_ns - received_ns)
+    return Reading(offset_ns * 1e-9, max(round_trip_ns, 0) * 1e-9)
+
+
+def hops_of(stamps: list[tuple[str, float]]) -> tuple[tuple[str, str, float], ...]:
+    """Neighbours and the time between them, from the stamps on the way there and back.
+
+    Args:
+        stamps: Node and its clock's time [s], in the order of the way; nodes stamp several times.
+
+    Returns:
+        From the asker outwards; empty where the way back is not the way there.
+    """
+    visits: list[tuple[str, float, float]] = []  # node, when it came there, when it left
+    for node, at_s in stamps:
+        if visits and visits[-1][0] == node:
+            visits[-1] = (node, visits[-1][1], at_s)
+        else:
+            visits.append((node, at_s, at_s))
+    nodes = [node for node, _, _ in visits]
+    if len(visits) < 3 or nodes != nodes[::-1]:
+        return ()
+    hops = []
+    for number in range(len(visits) // 2):
+        (near, _, left), (far, arrived, _) = visits[number], visits[number + 1]
+        (_, _, left_back), (_, back, _) = visits[-number - 2], visits[-number - 1]
+        hops.append((near, far, max((arrived - left + back - left_back) / 2, 0.0)))
+    return tuple(hops)
+
+
+def _stamps(sample: zenoh.Sample) -> list[tuple[str, float]]:
+    stack = sample.timestamp_stack
+    stamps = []
+    for record in stack.records if stack is not None else ():
+        at = record.timestamp()
+        if isinstance(at, zenoh.Timestamp):
+            stamps.append((str(at.get_id()), at.get_time().timestamp()))
+    return stamps
+
+
+_INSTRUMENTED = (
+    zenoh.TimestampInstrumentationBuilder().set_send(True).set_route(True).set_receive(True).build()
+)

@@ -1,0 +1,156 @@
+"""Key expressions of the mesh.
+
+robomesh/<site>/<robot>/<topic>                 a robot's topic: robomesh/shanghai/pt600-1/joints
+robomesh/<site>/-/<topic>                       what belongs to a whole site
+robomesh/<site>/<robot>/<request>/<asker>       a request made in somebody's name: .../command/li
+robomesh/<site>/<robot>/alive/<service>/<id>    presence: a liveliness token
+"""
+
+import re
+from typing import NamedTuple
+
+from robomesh.errors import KeyNameError
+from robomesh.texts import one_line
+
+ROOT = "robomesh"
+WHOLE_SITE = "-"
+# A recording played back is a robot named replay-<id>.
+REPLAY = "replay-"
+
+# Characters of a site's or robot's name, and of any other chunk of a key.
+LONGEST_NAME, LONGEST_CHUNK = 64, 200
+
+_NAME = re.compile(r"[a-z0-9][a-z0-9_-]*")
+# Operators and views come from people and certificates: what a key chunk can hold.
+_CHUNK = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+
+
+class Key(NamedTuple):
+    """A key taken apart."""
+
+    site: str
+    robot: str
+    topic: str
+
+    def __str__(self) -> str:
+        return f"{ROOT}/{self.site}/{self.robot}/{self.topic}"
+
+
+class PresenceKey(NamedTuple):
+    """A liveliness token's key taken apart."""
+
+    site: str
+    robot: str
+    service: str
+    id: str
+
+
+def check_name(name: str, what: str = "name") -> str:
+    """The name itself, when a site or robot may have it.
+
+    Raises:
+        KeyNameError: If it is not at most 64 lower-case letters, digits, `_` and `-`, beginning with a
+            letter or digit.
+    """
+    if len(name) > LONGEST_NAME or not _NAME.fullmatch(name):
+        raise KeyNameError(
+            f"{what} {one_line(name, LONGEST_NAME)!r} cannot be used: lower-case letters, digits, '_' and "
+            f"'-', beginning with a letter or digit, at most {LONGEST_NAME}"
+        )
+    return name
+
+
+def check_chunk(name: str, what: str = "operator") -> str:
+    """The name itself, when it can be one chunk of a key (an operator, a view).
+
+    Raises:
+        KeyNameError: If it cannot.
+    """
+    if len(name) > LONGEST_CHUNK or not _CHUNK.fullmatch(name):
+        raise KeyNameError(
+            f"{what} {one_line(name, LONGEST_NAME)!r} cannot be used: letters, digits, '_', '.' and '-', "
+            f"beginning with a letter or digit, at most {LONGEST_CHUNK} characters"
+        )
+    return name
+
+
+def robot_key(site: str, robot: str, topic: str) -> str:
+    """The key of a robot's topic; `-` as the robot for what belongs to the whole site.
+
+    Raises:
+        KeyNameError: If site or robot cannot stand in a key.
+    """
+    check_name(site, "site")
+    if robot != WHOLE_SITE:
+        check_name(robot, "robot")
+    return f"{ROOT}/{site}/{robot}/{topic}"
+
+
+def every_robot(topic: str) -> str:
+    """The key expression of a topic on every robot of every site."""
+    return f"{ROOT}/*/*/{topic}"
+
+
+def parse_key(key: str) -> Key:
+    """Return site, robot and topic of a key that fits the contract; no key expression does.
+
+    Raises:
+        KeyNameError: If it is not a key of the mesh, or a chunk of it cannot be used.
+    """
+    parsed = parse_expression(key)
+    robot_key(*parsed)
+    for chunk in parsed.topic.split("/"):
+        check_chunk(chunk, "chunk")
+    return parsed
+
+
+def parse_expression(key_expr: str) -> Key:
+    """Return site, robot and topic of a key or key expression of our own; each may have a wildcard.
+
+    What others send goes through `parse_key`, which checks every chunk.
+
+    Raises:
+        KeyNameError: If it does not have these three parts.
+    """
+    root, *rest = key_expr.split("/", 3)
+    if root != ROOT or len(rest) != 3 or not all(rest):
+        shown = one_line(key_expr, LONGEST_CHUNK)
+        raise KeyNameError(f"{shown!r} is not a key of the mesh: robomesh/<site>/<robot>/<topic>")
+    return Key(*rest)
+
+
+def has_wildcard(key: str) -> bool:
+    """Whether a key stands for many: what is asked and listened to may, what is told may not.
+
+    Zenoh lets somebody put to, answer on and be present on such a key: it would count for every robot.
+    """
+    return "*" in key  # `$` comes before one only
+
+
+def is_replay(key: str) -> bool:
+    """Whether a key belongs to a recording that is played back, with the times of then."""
+    return f"/{REPLAY}" in key
+
+
+def presence_key(site: str, robot: str, service: str, identity: str) -> str:
+    """Return the key of a liveliness token; `*` as the identity for every token of the service.
+
+    Raises:
+        KeyNameError: If a part of it cannot be used.
+    """
+    if identity != "*":
+        check_chunk(identity, "id")
+    return f"{robot_key(site, robot, 'alive')}/{check_chunk(service, 'service')}/{identity}"
+
+
+def parse_presence_key(key: str) -> PresenceKey:
+    """Site, robot, service and id of a liveliness token's key.
+
+    Raises:
+        KeyNameError: If it is not one, a chunk of it cannot be used, or it stands for many.
+    """
+    site, robot, topic = parse_key(key)
+    match topic.split("/"):
+        case ["alive", service, identity]:
+            return PresenceKey(site, robot, service, identity)
+    raise KeyNameError(f"{key!r} is not a presence key: {ROOT}/<site>/<robot>/alive/<service>/<id>")

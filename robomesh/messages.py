@@ -1,0 +1,175 @@
+"""Messages as bytes: protobuf, or protobuf's JSON form with the proto's own field names.
+
+Requests are checked more strictly than protobuf does: NaN, infinities and unspecified
+enums are refused by name.
+"""
+
+import json
+import math
+from collections.abc import Iterator
+from functools import cache
+from typing import Any, TypeVar
+
+from google.protobuf import json_format
+from google.protobuf.descriptor import Descriptor, FieldDescriptor
+from google.protobuf.message import DecodeError, Message
+from google.protobuf.timestamp_pb2 import Timestamp
+
+from robomesh.errors import MessageError
+from robomesh.reasons import Reason
+from robomesh.schemas import robomesh_pb2 as schema
+
+PROTOBUF = "application/protobuf"
+JSON = "application/json"
+TEXT = "text/plain"
+
+_FLOATS = (FieldDescriptor.TYPE_DOUBLE, FieldDescriptor.TYPE_FLOAT)
+_OWN = "robomesh"
+_TIME = Timestamp.DESCRIPTOR.full_name
+# Years 1 to 9999, as its proto has it: to make a number of any other raises ValueError.
+_FIRST_S, _LAST_S = -62_135_596_800, 253_402_300_799
+
+AnyMessage = TypeVar("AnyMessage", bound=Message)
+
+
+def is_json(encoding: str) -> bool:
+    """Whether a request with this encoding is JSON: said so, or nothing said."""
+    return not encoding.startswith(PROTOBUF)
+
+
+def to_json(message: Message, *, indent: int | None = None) -> str:
+    """A message as JSON: proto field names, defaults printed, times RFC 3339."""
+    return json_format.MessageToJson(
+        message,
+        preserving_proto_field_name=True,
+        always_print_fields_with_no_presence=True,
+        indent=indent,
+    )
+
+
+def encode(message: Message, *, as_json: bool) -> bytes:
+    """A message as protobuf or JSON bytes."""
+    return to_json(message).encode() if as_json else message.SerializeToString()
+
+
+def reason_message(reason: Reason) -> schema.Reason:
+    """Return a reason as it is in answers, audit entries and events."""
+    message = schema.Reason(code=reason.code, values=reason.values, text=reason.text)
+    message.causes.extend(map(reason_message, reason.causes))
+    return message
+
+
+def decode(schema: type[AnyMessage], payload: bytes) -> AnyMessage:
+    """A message from protobuf bytes.
+
+    Raises:
+        MessageError: If the bytes are not that message, or hold a time that is none.
+    """
+    try:
+        message = schema.FromString(payload)
+    except DecodeError as error:
+        raise MessageError(f"{len(payload)} bytes are not a {schema.DESCRIPTOR.full_name}: {error}") from None
+    _check_times(message, _dated(schema.DESCRIPTOR))
+    return message
+
+
+def decode_request(schema: type[AnyMessage], payload: bytes, encoding: str) -> AnyMessage:
+    """A request from its payload, checked.
+
+    Raises:
+        MessageError: If it is no such message, or holds a NaN, an infinity or an unspecified enum.
+    """
+    message = decode(schema, payload) if not is_json(encoding) else _from_json(schema, payload)
+    for problem in _problems(message):
+        raise MessageError(problem)
+    return message
+
+
+def _from_json(schema: type[AnyMessage], payload: bytes) -> AnyMessage:
+    name, message = schema.DESCRIPTOR.name, schema()
+    try:
+        text = payload.decode() or "{}"
+        values = json.loads(text)
+        if not isinstance(values, dict):
+            raise MessageError(f"not {_a(name)}: a JSON object is right, as in {{}}")
+        for key, value in values.items():
+            _check_key(schema, key, value)
+        json_format.Parse(text, message)
+    except (ValueError, RecursionError) as error:  # UnicodeDecodeError and JSON's own among them
+        raise MessageError(f"not JSON: {error}") from None
+    except json_format.ParseError as error:
+        # Behind " at " it repeats its own names.
+        raise MessageError(f"not {_a(name)}: {str(error).splitlines()[0].partition(' at ')[0]}") from None
+    return message
+
+
+def _check_key(schema: type[Message], key: str, value: object) -> None:
+    """What protobuf would say in its own names."""
+    descriptor = schema.DESCRIPTOR
+    fields = {name: field for field in descriptor.fields for name in (field.name, field.json_name)}
+    field = fields.get(key)
+    if field is None:
+        names = ", ".join(field.name for field in descriptor.fields)
+        raise MessageError(f"not {_a(descriptor.name)}: it has no field {key!r}; its fields are: {names}")
+    if field.enum_type is not None and isinstance(value, str) and value not in field.enum_type.values_by_name:
+        names = ", ".join(each.name for each in field.enum_type.values if each.number)
+        raise MessageError(f"{key}: {value!r} is none of {names}")
+
+
+def _a(name: str) -> str:
+    return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
+
+
+def _problems(message: Message, path: str = "") -> Iterator[str]:
+    for field in message.DESCRIPTOR.fields:
+        name = path + field.name
+        enum = field.enum_type
+        absent = field.has_presence and not message.HasField(field.name)
+        if enum is not None and not field.is_repeated and not absent:
+            number = getattr(message, field.name)
+            names = [value.name for value in enum.values if value.number]
+            if number == 0 or number not in enum.values_by_number:
+                yield f"{name}: one of {', '.join(names)} is needed"
+    for field, value in message.ListFields():
+        name = path + field.name
+        values = value if field.is_repeated and not _is_map(field) else (value,)
+        if field.type in _FLOATS and not all(math.isfinite(number) for number in values):
+            yield f"{name}: {value if not field.is_repeated else list(value)} is not finite"
+        elif field.type == FieldDescriptor.TYPE_MESSAGE and not _is_map(field):
+            for child in values:
+                yield from _problems(child, f"{name}.")
+
+
+def _is_map(field: FieldDescriptor) -> bool:
+    return field.message_type is not None and field.message_type.GetOptions().map_entry
+
+
+# Of each field that is a time or holds some: its name, whether it is repeated, and its own such fields; None:
+# it is a time itself.
+_Dated = tuple[tuple[str, bool, "_Dated | None"], ...]
+
+
+def _check_times(message: Message, dated: _Dated) -> None:
+    for name, repeated, within in dated:
+        value: Any = getattr(message, name)
+        for each in value if repeated else (value,):
+            if within is not None:
+                _check_times(each, within)
+            elif not (_FIRST_S <= each.seconds <= _LAST_S and 0 <= each.nanos < 1_000_000_000):
+                raise MessageError(f"{name}: {each.seconds} s and {each.nanos} ns are no time")
+
+
+@cache
+def _dated(schema: Descriptor) -> _Dated:
+    if schema.file.package != _OWN:  # Foxglove's come by the thousand, and nobody reckons with their times
+        return ()
+    found: list[tuple[str, bool, _Dated | None]] = []
+    for field in schema.fields:
+        if field.message_type is None or _is_map(field):
+            continue
+        if field.message_type is schema:
+            continue  # of a message that contains itself, only the outermost is searched
+        within = None if field.message_type.full_name == _TIME else _dated(field.message_type)
+        if within != ():
+            found.append((field.name, bool(field.is_repeated), within))
+    return tuple(found)

@@ -1,0 +1,136 @@
+"""Prometheus metrics of one process: read when they are asked for, so that they cost nothing else.
+
+What is told: docs/monitoring.md.
+"""
+
+from collections.abc import Iterator, Mapping
+
+from prometheus_client import CollectorRegistry, start_http_server
+from prometheus_client.core import (
+    CounterMetricFamily,
+    GaugeMetricFamily,
+    HistogramMetricFamily,
+    InfoMetricFamily,
+    Metric,
+)
+from prometheus_client.process_collector import ProcessCollector
+from prometheus_client.registry import Collector
+
+from robomesh.errors import SessionError
+from robomesh.keys import WHOLE_SITE, parse_key
+from robomesh.latencies import STEPS_S, Latencies
+from robomesh.session import Session
+from robomesh.tally import Measure
+
+_COUNTS = {
+    "published": "Messages published",
+    "received": "Messages received",
+    "lost": "Messages that never arrived: gaps in their publisher's numbers",
+    "skipped": "Messages that arrived and that the service was too slow to take",
+    "malformed": "Messages without a right attachment, left out",
+}
+# Of what has gone for good, such as an ended replay, nothing is told any more.
+_LONGEST_AGE_S = 3600.0
+
+
+class SessionMetrics(Collector):
+    """What a session counts, and its service's own measures."""
+
+    def __init__(self, session: Session, about: Mapping[str, str]) -> None:
+        self._session, self._about = session, dict(about)
+
+    def collect(self) -> Iterator[Metric]:
+        """Everything, as it is now."""
+        info = InfoMetricFamily("robomesh_process", "Which process this is")
+        info.add_metric([], self._about)
+        yield info
+        yield GaugeMetricFamily(
+            "robomesh_connected", "Whether a router is there", value=float(self._session.connected)
+        )
+        tally = self._session.tally()
+        for name, text in _COUNTS.items():
+            counter = CounterMetricFamily(f"robomesh_{name}", f"{text}, by topic", labels=["topic"])
+            for topic, count in sorted(getattr(tally, name).items()):
+                counter.add_metric([topic], count)
+            yield counter
+        yield CounterMetricFamily(
+            "robomesh_ignored",
+            "Tokens, publications, replies and requests on keys that fit no key of the contract",
+            value=self._session.ignored.count,
+        )
+        yield self._ages()
+        away = CounterMetricFamily(
+            "robomesh_turned_away", "Requests that found no place, by request", labels=["request"]
+        )
+        over = CounterMetricFamily(
+            "robomesh_over_quota", "Requests of who has had its quota, by request", labels=["request"]
+        )
+        took = HistogramMetricFamily(
+            "robomesh_request_seconds", "From a request's coming to its answer", labels=["request"]
+        )
+        for request, count in sorted(tally.turned_away.items()):
+            away.add_metric([request], count)
+            over.add_metric([request], tally.over_quota[request])
+            latencies = tally.latencies[request]
+            took.add_metric([request], _buckets(latencies), latencies.sum_s)
+        yield away
+        yield over
+        yield took
+        for measure in tuple(self._session.measures):
+            yield _own(measure)
+
+    def _ages(self) -> Metric:
+        ages = GaugeMetricFamily(
+            "robomesh_age_seconds",
+            "Since something new came, of topics that can be stale; of several in one row the newest",
+            labels=["site", "robot", "topic"],
+        )
+        newest: dict[tuple[str, str, str], float] = {}
+        for subscription in self._session.subscriptions:
+            if subscription.topic.stale_after_s is None:
+                continue
+            for key in subscription.keys:
+                age_s, parsed = subscription.age_s(key), parse_key(key)
+                # The row's name: each process that ever was would leave series of its own.
+                labels = parsed.site, parsed.robot, subscription.topic.name
+                if age_s is not None and age_s < min(newest.get(labels, _LONGEST_AGE_S), _LONGEST_AGE_S):
+                    newest[labels] = age_s
+        for labels, age_s in sorted(newest.items()):
+            ages.add_metric(labels, age_s)
+        return ages
+
+
+def serve_metrics(session: Session, host: str, port: int, about: Mapping[str, str]) -> str:
+    """Serve them until the process ends; the address, with the port that was taken.
+
+    Raises:
+        SessionError: If it cannot listen there.
+    """
+    registry = CollectorRegistry()
+    registry.register(SessionMetrics(session, about))
+    ProcessCollector(registry=registry)
+    try:
+        server, _ = start_http_server(port, addr=host, registry=registry)
+    except OSError as error:
+        raise SessionError(
+            f"--metrics {host}:{port}: cannot listen there: {error.strerror or error}; "
+            "name another port, or 0"
+        ) from None
+    shown = f"[{host}]" if ":" in host else host
+    return f"http://{shown}:{server.server_port}/metrics"
+
+
+def _own(measure: Measure) -> Metric:
+    value = measure.read()
+    by_robot = isinstance(value, Mapping)
+    family = CounterMetricFamily if measure.name.endswith("_total") else GaugeMetricFamily
+    metric = family(f"robomesh_{measure.name}", measure.text, labels=["robot"] if by_robot else [])
+    for robot, number in sorted(value.items()) if isinstance(value, Mapping) else [(WHOLE_SITE, value)]:
+        metric.add_metric([robot] if by_robot else [], number)
+    return metric
+
+
+def _buckets(latencies: Latencies) -> list[tuple[str, float]]:
+    """Prometheus's own: each counts what was quicker too."""
+    steps = [*map(str, STEPS_S), "+Inf"]
+    return [(step, float(sum(latencies.counts[: number + 1]))) for number, step in enumerate(steps)]

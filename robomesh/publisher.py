@@ -1,0 +1,230 @@
+"""Publishers: they number and date what they publish, and answer late joiners."""
+
+import asyncio
+import secrets
+import threading
+import time
+from collections import deque
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import zenoh
+import zenoh.ext
+from google.protobuf.message import Message
+
+from robomesh import keys
+from robomesh.endpoints import settle
+from robomesh.header import Header, pack
+from robomesh.messages import PROTOBUF
+from robomesh.schemas.robomesh_pb2 import VideoFrames
+from robomesh.topics import History, Topic, topic
+from robomesh.wall_clock import WallClock
+
+LIST_LENGTH = 100
+# Two key frame intervals at 30 Hz: a publisher that never marks a key frame must not grow.
+_MOST_FRAMES = 150
+
+OnGet = Callable[[], Awaitable[Message | None]]
+
+
+class Publisher:
+    """The publisher of one topic of one robot.
+
+    Safe to use from any one thread at a time; late joiners are answered on Zenoh's.
+    """
+
+    def __init__(
+        self, session: zenoh.Session, site: str, robot: str, name: str, *, on_get: OnGet | None = None
+    ) -> None:
+        self.key = keys.robot_key(site, robot, name)
+        self.topic: Topic = topic(name)
+        # New at each start, so that a number that begins again is not taken for an old one; and whenever
+        # another clock dates what follows: receivers compare the lags of one identity (`lateness.py`).
+        self._identity = secrets.randbits(64)
+        self._wall_clock = WallClock()
+        self._dated_by: int | None = None
+        self._sequence = 0
+        self._closed = False
+        self._lock = threading.Lock()
+        self._history: deque[tuple[Header, bytes]] = deque(maxlen=_history_length(self.topic))
+        self._publisher: Any = _declare(session, self.key, self.topic)
+        self._listener: Any = None
+        self._queryable: zenoh.Queryable[None] | None = None
+        if on_get is not None:
+            loop = asyncio.get_running_loop()
+            self._queryable = session.declare_queryable(self.key, lambda q: self._hand_over(q, on_get, loop))
+        elif self.topic.history is not History.NONE:
+            self._queryable = session.declare_queryable(self.key, self._answer)
+        settle(session, self.topic.priority)
+
+    def put(
+        self,
+        message: Message,
+        *,
+        source_time_ns: int | None = None,
+        dated_by: int | None = None,
+        key_frame: bool = False,
+    ) -> Header:
+        """Publish a message of the topic's schema, as it is now.
+
+        Args:
+            source_time_ns: When what it tells was so, ns since the Unix epoch; now, unless given.
+            dated_by: Which clock says that time, by any number: the publisher in whose message it stood, or
+                a clock of a controller's; None: this machine's. Another one begins another identity.
+            key_frame: Of a video topic: the joiner's frames begin here.
+
+        Returns:
+            The header that it was published with.
+        """
+        if source_time_ns is None:
+            source_time_ns = time.time_ns()
+        return self.put_bytes(
+            message.SerializeToString(),
+            source_time_ns=source_time_ns,
+            dated_by=dated_by,
+            key_frame=key_frame,
+        )
+
+    def put_bytes(
+        self, payload: bytes, *, source_time_ns: int, dated_by: int | None = None, key_frame: bool = False
+    ) -> Header:
+        """As `put`, of a message that is bytes already."""
+        with self._lock:
+            if self._clock_is_another(dated_by):
+                self._identity = secrets.randbits(64)
+                if self.topic.history is History.KEY_FRAME:
+                    self._history.clear()
+            self._sequence += 1
+            header = Header(self._identity, self._sequence, source_time_ns)
+            if key_frame:
+                self._history.clear()
+            if not (self.topic.history is History.KEY_FRAME and not (key_frame or self._history)):
+                self._history.append((header, payload))
+        self._publisher.put(payload, attachment=pack(header))
+        return header
+
+    def _clock_is_another(self, dated_by: int | None) -> bool:
+        """Whether what follows is dated by another clock than what went before, or by one that was set."""
+        before, self._dated_by = self._dated_by, dated_by
+        was_set = dated_by is None and self._wall_clock.was_set()
+        return self._sequence > 0 and (dated_by != before or was_set)
+
+    def remember(self, message: Message, *, source_time_ns: int) -> None:
+        """Answer late joiners with it, and publish nothing: what is old gets no new number."""
+        self.remember_bytes(message.SerializeToString(), source_time_ns=source_time_ns)
+
+    def remember_bytes(self, payload: bytes, *, source_time_ns: int) -> None:
+        """As `remember`, of a message that is bytes already."""
+        with self._lock:
+            self._history.append((Header(self._identity, self._sequence, source_time_ns), payload))
+
+    def forget(self) -> None:
+        """Answer late joiners with nothing until something is put or remembered again."""
+        with self._lock:
+            self._history.clear()
+
+    @property
+    def published(self) -> int:
+        """How many were put."""
+        return self._sequence
+
+    @property
+    def watched(self) -> bool:
+        """Whether anybody subscribes to it now; recovered topics always are, they are rare and small."""
+        if self._closed:
+            return False
+        if not isinstance(self._publisher, zenoh.Publisher):
+            return True
+        # Typed as bool, but it is an object that is always true.
+        status: Any = self._publisher.matching_status
+        return bool(status.matching)
+
+    def on_watched(self, changed: Callable[[], None]) -> None:
+        """Call something, on the event loop, whenever the first subscriber comes or the last one goes."""
+        loop = asyncio.get_running_loop()
+
+        def hand_over(status: object) -> None:
+            if not loop.is_closed():
+                loop.call_soon_threadsafe(changed)
+
+        self._listener = self._publisher.declare_matching_listener(hand_over)
+
+    @property
+    def closed(self) -> bool:
+        """Whether it was closed."""
+        return self._closed
+
+    def close(self) -> None:
+        """Publish and answer no more."""
+        if self._closed:
+            return
+        self._closed = True
+        if self._listener is not None:
+            self._listener.undeclare()
+        if self._queryable is not None:
+            self._queryable.undeclare()
+        self._publisher.undeclare()
+
+    def _answer(self, query: zenoh.Query) -> None:
+        with self._lock:
+            history = list(self._history)
+        with query:
+            if history:
+                self._reply(query, history[-1][0], _history_payload(self.topic, history))
+
+    def _reply(self, query: zenoh.Query, header: Header, payload: bytes) -> None:
+        query.reply(self.key, payload, encoding=PROTOBUF, attachment=pack(header))
+
+    def _hand_over(self, query: zenoh.Query, on_get: OnGet, loop: asyncio.AbstractEventLoop) -> None:
+        async def answer() -> None:
+            with query:
+                message = await on_get()
+                if message is not None:
+                    header = Header(self._identity, self._sequence, time.time_ns())
+                    self._reply(query, header, message.SerializeToString())
+
+        if not loop.is_closed():
+            asyncio.run_coroutine_threadsafe(answer(), loop)
+
+
+def _history_length(row: Topic) -> int:
+    match row.history:
+        case History.LAST_100:
+            return LIST_LENGTH
+        case History.KEY_FRAME:
+            return _MOST_FRAMES
+        case _:
+            return 1
+
+
+def _history_payload(row: Topic, history: list[tuple[Header, bytes]]) -> bytes:
+    """What a late joiner gets, as one message's bytes."""
+    if row.history_schema is None:
+        return history[-1][1]
+    if row.history is History.KEY_FRAME:
+        frames = VideoFrames(publisher=history[0][0].publisher)
+        for header, payload in history:
+            frames.frames.add(sequence=header.sequence, source_time_ns=header.source_time_ns, data=payload)
+        return frames.SerializeToString()
+    answer = row.history_schema()
+    (items,) = answer.DESCRIPTOR.fields
+    getattr(answer, items.name).extend(row.schema.FromString(payload) for _, payload in history)
+    return answer.SerializeToString()
+
+
+def _declare(session: zenoh.Session, key: str, row: Topic) -> zenoh.Publisher | zenoh.ext.AdvancedPublisher:
+    priority = getattr(zenoh.Priority, row.priority.value)
+    if row.recovered:
+        return zenoh.ext.declare_advanced_publisher(
+            session,
+            key,
+            encoding=PROTOBUF,
+            priority=priority,
+            congestion_control=zenoh.CongestionControl.DROP,
+            cache=zenoh.ext.CacheConfig(LIST_LENGTH),
+            sample_miss_detection=zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=0.5),
+            publisher_detection=True,
+        )
+    return session.declare_publisher(
+        key, encoding=PROTOBUF, priority=priority, congestion_control=zenoh.CongestionControl.DROP
+    )

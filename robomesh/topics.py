@@ -1,0 +1,442 @@
+"""The one table of topics and requests.
+
+Publishers, recorder, monitors, access control, documentation and tests read it; nobody else
+knows a rate, a priority, a schema or a right.
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+
+from robomesh.errors import KeyNameError, UnknownTopicError
+from robomesh.keys import check_chunk
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.topic_rows import EVERYONE, PEOPLE, SERVICES, History, Priority, Request, Role, Topic
+
+__all__ = [
+    "EVERYONE",
+    "PEOPLE",
+    "REQUESTS",
+    "SERVICES",
+    "TOPICS",
+    "History",
+    "Priority",
+    "Request",
+    "Role",
+    "Topic",
+    "check_operator",
+    "request",
+    "topic",
+]
+
+
+_GATEWAY = frozenset({Role.GATEWAY})
+# A player publishes robots named replay-<id>, and no other.
+_GATEWAY_OR_REPLAY = frozenset({Role.GATEWAY, Role.PLAYER})
+_KINEMATICS_OR_REPLAY = frozenset({Role.KINEMATICS, Role.PLAYER})
+_COMMANDERS = frozenset({Role.OPERATOR, Role.CONSOLE})
+
+
+_TOPICS = (
+    Topic(
+        name="joints",
+        schema=JointStates,
+        rate_hz=100.0,
+        priority=Priority.REAL_TIME,
+        stale_after_s=1.0,
+        publishers=_GATEWAY_OR_REPLAY,
+    ),
+    Topic(
+        name="joints/slow",
+        schema=JointStates,
+        rate_hz=10.0,
+        priority=Priority.INTERACTIVE_HIGH,
+        stale_after_s=1.0,
+        recorded=False,  # the same states as `joints`, thinned
+        publishers=_GATEWAY_OR_REPLAY,
+    ),
+    Topic(
+        name="controller",
+        schema=schema.ControllerState,
+        heartbeat_s=1.0,
+        priority=Priority.INTERACTIVE_HIGH,
+        stale_after_s=3.0,
+        publishers=_GATEWAY_OR_REPLAY,
+    ),
+    Topic(name="raw", schema=schema.RawRecord, priority=Priority.DATA_LOW, publishers=_GATEWAY_OR_REPLAY),
+    Topic(
+        name="frames",
+        schema=FrameTransforms,
+        rate_hz=60.0,
+        priority=Priority.INTERACTIVE_HIGH,
+        stale_after_s=1.0,
+        publishers=_KINEMATICS_OR_REPLAY,
+    ),
+    Topic(
+        name="kinematics",
+        schema=schema.KinematicState,
+        rate_hz=20.0,
+        priority=Priority.DATA_HIGH,
+        stale_after_s=1.0,
+        publishers=_KINEMATICS_OR_REPLAY,
+    ),
+    Topic(
+        name="lease",
+        schema=schema.Lease,
+        heartbeat_s=1.0,
+        priority=Priority.INTERACTIVE_HIGH,
+        stale_after_s=3.0,
+        publishers=_GATEWAY_OR_REPLAY,
+    ),
+    Topic(
+        name="events",
+        schema=schema.Event,
+        history=History.LAST_100,
+        history_schema=schema.EventList,
+        recovered=True,
+        priority=Priority.INTERACTIVE_LOW,
+        publishers=_GATEWAY_OR_REPLAY,
+    ),
+    # What services other than the gateway notice: a key each, because two publishers of one key would
+    # answer a `get` twice.
+    Topic(
+        name="events/*",
+        schema=schema.Event,
+        history=History.LAST_100,
+        history_schema=schema.EventList,
+        recovered=True,
+        priority=Priority.INTERACTIVE_LOW,
+        publishers=SERVICES - _GATEWAY,
+    ),
+    Topic(
+        name="audit",
+        schema=schema.AuditEntry,
+        history=History.LAST_100,
+        history_schema=schema.AuditList,
+        recovered=True,
+        priority=Priority.INTERACTIVE_LOW,
+        publishers=_GATEWAY_OR_REPLAY,
+    ),
+    Topic(
+        name="program",
+        schema=schema.ProgramState,
+        heartbeat_s=1.0,
+        priority=Priority.INTERACTIVE_HIGH,
+        stale_after_s=3.0,
+        publishers=_GATEWAY_OR_REPLAY,
+    ),
+    Topic(
+        name="description",
+        schema=schema.Description,
+        priority=Priority.DATA,
+        publishers=_KINEMATICS_OR_REPLAY,
+    ),
+    Topic(
+        name="recording",
+        schema=schema.Recording,
+        heartbeat_s=1.0,
+        recorded=False,  # it tells of the recording itself
+        priority=Priority.DATA,
+        stale_after_s=3.0,
+        publishers=frozenset({Role.RECORDER}),
+    ),
+    Topic(
+        name="replay",
+        schema=schema.ReplayState,
+        heartbeat_s=0.2,
+        recorded=False,
+        priority=Priority.DATA,
+        stale_after_s=3.0,
+        publishers=frozenset({Role.PLAYER}),
+    ),
+    Topic(
+        name="video/*",
+        schema=CompressedVideo,
+        rate_hz=30.0,
+        history=History.KEY_FRAME,
+        history_schema=schema.VideoFrames,
+        priority=Priority.DATA_LOW,
+        stale_after_s=1.0,
+        publishers=frozenset({Role.RENDERER, Role.PLAYER}),  # a player's are named recorded-<view>
+    ),
+    Topic(
+        name="image/*",
+        schema=CompressedImage,
+        rate_hz=5.0,
+        recorded=False,  # pictures of what the recording holds already
+        priority=Priority.BACKGROUND,
+        publishers=frozenset({Role.RENDERER}),
+    ),
+    # Below a site's `-`, as what follows. The chunk is <service>.<id>: one key a process.
+    Topic(
+        name="health/*",
+        schema=schema.ServiceHealth,
+        heartbeat_s=2.0,
+        recorded=False,
+        priority=Priority.BACKGROUND,
+        stale_after_s=6.0,
+        publishers=SERVICES,
+    ),
+    Topic(
+        name="mesh",
+        schema=schema.MeshState,
+        heartbeat_s=2.0,
+        recorded=False,
+        priority=Priority.DATA,
+        stale_after_s=6.0,
+        publishers=frozenset({Role.WATCH}),
+    ),
+    Topic(
+        name="alarms",
+        schema=schema.AlarmList,
+        heartbeat_s=1.0,
+        recorded=False,
+        priority=Priority.INTERACTIVE_HIGH,
+        stale_after_s=3.0,
+        publishers=frozenset({Role.WATCH}),
+    ),
+)
+
+_REQUESTS = (
+    Request(
+        name="stop",
+        request=schema.StopRequest,
+        answer=schema.StopAnswer,
+        priority=Priority.REAL_TIME,
+        owners=_GATEWAY_OR_REPLAY,
+        askers=EVERYONE,
+        wildcard=True,
+        unread=True,
+        own_link="stop",
+        both_links=True,
+    ),
+    Request(
+        name="lease/request/*",
+        request=schema.LeaseRequest,
+        answer=schema.LeaseAnswer,
+        priority=Priority.REAL_TIME,
+        owners=_GATEWAY_OR_REPLAY,
+        askers=_COMMANDERS,
+        own_link="requests",
+        in_name=True,
+    ),
+    Request(
+        name="command/*",
+        request=schema.CommandRequest,
+        answer=schema.CommandAnswer,
+        priority=Priority.REAL_TIME,
+        owners=_GATEWAY_OR_REPLAY,
+        askers=_COMMANDERS,
+        own_link="requests",
+        in_name=True,
+    ),
+    Request(
+        name="audit/find",
+        request=schema.AuditQuery,
+        answer=schema.AuditList,
+        priority=Priority.BACKGROUND,
+        owners=_GATEWAY,
+        askers=EVERYONE,
+    ),
+    Request(
+        name="simulator/fault",
+        request=schema.FaultRequest,
+        answer=schema.FaultAnswer,
+        priority=Priority.BACKGROUND,
+        owners=frozenset({Role.SIMULATOR}),
+        askers=_COMMANDERS,
+    ),
+    Request(
+        name="kinematics/forward",
+        request=schema.ForwardRequest,
+        answer=schema.ForwardAnswer,
+        priority=Priority.DATA,
+        owners=frozenset({Role.KINEMATICS}),
+        askers=EVERYONE,
+    ),
+    Request(
+        name="kinematics/inverse",
+        request=schema.InverseRequest,
+        answer=schema.InverseAnswer,
+        priority=Priority.DATA,
+        owners=frozenset({Role.KINEMATICS}),
+        askers=EVERYONE,
+    ),
+    Request(
+        name="kinematics/check/*",
+        request=schema.CheckRequest,
+        answer=schema.CheckAnswer,
+        priority=Priority.DATA,
+        owners=frozenset({Role.KINEMATICS}),
+        askers=EVERYONE,
+        in_name=True,
+    ),
+    Request(
+        name="video/*/keyframe/*",
+        request=schema.KeyFrameRequest,
+        answer=schema.KeyFrameAnswer,
+        priority=Priority.DATA,
+        owners=frozenset({Role.RENDERER}),
+        askers=EVERYONE,
+        in_name=True,
+    ),
+    Request(
+        name="views/*",
+        request=schema.ViewRequest,
+        answer=schema.ViewAnswer,
+        priority=Priority.DATA,
+        owners=frozenset({Role.RENDERER}),
+        askers=EVERYONE,
+        in_name=True,
+    ),
+    Request(
+        name="mesh/*",
+        request=None,
+        answer=None,
+        priority=Priority.DATA,
+        owners=_KINEMATICS_OR_REPLAY,
+        askers=EVERYONE,
+    ),
+    Request(
+        name="recorder/request",
+        request=schema.RecorderRequest,
+        answer=schema.Recording,
+        priority=Priority.BACKGROUND,
+        owners=frozenset({Role.RECORDER, Role.PLAYER}),  # which refuses: a replay is recorded already
+        askers=_COMMANDERS,
+    ),
+    Request(
+        name="recordings/list",
+        request=None,
+        answer=schema.RecordingList,
+        priority=Priority.BACKGROUND,
+        owners=frozenset({Role.RECORDER}),
+        askers=EVERYONE,
+    ),
+    Request(
+        name="recordings/info",
+        request=schema.RecordingQuery,
+        answer=schema.Recording,
+        priority=Priority.BACKGROUND,
+        owners=frozenset({Role.RECORDER}),
+        askers=EVERYONE,
+    ),
+    Request(
+        name="recordings/range/*",
+        request=schema.RangeRequest,
+        answer=schema.RecordedMessages,
+        priority=Priority.BACKGROUND,
+        owners=frozenset({Role.RECORDER}),
+        askers=EVERYONE,
+        in_name=True,
+    ),
+    Request(
+        name="recordings/series/*",
+        request=schema.SeriesRequest,
+        answer=schema.SeriesAnswer,
+        priority=Priority.BACKGROUND,
+        owners=frozenset({Role.RECORDER}),
+        askers=EVERYONE,
+        in_name=True,
+    ),
+    Request(
+        name="recordings/piece/*",
+        request=schema.PieceRequest,
+        answer=schema.Piece,
+        priority=Priority.BACKGROUND,
+        owners=frozenset({Role.RECORDER}),
+        askers=EVERYONE,
+        in_name=True,
+    ),
+    # Below a site's `-`.
+    Request(
+        name="player/open",
+        request=schema.PlayRequest,
+        answer=schema.ReplayState,
+        priority=Priority.DATA,
+        owners=frozenset({Role.PLAYER}),
+        askers=EVERYONE,
+    ),
+    # Below a site's `-`; the chunk is the process's id.
+    Request(
+        name="clock/*",
+        request=schema.ClockRequest,
+        answer=schema.ClockAnswer,
+        priority=Priority.INTERACTIVE_HIGH,
+        owners=SERVICES,
+        askers=EVERYONE,
+    ),
+    # Below a site's `-`, in an operator's name.
+    Request(
+        name="alarms/request/*",
+        request=schema.AlarmRequest,
+        answer=schema.AlarmList,
+        priority=Priority.INTERACTIVE_HIGH,
+        owners=frozenset({Role.WATCH}),
+        askers=_COMMANDERS,
+        in_name=True,
+    ),
+    # Below replay-<id>.
+    Request(
+        name="replay/request",
+        request=schema.ReplayRequest,
+        answer=schema.ReplayState,
+        priority=Priority.DATA,
+        owners=frozenset({Role.PLAYER}),
+        askers=EVERYONE,
+    ),
+)
+
+TOPICS: Mapping[str, Topic] = MappingProxyType({row.name: row for row in _TOPICS})
+REQUESTS: Mapping[str, Request] = MappingProxyType({row.name: row for row in _REQUESTS})
+
+
+def _row_name(name: str, rows: Mapping[str, object]) -> str | None:
+    if name in rows:
+        return name
+    chunks = name.split("/")
+    for row in rows:
+        pattern = row.split("/")
+        if len(pattern) == len(chunks) and all(p in ("*", c) for p, c in zip(pattern, chunks, strict=True)):
+            return row
+    return None
+
+
+def topic(name: str) -> Topic:
+    """The row of a topic: `joints`, `video/top`.
+
+    Raises:
+        UnknownTopicError: If the table has none.
+    """
+    row = _row_name(name, TOPICS)
+    if row is None:
+        raise UnknownTopicError(f"no topic {name!r}; there are {', '.join(TOPICS)}")
+    return TOPICS[row]
+
+
+def request(name: str) -> Request:
+    """The row of a request: `stop`, `command/li`.
+
+    Raises:
+        UnknownTopicError: If the table has none.
+    """
+    row = _row_name(name, REQUESTS)
+    if row is None:
+        raise UnknownTopicError(f"no request {name!r}; there are {', '.join(REQUESTS)}")
+    return REQUESTS[row]
+
+
+def check_operator(name: str) -> str:
+    """The name itself, when somebody may ask in it.
+
+    Raises:
+        KeyNameError: If it cannot stand in a key, or is what a request is called: no rule on a request's
+            key may ever mean somebody's.
+    """
+    if name in REQUESTS:
+        raise KeyNameError(f"operator {name!r} cannot be used: a request is called so")
+    return check_chunk(name)

@@ -1,0 +1,40 @@
+"""A worker for the tests: echoes, fails, dies, takes its time."""
+
+import os
+import sys
+import time
+
+from robomesh.worker import answer_all
+
+
+class OfTwoArgumentsError(Exception):
+    def __init__(self, what, why):
+        super().__init__(f"{what}: {why}")
+
+
+def begin(settings):
+    if settings == "wrong":
+        raise ValueError("settings are wrong")
+
+    def answer(question):
+        match question:
+            case ("fail", text):
+                raise ValueError(text)
+            case ("fail twice", text):
+                raise OfTwoArgumentsError(text, text)
+            case "die":
+                os._exit(3)
+            case ("say and sleep", seconds):
+                print("asleep", file=sys.stderr, flush=True)
+                time.sleep(seconds)
+            case ("sleep", seconds):
+                time.sleep(seconds)
+            case "print":
+                print("not an answer")
+        return settings, os.getpid(), question
+
+    return answer
+
+
+if __name__ == "__main__":
+    answer_all(begin)

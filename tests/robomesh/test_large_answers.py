@@ -1,0 +1,24 @@
+"""Answers as large as meshes are: whatever their last piece comes to, they arrive whole."""
+
+import pytest
+
+from robomesh.session import open_session
+from tests.conftest import run
+
+
+@pytest.mark.parametrize("size", [40_956, 133_596, 187_244, 241_624, 3_000_000])
+def test_an_answer_of_any_size_arrives_whole_at_the_first_asking(mesh, size):
+    async def main():
+        async with open_session(mesh) as owner, open_session(mesh) as asker:
+            asked = []
+
+            async def mesh_of(request):
+                asked.append(request.chunk)
+                return b"\x5a" * size
+
+            owner.answer("hall", "arm", "mesh/*", mesh_of)
+            answer = await asker.ask_bytes("robomesh/hall/arm/mesh/base", timeout_s=8.0)
+            assert answer == b"\x5a" * size
+            assert asked == ["base"]
+
+    run(main())

@@ -1,0 +1,166 @@
+"""Codes of refusals: the table, and their way over the mesh."""
+
+import asyncio
+import string
+
+import pytest
+import zenoh
+
+from robomesh import reason_codes as codes
+from robomesh.endpoints import client_config
+from robomesh.errors import BusyError, QuotaError, RefusedError
+from robomesh.messages import TEXT
+from robomesh.reasons import MOST_PARAMETER_BYTES, Code, Reason, pairs_of, reason_of, to_parameters
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import open_session
+from tests.conftest import run
+
+TABLE = [each for each in vars(codes).values() if isinstance(each, Code)]
+
+
+def sent(reason, when=""):
+    """A reason as the other end reads it."""
+    return reason_of(pairs_of(to_parameters(reason, when)), reason.text)
+
+
+def test_each_code_stands_once_in_the_table_and_is_a_dotted_word():
+    names = [each.name for each in TABLE]
+    assert len(names) == len(set(names)) > 100
+    assert set("".join(names)) <= set(string.ascii_lowercase + "._")
+    assert {each.name for each in TABLE if each.problem.endswith(".")} == set()
+
+
+def test_a_sentence_is_the_problem_and_the_advice_with_values_and_causes():
+    reason = codes.LINK_DOWN(codes.LINK_FAILED(where="10.0.0.7:5400", detail="refused"))
+    assert str(reason) == "the link to the controller is down (cannot connect to 10.0.0.7:5400: refused)"
+    assert str(codes.COMMAND_WAITED(waited=1.26, seconds=1.0)).startswith("it waited 1.3 s in the gateway")
+    with pytest.raises(KeyError, match="holder"):
+        codes.LEASE_HELD()
+
+
+@pytest.mark.parametrize(
+    "reason",
+    [
+        codes.LEASE_HELD(holder="li"),
+        codes.LEASE_NONE(),
+        codes.LINK_DOWN(codes.LINK_REFUSED(where="10.0.0.7:5400", detail="a&b=c;d%20 ÷ 操作员")),
+        codes.COMMAND_CHANGED(codes.ROBOT_OTHER_MOVED(name="left")),
+    ],
+)
+def test_the_other_end_reads_what_was_sent(reason):
+    found = sent(reason, "again_s=0.500")
+    assert (found.code, found.text) == (reason.code, reason.text)
+    assert found.values == reason.values
+    assert [(each.code, each.values) for each in found.causes] == [
+        (each.code, each.values) for each in reason.causes
+    ]
+
+
+def test_what_does_not_fit_is_left_out_and_the_code_never():
+    reason = codes.STOP_LATCHED(id=7, by="操" * 200, reason="x" * 200)
+    written = to_parameters(reason, "again_s=0.500")
+    assert len(written.encode()) <= MOST_PARAMETER_BYTES
+    assert sent(reason).values == {"id": "7", "reason": "x" * 200}
+    causes = Reason("a")
+    for _ in range(500):
+        causes = Reason("b", causes=(causes,))
+    assert len(to_parameters(causes)) <= MOST_PARAMETER_BYTES
+    assert sent(Reason("x" * 1000)).code == "x" * 85
+    # One of several causes would say less than the sentence.
+    assert sent(codes.SEVERAL(codes.ROBOT_MOVED(), codes.ROBOT_NOT_HOMED())).causes == ()
+
+
+def test_a_value_is_one_line_without_control_characters():
+    reason = codes.ALARM_UNKNOWN(id="a\x1b[2J\nb\u202e" + "x" * 2000)
+    assert reason.text.startswith("no alarm 'a [2J b<U+202E>xxx")
+    assert len(reason.values["id"]) == 800
+
+
+@pytest.mark.parametrize(
+    "parameters", ["", "busy", "quota=0.5", "%", "&&&=", "code=", "cause.code=x", "\ud800"]
+)
+def test_what_names_no_code_is_no_reason(parameters):
+    assert reason_of(pairs_of(parameters), "") is None
+
+
+async def refusals(session, error):
+    """A refusal as our client has it, and as a plain Zenoh client: text and encoding."""
+
+    async def refuse(_):
+        raise error
+
+    answerer = session.answer("site", "arm", "stop", refuse)
+    try:
+        with pytest.raises(RefusedError) as refused:
+            await session.ask("robomesh/site/arm/stop", schema.StopRequest(), timeout_s=5)
+    finally:
+        answerer.close()
+    return refused.value
+
+
+def test_a_refusal_keeps_its_code_over_a_router(mesh):
+    reason = codes.STOP_LATCHED(id=7, by="li " * 60, reason="%&=;" * 60)
+
+    async def main():
+        async with open_session(mesh) as session:
+            found = await refusals(session, RefusedError(reason, text=f"Not sent: {reason}."))
+            assert (type(found), str(found)) == (RefusedError, f"Not sent: {reason}.")
+            assert (found.reason.code, found.reason.values["id"]) == ("stop.latched", "7")
+            # The session goes on: over 255 bytes would have ended it.
+            found = await refusals(session, BusyError(codes.BUSY()))
+            assert (type(found), found.reason.code) == (BusyError, "request.busy")
+            over = codes.OVER_QUOTA(asker="li", quota="checks_a_minute", most=120, seconds=9.0)
+            found = await refusals(session, QuotaError(over, again_s=9.0))
+            assert (type(found), found.again_s, found.reason.code) == (QuotaError, 9.0, "quota.rate")
+            assert found.reason.values["quota"] == "checks_a_minute"
+
+    run(main())
+
+
+def test_an_older_client_gets_what_it_knows(mesh):
+    """Its question does not ask for codes, and it compares the encoding with those two."""
+    errors = iter(
+        [BusyError(codes.BUSY()), QuotaError(codes.BUSY(), again_s=0.25), RefusedError(codes.BUSY())]
+    )
+
+    async def refuse(_):
+        raise next(errors)
+
+    def asked(plain):
+        return [
+            (str(reply.err.encoding), reply.err.payload.to_string())
+            for _ in range(3)
+            for reply in plain.get("robomesh/site/arm/stop", timeout=5.0)
+        ]
+
+    async def main():
+        async with open_session(mesh) as session:
+            session.answer("site", "arm", "stop", refuse)
+            with zenoh.open(client_config(mesh.connect, mesh.tls)) as plain:
+                found = await asyncio.to_thread(asked, plain)
+            assert [encoding for encoding, _ in found] == [
+                f"{TEXT};busy",
+                f"{TEXT};quota=0.250",
+                f"{TEXT};code=request.busy",
+            ]
+            assert {text for _, text in found} == {str(codes.BUSY())}
+
+    run(main())
+
+
+@pytest.mark.parametrize(
+    ("encoding", "kind"), [("busy", BusyError), ("quota=0.250", QuotaError), ("quota=nan", RefusedError)]
+)
+def test_an_older_owner_is_understood(mesh, encoding, kind):
+    def refuse(query):
+        with query:
+            query.reply_err(b"no", encoding=f"{TEXT};{encoding}")
+
+    async def main():
+        async with open_session(mesh) as session:
+            with zenoh.open(client_config(mesh.connect, mesh.tls)) as plain:
+                plain.declare_queryable("robomesh/site/arm/stop", refuse)
+                with pytest.raises(kind, match=r"^no$"):
+                    await session.ask("robomesh/site/arm/stop", schema.StopRequest(), timeout_s=0.2)
+
+    run(main())

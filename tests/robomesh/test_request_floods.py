@@ -1,0 +1,219 @@
+"""More requests than their owner can begin."""
+
+import asyncio
+import contextlib
+import time
+
+import pytest
+
+from robomesh.answering import Request
+from robomesh.asking import ask_all
+from robomesh.errors import BusyError
+from robomesh.intake import RateLimit, begin_now
+from robomesh.messages import PROTOBUF
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import open_session
+from tests.conftest import run
+from tests.protocol_gateway.hall import until
+
+HOME = schema.CommandRequest(command=schema.CommandRequest.HOME)
+
+
+class Owner:
+    """Begins whatever comes, and answers once it is let."""
+
+    def __init__(self, session):
+        self.begun, self.go_on = [], asyncio.Event()
+        self.begun_before_stop = self.begun_before_other = None
+        self.commands = session.answer("site", "arm", "command/*", self._wait)
+        self.commands_of_other = session.answer("site", "other", "command/*", self._of_other)
+        session.answer("site", "arm", "video/*/keyframe/*", self._key_frame)
+        self.stops = session.answer("site", "arm", "stop", self._stop)
+
+    async def _wait(self, request: Request):
+        if request.chunk != "ready":
+            self.begun.append(request.chunk)
+            await self.go_on.wait()
+        return schema.CommandAnswer(accepted=True)
+
+    async def _key_frame(self, request: Request):
+        self.begun.append(request.asker)
+        await self.go_on.wait()
+        return schema.KeyFrameAnswer()
+
+    async def _of_other(self, request: Request):
+        self.begun_before_other = len(self.begun)
+        return schema.CommandAnswer(accepted=True)
+
+    async def _stop(self, request: Request):
+        self.begun_before_stop = len(self.begun)
+        return schema.StopAnswer(stop_id=1, sent=True)
+
+
+@contextlib.asynccontextmanager
+async def site(mesh):
+    async with open_session(mesh) as gateway, open_session(mesh) as eve, open_session(mesh) as li:
+        owner = Owner(gateway)
+        # The router knows of it from here on: what is asked before has no answer.
+        await li.ask("robomesh/site/arm/command/ready", HOME, timeout_s=20.0)
+        yield owner, eve, li
+
+
+def once(session, name, what="command"):
+    """Asked as a flooder asks, who is answered and does not wait."""
+    key = f"robomesh/site/arm/{what}/{name}"
+    payload = HOME.SerializeToString() if what == "command" else b""
+    return asyncio.create_task(ask_all(session.zenoh_session, key, payload, timeout_s=60.0))
+
+
+def until_it_is_so(condition):
+    """Wait without letting the event loop go on: what comes meanwhile waits for it."""
+    deadline = time.monotonic() + 20.0
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+def flood_while_the_loop_is_held(owner, session):
+    """Fill every place of the owner's with requests that its event loop has not seen; keep the result."""
+    keys = [f"robomesh/site/arm/command/eve-{number}" for number in range(600)]
+    payload = HOME.SerializeToString()
+    asked = [session.zenoh_session.get(key, payload=payload, encoding=PROTOBUF) for key in keys]
+    until_it_is_so(lambda: owner.commands.turned_away >= 600 - 256)
+    return asked
+
+
+def is_busy(task):
+    return task.done() and isinstance(task.result()[0][2], BusyError)
+
+
+def test_who_floods_an_owner_fills_his_own_share_and_others_are_answered_meanwhile(mesh):
+    async def main():
+        async with site(mesh) as (owner, eve, li):
+            asked = [once(eve, "eve") for _ in range(500)]
+            await until(lambda: sum(map(is_busy, asked)) >= 480)
+            other = asyncio.create_task(li.ask("robomesh/site/arm/command/li", HOME, timeout_s=20.0))
+            await until(lambda: "li" in owner.begun)
+            assert (await li.ask("robomesh/site/arm/stop", schema.StopRequest())).sent
+            owner.go_on.set()
+            assert (await other).accepted
+            await asyncio.gather(*asked)
+            assert sum(map(is_busy, asked)) + owner.begun.count("eve") == 500
+            assert owner.begun.count("eve") == 16
+
+    run(main())
+
+
+def test_a_flooder_of_many_names_is_bounded_too(mesh):
+    async def main():
+        async with site(mesh) as (owner, eve, li):
+            asked = [once(eve, f"eve-{number}") for number in range(600)]
+            await until(lambda: sum(map(is_busy, asked)) == 600 - 256)
+            assert (await li.ask("robomesh/site/arm/stop", schema.StopRequest())).sent
+            owner.go_on.set()
+            await asyncio.gather(*asked)
+            assert len(owner.begun) == 256
+
+    run(main())
+
+
+def test_a_flooder_with_one_name_has_one_share_whatever_views_it_names(mesh):
+    async def main():
+        async with site(mesh) as (owner, eve, li):
+            asked = [once(eve, "eve", f"video/view-{number}/keyframe") for number in range(40)]
+            await until(lambda: sum(map(is_busy, asked)) == 40 - 16)
+            other = once(li, "li", "video/view-1/keyframe")
+            await until(lambda: "li" in owner.begun)
+            owner.go_on.set()
+            await asyncio.gather(*asked, other)
+            assert len(owner.begun) == 17
+
+    run(main())
+
+
+def test_a_busy_owner_is_asked_again_until_the_time_is_over_and_begins_it_once(mesh):
+    async def main():
+        async with site(mesh) as (owner, eve, li):
+            asked = [once(eve, "li") for _ in range(16)]
+            await until(lambda: len(owner.begun) >= 16)
+            key = "robomesh/site/arm/command/li"
+            with pytest.raises(BusyError, match="too many requests wait"):
+                await li.ask(key, HOME, timeout_s=0.3)
+            patient = asyncio.create_task(li.ask(key, HOME, timeout_s=20.0))
+            await asyncio.sleep(0.2)
+            assert len(owner.begun) == 16
+            owner.go_on.set()
+            assert (await patient).accepted
+            await asyncio.gather(*asked)
+            assert len(owner.begun) == 17
+
+    run(main())
+
+
+def test_a_stop_is_begun_before_the_requests_that_came_earlier(mesh):
+    async def main():
+        async with site(mesh) as (owner, eve, li):
+            asked = flood_while_the_loop_is_held(owner, eve)
+            stop = li.zenoh_session.get("robomesh/site/arm/stop")
+            until_it_is_so(lambda: owner.stops.waiting)
+            await until(lambda: owner.begun_before_stop is not None)
+            assert owner.begun_before_stop <= 2
+            owner.go_on.set()
+            await until(lambda: len(owner.begun) == 256)
+            del asked, stop
+
+    run(main())
+
+
+def test_a_flood_for_one_robot_takes_no_other_robots_turn(mesh):
+    async def main():
+        async with site(mesh) as (owner, eve, li):
+            asked = flood_while_the_loop_is_held(owner, eve)
+            other = li.zenoh_session.get(
+                "robomesh/site/other/command/li", payload=HOME.SerializeToString(), encoding=PROTOBUF
+            )
+            until_it_is_so(lambda: owner.commands_of_other.waiting)
+            await until(lambda: owner.begun_before_other is not None)
+            assert owner.begun_before_other <= 3
+            owner.go_on.set()
+            await until(lambda: len(owner.begun) == 256)
+            del asked, other
+
+    run(main())
+
+
+def test_what_is_limited_may_come_in_a_burst_and_then_at_its_rate():
+    limit = RateLimit(per_s=10.0, burst=3)
+    assert [limit.take(5.0) for _ in range(5)] == [True, True, True, False, False]
+    assert [limit.take(5.1), limit.take(5.1), limit.take(5.2)] == [True, False, True]
+    assert [limit.take(99.0) for _ in range(4)] == [True, True, True, False]
+
+
+def test_what_begins_now_runs_to_its_first_wait_and_goes_on_in_a_task():
+    async def main():
+        loop, seen, go_on = asyncio.get_running_loop(), [], asyncio.Event()
+
+        async def work():
+            try:
+                seen.append("begun")
+                await go_on.wait()
+                await asyncio.sleep(0)
+                seen.append("done")
+            except asyncio.CancelledError:
+                seen.append("cancelled")
+                raise
+
+        task = begin_now(loop, work())
+        assert seen == ["begun"]
+        go_on.set()
+        await task
+        assert begin_now(loop, asyncio.sleep(0)) is not None
+        go_on.clear()
+        task = begin_now(loop, work())
+        await asyncio.sleep(0)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        assert seen == ["begun", "done", "begun", "cancelled"]
+
+    run(main())

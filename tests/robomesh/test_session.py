@@ -1,0 +1,506 @@
+"""Publishers, subscriptions, requests and presence over a real router."""
+
+import asyncio
+import signal
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import zenoh
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+
+from robomesh import subscription as subscription_module
+from robomesh.answering import Request
+from robomesh.endpoints import client_config, router_config
+from robomesh.errors import NoAnswerError, RefusedError, SessionError
+from robomesh.header import pack
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import SessionSettings, open_session
+from tests.conftest import free_port, put_unheard, run
+
+
+def joints(value: float) -> JointStates:
+    message = JointStates()
+    message.joints.add(name="waist", position=value)
+    return message
+
+
+async def until(condition, timeout_s=30.0):
+    async with asyncio.timeout(timeout_s):
+        while not condition():
+            await asyncio.sleep(0.01)
+
+
+def test_what_is_put_arrives_with_key_number_and_source_time(mesh):
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            subscription = monitor.subscribe("robomesh/*/*/joints", newest=10)
+            publisher = gateway.declare_publisher("site", "arm", "joints")
+            await until(lambda: publisher.watched)
+            publisher.put(joints(1.0), source_time_ns=123)
+            publisher.put(joints(2.0))
+            first, second = await anext(subscription), await anext(subscription)
+            assert first.parsed == ("site", "arm", "joints")
+            assert first.message() == joints(1.0)
+            assert first.header.source_time_ns == 123
+            assert second.header.sequence == first.header.sequence + 1
+            assert second.header.publisher == first.header.publisher
+            assert subscription.age_s(first.key) < 5.0
+
+    run(main())
+
+
+def test_a_value_that_is_published_while_it_is_answered_is_live(mesh):
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            publisher = gateway.declare_publisher("site", "arm", "joints")
+            publisher.put(joints(1.0))
+            # As in the middle of `put`: what is about to be published is answered already.
+            put_unheard(publisher, joints(2.0))
+            subscription = monitor.subscribe("robomesh/site/arm/joints", newest=10)
+            answer = await anext(subscription)
+            assert (answer.live, answer.message()) == (False, joints(2.0))
+            for _ in range(2):
+                publisher._publisher.put(answer.payload, attachment=pack(answer.header))
+            publisher.put(joints(3.0))
+            came = [await anext(subscription) for _ in range(2)]
+            assert [(each.live, each.message()) for each in came] == [
+                (True, joints(2.0)),
+                (True, joints(3.0)),
+            ]
+            assert subscription.age_s(answer.key) is not None
+            assert subscription.lost(answer.key) == 0
+
+    run(main())
+
+
+def test_live_samples_that_an_answer_overtakes_are_not_lost(mesh, monkeypatch):
+    monkeypatch.setattr(subscription_module, "_EARLY_S", 3.0)
+
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            publisher = gateway.declare_publisher("site", "arm", "joints")
+            states = monitor.subscribe("robomesh/site/arm/joints", newest=10)
+            await until(lambda: publisher.watched)
+            publisher.put(joints(1.0))
+            first = await anext(states)
+            for value in (2.0, 3.0, 4.0):
+                put_unheard(publisher, joints(value))
+            is_early, loop, answered = states._is_early, asyncio.get_running_loop(), asyncio.Event()
+
+            def read_answer(reply):
+                loop.call_soon_threadsafe(answered.set)
+                return is_early(reply)
+
+            states._is_early = read_answer
+            states.refresh("site", "arm")
+            await answered.wait()
+            for more, value in ((1, 2.0), (2, 3.0)):
+                header = first.header._replace(sequence=first.header.sequence + more)
+                publisher._publisher.put(joints(value).SerializeToString(), attachment=pack(header))
+            came = [await anext(states) for _ in range(3)]
+            # The last one never comes live: then the answer counts.
+            assert [(each.live, each.message().joints[0].position) for each in came] == [
+                *((True, 2.0), (True, 3.0), (False, 4.0))
+            ]
+            assert states.lost(first.key) == 0
+
+    run(main())
+
+
+def test_a_late_joiner_gets_the_last_state_whose_age_is_not_known(mesh):
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            publisher = gateway.declare_publisher("site", "arm", "joints")
+            publisher.put(joints(1.0))
+            publisher.put(joints(2.0))
+            # The first of them may still be on its way when it is asked for the last.
+            while await monitor.last("robomesh/site/arm/joints") != joints(2.0):
+                pass
+            subscription = monitor.subscribe("robomesh/site/arm/joints")
+            sample = await anext(subscription)
+            assert sample.message() == joints(2.0)
+            assert not sample.live
+            assert subscription.age_s(sample.key) is None
+            publisher.put(joints(3.0))
+            sample = await anext(subscription)
+            assert (sample.live, sample.message()) == (True, joints(3.0))
+            assert subscription.lost(sample.key) == 0
+
+    run(main())
+
+
+def test_a_plain_zenoh_get_is_answered_once_with_an_attachment_of_24_bytes(mesh):
+    async def main():
+        async with open_session(mesh) as gateway:
+            publisher = gateway.declare_publisher("site", "arm", "joints")
+            header = publisher.put(joints(2.0), source_time_ns=7)
+            with zenoh.open(client_config(mesh.connect)) as plain:
+                replies = await asyncio.to_thread(lambda: list(plain.get("robomesh/site/arm/joints")))
+            (reply,) = replies
+            assert str(reply.ok.encoding) == "application/protobuf"
+            assert struct.unpack("<QQq", reply.ok.attachment.to_bytes()) == header
+            assert JointStates.FromString(reply.ok.payload.to_bytes()) == joints(2.0)
+
+    run(main())
+
+
+def test_lists_come_whole_before_what_follows_them_and_without_repetition(mesh):
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            publisher = gateway.declare_publisher("site", "arm", "events")
+            for number in range(150):
+                publisher.put(schema.Event(code=str(number)))
+            subscription = monitor.subscribe("robomesh/site/arm/events", newest=1000)
+            for number in range(150, 200):
+                publisher.put(schema.Event(code=str(number)))
+            codes: list[str] = []
+            while not codes or codes[-1] != "199":
+                sample = await anext(subscription)
+                message = sample.message()
+                codes += [message.code] if sample.live else [event.code for event in message.events]
+            assert codes == [str(number) for number in range(200 - len(codes), 200)]
+            assert len(codes) >= 100
+
+    run(main())
+
+
+def test_a_joiner_of_a_video_gets_the_frames_since_the_last_key_frame(mesh):
+    async def main():
+        from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+
+        async with open_session(mesh) as renderer, open_session(mesh) as monitor:
+            publisher = renderer.declare_publisher("site", "arm", "video/top")
+            publisher.put(CompressedVideo(data=b"lost"))
+            for data in (b"K1", b"P1", b"K2", b"P2", b"P3"):
+                publisher.put(CompressedVideo(data=data), key_frame=data.startswith(b"K"))
+            sample = await anext(monitor.subscribe("robomesh/site/arm/video/top", newest=100))
+            frames = sample.message().frames
+            assert [CompressedVideo.FromString(frame.data).data for frame in frames] == [b"K2", b"P2", b"P3"]
+            assert frames[-1].sequence == sample.header.sequence
+
+    run(main())
+
+
+def test_a_slow_consumer_keeps_the_newest_and_starves_nobody(mesh):
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            slow = monitor.subscribe("robomesh/site/arm/joints", newest=3)
+            quick = monitor.subscribe("robomesh/site/arm/frames", newest=1000)
+            publisher = gateway.declare_publisher("site", "arm", "joints")
+            frames = gateway.declare_publisher("site", "arm", "frames")
+            await until(lambda: publisher.watched and frames.watched)
+            for number in range(200):
+                publisher.put(joints(number))
+                frames.put(quick.topic.schema())
+            got = [(await anext(quick)).header.sequence for _ in range(200)]
+            assert got == list(range(1, 201))
+            await until(lambda: slow.skipped == 197)
+            assert [(await anext(slow)).message().joints[0].position for _ in range(3)] == [197, 198, 199]
+            assert slow.lost("robomesh/site/arm/joints") == 0
+
+    run(main())
+
+
+def test_a_gap_in_the_numbers_is_counted_as_lost(mesh):
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            subscription = monitor.subscribe("robomesh/site/arm/joints", newest=10)
+            publisher = gateway.declare_publisher("site", "arm", "joints")
+            await until(lambda: publisher.watched)
+            publisher.put(joints(1))
+            publisher._sequence += 5  # what a full link drops, nobody hears of
+            publisher.put(joints(2))
+            assert [(await anext(subscription)).message().joints[0].position for _ in range(2)] == [1, 2]
+            assert subscription.lost(publisher.key) == 5
+
+    run(main())
+
+
+def test_the_first_put_and_the_first_get_on_the_second_link_wait_for_their_declarations(mesh):
+    async def main():
+        async with open_session(mesh) as monitor:
+            subscription = monitor.subscribe("robomesh/*/*/description", newest=100, history=False)
+            for number in range(30):
+                async with open_session(mesh) as gateway, open_session(mesh) as joiner:
+                    publisher = gateway.declare_publisher("site", f"arm-{number}", "description")
+                    publisher.put(schema.Description(name=str(number)))
+                    assert (await anext(subscription)).message().name == str(number)
+                    late = joiner.subscribe(publisher.key)
+                    assert (await anext(late)).message().name == str(number)
+
+    run(main())
+
+
+def test_a_publisher_restarted_while_the_link_was_down_is_asked_for_what_it_said(mesh):
+    async def main():
+        async with open_session(mesh) as monitor:
+            subscription = monitor.subscribe("robomesh/site/arm/description", newest=10)
+            async with open_session(mesh) as first:
+                first.declare_presence("site", "arm", "kinematics")
+                publisher = first.declare_publisher("site", "arm", "description")
+                await until(lambda: publisher.watched)
+                publisher.put(schema.Description(name="first"))
+                assert (await anext(subscription)).message().name == "first"
+            async with open_session(mesh) as second:
+                # As after an outage: its put was not heard, only its presence comes.
+                publisher = second.declare_publisher("site", "arm", "description")
+                publisher.remember(schema.Description(name="second"), source_time_ns=1)
+                second.declare_presence("site", "arm", "kinematics")
+                assert (await anext(subscription)).message().name == "second"
+
+    run(main())
+
+
+def test_what_an_outage_took_of_a_list_comes_with_the_answer_and_the_rest_is_counted(mesh):
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+            subscription = monitor.subscribe("robomesh/site/arm/events", newest=1000)
+            # Its question for what was before is over, and so is no answer to come with event 1 in it.
+            await until(lambda: subscription._held is None)
+            publisher = gateway.declare_publisher("site", "arm", "events")
+            publisher.put(schema.Event(code="1"))
+            assert (await anext(subscription)).message().code == "1"
+            for number in range(2, 152):
+                put_unheard(publisher, schema.Event(code=str(number)))
+            gateway.declare_presence("site", "arm", "gateway")
+            sample = await anext(subscription)
+            assert [event.code for event in sample.message().events] == [str(n) for n in range(52, 152)]
+            assert subscription.lost(publisher.key) == 50
+            publisher.put(schema.Event(code="152"))
+            assert (await anext(subscription)).message().code == "152"
+            assert subscription.lost(publisher.key) == 50
+
+    run(main())
+
+
+async def answer_lease(request: Request):
+    if request.message.ttl_s > 5:
+        raise RefusedError(f"ttl_s {request.message.ttl_s:g} is too long: 0.5 to 5")
+    return schema.LeaseAnswer(holder=request.chunk)
+
+
+def test_a_request_is_answered_and_refused_in_words(mesh):
+    async def main():
+        async with open_session(mesh) as gateway, open_session(mesh) as operator:
+            gateway.answer("site", "arm", "lease/request/*", answer_lease)
+            key = "robomesh/site/arm/lease/request/li"
+            acquire = schema.LeaseRequest(action=schema.LeaseRequest.ACQUIRE)
+            answer = await operator.ask(key, acquire)
+            assert answer.holder == "li"
+            acquire.ttl_s = 9
+            with pytest.raises(RefusedError, match="ttl_s 9 is too long"):
+                await operator.ask(key, acquire)
+            with pytest.raises(RefusedError, match="action: one of ACQUIRE, RENEW"):
+                await operator.ask(key, schema.LeaseRequest())
+            acquire.ttl_s = float("nan")
+            with pytest.raises(RefusedError, match="ttl_s: nan is not finite"):
+                await operator.ask(key, acquire)
+            with pytest.raises(RefusedError, match="wildcard"):
+                await operator.ask("robomesh/site/*/lease/request/li", acquire)
+            with pytest.raises(NoAnswerError, match="nobody answered"):
+                await operator.ask("robomesh/site/other/lease/request/li", acquire, timeout_s=0.5)
+
+    run(main())
+
+
+def test_a_request_in_json_is_answered_in_json_with_the_protos_names_and_defaults(mesh):
+    async def main():
+        async with open_session(mesh) as gateway:
+            gateway.answer("site", "arm", "lease/request/*", answer_lease)
+            with zenoh.open(client_config(mesh.connect)) as plain:
+
+                def get(payload, encoding):
+                    replies = list(
+                        plain.get("robomesh/site/arm/lease/request/li", payload=payload, encoding=encoding)
+                    )
+                    return replies[0]
+
+                reply = await asyncio.to_thread(get, '{"action":"ACQUIRE","ttl_s":1.5}', "application/json")
+                text = reply.ok.payload.to_string()
+                assert '"holder":"li"' in text.replace(" ", "")
+                assert '"lease":""' in text.replace(" ", "")
+                assert str(reply.ok.encoding) == "application/json"
+                for payload, words in (
+                    ('{"action":"ACQUIRE","ttl_s":"NaN"}', "not finite"),
+                    ('{"action":"GRAB"}', "action: 'GRAB' is none of ACQUIRE, RENEW"),
+                    ("{", "not JSON: "),
+                    ("[1]", "a JSON object is right"),
+                    (
+                        '{"actoin":"ACQUIRE"}',
+                        "no field 'actoin'; its fields are: action, lease, ttl_s",
+                    ),
+                    ("{}", "action: one of"),
+                ):
+                    reply = await asyncio.to_thread(get, payload, None)
+                    assert words in reply.err.payload.to_string()
+                    assert "text/plain;code=request.invalid&detail=" in str(reply.err.encoding)
+
+    run(main())
+
+
+def test_a_slow_request_does_not_hold_up_the_next(mesh):
+    async def main():
+        gate = asyncio.Event()
+
+        async def answer(request: Request):
+            if request.chunk == "slow":
+                await gate.wait()
+            return schema.CommandAnswer(accepted=True, text=request.chunk)
+
+        async with open_session(mesh) as gateway, open_session(mesh) as operator:
+            gateway.answer("site", "arm", "command/*", answer)
+            command = schema.CommandRequest(command=schema.CommandRequest.HOME)
+            slow = asyncio.create_task(operator.ask("robomesh/site/arm/command/slow", command))
+            quick = await operator.ask("robomesh/site/arm/command/quick", command)
+            assert quick.text == "quick"
+            gate.set()
+            assert (await slow).text == "slow"
+
+    run(main())
+
+
+def test_asking_for_everything_stops_nobody_but_asking_all_to_stop_stops_all(mesh):
+    async def main():
+        stopped = []
+
+        async def stop(request: Request):
+            stopped.append(request.key.robot)
+            return schema.StopAnswer(stop_id=1)
+
+        async with open_session(mesh) as gateway, open_session(mesh) as operator:
+            for robot in ("arm-1", "arm-2"):
+                gateway.answer("site", robot, "stop", stop)
+            with zenoh.open(client_config(mesh.connect)) as plain:
+                assert await asyncio.to_thread(lambda: list(plain.get("robomesh/**"))) == []
+                assert stopped == []
+                plain_stop = lambda: list(plain.get("robomesh/site/arm-1/stop", payload="{not json"))  # noqa: E731
+                assert (await asyncio.to_thread(plain_stop))[0].ok is not None
+            assert stopped.pop() == "arm-1"
+            answers = await operator.ask_all("robomesh/*/*/stop", schema.StopRequest())
+            assert sorted(stopped) == ["arm-1", "arm-2"]
+            assert sorted(answer.key for answer in answers) == [
+                "robomesh/site/arm-1/stop",
+                "robomesh/site/arm-2/stop",
+            ]
+
+    run(main())
+
+
+_ROUTER = """
+import sys, zenoh
+from robomesh.endpoints import router_config
+with zenoh.open(router_config((sys.argv[1],))):
+    sys.stdin.read()
+"""
+
+
+@pytest.mark.processes
+def test_a_router_that_does_not_say_who_is_alive_is_not_taken_for_a_mesh_without_anybody():
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    command = [sys.executable, "-c", _ROUTER, endpoint]
+    router = subprocess.Popen(command, stdin=subprocess.PIPE, cwd=Path(__file__).parents[2])
+
+    async def main():
+        async with open_session(SessionSettings(connect=(endpoint,), wait_s=20.0)) as session:
+            assert await session.present() == []
+            router.send_signal(signal.SIGSTOP)
+            try:
+                with pytest.raises(NoAnswerError, match="who is alive"):
+                    await session.present()
+            finally:
+                router.send_signal(signal.SIGCONT)
+
+    try:
+        run(main())
+    finally:
+        router.communicate()
+
+
+def test_who_watches_presence_is_always_told_of_all_when_it_asks(mesh):
+    async def main():
+        async with open_session(mesh) as monitor, open_session(mesh) as service:
+            for robot in "abc":
+                service.declare_presence("site", robot, "gateway")
+            watch = monitor.watch_presence()
+            for _ in range(3):
+                await anext(watch)
+            for _ in range(500):
+                assert [who.robot for who in await monitor.present()] == ["a", "b", "c"]
+                await asyncio.sleep(0.001)
+
+    run(main())
+
+
+def test_presence_comes_and_goes(mesh):
+    async def main():
+        async with open_session(mesh) as monitor:
+            watch = monitor.watch_presence()
+            async with open_session(mesh) as service:
+                service.declare_presence("site", "arm", "gateway")
+                key, alive = await anext(watch)
+                assert (key.site, key.robot, key.service, alive) == ("site", "arm", "gateway", True)
+                # A router in its first milliseconds may know less than it has told already.
+                while await monitor.present() != [key]:
+                    await asyncio.sleep(0.01)
+            key, alive = await anext(watch)
+            assert (key.service, alive) == ("gateway", False)
+
+    run(main())
+
+
+def test_a_session_waits_for_its_router_and_outlives_it():
+    async def main():
+        endpoint = f"tcp/127.0.0.1:{free_port()}"
+        settings = SessionSettings(connect=(endpoint,), wait_s=10.0)
+
+        async def gateway(opened: asyncio.Event, end: asyncio.Event):
+            async with open_session(settings) as session:
+                publisher = session.declare_publisher("site", "arm", "description")
+                session.declare_presence("site", "arm", "kinematics")
+                publisher.put(schema.Description(name="before"))
+                opened.set()
+                await end.wait()
+                publisher.put(schema.Description(name="while the router was away"))
+                opened.clear()
+                while not opened.is_set():
+                    await asyncio.sleep(0.01)
+
+        opened, end = asyncio.Event(), asyncio.Event()
+        task = asyncio.create_task(gateway(opened, end))
+        await asyncio.sleep(0.3)
+        assert not opened.is_set()
+        router = zenoh.open(router_config((endpoint,)))
+        await opened.wait()
+        async with open_session(settings) as monitor:
+            subscription = monitor.subscribe("robomesh/*/*/description")
+            assert (await anext(subscription)).message().name == "before"
+            await asyncio.to_thread(router.close)
+            await until(lambda: not monitor.connected)
+            end.set()
+            await until(lambda: not opened.is_set())
+            router = zenoh.open(router_config((endpoint,)))
+            assert (await anext(subscription)).message().name == "while the router was away"
+            opened.set()
+            await task
+        await asyncio.to_thread(router.close)
+
+    run(main())
+
+
+def test_no_router_is_one_line_that_says_what_to_do():
+    async def main():
+        settings = SessionSettings(connect=(f"tcp/127.0.0.1:{free_port()}",), wait_s=0.0)
+        with pytest.raises(SessionError, match=r"no router at tcp/127\.0\.0\.1:.*robomesh up"):
+            async with open_session(settings):
+                pass
+        with pytest.raises(SessionError, match="'nonsense' is no endpoint: tcp/"):
+            async with open_session(SessionSettings(connect=("nonsense",), wait_s=0.0)):
+                pass
+        with pytest.raises(SessionError, match="no router at tcp/"):
+            async with open_session(SessionSettings(connect=("tcp/no..name:7447",), wait_s=0.0)):
+                pass
+
+    run(main())

@@ -1,0 +1,43 @@
+import time
+
+import pytest
+
+from robomesh.wall_clock import WallClock
+
+S = 1_000_000_000
+
+
+def test_two_readers_of_one_machine_agree_on_the_order_of_times():
+    earlier, later = WallClock(), WallClock()
+    for _ in range(1000):
+        now_ns = time.monotonic_ns()
+        assert not earlier.was_set()
+        assert earlier.earliest_ns(now_ns) <= later.latest_ns(now_ns)
+        assert earlier.earliest_ns(now_ns) <= time.time_ns() <= later.latest_ns(time.monotonic_ns())
+    assert later.latest_ns(0) - earlier.earliest_ns(0) < S
+
+
+@pytest.mark.parametrize(
+    ("by_ns", "was_set"), [(5 * S, True), (-2 * S, True), (-900_000, True), (200_000, False), (100, False)]
+)
+def test_a_clock_that_is_set_is_noticed_once(monkeypatch, by_ns, was_set):
+    clock, real = WallClock(), time.time_ns
+    monkeypatch.setattr(time, "time_ns", lambda: real() + by_ns)
+    assert clock.was_set() is was_set
+    assert not clock.was_set()
+    assert abs(clock.earliest_ns(time.monotonic_ns()) - time.time_ns()) < 0.2 * S
+
+
+def test_a_process_that_waits_between_two_readings_takes_no_clock_for_set(monkeypatch):
+    clock, real, waited_ns = WallClock(), time.monotonic_ns, 0
+
+    def slowly():
+        nonlocal waited_ns
+        waited_ns += 1_000_000
+        time.sleep(0.001)
+        return real()
+
+    monkeypatch.setattr(time, "monotonic_ns", slowly)
+    for _ in range(5):
+        assert not clock.was_set()
+    assert waited_ns

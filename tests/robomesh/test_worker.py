@@ -1,0 +1,160 @@
+import asyncio
+import contextlib
+import os
+import subprocess
+import sys
+from contextlib import asynccontextmanager
+from subprocess import PIPE
+
+import psutil
+import pytest
+
+from robomesh.worker import Worker, WorkerError
+
+CHILD = "tests.robomesh.echo_worker"
+
+
+@asynccontextmanager
+async def running(settings="settings"):
+    worker = Worker(CHILD, settings)
+    try:
+        yield worker
+    finally:
+        await worker.close()
+
+
+def run(coroutine):
+    return asyncio.run(coroutine)
+
+
+@pytest.mark.slow
+def test_a_worker_answers_in_a_process_of_its_own_and_keeps_it():
+    async def main():
+        async with running() as worker:
+            settings, pid, question = await worker.ask({"a": 1}, timeout_s=30)
+            assert (settings, question) == ("settings", {"a": 1})
+            assert pid not in (os.getpid(), None)
+            assert (await worker.ask("print", timeout_s=30))[1] == pid == worker.pid
+
+    run(main())
+
+
+@pytest.mark.slow
+def test_what_the_handler_raises_is_raised_and_the_process_goes_on():
+    async def main():
+        async with running() as worker:
+            with pytest.raises(ValueError, match="no such pose"):
+                await worker.ask(("fail", "no such pose"), timeout_s=30)
+            pid = worker.pid
+            with pytest.raises(RuntimeError, match="odd: odd"):
+                await worker.ask(("fail twice", "odd"), timeout_s=30)
+            assert (await worker.ask("hello", timeout_s=30))[1] == pid
+
+    run(main())
+
+
+@pytest.mark.slow
+def test_a_worker_that_cannot_begin_says_why():
+    async def main():
+        async with running("wrong") as worker:
+            with pytest.raises(WorkerError, match="settings are wrong"):
+                await worker.start()
+            with pytest.raises(WorkerError, match="settings are wrong"):
+                await worker.ask("hello", timeout_s=30)
+
+    run(main())
+
+
+@pytest.mark.slow
+def test_what_takes_too_long_is_ended_and_the_next_question_is_answered_by_another_process():
+    async def main():
+        async with running() as worker:
+            await worker.start()
+            pid = worker.pid
+            with pytest.raises(WorkerError, match="no answer within"):
+                await worker.ask(("sleep", 60), timeout_s=0.2)
+            with pytest.raises(ProcessLookupError):
+                os.kill(pid, 0)
+            assert (await worker.ask("hello", timeout_s=30))[1] != pid
+
+    run(main())
+
+
+@pytest.mark.slow
+def test_a_worker_that_dies_over_a_question_is_told_of_and_started_anew():
+    async def main():
+        async with running() as worker:
+            with pytest.raises(WorkerError, match="status 3"):
+                await worker.ask("die", timeout_s=30)
+            assert (await worker.ask("hello", timeout_s=30))[2] == "hello"
+
+    run(main())
+
+
+@pytest.mark.slow
+def test_the_answer_to_somebody_who_is_gone_is_not_given_to_the_next():
+    async def main():
+        async with running() as worker:
+            await worker.start()
+            task = asyncio.create_task(worker.ask(("sleep", 60), timeout_s=60))
+            await asyncio.sleep(0.1)
+            task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await task
+            assert (await worker.ask("mine", timeout_s=30))[2] == "mine"
+
+    run(main())
+
+
+@pytest.mark.slow
+def test_close_waits_for_a_process_that_another_caller_began_to_end():
+    async def main():
+        async with running() as worker:
+            await worker.start()
+            process = psutil.Process(worker.pid)
+            first = asyncio.create_task(worker.close())
+            await asyncio.sleep(0)
+            first.cancel()
+            await worker.close()
+            assert not process.is_running()  # a zombie runs
+            await asyncio.gather(first, return_exceptions=True)
+
+    run(main())
+
+
+@pytest.mark.slow
+def test_questions_wait_for_each_other_and_waiting_counts():
+    async def main():
+        async with running() as worker:
+            await worker.start()
+            first = asyncio.create_task(worker.ask(("sleep", 1.5), timeout_s=30))
+            await asyncio.sleep(0.1)
+            with pytest.raises(WorkerError, match="no answer within"):
+                await worker.ask("impatient", timeout_s=0.2)
+            assert (await first)[2] == ("sleep", 1.5)
+
+    run(main())
+
+
+@pytest.mark.slow
+def test_a_worker_ends_with_its_owner_in_the_middle_of_a_question_too():
+    owner = (
+        "import asyncio\n"
+        "from robomesh.worker import Worker\n"
+        "async def main():\n"
+        f"    worker = Worker({CHILD!r}, 'settings')\n"
+        "    await worker.start()\n"
+        "    print(worker.pid, flush=True)\n"
+        "    await worker.ask(('say and sleep', 300), timeout_s=300)\n"
+        "asyncio.run(main())\n"
+    )
+    # The worker says what it has to say where its owner does: whoever reads that waits for both to end.
+    with subprocess.Popen([sys.executable, "-c", owner], stdout=PIPE, stderr=PIPE, text=True) as process:
+        worker = psutil.Process(int(process.stdout.readline()))
+        assert process.stderr.readline() == "asleep\n"
+        process.kill()
+        try:
+            process.communicate(timeout=40.0)
+        finally:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                worker.kill()
