@@ -21,6 +21,7 @@ COPY protocol_gateway protocol_gateway
 COPY mcap_files mcap_files
 COPY renderer renderer
 COPY services services
+COPY web web
 RUN /opt/uv/bin/uv build --quiet --wheel --build-constraint requirements.lock --out-dir /dist
 
 FROM base AS role

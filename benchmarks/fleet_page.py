@@ -27,9 +27,9 @@ if __name__ == "__main__":
     # A program beside this one has a room's name: what is imported is looked for from the root.
     sys.path[0] = str(Path(__file__).parents[1])
 
-from services.console import build_page
 from tests.browser.conftest import ARGUMENTS, CHROMIUM, NO_WEBGL
 from tests.browser.crowd import crowd
+from web import build_page
 
 SIZES = ((360, 740), (1440, 900))
 SPEED_PX_S = 600

@@ -35,7 +35,7 @@ from robomesh.schemas.robomesh_pb2 import FromPage, ToPage
 from robomesh.session import SessionSettings, open_session
 from robots.description import load
 from robots.joints import joints_of
-from services.console import build_page
+from web import build_page
 
 RATE_HZ = 100
 # The counter, in steps that the protocol's text carries exactly: 300 degrees of the last joint, then anew.

@@ -46,7 +46,7 @@ from services.listen import check_page_reach, split_address
 
 log = logging.getLogger(__name__)
 
-PAGE = Path(__file__).parent / "page" / "dist"
+PAGE = Path(__file__).parent / "page"  # built from `web/`
 
 _CONNECTED_EACH_S = 0.5
 
@@ -92,9 +92,7 @@ async def serve(
         PageNotBuiltError: If there is no page.
     """
     if not (settings.page / "index.html").exists():
-        raise PageNotBuiltError(
-            f"no page in {settings.page}: build it with `python services/console/build_page.py`"
-        )
+        raise PageNotBuiltError(f"no page in {settings.page}: build it with `python web/build_page.py`")
     host, port = split_address(settings.listen)
     warning = reach_warning(settings, host)
     if warning is not None:

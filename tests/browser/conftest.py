@@ -18,13 +18,14 @@ from robomesh.keys import WHOLE_SITE
 from robomesh.schemas.robomesh_pb2 import Event
 from robomesh.session import Session, SessionSettings, open_session
 from robots.cells import Fixture
-from services.console import build_page, console
+from services.console import console
 from services.kinematics import kinematics
 from services.simulator import simulator
 from services.simulator.fault_requests import Mesh
 from services.watch import watch
 from tests.cells import arm_alone
 from tests.conftest import free_port
+from web import build_page
 
 CHROMIUM = Path("/usr/bin/chromium")
 PATIENCE_MS = 60_000

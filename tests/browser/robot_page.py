@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 from playwright.sync_api import Error, expect
 
 from robomesh.schemas.robomesh_pb2 import FaultRequest
-from services.console import build_page
+from web import build_page
 
 ARM = "#/hall/arm"
 HOME = ["0.00°", "90.00°", "−90.00°", "0.00°", "0.00°"]

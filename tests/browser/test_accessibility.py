@@ -85,7 +85,7 @@ def test_no_page_scrolls_sideways_on_a_phone_and_everything_is_large_enough_for_
 
 def test_every_texts_table_has_both_languages():
     """Read from the sources: each text has two, and fills in the same values."""
-    from services.console.build_page import PAGE
+    from web.build_page import PAGE
 
     pair = re.compile(r'^  "?([\w.]+)"?: \[(".*?(?<!\\)"), (".*?(?<!\\)")\],$', re.MULTILINE)
     wrong, count = [], 0

@@ -10,11 +10,11 @@ import pytest
 from playwright.sync_api import expect
 
 from robomesh.session import open_session
-from services.console import build_page
 from tests.browser.conftest import CHROMIUM
 from tests.browser.robot_page import serious
 from tests.conftest import last_value
 from tests.site import READY_S, running_site
+from web import build_page
 
 pytestmark = pytest.mark.browser
 

@@ -10,8 +10,8 @@ import pytest
 from robots.description import load
 from robots.model import build_model, link_placements
 from robots.urdf.write import to_urdf
-from services.console import build_page
 from tests.browser.conftest import ARGUMENTS, CHROMIUM
+from web import build_page
 
 pytestmark = pytest.mark.browser
 

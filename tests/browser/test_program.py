@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import pytest
 from playwright.sync_api import expect
 
-from services.console import build_page
 from tests.browser.conftest import CHROMIUM
 from tests.browser.robot_page import button, serious, take
 from tests.site import running_site
+from web import build_page
 
 pytestmark = pytest.mark.browser
 

@@ -10,7 +10,7 @@ from services.console.errors import AccountsError
 from services.watch.rules import RULES
 
 HOUSE = Path(__file__).resolve().parents[2]
-PAGE = HOUSE / "services/console/page/src"
+PAGE = HOUSE / "web/src"
 
 
 def table(name: str) -> set[str]:

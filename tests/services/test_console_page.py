@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from services.console import build_page
+from web import build_page
 
 PAIRS = [
     (text, ground)

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from services.console import build_page
 from tests.browser.conftest import CHROMIUM
 from tests.site import running_site
+from web import build_page
 
 
 @pytest.fixture(scope="package")

@@ -1,6 +1,6 @@
 """Builds the page: types from the mesh's own schemas, then the type check, then Vite.
 
-Runs as a script (`python services/console/build_page.py [--check]`) and as hatchling's build
+Runs as a script (`python web/build_page.py [--check]`) and as hatchling's build
 hook of the wheel. Needs the standard library, protobuf, Foxglove's modules and the Node that
 comes as a wheel; no protoc, no Node of the machine's, so that every build is the same build.
 """
@@ -13,9 +13,9 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[2]
-PAGE = Path(__file__).resolve().parent / "page"
-DIST = PAGE / "dist"
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = Path(__file__).resolve().parent
+DIST = ROOT / "services" / "console" / "page"  # as in vite.config.ts
 GENERATED = PAGE / "src" / "gen"
 MODULES = PAGE / "node_modules"
 
@@ -85,7 +85,7 @@ def install() -> None:
 
 
 def write_types() -> None:
-    """Writes the TypeScript of every message of the topic table to `page/src/gen`."""
+    """Writes the TypeScript of every message of the topic table to `web/src/gen`."""
     from google.protobuf.compiler import plugin_pb2
 
     request = plugin_pb2.CodeGeneratorRequest(parameter="target=ts,import_extension=none")

@@ -3,6 +3,8 @@ import { defineConfig } from "vite";
 export default defineConfig({
   base: "/",
   build: {
+    outDir: "../services/console/page", // in the package that serves it, so that the wheel holds it
+    emptyOutDir: true,
     target: "es2024",
     assetsDir: "assets",
     assetsInlineLimit: 0, // data: addresses would need a wider security policy
