@@ -1,7 +1,7 @@
 """Every reason of the system: its code, its English sentence, and what to do about it.
 
 The sentence is the problem, then a colon and the advice. Words in braces are parameters; `{cause}` is the
-sentence of another reason. The page translates these codes (`web/src/reasons.ts`).
+sentence of another reason. The page translates these codes (`web/src/i18n/reasons.ts`).
 """
 
 from robomesh.reasons import Code

@@ -89,7 +89,7 @@ def test_every_texts_table_has_both_languages():
 
     pair = re.compile(r'^  "?([\w.]+)"?: \[(".*?(?<!\\)"), (".*?(?<!\\)")\],$', re.MULTILINE)
     wrong, count = [], 0
-    for path in sorted((PAGE / "src").rglob("*texts.ts")):
+    for path in sorted((PAGE / "src" / "i18n").glob("*.ts")):
         for name, english, chinese in pair.findall(path.read_text()):
             count += 1
             values = [sorted(re.findall(r"\{\w+\}", text)) for text in (english, chinese)]

@@ -20,7 +20,7 @@ def table(name: str) -> set[str]:
 
 def test_every_alarm_that_the_watch_can_raise_has_chinese_words_on_the_page():
     wanted = {code for code, rule in RULES.items() if rule.priority is not None}
-    assert wanted - table("events/alarm-words.ts") == set()
+    assert wanted - table("i18n/alarm-words.ts") == set()
 
 
 def test_every_event_that_asks_nobody_to_act_has_chinese_words_on_the_page():
@@ -32,7 +32,7 @@ def test_every_event_that_asks_nobody_to_act_has_chinese_words_on_the_page():
             told |= set(re.findall(r'\bINFO\b[^"()]{0,40}"([a-z_]+\.[a-z_]+)"', text))
     assert len(told) > 15
     # The page has words of its own for stops, in both languages.
-    known = table("events/event-words.ts") | table("events/alarm-words.ts") | {"stop.reset"}
+    known = table("i18n/event-text.ts") | table("i18n/alarm-words.ts") | {"stop.reset"}
     assert told - known == set()
 
 
@@ -51,4 +51,4 @@ def test_why_a_password_is_refused_has_words_in_both_languages_on_the_page(word,
     with pytest.raises(AccountsError) as caught:
         check_password(password, name="li")
     assert caught.value.word == word
-    assert f"refused_{word}: [" in (PAGE / "account/texts.ts").read_text(encoding="utf-8")
+    assert f"refused_{word}: [" in (PAGE / "i18n/account.ts").read_text(encoding="utf-8")

@@ -7,7 +7,7 @@ from pathlib import Path
 from robomesh import reason_codes
 from robomesh.reasons import Code
 
-SENTENCES = Path(__file__).resolve().parents[2] / "web/src/reasons.ts"
+SENTENCES = Path(__file__).resolve().parents[2] / "web/src/i18n/reasons.ts"
 ROW = re.compile(r'^  \[("[^"]+"), \[("(?:[^"\\]|\\.)*"), ("(?:[^"\\]|\\.)*")\]\],$', re.MULTILINE)
 ROWS = {
     json.loads(code): (json.loads(english), json.loads(chinese))

@@ -1,0 +1,273 @@
+// What is on every screen: where one is, what is wrong, and STOP, always in the same place.
+
+import { signal } from "@preact/signals";
+import type { ComponentType } from "preact";
+import { useEffect, useRef } from "preact/hooks";
+import { mustSignIn } from "../mesh/account";
+import { AccountMenu } from "../features/account/menu";
+import { SignIn } from "../features/account/sign-in";
+import { a } from "../i18n/account";
+import { held, release } from "../mesh/control";
+import { AlarmBadge } from "../features/events/badge";
+import { Fleet } from "../features/fleet/fleet";
+import { fleetRobots } from "../mesh/known-robots";
+import { timeOfDay } from "../i18n/format";
+import { hello, lostAt } from "../mesh/connection";
+import { Missing } from "../ui/robot-not-found";
+import { NoticeLine } from "../ui/parts";
+import { canBe, isReplay } from "../mesh/robot-name";
+import { defined, plain, programming, recorded, robotLink, route, walled } from "../ui/route";
+import { stop, stopNotice } from "../mesh/stop";
+import { language, switchLanguage, t } from "../i18n/texts";
+import { switchTheme, theme } from "../ui/theme";
+
+/** A page that is loaded when it is first shown. */
+function onDemand<Props>(load: () => Promise<ComponentType<Props>>) {
+  const loaded = signal<ComponentType<Props> | null>(null);
+  const failed = signal(false);
+  return function OnDemand(props: Props & object) {
+    useEffect(() => {
+      failed.value = false;
+      if (!loaded.value) load().then((page) => (loaded.value = page), () => (failed.value = true));
+    }, []);
+    const Page = loaded.value;
+    return Page ? <Page {...props} /> : failed.value && <NotLoaded />;
+  };
+}
+
+/** A console that was renewed has other files. */
+function NotLoaded() {
+  return (
+    <div class="empty" role="alert">
+      <p>{t("page_not_loaded")}</p>
+      <button class="action" onClick={() => location.reload()}>
+        {t("load_again")}
+      </button>
+    </div>
+  );
+}
+
+// The robot's page brings three.js: the fleet's words do not wait for it.
+const Robot = onDemand(async () => (await import("../features/robot/robot")).Robot);
+const ReplayRobot = onDemand(async () => (await import("../features/recordings/replay-robot")).ReplayRobot);
+const Program = onDemand(async () => (await import("../features/program/program")).Program);
+const Define = onDemand(async () => (await import("../features/define/define")).Define);
+const Wall = onDemand(async () => (await import("../features/wall/wall")).Wall);
+const Recordings = onDemand(async () => (await import("../features/recordings/recordings")).Recordings);
+const Events = onDemand(async () => (await import("../features/events/events")).Events);
+const Settings = onDemand(async () => (await import("../features/settings/settings")).Settings);
+
+const PAGES = ["fleet", "wall", "recordings", "define", "events", "settings"] as const;
+type Place = (typeof PAGES)[number] | "program" | "robot";
+
+function place(): Place {
+  if (programming.value && !(route.value && isReplay(route.value.robot))) return "program";
+  if (route.value) return "robot";
+  if (plain.value) return plain.value;
+  if (defined.value !== null) return "define";
+  if (walled.value) return "wall";
+  return recorded.value ? "recordings" : "fleet";
+}
+
+export function App() {
+  const shown = route.value;
+  const nowhere = shown !== null && !canBe(shown);
+  const key = shown && !nowhere ? `robomesh/${shown.site}/${shown.robot}` : null;
+  const replay = shown !== null && isReplay(shown.robot);
+  const at = place();
+  // Control does not outlive the robot's pages; between them it stays.
+  useEffect(() => () => void release(), [key]);
+  const page = at === "fleet" || at === "robot" ? "" : t(at);
+  const what = [nowhere ? "" : shown?.robot, page].filter(Boolean).join(" · ");
+  useEffect(() => void (document.title = what ? `${what} · robomesh` : "robomesh"), [what]);
+  useStopKey();
+  // Nothing of a replay is live: STOP stays that of the robots that are.
+  const robots = key && !replay ? [key] : fleetRobots.value;
+  return (
+    <>
+      <header class="bar">
+        <a class="brand" href="#/" aria-label={`robomesh, ${t("fleet")}`}>
+          <Mark />
+          <span>robomesh</span>
+        </a>
+        <nav class="crumbs" aria-label={t("pages")}>
+          {mustSignIn.value ? null : shown ? <Crumbs at={at} {...shown} /> : <PageLinks at={at} />}
+        </nav>
+        <div class="bar-end">
+          {mustSignIn.value || <AlarmBadge />}
+          <AccountMenu />
+          <button class="quiet in-settings" onClick={switchLanguage} title={t("language_hint")}>
+            {t("language")}
+          </button>
+          <button
+            class="quiet in-settings"
+            onClick={switchTheme}
+            title={t("theme_hint", { theme: t(theme.value === "dark" ? "theme_dark" : "theme_light") })}
+          >
+            {t(theme.value === "dark" ? "theme_light" : "theme_dark")}
+          </button>
+        </div>
+        <StopButton robots={mustSignIn.value ? [] : robots} />
+      </header>
+      <Banners />
+      <main lang={language.value === "zh" ? "zh-Hans" : "en"}>
+        {mustSignIn.value ? (
+          <SignIn />
+        ) : nowhere ? (
+          <Missing {...shown} />
+        ) : at === "program" ? (
+          <Program shown={shown} />
+        ) : shown && isReplay(shown.robot) ? (
+          <ReplayRobot key={key ?? ""} {...shown} />
+        ) : shown ? (
+          <Robot key={key ?? ""} {...shown} />
+        ) : at === "define" ? (
+          <Define name={defined.value ?? ""} />
+        ) : at === "wall" ? (
+          <Wall chosen={walled.value ?? []} />
+        ) : at === "recordings" ? (
+          <Recordings shown={recorded.value ?? []} />
+        ) : at === "events" ? (
+          <Events />
+        ) : at === "settings" ? (
+          <Settings />
+        ) : (
+          <Fleet />
+        )}
+      </main>
+    </>
+  );
+}
+
+function Crumbs({ at, site, robot }: { at: Place; site: string; robot: string }) {
+  return (
+    <>
+      <a href="#/">{t("fleet")}</a>
+      <span aria-hidden="true">/</span>
+      <span class="dim">{site}</span>
+      <span aria-hidden="true">/</span>
+      {at === "program" ? (
+        <>
+          <a href={robotLink(site, robot)}>{robot}</a>
+          <span aria-hidden="true">/</span>
+          <strong>{t("program")}</strong>
+        </>
+      ) : (
+        <strong>{robot}</strong>
+      )}
+    </>
+  );
+}
+
+/** The pages, in a row; where that has no place, in a menu that names the one that is shown. */
+function PageLinks({ at }: { at: Place }) {
+  const menu = useRef<HTMLDetailsElement>(null);
+  const close = () => menu.current?.removeAttribute("open");
+  const links = () =>
+    PAGES.map((page) => (
+      <a
+        key={page}
+        href={page === "fleet" ? "#/" : `#/${page}`}
+        aria-current={page === at ? "page" : undefined}
+        onClick={close}
+      >
+        {t(page)}
+      </a>
+    ));
+  return (
+    <>
+      <span class="page-links">{links()}</span>
+      <details ref={menu} class="page-menu" onKeyDown={(event) => event.key === "Escape" && close()}>
+        <summary>{t(at === "robot" ? "fleet" : at)}</summary>
+        <div>{links()}</div>
+      </details>
+    </>
+  );
+}
+
+function StopButton({ robots }: { robots: readonly string[] }) {
+  const robot = route.value && canBe(route.value) && !isReplay(route.value.robot) ? route.value.robot : "";
+  const one = robot !== "";
+  return (
+    <div class="stop-place">
+      {stopNotice.value && (
+        <div class={`stop-notice ${stopNotice.value.kind}`}>
+          <NoticeLine notice={stopNotice.value} />
+          <button class="quiet" onClick={() => (stopNotice.value = null)}>
+            {t("dismiss")}
+          </button>
+        </div>
+      )}
+      <button
+        class="stop"
+        disabled={robots.length === 0}
+        onClick={() => void stop(robots)}
+        title={mustSignIn.value ? a("no_stop") : one ? t("stop_hint", { robot }) : t("stop_all_hint")}
+      >
+        <span class="stop-shape" aria-hidden="true" />
+        <span>{t(one ? "stop" : "stop_all")}</span>
+        {held.value && <kbd>{t("stop_space")}</kbd>}
+      </button>
+    </div>
+  );
+}
+
+/** Space asks for a stop while this tab is in control, wherever the focus is, typing excepted. */
+function useStopKey(): void {
+  useEffect(() => {
+    const isTyping = (target: EventTarget | null) =>
+      target instanceof HTMLTextAreaElement ||
+      (target instanceof HTMLInputElement && ["text", "search", "password"].includes(target.type));
+    const onKey = (event: KeyboardEvent) => {
+      const mine = held.value;
+      if (event.code !== "Space" || !mine || isTyping(event.target)) return;
+      event.preventDefault(); // nor does it press the button that has the focus
+      event.stopPropagation();
+      if (event.type === "keydown" && !event.repeat) void stop([mine.robotKey]);
+    };
+    addEventListener("keydown", onKey, true);
+    addEventListener("keyup", onKey, true);
+    return () => {
+      removeEventListener("keydown", onKey, true);
+      removeEventListener("keyup", onKey, true);
+    };
+  }, []);
+}
+
+function Banners() {
+  const lost = lostAt.value;
+  if (mustSignIn.value) return null; // what there is to say stands there
+  return (
+    <div class="banners">
+      {lost === 0 && <div class="banner connecting">{t("connecting")}</div>}
+      {lost !== null && lost > 0 && (
+        <div class="banner warning" role="alert">
+          <span class="shape warning" aria-hidden="true" />
+          {t("reconnecting", { time: timeOfDay(lost) })}
+        </div>
+      )}
+      {lost === null && hello.value?.connected === false && (
+        <div class="banner warning" role="alert">
+          <span class="shape warning" aria-hidden="true" />
+          {t("router_lost")}
+        </div>
+      )}
+      {hello.value?.insecure && (
+        <div class="banner warning">
+          <span class="shape warning" aria-hidden="true" />
+          {hello.value.account ? a("insecure_signed_in") : t("insecure")}
+        </div>
+      )}
+    </div>
+  );
+}
+
+function Mark() {
+  return (
+    <svg viewBox="0 0 32 32" width="28" height="28" aria-hidden="true">
+      <path class="mark-arm" d="M6 27h12M10 27V17l9-8 7 5" />
+      <circle class="mark-joint" cx="10" cy="17" r="3" />
+      <circle class="mark-joint" cx="19" cy="9" r="3" />
+    </svg>
+  );
+}

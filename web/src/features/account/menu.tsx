@@ -1,0 +1,59 @@
+// In the bar: who is signed in, as what; signing out; a new password.
+
+import { useEffect, useRef, useState } from "preact/hooks";
+import { hello } from "../../mesh/connection";
+import { me, onlyWatches, rests, signOut } from "../../mesh/account";
+import { ChangePassword } from "../../ui/change-password";
+import { a, roleText } from "../../i18n/account";
+import "../../ui/account.css";
+
+export function AccountMenu() {
+  const menu = useRef<HTMLDetailsElement>(null);
+  const [changing, setChanging] = useState(false);
+  const close = () => {
+    setChanging(false);
+    menu.current?.removeAttribute("open");
+  };
+  useEffect(() => {
+    const elsewhere = (event: Event) => {
+      if (event.target instanceof Node && !menu.current?.contains(event.target)) close();
+    };
+    addEventListener("pointerdown", elsewhere);
+    return () => removeEventListener("pointerdown", elsewhere);
+  }, []);
+  const who = me.value;
+  if (!who?.account) return null;
+  const { account, role } = who;
+  const operator = hello.value?.operator || who.operator;
+  return (
+    <details ref={menu} class="account-menu" onKeyDown={(event) => event.key === "Escape" && close()}>
+      <summary title={a("menu", { account, role: roleText(role) })}>
+        <span class="account-name">{account}</span>{" "}
+        <span class="account-role dim">{roleText(role)}</span>
+      </summary>
+      <div class="account-sheet">
+        {changing ? (
+          <ChangePassword close={close} />
+        ) : (
+          <>
+            <p>
+              <strong>{account}</strong> <span class="dim">{roleText(role)}</span>
+            </p>
+            <p class="dim">
+              {onlyWatches.value ? a("may_watch") : rests.value ? a("rests") : a("may_command", { operator })}
+            </p>
+            <button class="action" onClick={() => setChanging(true)}>
+              {a("change_password")}
+            </button>
+            <button class="action" onClick={() => void signOut(true)}>
+              {a("sign_out_everywhere")}
+            </button>
+            <button class="action primary" onClick={() => void signOut(false)}>
+              {a("sign_out")}
+            </button>
+          </>
+        )}
+      </div>
+    </details>
+  );
+}

@@ -1,0 +1,105 @@
+// The page before one is signed in: what console this is, how it is reached, and who one is.
+
+import { useEffect, useRef, useState } from "preact/hooks";
+import { AccountError, endedBy, me, signIn } from "../../mesh/account";
+import { switchLanguage, t } from "../../i18n/texts";
+import { switchTheme, theme } from "../../ui/theme";
+import { PasswordField } from "../../ui/password-field";
+import { a, endText } from "../../i18n/account";
+import "../../ui/account.css";
+
+export function SignIn() {
+  const [name, setName] = useState("");
+  const [password, setPassword] = useState("");
+  const [problem, setProblem] = useState("");
+  const [busy, setBusy] = useState(false);
+  const [waitUntil, setWaitUntil] = useState(0);
+  const left = useSecondsUntil(waitUntil);
+  const input = useRef<HTMLInputElement>(null);
+  useEffect(() => input.current?.focus(), []);
+  const how = me.value;
+  const send = async () => {
+    if (busy || left > 0) return;
+    setBusy(true);
+    setProblem("");
+    try {
+      await signIn(name, password);
+    } catch (error) {
+      const { word, seconds } = error instanceof AccountError ? error : new AccountError("unreachable", "");
+      if (word === "wait") setWaitUntil(Date.now() + seconds * 1000);
+      setProblem(word === "wait" ? "" : a(word === "wrong" || word === "busy" ? word : "unreachable"));
+      setPassword(word === "wrong" ? "" : password);
+    }
+    setBusy(false);
+  };
+  return (
+    <section class="sign-in" aria-label={a("sign_in")}>
+      <form
+        onSubmit={(event) => {
+          event.preventDefault();
+          void send();
+        }}
+      >
+        <h1>{how ? a("to_site", { site: how.site }) : "\u00a0"}</h1>
+        {endedBy.value && (
+          <div class={`sign-in-ended ${endedBy.value === "signed_out" ? "" : "warning"}`} role="status">
+            <p>{endText(endedBy.value)}</p>
+            {endedBy.value !== "signed_out" && <p class="dim">{a("out_nothing_live")}</p>}
+          </div>
+        )}
+        <label>
+          <span>{a("name")}</span>
+          <input
+            ref={input}
+            type="text"
+            name="username"
+            autocomplete="username"
+            autocapitalize="none"
+            autocorrect="off"
+            spellcheck={false}
+            maxLength={32}
+            required
+            value={name}
+            onInput={(event) => setName(event.currentTarget.value)}
+          />
+        </label>
+        <PasswordField label={a("password")} kind="current-password" value={password} set={setPassword} />
+        <p class="sign-in-problem" role="alert">
+          {left > 0 ? a("wait", { seconds: left }) : problem}
+        </p>
+        <button class="action primary" type="submit" disabled={busy || left > 0}>
+          {a(busy ? "signing_in" : "sign_in")}
+        </button>
+        <p class="dim">{a("forgotten")}</p>
+      </form>
+      <footer>
+        <p class={how?.insecure ? "state warning" : "dim"}>
+          <span class={`shape ${how?.insecure ? "warning" : ""}`} aria-hidden="true" />
+          {how && a(how.insecure && !how.secure ? "insecure" : how.secure ? "secure" : "this_machine")}
+        </p>
+        <p class="dim">{a("no_stop")}</p>
+        {/* Where the bar has no place for them. */}
+        <p class="sign-in-look">
+          <button class="quiet" onClick={switchLanguage} title={t("language_hint")}>
+            {t("language")}
+          </button>
+          <button class="quiet" onClick={switchTheme}>
+            {t(theme.value === "dark" ? "theme_light" : "theme_dark")}
+          </button>
+        </p>
+      </footer>
+    </section>
+  );
+}
+
+/** Whole seconds until a time, counted down. */
+function useSecondsUntil(time: number): number {
+  const secondsLeft = () => Math.max(0, Math.ceil((time - Date.now()) / 1000));
+  const [left, setLeft] = useState(secondsLeft);
+  useEffect(() => {
+    setLeft(secondsLeft());
+    const timer = setInterval(() => setLeft(secondsLeft()), 250);
+    return () => clearInterval(timer);
+  }, [time]);
+  return left;
+}

@@ -1,0 +1,131 @@
+// What the server finds wrong with the draft as one types, and where it says the tool is.
+
+import { computed, effect, signal } from "@preact/signals";
+import { bodies } from "./description";
+import { draft, identity } from "./draft";
+import type { Draft } from "./draft";
+import { check, Refused } from "./server";
+import type { Checked, Problem } from "./server";
+import { shapeOf } from "./shapes";
+import { d } from "../../i18n/define";
+import { positions } from "./workbench";
+
+const AFTER_MS = 200;
+const AGAIN_MS = 1500;
+// Beyond these a link's shape is hardly in the unit that was meant [m].
+const LARGEST_M = 10;
+const SMALLEST_M = 0.001;
+
+export const checked = signal<Checked | null>(null);
+/** Whether an answer for the draft as it stands is still to come. */
+export const checking = signal(false);
+/** Why it could not be checked; "" when it could. */
+export const checkFailed = signal("");
+
+/** What stands in number fields and is no number, by path; the draft keeps the last one that was. */
+export const unread = signal<ReadonlyMap<string, string>>(new Map());
+
+/** A field's path in the form of a problem's. */
+export function placeOf(path: string): (string | number)[] {
+  return path.split("/").map((step) => (/^\d+$/.test(step) ? Number(step) : step));
+}
+
+/** Notes what was typed where a number belongs; null: it is one. */
+export function noNumber(path: string, text: string | null): void {
+  if (text === (unread.peek().get(path) ?? null)) return;
+  const others = [...unread.peek()].filter(([other]) => other !== path);
+  unread.value = new Map(text === null ? others : [...others, [path, text]]);
+}
+
+// In another draft, or after links came, went or moved, a path is another field's.
+const fields = computed(() => `${identity.value.id} ${draft.value?.description.joint.map(({ name }) => name).join(" ") ?? ""}`);
+effect(() => {
+  if (fields.value) unread.value = new Map();
+});
+
+/** What is wrong: as the server checks it, the shapes that it could not read, and what is no number. */
+export const problems = computed<readonly Problem[]>(() => {
+  const typed = [...unread.value].map(([path, text]) => ({
+    path: placeOf(path),
+    text: d("wrong_number", { text: text.trim() || " " }),
+  }));
+  const told = [...typed, ...(checked.value?.problems ?? [])];
+  const places = new Set(told.map(({ path }) => path.join("/")));
+  return [...told, ...oddShapes().filter(({ path }) => !places.has(path.join("/")))];
+});
+
+function oddShapes(): Problem[] {
+  const now = draft.value;
+  if (!now) return [];
+  return bodies(now.description).flatMap(({ mesh, mesh_scale: scale }, index) => {
+    const shape = mesh ? shapeOf(mesh, now.files) : undefined;
+    if (typeof shape !== "object") return [];
+    const place = index === 0 ? ["base"] : ["joint", index - 1, "link"];
+    if ("error" in shape) return { path: [...place, "mesh"], text: shape.error };
+    const { min, max, triangles } = shape.info;
+    const size = Math.max(...max.map((value, axis) => value - (min[axis] ?? 0))) * scale;
+    if (triangles === 0 || (size >= SMALLEST_M && size <= LARGEST_M)) return [];
+    const told = size >= 1 ? `${Number(size.toPrecision(3))} m` : `${Number((size * 1000).toPrecision(2))} mm`;
+    return { path: [...place, "mesh_scale"], text: d("odd_size", { file: mesh.split("/").at(-1) ?? mesh, size: told }) };
+  });
+}
+
+/** Whether shapes are still being read, which may be found unreadable. */
+export const readingShapes = computed(() => {
+  const now = draft.value;
+  return now !== null && bodies(now.description).some(({ mesh }) => mesh && shapeOf(mesh, now.files) === "reading");
+});
+
+let timer = 0;
+let asking: AbortController | null = null;
+
+/** Checks each change of the draft and of the joints until the returned function is called. */
+export function keepChecking(): () => void {
+  const end = effect(() => {
+    const now = draft.value;
+    const joints = positions.value;
+    clearTimeout(timer);
+    if (!now) {
+      asking?.abort(); // its answer is of a draft that was left
+      checked.value = null;
+      return;
+    }
+    checking.value = true;
+    timer = setTimeout(() => void ask(now, joints), AFTER_MS);
+  });
+  return () => {
+    end();
+    clearTimeout(timer);
+    asking?.abort();
+    checked.value = null;
+  };
+}
+
+async function ask(of: Draft, joints: readonly number[]): Promise<void> {
+  asking?.abort();
+  const own = (asking = new AbortController());
+  try {
+    const answer = await check(of, joints, own.signal);
+    if (own.signal.aborted) return;
+    checked.value = answer;
+    checkFailed.value = "";
+  } catch (error) {
+    if (own.signal.aborted) return;
+    checked.value = null;
+    checkFailed.value = error instanceof Error ? error.message : String(error);
+    // A console that was gone comes back, and nobody types meanwhile.
+    if (error instanceof Refused && (error.status === 0 || error.status >= 500)) {
+      clearTimeout(timer);
+      timer = setTimeout(() => void ask(of, joints), AGAIN_MS);
+    }
+  }
+  checking.value = false;
+}
+
+/** Problems of a field: at its path, beneath it, or at the list of numbers that it is one of. */
+export function problemsAt(path: string): readonly Problem[] {
+  return problems.value.filter((problem) => {
+    const at = problem.path.join("/");
+    return at === path || at.startsWith(`${path}/`) || (at !== "" && /^\/\d$/.test(path.slice(at.length)) && path.startsWith(at));
+  });
+}

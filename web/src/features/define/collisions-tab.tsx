@@ -1,0 +1,132 @@
+// How each pair of links is checked, or why it is ignored; the user may ignore more.
+
+import { useEffect } from "preact/hooks";
+import { isPlanned, isSame, isTouching, keepPlanning, pairRows, planAgain, planFailed, planning } from "./collision-plan";
+import type { PairRow } from "./collision-plan";
+import { draft, edit, seal } from "./draft";
+import { ProblemWords } from "./fields";
+import type { PairKind } from "./server";
+import { d } from "../../i18n/define";
+import type { DefineText } from "../../i18n/define";
+
+const WAYS: Readonly<Partial<Record<PairKind, DefineText>>> = {
+  collision_meshes: "way_collision_meshes",
+  visual_meshes: "way_visual_meshes",
+  false_contacts: "way_collision_meshes",
+};
+const REASONS: Readonly<Record<PairKind, DefineText | null>> = {
+  adjacent: "pair_adjacent",
+  description: "pair_description",
+  always: "pair_always",
+  apart: null,
+  collision_meshes: "pair_hulls_touch",
+  visual_meshes: "pair_hulls_touch",
+  false_contacts: "pair_false_contacts",
+  too_large: "pair_too_large",
+  touching: "pair_touching",
+  no_surface: "pair_no_surface",
+  not_studied: "pair_not_studied",
+};
+
+function setIgnored(links: readonly [string, string], ignored: boolean): void {
+  seal();
+  edit(({ description }) => {
+    const others = description.collision.ignore.filter((pair) => !isSame(pair, links));
+    description.collision.ignore = ignored ? [...others, [...links]] : others;
+  });
+}
+
+export function CollisionsTab() {
+  useEffect(keepPlanning, []);
+  const now = draft.value;
+  if (!now) return null;
+  const rows = pairRows.value;
+  const { ignore } = now.description.collision;
+  return (
+    <>
+      <div class="tab-intro">
+        <p class="dim small">{d("collisions_words")}</p>
+      </div>
+      <PlanState rows={rows} />
+      {rows.length > 0 && (
+        <table class="pairs" aria-busy={planning.value}>
+          <thead>
+            <tr>
+              <th scope="col">{d("ignore")}</th>
+              <th scope="col">{d("pair")}</th>
+              <th scope="col">{d("pair_check")}</th>
+            </tr>
+          </thead>
+          <tbody>
+            {rows.map((row) => (
+              <Row key={row.links.join(" ")} row={row} place={ignore.findIndex((pair) => isSame(pair, row.links))} />
+            ))}
+          </tbody>
+        </table>
+      )}
+      <ProblemWords path="collision" />
+    </>
+  );
+}
+
+/** What the plan comes to, or why there is none yet. */
+function PlanState({ rows }: { rows: readonly PairRow[] }) {
+  if (planFailed.value) {
+    return (
+      <div class="plan-state" role="alert">
+        <p class="problem-word">
+          <span class="shape warning" aria-hidden="true" />
+          {d("plan_failed", { text: planFailed.value })}
+        </p>
+        <button class="quiet" onClick={planAgain}>
+          {d("plan_again")}
+        </button>
+      </div>
+    );
+  }
+  const ignored = rows.filter(({ isIgnored }) => isIgnored).length;
+  const touching = rows.filter(isTouching).length;
+  return (
+    <div class="plan-state" role="status">
+      {isPlanned.value && rows.length === 0 && <p class="dim small">{d("no_pairs")}</p>}
+      {isPlanned.value && rows.length > 0 && (
+        <>
+          <p class={touching ? "problem-word" : "small"}>
+            <span class={`shape ${touching ? "warning" : "info"}`} aria-hidden="true" />
+            {touching === 0 ? d("plan_free") : touching === 1 ? d("plan_touching_one") : d("plan_touching", { count: touching })}
+          </p>
+          <p class="dim small">{d("plan_counts", { checked: rows.length - ignored, ignored })}</p>
+        </>
+      )}
+      {!isPlanned.value && <p class="dim small">{d("planning")}</p>}
+    </div>
+  );
+}
+
+function Row({ row, place }: { row: PairRow; place: number }) {
+  const { links, kind, values, isIgnored, isAutomatic } = row;
+  const [first, second] = links;
+  const reason = REASONS[kind];
+  const said = Object.fromEntries(Object.entries(values).map(([name, value]) => [name, value.toLocaleString("en")]));
+  return (
+    <tr class={isTouching(row) ? "touching" : isIgnored ? "ignored" : ""} data-kind={kind}>
+      <td>
+        <input
+          type="checkbox"
+          {...(place >= 0 && { "data-path": `collision/ignore/${place}` })}
+          aria-label={d("pair_label", { first, second })}
+          checked={isIgnored}
+          disabled={isAutomatic}
+          onChange={(event) => setIgnored(links, event.currentTarget.checked)}
+        />
+      </td>
+      <td>
+        {first} – {second}
+      </td>
+      <td>
+        <span class="way">{d(isIgnored ? "way_ignored" : (WAYS[kind] ?? "way_hulls"))}</span>
+        {reason && <span class="dim"> {d(reason, said)}</span>}
+      </td>
+    </tr>
+  );
+}

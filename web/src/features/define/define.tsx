@@ -1,0 +1,176 @@
+// Define: a robot from nothing, from link files, from a URDF or from another robot, to a simulated one on the mesh.
+
+import { signal } from "@preact/signals";
+import { useEffect, useLayoutEffect } from "preact/hooks";
+import { Chain } from "./chain";
+import { keepChecking } from "./checks";
+import { CollisionsTab } from "./collisions-tab";
+import { Details } from "./details";
+import { DhTable } from "./dh-table";
+import { draft, keptFiles, leave, redo, undo } from "./draft";
+import { doneWithout, droppedFiles, goOnWithout, takeFiles, waitingUrdf } from "./drop";
+import { FileButton } from "./file-button";
+import { keepOnly } from "./kept-files";
+import { ConstraintsTab, FramesTab } from "./lists-tabs";
+import { loading, open } from "./opening";
+import { listRobots, save } from "./outcome";
+import { PositionsPanel } from "./positions-panel";
+import { ProblemsPanel } from "./problems-panel";
+import { RobotTab } from "./robot-tab";
+import { ScenePanel } from "./scene-panel";
+import { keepReading, missingFiles } from "./shapes";
+import { Start } from "./start";
+import { d } from "../../i18n/define";
+import { Outcomes, Toolbar } from "./toolbar";
+import { ViewsTab } from "./views-tab";
+import { TABS, tab } from "./workbench";
+import type { Tab } from "./workbench";
+import "./define.css";
+
+const draggedOver = signal(false);
+
+export function Define({ name }: { name: string }) {
+  useEffect(() => {
+    void keepOnly(keptFiles());
+    const ends = [keepChecking(), keepReading()];
+    void listRobots();
+    return () => {
+      for (const end of ends) end();
+      leave();
+    };
+  }, []);
+  // Before files can be dropped: they are of what is open then.
+  useLayoutEffect(() => void open(name), [name]);
+  useKeys();
+  useDrop();
+  return (
+    <div class={`define ${draft.value ? "editing" : "starting"}`}>
+      <div class="define-top">
+        <Toolbar />
+        <Outcomes />
+        <MissingFiles />
+      </div>
+      {draft.value ? <Workbench /> : loading.value ? <p class="dim define-loading">{loading.value}</p> : <Start />}
+      {draggedOver.value && <div class="drop-veil">{d("dropped")}</div>}
+    </div>
+  );
+}
+
+function Workbench() {
+  const tabs: Record<Tab, () => preact.ComponentChild> = {
+    details: () => <Details />,
+    robot: () => <RobotTab />,
+    frames: () => <FramesTab />,
+    constraints: () => <ConstraintsTab />,
+    collisions: () => <CollisionsTab />,
+    views: () => <ViewsTab />,
+  };
+  return (
+    <>
+      <div class="define-left">
+        <Chain />
+        <ProblemsPanel />
+      </div>
+      <ScenePanel />
+      <PositionsPanel />
+      <section class="panel define-right" aria-label={d("details")}>
+        <DhTable />
+        <div class="tabs" role="tablist" aria-label={d("details")}>
+          {TABS.map((each) => (
+            <button
+              key={each}
+              id={`tab-${each}`}
+              role="tab"
+              aria-selected={tab.value === each}
+              aria-controls="tab-panel"
+              onClick={() => (tab.value = each)}
+            >
+              {d(each)}
+            </button>
+          ))}
+        </div>
+        <div id="tab-panel" class="tab-panel" role="tabpanel" aria-labelledby={`tab-${tab.value}`} tabIndex={-1}>
+          {tabs[tab.value]()}
+        </div>
+      </section>
+    </>
+  );
+}
+
+/** Files that others refer to: asked for by name, until they come or are done without. */
+function MissingFiles() {
+  const waiting = waitingUrdf.value;
+  const missing = waiting
+    ? waiting.missing.map((name) => ({ of: waiting.file, name, path: name }))
+    : missingFiles().filter(({ path }) => !doneWithout.value.has(path));
+  if (missing.length === 0) return null;
+  const goOn = () => {
+    if (waiting) void goOnWithout();
+    else doneWithout.value = new Set([...doneWithout.value, ...missing.map(({ path }) => path)]);
+  };
+  return (
+    <section class="panel missing" aria-label={d("missing_title")} role="alert">
+      <div>
+        <h2>{d("missing_title")}</h2>
+        <ul>
+          {missing.map(({ of, name }) => (
+            <li key={`${of} ${name}`}>
+              <span class="dim">{d("missing_for", { file: of })}</span> <strong>{name}</strong>
+            </li>
+          ))}
+        </ul>
+        <p class="dim small">{d("missing_words")}</p>
+      </div>
+      <div class="missing-actions">
+        <FileButton label={d("choose_files")} take={(files) => void takeFiles(files)} />
+        <button class="quiet" onClick={goOn}>
+          {d("go_on_without")}
+        </button>
+      </div>
+    </section>
+  );
+}
+
+/** Undo, redo and save by keyboard, wherever the focus is. */
+function useKeys(): void {
+  useEffect(() => {
+    const onKey = (event: KeyboardEvent) => {
+      if (!(event.ctrlKey || event.metaKey) || event.altKey || !draft.value) return;
+      const key = event.key.toLowerCase();
+      const action = key === "z" ? (event.shiftKey ? redo : undo) : key === "y" ? redo : key === "s" ? () => void save(false) : null;
+      if (!action) return;
+      event.preventDefault();
+      action();
+    };
+    addEventListener("keydown", onKey);
+    return () => removeEventListener("keydown", onKey);
+  }, []);
+}
+
+/** Files may be dropped anywhere on the page. */
+function useDrop(): void {
+  // At once: a file let go a moment too early would replace the page.
+  useLayoutEffect(() => {
+    const ending = new AbortController();
+    const { signal: until } = ending;
+    const hasFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
+    const over = (event: DragEvent) => {
+      if (!hasFiles(event)) return;
+      event.preventDefault();
+      draggedOver.value = true;
+    };
+    addEventListener("dragover", over, { signal: until });
+    addEventListener("dragleave", (event) => event.relatedTarget === null && (draggedOver.value = false), { signal: until });
+    addEventListener(
+      "drop",
+      (event) => {
+        if (!hasFiles(event) || !event.dataTransfer) return;
+        event.preventDefault();
+        draggedOver.value = false;
+        void takeFiles(droppedFiles(event.dataTransfer));
+      },
+      { signal: until },
+    );
+    return () => ending.abort();
+  }, []);
+}

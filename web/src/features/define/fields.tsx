@@ -1,0 +1,202 @@
+// Fields of the forms: numbers with units, texts, choices; each knows its place in the description.
+
+import { useId, useState } from "preact/hooks";
+import type { ComponentChildren } from "preact";
+import { noNumber, problemsAt, unread } from "./checks";
+import type { Pose, Triple } from "./description";
+import { seal } from "./draft";
+import { d } from "../../i18n/define";
+
+interface Place {
+  /** Its place in the description, as the server's problems name it: "joint/2/limits/0". */
+  path: string;
+  label: string;
+  /** The label is read out, not shown: a column's head or the row says it. */
+  quiet?: boolean;
+}
+
+/** A number as text: no more digits than it has, and the sign that people read. */
+export function numberText(value: number): string {
+  return String(Math.round(value * 1e6) / 1e6).replace("-", "−");
+}
+
+/** The number that a person typed, all of it; null: none. A comma may mean two things, so it means nothing. */
+export function readNumber(text: string): number | null {
+  const plain = text.trim().replace("−", "-");
+  return /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(plain) && Number.isFinite(Number(plain)) ? Number(plain) : null;
+}
+
+/** A number with its unit. Arrow keys step it; what is no number stays, marked, until it is mended or Escape. */
+export function NumberField(
+  props: Place & { value: number; unit?: string; step?: number; set: (value: number) => void; onFocus?: () => void },
+) {
+  const id = useId();
+  const [being, setBeing] = useState<string | null>(null);
+  const typed = unread.value.get(props.path) ?? being;
+  const setTyped = (text: string | null) => {
+    setBeing(text);
+    noNumber(props.path, text !== null && readNumber(text) === null ? text : null);
+  };
+  const read = typed === null ? props.value : readNumber(typed);
+  // What was typed stands as typed while it means the value; an undo shows the value again.
+  const text = typed !== null && (read === null || read === props.value) ? typed : numberText(props.value);
+  const problems = problemsAt(props.path);
+  const wrong = problems[0]?.text ?? "";
+  const onKey = (event: KeyboardEvent) => {
+    const direction = { ArrowUp: 1, ArrowDown: -1 }[event.key];
+    if (direction) {
+      event.preventDefault();
+      setTyped(null);
+      const by = (props.step ?? 1) * (event.shiftKey ? 10 : 1) * direction;
+      props.set(Math.round((props.value + by) * 1e6) / 1e6);
+    } else if (event.key === "Escape" || (event.key === "Enter" && read !== null)) {
+      setTyped(null);
+      seal();
+    }
+  };
+  return (
+    <span class={`field number ${props.quiet ? "quiet-label" : ""}`}>
+      <label for={id}>{props.label}</label>
+      <span class={`entry ${wrong ? "wrong" : ""}`}>
+        <input
+          id={id}
+          type="text"
+          inputMode="decimal"
+          autocomplete="off"
+          data-path={props.path}
+          value={text}
+          aria-invalid={wrong !== ""}
+          title={wrong}
+          onFocus={() => props.onFocus?.()}
+          onInput={(event) => {
+            const value = readNumber(event.currentTarget.value);
+            setTyped(event.currentTarget.value);
+            if (value !== null) props.set(value);
+          }}
+          onBlur={() => {
+            if (read !== null) setTyped(null);
+            seal();
+          }}
+          onKeyDown={onKey}
+        />
+        {props.unit && <span class="entry-unit">{props.unit}</span>}
+      </span>
+    </span>
+  );
+}
+
+export function TextField(
+  props: Place & { value: string; set: (value: string) => void; hint?: string; placeholder?: string },
+) {
+  const id = useId();
+  const problems = problemsAt(props.path);
+  return (
+    <span class={`field ${props.quiet ? "quiet-label" : ""}`}>
+      <label for={id}>{props.label}</label>
+      <span class={`entry ${problems.length ? "wrong" : ""}`}>
+        <input
+          id={id}
+          type="text"
+          autocomplete="off"
+          spellcheck={false}
+          data-path={props.path}
+          value={props.value}
+          placeholder={props.placeholder ?? ""}
+          aria-invalid={problems.length > 0}
+          title={problems[0]?.text ?? ""}
+          onInput={(event) => props.set(event.currentTarget.value)}
+          onBlur={seal}
+          onKeyDown={(event) => event.key === "Enter" && seal()}
+        />
+      </span>
+      {props.hint && <span class="hint">{props.hint}</span>}
+    </span>
+  );
+}
+
+export function SelectField<Value extends string>(
+  props: Place & { value: Value; values: readonly Value[]; text: (value: Value) => string; set: (value: Value) => void },
+) {
+  const id = useId();
+  const wrong = problemsAt(props.path).length > 0;
+  return (
+    <span class={`field ${props.quiet ? "quiet-label" : ""}`}>
+      <label for={id}>{props.label}</label>
+      <span class={`entry ${wrong ? "wrong" : ""}`}>
+        <select
+          id={id}
+          data-path={props.path}
+          value={props.value}
+          aria-invalid={wrong}
+          onChange={(event) => props.set(event.currentTarget.value as Value)}
+        >
+          {props.values.map((value) => (
+            <option key={value} value={value} selected={value === props.value}>
+              {props.text(value)}
+            </option>
+          ))}
+        </select>
+      </span>
+    </span>
+  );
+}
+
+/** A pose: x, y, z and roll, pitch, yaw, each with its unit. */
+export function PoseFields(props: {
+  path: string;
+  of: string;
+  pose: Pose;
+  length: string;
+  angle: string;
+  set: (change: (pose: Pose) => void, field: string) => void;
+}) {
+  const row = (key: "xyz" | "rpy", labels: readonly string[], unit: string) =>
+    labels.map((label, index) => (
+      <NumberField
+        key={label}
+        path={`${props.path}/${key}/${index}`}
+        label={label}
+        value={props.pose[key][index] ?? 0}
+        unit={unit}
+        set={(value) =>
+          props.set((pose) => {
+            const values: Triple = [...pose[key]];
+            values[index] = value;
+            pose[key] = values;
+          }, `${key}/${index}`)
+        }
+      />
+    ));
+  return (
+    <div class="pose" role="group" aria-label={props.of}>
+      {row("xyz", ["x", "y", "z"], props.length)}
+      {row("rpy", [d("roll"), d("pitch"), d("yaw")], props.angle)}
+    </div>
+  );
+}
+
+export function Section(props: { title: string; end?: ComponentChildren; children: ComponentChildren }) {
+  return (
+    <section class="section" aria-label={props.title}>
+      <div class="section-head">
+        <h3>{props.title}</h3>
+        {props.end}
+      </div>
+      {props.children}
+    </section>
+  );
+}
+
+/** Problems of a place, in words. */
+export function ProblemWords({ path }: { path: string }) {
+  return (
+    <>
+      {problemsAt(path).map(({ text }) => (
+        <p key={text} class="problem-word">
+          <span class="shape warning" aria-hidden="true" />
+          {text}
+        </p>
+      ))}
+    </>
+  );
+}

@@ -1,0 +1,50 @@
+// Opening a robot to be defined: as it is saved, or its unsaved draft.
+
+import { signal } from "@preact/signals";
+import { complete } from "./description";
+import { begin, bringBack, discard, identity, isOpen, leave } from "./draft";
+import { fileNotices, waitingUrdf } from "./drop";
+import { known, listRobots, outcome } from "./outcome";
+import { robot } from "./server";
+import { d } from "../../i18n/define";
+import { resetWorkbench } from "./workbench";
+
+/** What is being opened, in words; "": nothing. */
+export const loading = signal("");
+
+/** Opens a robot, or its unsaved draft; "": a new one's. */
+export async function open(name: string): Promise<void> {
+  leave();
+  resetWorkbench();
+  outcome.value = null;
+  fileNotices.value = [];
+  waitingUrdf.value = null;
+  loading.value = "";
+  if (bringBack(name) || !name) return;
+  const place = identity.value;
+  loading.value = d("loading");
+  try {
+    await listRobots();
+    const origin = known.value?.robots.find((each) => each.name === name)?.origin ?? "site";
+    const { description, files, notes, revision } = await robot(name);
+    if (!isOpen(place)) return;
+    const read = complete(description);
+    // The library's names are the library's: what is made of one is another robot.
+    if (origin === "library") read.name = `${name}-copy`;
+    begin({ description: read, files }, name, origin, revision);
+    fileNotices.value = notes.map((text) => ({ kind: "done", text }));
+  } catch (error) {
+    if (!isOpen(place)) return;
+    const text = error instanceof Error ? error.message : String(error);
+    outcome.value = { kind: "refused", text: d("not_loaded", { name, text }) };
+  } finally {
+    if (isOpen(place)) loading.value = "";
+  }
+}
+
+/** Ends the draft: back to the robot as it was saved; a new one is gone. */
+export function discardDraft(): void {
+  const { owner } = identity.value;
+  discard();
+  void open(owner);
+}

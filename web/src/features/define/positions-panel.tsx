@@ -1,0 +1,117 @@
+// The joints' sliders, and where the server says that the tool is.
+
+import { Matrix4 } from "three";
+import { Unit } from "../../ui/parts";
+import { checkFailed, checked, checking } from "./checks";
+import { jointUnit } from "./description";
+import type { Joint, Units } from "./description";
+import { draft, edit } from "./draft";
+import { NumberField, numberText } from "./fields";
+import { poseOf } from "./placements";
+import { d } from "../../i18n/define";
+import { positionOf, slid } from "./workbench";
+
+const SI_TO_SHOWN: Units = { length: "mm", angle: "deg" };
+
+function slide(joint: Joint, position: number): void {
+  slid.value = new Map([...slid.value, [joint.name, position]]);
+}
+
+export function PositionsPanel() {
+  const now = draft.value;
+  if (!now) return null;
+  const { joint: joints, units } = now.description;
+  return (
+    <section class="panel positions" aria-label={d("joints")}>
+      <div class="panel-head">
+        <h2>{d("joints")}</h2>
+        <div class="panel-end">
+          <button
+            class="quiet"
+            disabled={joints.length === 0}
+            onClick={() =>
+              edit(({ description }) => {
+                for (const joint of description.joint) joint.home = positionOf(joint);
+              })
+            }
+          >
+            {d("home_from")}
+          </button>
+          <button class="quiet" disabled={joints.length === 0} onClick={() => (slid.value = new Map())}>
+            {d("to_home")}
+          </button>
+        </div>
+      </div>
+      <div class="sliders">
+        {joints.length === 0 && <p class="dim">{d("no_joints")}</p>}
+        {joints.map((joint, index) => (
+          <Slider key={index} joint={joint} units={units} />
+        ))}
+      </div>
+      <ToolAt />
+    </section>
+  );
+}
+
+function Slider({ joint, units }: { joint: Joint; units: Units }) {
+  const [lower, upper] = joint.limits;
+  const position = positionOf(joint);
+  const unit = jointUnit(joint.type, units);
+  const usable = lower < upper;
+  const step = unit === "rad" || unit === "m" ? 0.001 : 0.1;
+  return (
+    <div class="slider">
+      <span class="slider-name">{joint.name}</span>
+      <span class="limit dim">{numberText(Math.round(lower * 100) / 100)}</span>
+      <input
+        type="range"
+        aria-label={d("position_of", { joint: joint.name })}
+        aria-valuetext={`${position} ${unit}`}
+        min={lower}
+        max={upper}
+        step={step}
+        value={position}
+        disabled={!usable}
+        onInput={(event) => slide(joint, Math.round(Number(event.currentTarget.value) * 1e4) / 1e4)}
+      />
+      <span class="limit dim">{numberText(Math.round(upper * 100) / 100)}</span>
+      <NumberField
+        quiet
+        path=""
+        label={d("position_of", { joint: joint.name })}
+        value={position}
+        unit={unit}
+        set={(value) => slide(joint, value)}
+      />
+    </div>
+  );
+}
+
+/** The server's answer: what is drawn here is only a picture. */
+function ToolAt() {
+  const tool = checked.value?.tool;
+  const pose = tool && poseOf(new Matrix4().set(...(tool.flat() as Parameters<Matrix4["set"]>)), SI_TO_SHOWN);
+  const number = (label: string, value: number | undefined, digits: number, unit: string) => (
+    <div key={label}>
+      <dt>{label}</dt>
+      <dd>
+        {value === undefined ? "–" : value.toFixed(digits).replace(/^-(?=0\.?0*$)/, "").replace("-", "−")}
+        <Unit of={unit} />
+      </dd>
+    </div>
+  );
+  return (
+    <div class="tool-line">
+      <h3>{d("tool")}</h3>
+    <dl
+      class={`tool-at ${checking.value || checkFailed.value ? "waiting" : ""}`}
+      aria-label={d("tool_at")}
+      data-tool={tool ? JSON.stringify(tool) : ""}
+      data-checking={checking.value}
+    >
+      {["x", "y", "z"].map((label, index) => number(label, pose?.xyz[index], 1, "mm"))}
+      {[d("roll"), d("pitch"), d("yaw")].map((label, index) => number(label, pose?.rpy[index], 2, "°"))}
+    </dl>
+    </div>
+  );
+}

@@ -1,0 +1,33 @@
+// What is wrong with the draft, in the server's words; a click goes to the field.
+
+import { checkFailed, checked, checking, problems, readingShapes } from "./checks";
+import { d } from "../../i18n/define";
+import { goTo } from "./workbench";
+
+export function ProblemsPanel() {
+  const found = problems.value;
+  const busy = checking.value || readingShapes.value;
+  const count = found.length === 1 ? d("problem_one") : d("problems", { count: found.length });
+  return (
+    <section class="panel checks" aria-label={d("checks")}>
+      <div class="panel-head">
+        <h2>{d("checks")}</h2>
+        <div class="panel-end">
+          <span class="dim small" role="status">
+            {busy ? d("checking") : found.length > 0 ? count : ""}
+          </span>
+        </div>
+      </div>
+      <div class="check-list">
+        {checkFailed.value && <p class="problem-word">{d("check_failed", { text: checkFailed.value })}</p>}
+        {checked.value && !readingShapes.value && found.length === 0 && <p class="dim small">{d("no_problems")}</p>}
+        {found.map(({ path, text }) => (
+          <button key={`${path.join("/")} ${text}`} class="problem" onClick={() => goTo(path)}>
+            <span class="shape warning" aria-hidden="true" />
+            <span>{text}</span>
+          </button>
+        ))}
+      </div>
+    </section>
+  );
+}

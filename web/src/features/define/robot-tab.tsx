@@ -1,0 +1,45 @@
+// What belongs to the whole robot: its name, where its dimensions come from, its units.
+
+import { SelectField, Section, TextField, ProblemWords } from "./fields";
+import type { Units } from "./description";
+import { draft, edit, seal } from "./draft";
+import { setUnits } from "./edits";
+import { d } from "../../i18n/define";
+
+export function RobotTab() {
+  const now = draft.value;
+  if (!now) return null;
+  const { name, title, provenance, units } = now.description;
+  const text = (key: "name" | "title" | "provenance", value: string, hint = "") => (
+    <>
+      <TextField
+        path={key}
+        label={d(key)}
+        value={value}
+        hint={hint}
+        set={(typed) => edit(({ description }) => void (description[key] = typed), key)}
+      />
+      <ProblemWords path={key} />
+    </>
+  );
+  const inUnits = (changed: Partial<Units>) => {
+    seal();
+    edit(({ description }) => setUnits(description, { ...description.units, ...changed }));
+  };
+  return (
+    <>
+      <Section title={d("robot")}>
+        {text("name", name, d("name_hint"))}
+        {text("title", title)}
+        {text("provenance", provenance, d("provenance_hint"))}
+      </Section>
+      <Section title={d("units")}>
+        <div class="grid-2">
+          <SelectField path="units/length" label={d("unit_length")} value={units.length} values={["mm", "m"]} text={(unit) => unit} set={(length) => inUnits({ length })} />
+          <SelectField path="units/angle" label={d("unit_angle")} value={units.angle} values={["deg", "rad"]} text={(unit) => (unit === "deg" ? "°" : unit)} set={(angle) => inUnits({ angle })} />
+        </div>
+        <p class="dim small">{d("units_hint")}</p>
+      </Section>
+    </>
+  );
+}

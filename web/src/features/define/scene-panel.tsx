@@ -1,0 +1,190 @@
+// The 3-D panel: the arm at the sliders' positions, its D-H rows, and the gizmo.
+
+import { signal } from "@preact/signals";
+import { Matrix4 } from "three";
+import { useEffect, useRef, useState } from "preact/hooks";
+import { Choice, Toggle } from "../../ui/parts";
+import { t, viewText } from "../../i18n/texts";
+import { theme } from "../../ui/theme";
+import { bodies, linkNames } from "./description";
+import type { Pose } from "./description";
+import { draft, edit, seal } from "./draft";
+import type { Draft } from "./draft";
+import { linkPlacements, poseMatrix, poseOf, rowAt } from "./placements";
+import { DefineScene } from "./scene";
+import type { Dragging, Picture, Shown } from "./scene";
+import { readShape, shapeOf } from "./shapes";
+import { d } from "../../i18n/define";
+import { USUAL_VIEWS, lookOf, sizeOf } from "./views";
+import type { Look } from "./viewpoint";
+import { choose, chosen, chosenBody, positions } from "./workbench";
+
+/** The scene's camera, for the views' tab; null: there is no scene. */
+export const cameraNow = signal<(() => Look) | null>(null);
+/** The view that the scene is asked to look from; a new object asks anew. */
+export const lookFrom = signal<{ name: string }>({ name: "free" });
+
+function pictureOf(now: Draft): Picture {
+  const { description } = now;
+  const rows = description.joint.map((joint, index) => rowAt(joint, positions.value[index] ?? joint.home, description.units));
+  let widest = 0;
+  const shapes = bodies(description).map((body): Shown | null => {
+    const shape = body.mesh ? shapeOf(body.mesh, now.files) : undefined;
+    if (typeof shape !== "object" || !("info" in shape) || !(body.mesh_scale > 0)) return null;
+    const { glb, min, max } = shape.info;
+    widest = Math.max(widest, ...max.map((value, axis) => (value - (min[axis] ?? 0)) * body.mesh_scale));
+    return { glb, scale: body.mesh_scale, pose: poseMatrix(body.mesh_pose, description.units), color: body.color };
+  });
+  const part = chosen.value;
+  const start = poseMatrix(description.base.pose, description.units);
+  const placements = linkPlacements(start, rows);
+  const links = linkNames(description);
+  return {
+    placements,
+    start,
+    rows,
+    frames: description.frame.map((frame) => ({
+      name: frame.name,
+      placement: (placements[links.indexOf(frame.link)] ?? new Matrix4()).clone().multiply(poseMatrix(frame, description.units)),
+    })),
+    shapes,
+    tool: poseMatrix(description.tool, description.units),
+    size: sizeOf(description, widest),
+    chosen: part === "base" ? 0 : part === "tool" ? "tool" : part + 1,
+  };
+}
+
+export function ScenePanel() {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const scene = useRef<DefineScene | null>(null);
+  const [problem, setProblem] = useState("");
+  const [rows, setRows] = useState(true);
+  const [shapesShown, setShapes] = useState(true);
+  const [dragging, setDragging] = useState<Dragging>("off");
+  const now = draft.value;
+  const picture = now && pictureOf(now);
+
+  useEffect(() => {
+    if (!canvas.current) return;
+    let made: DefineScene;
+    const again = new Set<string>();
+    try {
+      made = new DefineScene(canvas.current, {
+        pick: (link) => choose(link === 0 ? "base" : link - 1),
+        drag: (pose) => placeChosen(poseOf(pose, draft.value?.description.units ?? { length: "mm", angle: "deg" })),
+        dragged: seal,
+        failed: (glb, text) => {
+          setProblem(text);
+          if (!text || again.has(glb)) return;
+          again.add(glb);
+          made.forget(glb);
+          void convertAgain(glb);
+        },
+      });
+    } catch {
+      setProblem(d("no_webgl"));
+      return;
+    }
+    scene.current = made;
+    cameraNow.value = () => made.view.now();
+    return () => {
+      cameraNow.value = null;
+      made.dispose();
+      scene.current = null;
+    };
+  }, []);
+  useEffect(() => {
+    if (picture) scene.current?.show(picture);
+  });
+  useEffect(() => scene.current?.setColours(), [theme.value]);
+  useEffect(() => scene.current?.showRows(rows), [rows]);
+  useEffect(() => scene.current?.showShapes(shapesShown), [shapesShown]);
+  useEffect(() => scene.current?.drag(dragging), [dragging]);
+  useEffect(() => {
+    if (now && picture) scene.current?.view.look(lookOf(lookFrom.value.name, now.description, picture.size));
+  }, [lookFrom.value]);
+  // Until somebody moves the camera it keeps the whole arm in the picture.
+  useEffect(() => {
+    const view = scene.current?.view;
+    if (view && !view.touched && now && picture) view.look(lookOf(lookFrom.value.name, now.description, picture.size));
+  }, [picture?.size]);
+
+  const onKey = (event: KeyboardEvent) => {
+    const turn = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] }[event.key];
+    if (!turn) return;
+    event.preventDefault();
+    scene.current?.view.turn(turn[0] ?? 0, turn[1] ?? 0);
+  };
+  const views = ["free", ...new Set([...USUAL_VIEWS, ...Object.keys(now?.description.view ?? {})])].filter(
+    (name, index, all) => all.indexOf(name) === index,
+  );
+  return (
+    <section class="panel scene define-scene" aria-label={d("scene")}>
+      <div class="canvas-place">
+        <canvas ref={canvas} tabIndex={0} role="img" aria-label={`${d("scene")}. ${d("scene_hint")}`} title="" onKeyDown={onKey} />
+      </div>
+      <div class="scene-tools">
+        <Choice
+          label={t("view")}
+          values={views}
+          chosen={lookFrom.value.name}
+          text={viewText}
+          choose={(name) => (lookFrom.value = { name })}
+        />
+        <div class="scene-toggles">
+          <Toggle on={rows} set={setRows}>
+            {d("show_rows")}
+          </Toggle>
+          <Toggle on={shapesShown} set={setShapes}>
+            {d("show_shapes")}
+          </Toggle>
+        </div>
+      </div>
+      <div class="scene-foot">
+        <span title={d("gizmo_hint")}>
+          <Choice
+            label={d("gizmo")}
+            values={["off", "translate", "rotate"] as const}
+            chosen={dragging}
+            text={(how) => d(`gizmo_${how}`)}
+            choose={setDragging}
+          />
+        </span>
+        {dragging !== "off" && picture && !canPlace(picture) && <span class="scene-hint">{d("gizmo_hint")}</span>}
+        {rows && (
+          <span class="scene-legend">
+            <span class="key-z">{d("legend_z")}</span>
+            <span class="key-d">{d("legend_d")}</span>
+            <span class="key-a">{d("legend_a")}</span>
+          </span>
+        )}
+      </div>
+      {problem && <p class="scene-word trouble">{problem}</p>}
+    </section>
+  );
+}
+
+function canPlace({ chosen: part, shapes }: Picture): boolean {
+  return part === "tool" || (part !== null && Boolean(shapes[part]));
+}
+
+/** The gizmo was dragged: one step of undo until it is let go. */
+function placeChosen(pose: Pose): void {
+  edit((now) => {
+    if (chosen.value === "tool") now.description.tool = pose;
+    else {
+      const body = chosenBody(now.description);
+      if (body) body.mesh_pose = pose;
+    }
+  }, "gizmo");
+}
+
+/** The server no longer has a converted shape: it is converted again, and so shown again. */
+async function convertAgain(glb: string): Promise<void> {
+  const now = draft.value;
+  if (!now) return;
+  for (const { mesh } of bodies(now.description)) {
+    const shape = mesh ? shapeOf(mesh, now.files) : undefined;
+    if (typeof shape === "object" && "info" in shape && shape.info.glb === glb) await readShape(mesh, now.files);
+  }
+}

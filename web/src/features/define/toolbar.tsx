@@ -1,0 +1,149 @@
+// Above the columns: what is being defined, undo and redo, save, download, start; and what became of it.
+
+import { useState } from "preact/hooks";
+import { timeOfDay } from "../../i18n/format";
+import { robotLink } from "../../ui/route";
+import { t } from "../../i18n/texts";
+import { broughtBack, canRedo, canUndo, draft, identity, isUnsaved, keepingFailed, putAside, redo, undo } from "./draft";
+import { fileNotices, reading } from "./drop";
+import { discardDraft } from "./opening";
+import { busy, download, isRunning, known, outcome, save, start, stop } from "./outcome";
+import { d } from "../../i18n/define";
+
+export function Toolbar() {
+  const now = draft.value;
+  if (!now) return null;
+  const { name, title } = now.description;
+  const { siteName } = identity.value;
+  const canStart = known.value?.can_start ?? false;
+  const state = isUnsaved.value ? (siteName ? "unsaved" : "not_yet_saved") : siteName ? "all_saved" : "no_changes";
+  const running = isRunning();
+  return (
+    <div class="toolbar" role="toolbar" aria-label={d("define")}>
+      <div class="toolbar-name">
+        <h1>{title || name || d("define")}</h1>
+        <span class={`save-state ${isUnsaved.value ? "unsaved" : ""}`} role="status">
+          {busy.value || reading.value || d(state)}
+        </span>
+      </div>
+      <div class="toolbar-group">
+        <button class="action" disabled={!canUndo.value} onClick={undo} title={`${d("undo")} (Ctrl+Z)`}>
+          {d("undo")}
+        </button>
+        <button class="action" disabled={!canRedo.value} onClick={redo} title={`${d("redo")} (Ctrl+Shift+Z)`}>
+          {d("redo")}
+        </button>
+      </div>
+      <div class="toolbar-group">
+        <a class="action" href="#/define" onClick={putAside}>
+          {d("new")}
+        </a>
+        <button class="action" disabled={busy.value !== ""} onClick={() => void download()}>
+          {d("download")}
+        </button>
+        {running ? (
+          <button class="action" disabled={busy.value !== ""} onClick={() => void stop()}>
+            {d("stop_simulated")}
+          </button>
+        ) : (
+          <button
+            class="action"
+            disabled={busy.value !== "" || !canStart}
+            title={canStart ? "" : d("cannot_start")}
+            onClick={() => void start()}
+          >
+            {d(isUnsaved.value || !siteName ? "save_start" : "start")}
+          </button>
+        )}
+        <button
+          class="action primary"
+          disabled={busy.value !== "" || (!isUnsaved.value && siteName !== "")}
+          onClick={() => void save(false)}
+          title="Ctrl+S"
+        >
+          {d("save")}
+        </button>
+      </div>
+    </div>
+  );
+}
+
+/** What became of things, one line each, put away by hand. */
+export function Outcomes() {
+  const [sure, setSure] = useState(false);
+  const done = outcome.value;
+  return (
+    <div class="outcomes">
+      {broughtBack.value !== null && draft.value && (
+        <div class="outcome" role="status">
+          <span>{sure ? d("discard_sure") : d("brought_back", { time: timeOfDay(broughtBack.value) })}</span>
+          {sure ? (
+            <>
+              <button class="action small-action" onClick={discardDraft}>
+                {d("discard")}
+              </button>
+              <button class="quiet" onClick={() => setSure(false)}>
+                {d("cancel")}
+              </button>
+            </>
+          ) : (
+            <>
+              <button class="quiet" onClick={() => setSure(true)}>
+                {d("discard")}
+              </button>
+              <button class="quiet" onClick={() => (broughtBack.value = null)}>
+                {d("keep")}
+              </button>
+            </>
+          )}
+        </div>
+      )}
+      {keepingFailed.value && <p class="outcome refused">{d("not_kept", { text: keepingFailed.value })}</p>}
+      {done?.kind === "exists" && (
+        <div class="outcome" role="alertdialog" aria-label={d("save_over")}>
+          <span class="shape warning" aria-hidden="true" />
+          <span>{done.text}</span>
+          <button class="action small-action" onClick={() => void save(done.thenStart, done.name)}>
+            {d("save_over")}
+          </button>
+          <button class="quiet" onClick={() => (outcome.value = null)}>
+            {d("cancel")}
+          </button>
+        </div>
+      )}
+      {done?.kind === "started" && (
+        <div class="outcome done" role="status">
+          <span>{d("started", { name: done.robot })}</span>
+          <a class="action small-action" href={robotLink(done.site, done.robot)}>
+            {d("watch_it")}
+          </a>
+          <Close />
+        </div>
+      )}
+      {(done?.kind === "done" || done?.kind === "refused") && (
+        <div class={`outcome ${done.kind}`} role={done.kind === "refused" ? "alert" : "status"}>
+          {done.kind === "refused" && <span class="shape warning" aria-hidden="true" />}
+          <span>{done.text}</span>
+          <Close />
+        </div>
+      )}
+      {fileNotices.value.map(({ kind, text }) => (
+        <div key={text} class={`outcome ${kind}`} role={kind === "refused" ? "alert" : "status"}>
+          {kind === "refused" && <span class="shape warning" aria-hidden="true" />}
+          <span>{text}</span>
+          <button class="quiet" onClick={() => (fileNotices.value = fileNotices.value.filter((each) => each.text !== text))}>
+            {t("dismiss")}
+          </button>
+        </div>
+      ))}
+    </div>
+  );
+}
+
+function Close() {
+  return (
+    <button class="quiet" onClick={() => (outcome.value = null)}>
+      {t("dismiss")}
+    </button>
+  );
+}

@@ -1,0 +1,89 @@
+// Named views: what the video and the 3-D panel look from, set from this page's own camera.
+
+import { useState } from "preact/hooks";
+import { viewText } from "../../i18n/texts";
+import type { View } from "./description";
+import { draft, edit, seal } from "./draft";
+import { ProblemWords, SelectField, TextField } from "./fields";
+import { cameraNow, lookFrom } from "./scene-panel";
+import { d } from "../../i18n/define";
+import { USUAL_VIEWS, viewOf } from "./views";
+
+function setFromCamera(name: string): void {
+  const look = cameraNow.value?.();
+  seal();
+  if (look) edit(({ description }) => void (description.view[name] = viewOf(look, description)));
+}
+
+export function ViewsTab() {
+  const [fresh, setFresh] = useState("");
+  const now = draft.value;
+  if (!now) return null;
+  const given = now.description.view;
+  const names = [...new Set<string>([...USUAL_VIEWS, ...Object.keys(given)])];
+  const usable = /^[A-Za-z0-9][A-Za-z0-9_.-]*$/.test(fresh) && !names.includes(fresh);
+  return (
+    <>
+      <p class="dim small tab-intro">{d("views_words")}</p>
+      <ul class="view-list">
+        {names.map((name) => (
+          <li key={name}>
+            <span class="view-name">
+              <strong>{viewText(name)}</strong>
+              <span class="dim small">{d(given[name] ? "view_own" : "view_auto")}</span>
+            </span>
+            <button class="quiet" onClick={() => (lookFrom.value = { name })}>
+              {d("view_look")}
+            </button>
+            <button class="quiet" disabled={!cameraNow.value} onClick={() => setFromCamera(name)}>
+              {d("view_set")}
+            </button>
+            {given[name] && (
+              <span class="view-more">
+                <SelectField
+                  quiet
+                  path={`view/${name}/projection`}
+                  label={`${d("projection")}: ${viewText(name)}`}
+                  value={given[name].projection}
+                  values={["orthographic", "perspective"] as const}
+                  text={(projection: View["projection"]) => d(projection)}
+                  set={(projection) => {
+                    seal();
+                    edit(({ description }) => {
+                      const view = description.view[name];
+                      if (view) view.projection = projection;
+                    });
+                    lookFrom.value = { name };
+                  }}
+                />
+                <button
+                  class="quiet"
+                  onClick={() => {
+                    seal();
+                    edit(({ description }) => void delete description.view[name]);
+                  }}
+                >
+                  {d((USUAL_VIEWS as readonly string[]).includes(name) ? "view_reset" : "remove")}
+                </button>
+              </span>
+            )}
+          </li>
+        ))}
+      </ul>
+      <div class="view-add">
+        <TextField path="view" label={d("view_new")} value={fresh} set={setFresh} />
+        <button
+          class="action small-action"
+          disabled={!usable || !cameraNow.value}
+          onClick={() => {
+            setFromCamera(fresh);
+            setFresh("");
+          }}
+        >
+          {d("view_add")}
+        </button>
+      </div>
+      <ProblemWords path="view" />
+    </>
+  );
+}

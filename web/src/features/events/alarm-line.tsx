@@ -1,0 +1,111 @@
+// One alarm: how urgent, how it stands, since when, of what, what to do about it, who has seen to it.
+
+import { timestampMs } from "@bufbuild/protobuf/wkt";
+import { stampFull, stampTime, timeOfDay, fullTime } from "../../i18n/format";
+import { robotLink } from "../../ui/route";
+import { State, isUnacknowledged, nameOf } from "../../mesh/alarms";
+import type { Alarm } from "../../mesh/alarms";
+import { alarmAdvice, alarmTitle } from "../../i18n/alarm-words";
+import { PriorityMark } from "../../ui/priority";
+import { e } from "../../i18n/events";
+import type { EventsTextName } from "../../i18n/events";
+
+const STATE_WORDS = new Map<State, EventsTextName>([
+  [State.UNACKNOWLEDGED, "state_unacknowledged"],
+  [State.ACKNOWLEDGED, "state_acknowledged"],
+  [State.RETURNED, "state_returned"],
+  [State.SHELVED, "state_shelved"],
+]);
+
+export function AlarmLine(props: {
+  alarm: Alarm;
+  selected: boolean;
+  select: (on: boolean) => void;
+  able: boolean;
+  acknowledge: () => void;
+  shelve: () => void;
+  unshelve: () => void;
+}) {
+  const { alarm, able } = props;
+  const { text, site, robot, state } = alarm;
+  const open = isUnacknowledged(alarm);
+  const [title, advice] = [alarmTitle(alarm.code), alarmAdvice(alarm.code, alarm.advice)];
+  const when = alarm.last ?? alarm.since;
+  return (
+    <li class={`alarm-line ${open ? "open" : ""} ${state === State.RETURNED ? "over" : ""}`} data-alarm={nameOf(alarm)}>
+      <label class="alarm-select">
+        <input
+          type="checkbox"
+          checked={props.selected}
+          aria-label={e("select", { text })}
+          onChange={(event) => props.select(event.currentTarget.checked)}
+        />
+      </label>
+      <PriorityMark of={alarm.priority} />
+      <span class="alarm-state">{e(STATE_WORDS.get(state) ?? "state_unacknowledged")}</span>
+      <time title={stampFull(when)}>{stampTime(when)}</time>
+      <span class="alarm-of">
+        {robot === "-" || !robot ? (
+          <>
+            {site} <span class="dim">{e("whole_site")}</span>
+          </>
+        ) : (
+          <a href={robotLink(site, robot)}>
+            {site}/{robot}
+          </a>
+        )}
+      </span>
+      <div class="alarm-text">
+        {title && <strong>{title}</strong>}
+        {!title && <strong lang="en">{text}</strong>}
+        {advice && <span class="alarm-advice">{e("advice", { text: advice })}</span>}
+        {title && (
+          <span class="dim alarm-more">
+            {e("in_its_words")} <span lang="en">{text}</span>
+          </span>
+        )}
+        <span class="dim alarm-more">
+          {more(alarm).join(" · ")} · <code title={e("id_hint")}>{nameOf(alarm)}</code>
+        </span>
+      </div>
+      <span class="alarm-actions">
+        {open && (
+          <button
+            class="action"
+            disabled={!able}
+            aria-label={e("acknowledge_of", { text })}
+            onClick={props.acknowledge}
+          >
+            {e("acknowledge")}
+          </button>
+        )}
+        {state === State.SHELVED ? (
+          <button class="action" disabled={!able} aria-label={e("unshelve_of", { text })} onClick={props.unshelve}>
+            {e("unshelve")}
+          </button>
+        ) : (
+          <button class="action" disabled={!able} onClick={props.shelve}>
+            {e("shelve")}
+          </button>
+        )}
+      </span>
+    </li>
+  );
+}
+
+function more(alarm: Alarm): string[] {
+  const { count, since, last, returned, by, at, state, shelvedUntil, reason } = alarm;
+  const words = [`${alarm.source} · ${alarm.code}`];
+  if (since && last && timestampMs(last) > timestampMs(since)) words.push(e("since", { time: stampTime(since) }));
+  if (count > 1) words.push(e("times", { count }));
+  if (returned && state === State.RETURNED) words.push(e("over_at", { time: stampTime(returned) }));
+  if (state === State.SHELVED) {
+    const until = shelvedUntil ? timestampMs(shelvedUntil) : 0;
+    words.push(e("shelved_by", { by, time: sameDay(until) ? timeOfDay(until) : fullTime(until), reason }));
+  } else if (by) words.push(e("by_at", { by, time: stampTime(at) }));
+  return words;
+}
+
+function sameDay(ms: number): boolean {
+  return new Date(ms).toDateString() === new Date().toDateString();
+}

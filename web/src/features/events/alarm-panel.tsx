@@ -1,0 +1,227 @@
+// The alarm list after ISA-18.2: chosen, acknowledged and shelved, one or many at a time.
+
+import type { ComponentChildren } from "preact";
+import { useState } from "preact/hooks";
+import { setOperator, operator, reasonOf } from "../../mesh/control";
+import type { Notice } from "../../mesh/control";
+import { hello } from "../../mesh/connection";
+import { Choice, NoticeLine, Toggle } from "../../ui/parts";
+import { t } from "../../i18n/texts";
+import { Action, Priority, State, act, alarms, anyWatch, asker, isUnacknowledged, mayAct, nameOf, silentSites } from "../../mesh/alarms";
+import type { Alarm } from "../../mesh/alarms";
+import { AlarmLine } from "./alarm-line";
+import { Select } from "../../ui/select";
+import { Shelve } from "./shelve";
+import { setSound, sound } from "../../ui/alarm-sound";
+import { e } from "../../i18n/events";
+import type { EventsTextName } from "../../i18n/events";
+
+const SHOWN = ["all", "unacknowledged", "shelved"] as const;
+type Shown = (typeof SHOWN)[number];
+const LEAST = { any_priority: Priority.LOW, from_medium: Priority.MEDIUM, from_high: Priority.HIGH } as const;
+const MOST_SHOWN = 200; // nobody acts on more; those are the most urgent
+
+const DONE = new Map<Action, EventsTextName>([
+  [Action.ACKNOWLEDGE, "acknowledged"],
+  [Action.SHELVE, "shelved"],
+  [Action.UNSHELVE, "unshelved"],
+]);
+
+function passes(alarm: Alarm, shown: Shown): boolean {
+  if (shown === "shelved") return alarm.state === State.SHELVED;
+  return shown === "unacknowledged" ? isUnacknowledged(alarm) : alarm.state !== State.SHELVED;
+}
+
+export function AlarmPanel() {
+  const [shown, setShown] = useState<Shown>("all");
+  const [least, setLeast] = useState<keyof typeof LEAST>("any_priority");
+  const [site, setSite] = useState("");
+  const [text, setText] = useState("");
+  const [selected, setSelected] = useState<ReadonlySet<string>>(new Set());
+  const [shelving, setShelving] = useState<readonly Alarm[] | null>(null);
+  const [notice, setNotice] = useState<Notice | null>(null);
+
+  const all = alarms.value;
+  const wanted = text.trim().toLowerCase();
+  const listed = all.filter(
+    (alarm) =>
+      passes(alarm, shown) &&
+      alarm.priority >= LEAST[least] &&
+      (!site || alarm.site === site) &&
+      `${alarm.text} ${alarm.code} ${alarm.site} ${alarm.robot} ${alarm.source}`.toLowerCase().includes(wanted),
+  );
+  const drawn = listed.slice(0, MOST_SHOWN);
+  const chosen = drawn.filter((alarm) => selected.has(nameOf(alarm)));
+  const open = drawn.filter(isUnacknowledged);
+  const openChosen = chosen.filter(isUnacknowledged);
+  const able = mayAct.value && asker.value !== "";
+
+  const run = async (some: readonly Alarm[], action: Action, values?: { reason: string; shelveS: number }) => {
+    setNotice({ kind: "busy", text: e("acting") });
+    try {
+      await act(some, action, values);
+      setNotice({ kind: "done", text: e(DONE.get(action) ?? "acknowledged", { count: some.length }) });
+      setSelected(new Set());
+    } catch (error) {
+      setNotice({ kind: "refused", text: e("not_done", { text: reasonOf(error) }) });
+    }
+  };
+  const select = (alarm: Alarm, on: boolean) => {
+    const names = new Set(selected);
+    if (on) names.add(nameOf(alarm));
+    else names.delete(nameOf(alarm));
+    setSelected(names);
+  };
+
+  return (
+    <section class="panel alarms" aria-label={e("alarms")}>
+      <div class="panel-head">
+        <h1>{e("alarms")}</h1>
+        <Choice
+          label={e("state")}
+          values={SHOWN}
+          chosen={shown}
+          text={(each) => `${e(`show_${each}`)} ${all.filter((alarm) => passes(alarm, each)).length}`}
+          choose={setShown}
+        />
+        <span class="panel-end">
+          <Toggle on={sound.value} set={setSound}>
+            {e("sound")}: {e(sound.value ? "on" : "off")}
+          </Toggle>
+        </span>
+      </div>
+      <div class="list-tools">
+        <Filters>
+          <Select
+            label={e("priority")}
+            value={least}
+            values={Object.keys(LEAST) as (keyof typeof LEAST)[]}
+            text={e}
+            choose={setLeast}
+          />
+          <SiteSelect site={site} sites={all.map((alarm) => alarm.site)} choose={setSite} />
+          <input
+            type="search"
+            placeholder={e("search")}
+            aria-label={e("search")}
+            value={text}
+            onInput={(event) => setText(event.currentTarget.value)}
+          />
+        </Filters>
+        {all.length > 0 && mayAct.value && (
+          <div class="list-actions">
+            {!hello.value?.operator && <Name />}
+            {openChosen.length > 0 ? (
+              <button class="action primary" disabled={!able} onClick={() => void run(openChosen, Action.ACKNOWLEDGE)}>
+                {e("acknowledge_selected", { count: openChosen.length })}
+              </button>
+            ) : (
+              <button
+                class="action"
+                disabled={!able || open.length === 0}
+                onClick={() => void run(open, Action.ACKNOWLEDGE)}
+              >
+                {e("acknowledge_shown", { count: open.length })}
+              </button>
+            )}
+            <button class="action" disabled={!able || chosen.length === 0} onClick={() => setShelving(chosen)}>
+              {e("shelve_selected")}
+            </button>
+          </div>
+        )}
+      </div>
+      {shelving && (
+        <Shelve
+          alarms={shelving}
+          close={() => setShelving(null)}
+          done={(reason, shelveS) => void run(shelving, Action.SHELVE, { reason, shelveS })}
+        />
+      )}
+      {silentSites().map((name) => (
+        <p key={name} class="banner warning">
+          <span class="shape warning" aria-hidden="true" />
+          {e("badge_silent", { sites: name })}
+        </p>
+      ))}
+      {drawn.length === 0 ? (
+        <p class="empty">
+          {!anyWatch.value
+            ? e("no_watch")
+            : all.length === 0
+              ? e("no_alarms")
+              : e("no_alarms_match", { count: all.length })}
+        </p>
+      ) : (
+        <ul class="alarm-list">
+          {drawn.map((alarm) => (
+            <AlarmLine
+              key={nameOf(alarm)}
+              alarm={alarm}
+              selected={selected.has(nameOf(alarm))}
+              select={(on) => select(alarm, on)}
+              able={able}
+              acknowledge={() => void run([alarm], Action.ACKNOWLEDGE)}
+              shelve={() => setShelving([alarm])}
+              unshelve={() => void run([alarm], Action.UNSHELVE)}
+            />
+          ))}
+        </ul>
+      )}
+      {listed.length > drawn.length && (
+        <p class="footnote dim">{e("more_alarms", { count: listed.length - drawn.length })}</p>
+      )}
+      <NoticeLine
+        notice={notice}
+        idle={mayAct.value ? "" : e("may_not")}
+      />
+    </section>
+  );
+}
+
+/** What narrows a list; on a phone only when one asks for it, so that the list itself is in sight. */
+export function Filters({ children }: { children: ComponentChildren }) {
+  const [open, setOpen] = useState(false);
+  return (
+    <>
+      <button class="action filters-open" aria-expanded={open} onClick={() => setOpen(!open)}>
+        {e("filter")}
+      </button>
+      <div class={`list-filter ${open ? "unfolded" : ""}`}>{children}</div>
+    </>
+  );
+}
+
+/** Where no account says who one is. */
+function Name() {
+  return (
+    <label class="alarm-name">
+      {!asker.value && <span class="name-needed">{e("name_needed")}</span>}
+      <input
+        type="text"
+        name="operator"
+        autocomplete="username"
+        spellcheck={false}
+        maxLength={40}
+        placeholder={t("operator")}
+        aria-label={t("operator")}
+        title={t("operator_hint")}
+        value={operator.value}
+        onInput={(event) => setOperator(event.currentTarget.value)}
+      />
+    </label>
+  );
+}
+
+export function SiteSelect(props: { site: string; sites: readonly string[]; choose: (site: string) => void }) {
+  const sites = [...new Set(props.sites)].sort();
+  if (sites.length < 2) return null;
+  return (
+    <Select
+      label={e("site")}
+      value={props.site}
+      values={["", ...sites]}
+      text={(name) => name || e("every_site")}
+      choose={props.choose}
+    />
+  );
+}

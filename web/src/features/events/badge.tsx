@@ -1,0 +1,37 @@
+// On every page: how many alarms nobody has acknowledged, by priority; calm while there is none.
+
+import { useEffect } from "preact/hooks";
+import { anyWatch, counts, followAlarms, silentSites } from "../../mesh/alarms";
+import { PriorityMark, priorityWord } from "../../ui/priority";
+import { followSound } from "../../ui/alarm-sound";
+import { e } from "../../i18n/events";
+
+export function AlarmBadge() {
+  useEffect(() => {
+    const ends = [followAlarms(), followSound()];
+    return () => ends.forEach((end) => end());
+  }, []);
+  const told = counts.value;
+  const silent = silentSites();
+  const words = silent.length
+    ? e("badge_silent", { sites: silent.join(", ") })
+    : !anyWatch.value
+      ? e("badge_unknown")
+      : told.length
+        ? e("badge", { counts: told.map(({ priority, count }) => `${count} ${priorityWord(priority)}`).join(", ") })
+        : e("badge_none");
+  return (
+    <a class={`alarm-badge ${told.length ? "" : "calm"}`} href="#/events" title={words}>
+      <span class="unseen">{words}</span>
+      {silent.length > 0 && <span class="shape warning" aria-hidden="true" />}
+      <span class="badge-counts" aria-hidden="true">
+        {told.map(({ priority, count }) => (
+          <PriorityMark key={priority} of={priority}>
+            {count}
+          </PriorityMark>
+        ))}
+        {told.length === 0 && e(anyWatch.value ? "badge_calm" : "badge_dash")}
+      </span>
+    </a>
+  );
+}

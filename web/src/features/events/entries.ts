@@ -1,0 +1,105 @@
+// Events and audit entries of every robot and service, newest first, each once, as many as are kept.
+
+import { fromBinary } from "@bufbuild/protobuf";
+import { timestampMs } from "@bufbuild/protobuf/wkt";
+import { signal } from "@preact/signals";
+import type { Signal } from "@preact/signals";
+import { useEffect } from "preact/hooks";
+import { AuditEntrySchema, AuditListSchema, EventListSchema, EventSchema } from "../../gen/robomesh_pb";
+import type { AuditEntry, Event } from "../../gen/robomesh_pb";
+import { watch } from "../../mesh/connection";
+import type { Sample } from "../../mesh/connection";
+
+export const MOST_KEPT = 5000;
+const TAKEN_EACH_MS = 250;
+
+interface Of {
+  /** Told apart from every other. */
+  id: string;
+  ms: number;
+  site: string;
+  robot: string;
+}
+export type EventEntry = Of & { event: Event };
+export type AuditLine = Of & { audit: AuditEntry };
+
+/** A list that many publishers tell. */
+export class Entries<E extends Of> {
+  readonly newest: Signal<readonly E[]> = signal([]);
+  private readonly known = new Set<string>();
+  private waiting: E[] = [];
+
+  /** Takes what is not known yet; it is seen at the next `settle`. */
+  take(entries: readonly E[]): void {
+    for (const entry of entries) {
+      if (this.known.has(entry.id)) continue;
+      this.known.add(entry.id);
+      this.waiting.push(entry);
+    }
+  }
+
+  settle(): void {
+    if (this.waiting.length === 0) return;
+    // Two runs in order or nearly so: the sort is quick, and stable.
+    const merged = [...this.waiting.reverse(), ...this.newest.value].sort((a, b) => b.ms - a.ms);
+    for (const { id } of merged.splice(MOST_KEPT)) this.known.delete(id);
+    this.waiting = [];
+    this.newest.value = merged;
+  }
+}
+
+export const events = new Entries<EventEntry>();
+export const audits = new Entries<AuditLine>();
+
+/** Follows both while it is mounted; what was there before stays. */
+export function useEntries(): void {
+  useEffect(() => {
+    const ends = [
+      watch("robomesh/*/*/events", takeEvents),
+      watch("robomesh/*/*/events/*", takeEvents),
+      watch("robomesh/*/*/audit", takeAudit),
+    ];
+    const timer = setInterval(() => {
+      events.settle();
+      audits.settle();
+    }, TAKEN_EACH_MS);
+    return () => {
+      clearInterval(timer);
+      ends.forEach((end) => end());
+    };
+  }, []);
+}
+
+function takeEvents(sample: Sample): void {
+  const told = sample.live
+    ? [fromBinary(EventSchema, sample.payload)]
+    : fromBinary(EventListSchema, sample.payload).events;
+  const [, site = "", robot = ""] = sample.key.split("/");
+  events.take(
+    told.map((event) => {
+      const ms = event.timestamp ? timestampMs(event.timestamp) : 0;
+      const nanos = event.timestamp?.nanos ?? 0;
+      return { id: `${sample.key} ${ms} ${nanos} ${event.code} ${event.text}`, ms, site, robot, event };
+    }),
+  );
+}
+
+function takeAudit(sample: Sample): void {
+  const told = sample.live
+    ? [fromBinary(AuditEntrySchema, sample.payload)]
+    : fromBinary(AuditListSchema, sample.payload).entries;
+  const [, site = "", robot = ""] = sample.key.split("/");
+  audits.take(auditLines(site, robot, told));
+}
+
+/** Entries of one robot's log. */
+export function auditLines(site: string, robot: string, entries: readonly AuditEntry[]): AuditLine[] {
+  return entries.map((audit) => ({
+    // An entry that is repeated comes again under its number.
+    id: `${site}/${robot} ${audit.number} ${audit.repeatedCount}`,
+    ms: audit.timestamp ? timestampMs(audit.timestamp) : 0,
+    site,
+    robot,
+    audit,
+  }));
+}

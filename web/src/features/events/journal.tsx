@@ -1,0 +1,255 @@
+// What happened and who asked for what, newest first: of all robots and services, narrowed by what one looks for.
+
+import { useEffect, useState } from "preact/hooks";
+import { count, stampFull } from "../../i18n/format";
+import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "../../gen/robomesh_pb";
+import { eventText } from "../../i18n/event-text";
+import { Mark, OUTCOMES, SEVERITIES } from "../../ui/event-mark";
+import { fleetRobots } from "../../mesh/known-robots";
+import { entryText } from "../../i18n/audit-text";
+import { Choice, NoticeLine, Toggle } from "../../ui/parts";
+import type { Notice } from "../../mesh/control";
+import { alarmTitle } from "../../i18n/alarm-words";
+import { Filters, SiteSelect } from "./alarm-panel";
+import { MOST_ASKED, findInLogs } from "./audit-logs";
+import { audits, events, MOST_KEPT, useEntries } from "./entries";
+import type { AuditLine, EventEntry } from "./entries";
+import { Select } from "../../ui/select";
+import { t } from "../../i18n/texts";
+import { e } from "../../i18n/events";
+import { VirtualList } from "./virtual-list";
+
+const KINDS = ["events", "requests"] as const;
+const LEAST = { any_severity: Severity.DEBUG, from_warning: Severity.WARNING, from_error: Severity.ERROR } as const;
+const SINCE_S = { any_time: Number.POSITIVE_INFINITY, last_hour: 3600, last_day: 86_400 } as const;
+const WHAT = { any_outcome: null, outcome_refused: Outcome.REFUSED, outcome_failed: Outcome.FAILED } as const;
+type Entry = EventEntry | AuditLine;
+
+export function Journal() {
+  useEntries();
+  const [kind, setKind] = useState<(typeof KINDS)[number]>("events");
+  const [least, setLeast] = useState<keyof typeof LEAST>("any_severity");
+  const [outcome, setOutcome] = useState<keyof typeof WHAT>("any_outcome");
+  const [since, setSince] = useState<keyof typeof SINCE_S>("any_time");
+  const [site, setSite] = useState("");
+  const [robot, setRobot] = useState("");
+  const [text, setText] = useState("");
+  const [held, setHeld] = useState<readonly Entry[] | null>(null);
+  const [open, setOpen] = useState<Entry | null>(null);
+  const [notice, setNotice] = useState<Notice | null>(null);
+  const lineHeight = useLineHeight();
+  useEffect(() => {
+    setHeld(null);
+    setOpen(null);
+  }, [kind]);
+
+  const newest: readonly Entry[] = kind === "events" ? events.newest.value : audits.newest.value;
+  const all = held ?? newest;
+  const wanted = text.trim().toLowerCase();
+  const from = Date.now() - SINCE_S[since] * 1000;
+  const listed = all.filter(
+    (entry) =>
+      entry.ms >= from &&
+      (!site || entry.site === site) &&
+      (!robot || entry.robot === robot) &&
+      ("event" in entry
+        ? entry.event.severity >= LEAST[least]
+        : WHAT[outcome] === null || entry.audit.outcome === WHAT[outcome]) &&
+      (!wanted || wordsOf(entry).toLowerCase().includes(wanted)),
+  );
+  const robots = fleetRobots.value.filter((key) => !site || key.split("/")[1] === site);
+  const sites = [...new Set([...fleetRobots.value.map((key) => key.split("/")[1] ?? ""), ...all.map((entry) => entry.site)])];
+  const names = [...new Set(robots.map((key) => key.split("/")[2] ?? ""))].sort();
+
+  const search = async () => {
+    const keys = robots.filter((key) => !robot || key.split("/")[2] === robot);
+    if (keys.length > MOST_ASKED) {
+      setNotice({ kind: "refused", text: e("older_many", { count: keys.length, most: MOST_ASKED }) });
+      return;
+    }
+    setNotice({ kind: "busy", text: e("older_busy", { count: keys.length }) });
+    const found = await findInLogs(keys, SINCE_S[since]);
+    audits.take(found.entries);
+    audits.settle();
+    const failed = found.failed.map((each) => e("older_failed", each)).join(" ");
+    const text = `${e("older_done", { count: found.entries.length })} ${failed}`.trim();
+    setNotice({ kind: failed ? "refused" : "done", text });
+  };
+
+  return (
+    <section class="panel journal" aria-label={e("journal")}>
+      <div class="panel-head">
+        <h2>{e("journal")}</h2>
+        <Choice
+          label={e("journal")}
+          values={KINDS}
+          chosen={kind}
+          text={(each) => e(each === "events" ? "journal_events" : "journal_requests")}
+          choose={setKind}
+        />
+        <span class="panel-end">
+          <span class="dim small">{e("shown_of", { shown: count(listed.length), all: count(all.length) })}</span>
+          <Toggle on={held !== null} set={(on) => setHeld(on ? newest : null)}>
+            {held ? e("go_on", { count: Math.max(0, newest.length - held.length) }) : e("pause")}
+          </Toggle>
+        </span>
+      </div>
+      <Filters>
+        {kind === "events" ? (
+          <Select label={e("severity")} value={least} values={keysOf(LEAST)} text={e} choose={setLeast} />
+        ) : (
+          <Select
+            label={e("outcome")}
+            value={outcome}
+            values={keysOf(WHAT)}
+            text={outcomeText}
+            choose={setOutcome}
+          />
+        )}
+        <Select label={e("time")} value={since} values={keysOf(SINCE_S)} text={e} choose={setSince} />
+        <SiteSelect site={site} sites={sites} choose={(name) => (setSite(name), setRobot(""))} />
+        <Select
+          label={e("robot")}
+          value={robot}
+          values={["", "-", ...names]}
+          text={(name) => (name === "-" ? e("whole_site") : name || e("every_robot"))}
+          choose={setRobot}
+        />
+        <input
+          type="search"
+          placeholder={e("search")}
+          aria-label={`${e("search")}, ${e("journal")}`}
+          value={text}
+          onInput={(event) => setText(event.currentTarget.value)}
+        />
+        {kind === "requests" && (
+          <button class="action list-end" title={e("older_hint")} onClick={() => void search()}>
+            {e("older")}
+          </button>
+        )}
+      </Filters>
+      {notice && kind === "requests" && <NoticeLine notice={notice} />}
+      {listed.length === 0 ? (
+        <p class="empty">{e(all.length ? "no_entries_match" : "no_entries")}</p>
+      ) : (
+        <VirtualList
+          label={e("journal")}
+          items={listed}
+          lineHeight={lineHeight}
+          line={(entry) => <Line key={entry.id} entry={entry} open={entry.id === open?.id} choose={setOpen} />}
+        />
+      )}
+      {open && <Details entry={open} close={() => setOpen(null)} />}
+      {all.length >= MOST_KEPT && <p class="footnote dim">{e("oldest_left_out", { count: count(MOST_KEPT) })}</p>}
+    </section>
+  );
+}
+
+function keysOf<T extends object>(table: T): (keyof T & string)[] {
+  return Object.keys(table) as (keyof T & string)[];
+}
+
+function outcomeText(name: keyof typeof WHAT): string {
+  return name === "any_outcome" ? e(name) : t((OUTCOMES[WHAT[name] ?? Outcome.REFUSED] ?? ["state_unknown", ""])[0]);
+}
+
+function wordsOf(entry: Entry): string {
+  if ("event" in entry) {
+    const { text, code, source } = entry.event;
+    return `${entry.site}/${entry.robot} ${source} ${code} ${text} ${eventText(entry.event)} ${alarmTitle(code) ?? ""}`;
+  }
+  const { operator, source, request, text } = entry.audit;
+  return `${entry.site}/${entry.robot} ${operator} ${source} ${request} ${text} ${entryText(entry.audit)}`;
+}
+
+function Line({ entry, open, choose }: { entry: Entry; open: boolean; choose: (entry: Entry) => void }) {
+  const stamp = "event" in entry ? entry.event.timestamp : entry.audit.timestamp;
+  return (
+    <button class="journal-line" aria-expanded={open} onClick={() => choose(entry)}>
+      <time title={stampFull(stamp)}>{dayTime(entry.ms)}</time>
+      <span class="journal-of">{entry.robot === "-" ? entry.site : `${entry.site}/${entry.robot}`}</span>
+      <span class="journal-text">{"event" in entry ? <EventWords entry={entry} /> : <AuditWords entry={entry} />}</span>
+    </button>
+  );
+}
+
+function EventWords({ entry: { event } }: { entry: EventEntry }) {
+  const [word, level] = SEVERITIES[event.severity] ?? ["severity_info", "normal"];
+  const [title, text] = [alarmTitle(event.code), eventText(event)];
+  // What the page says in its own language needs no title; what ends an alarm has that alarm's code.
+  const titled = title && text === event.text && event.severity > Severity.INFO;
+  return (
+    <>
+      {level !== "normal" && <Mark word={word} level={level} />} {titled && <strong>{title}</strong>}{" "}
+      <span lang={text === event.text ? "en" : undefined}>{text}</span>
+    </>
+  );
+}
+
+function AuditWords({ entry: { audit } }: { entry: AuditLine }) {
+  const [word, level] = OUTCOMES[audit.outcome] ?? ["state_unknown", "normal"];
+  const repeated = audit.repeatedCount > 0n ? ` × ${count(audit.repeatedCount)}` : "";
+  const text = entryText(audit);
+  return (
+    <>
+      <Mark word={word} level={level} /> <strong>{audit.operator || audit.source}</strong> {audit.request}
+      {repeated}
+      {text && <span lang={text === audit.text ? "en" : undefined}>{`: ${text}`}</span>}
+    </>
+  );
+}
+
+/** All of one entry, below the list: a line is cut where it ends. */
+function Details({ entry, close }: { entry: Entry; close: () => void }) {
+  const event = "event" in entry ? entry.event : null;
+  const audit = "audit" in entry ? entry.audit : null;
+  const told = event?.text ?? audit?.text ?? "";
+  const facts: [string, string][] = [
+    [e("time"), stampFull(event?.timestamp ?? audit?.timestamp)],
+    [e("entry_source"), event?.source ?? audit?.source ?? ""],
+    [event ? e("entry_code") : e("entry_number"), event?.code ?? String(audit?.number ?? "")],
+    ...Object.entries(event?.values ?? audit?.values ?? {}),
+  ];
+  return (
+    <div class="entry-details" role="region" aria-label={wordsOf(entry)}>
+      <p>{"event" in entry ? <EventWords entry={entry} /> : <AuditWords entry={entry} />}</p>
+      {!told.includes(event ? eventText(event) : audit ? entryText(audit) : "") && (
+        <p class="dim">
+          {e("in_its_words")} <span lang="en">{told}</span>
+        </p>
+      )}
+      <dl>
+        {facts.map(([name, value]) => (
+          <div key={name}>
+            <dt>{name}</dt>
+            <dd>{value}</dd>
+          </div>
+        ))}
+      </dl>
+      <button class="quiet" onClick={close}>
+        {e("close")}
+      </button>
+    </div>
+  );
+}
+
+/** Time of day; with its day where that is not today. */
+function dayTime(ms: number): string {
+  const at = new Date(ms);
+  const time = at.toLocaleTimeString("en-GB", { hour12: false });
+  if (at.toDateString() === new Date().toDateString()) return time;
+  return `${String(at.getDate()).padStart(2, "0")}/${String(at.getMonth() + 1).padStart(2, "0")} ${time}`;
+}
+
+const NARROW = matchMedia("(max-width: 899px)");
+
+/** px: on a phone a line has its place below its time. */
+function useLineHeight(): number {
+  const [narrow, setNarrow] = useState(NARROW.matches);
+  useEffect(() => {
+    const changed = () => setNarrow(NARROW.matches);
+    NARROW.addEventListener("change", changed);
+    return () => NARROW.removeEventListener("change", changed);
+  }, []);
+  return narrow ? 88 : 32;
+}

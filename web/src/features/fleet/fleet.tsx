@@ -1,0 +1,236 @@
+// Every robot of every site as a tile: picture, state, who controls, how old, what is wrong.
+
+import { signal, useComputed } from "@preact/signals";
+import { useEffect, useState } from "preact/hooks";
+import { alarmsOf } from "../../mesh/alarms";
+import { ageText } from "../../i18n/format";
+import { lostAt } from "../../mesh/connection";
+import { Replays } from "../../ui/replays";
+import { stateWord } from "../../mesh/robot-state";
+import type { Level, StateWord } from "../../mesh/robot-state";
+import { State } from "../../ui/parts";
+import { isClockOff, isMeshStale, isSilent, seenAge, useMesh } from "../../mesh/site-health";
+import { t } from "../../i18n/texts";
+import { ageOf, now } from "../../mesh/topics";
+import { fleetRobots } from "../../mesh/known-robots";
+import { robotNow, useFleetNow } from "../../mesh/robot-snapshots";
+import { Services } from "../../ui/alive-services";
+import { f } from "../../i18n/fleet";
+import { Tile } from "./tile";
+import "./fleet.css";
+
+const STATES = ["any_state", "needs_look", "faulty", "with_alarm"] as const;
+const ORDERS = ["by_name", "by_urgency"] as const;
+const LEVELS: readonly Level[] = ["alarm", "warning", "normal"];
+const EMPTY_AFTER_MS = 1500; // robots tell of themselves within that, if there are any
+
+const text = signal("");
+const site = signal("");
+const state = signal<(typeof STATES)[number]>("any_state");
+const order = signal<(typeof ORDERS)[number]>("by_name");
+
+export function Fleet() {
+  useFleetNow();
+  // Once a second: two hundred tiles that change places more often could not be read.
+  const second = useComputed(() => Math.floor(now.value / 1000));
+  const robots = fleetRobots.value;
+  void second.value;
+  const states = new Map(robots.map((key) => [key, stateWord(robotNow(key).controller.peek())]));
+  const shown = chosen(robots, states);
+  const bySite = Map.groupBy(shown, (key) => key.split("/")[1] ?? "");
+  const size = shown.length <= 3 ? "few" : shown.length <= 12 ? "some" : "many";
+  const settled = useSettled();
+  return (
+    <div class="fleet">
+      <div class="fleet-head">
+        <h1>{t("all_robots")}</h1>
+        <span class="dim">{count(robots.length)}</span>
+        <Summary states={[...states.values()]} />
+        <Filter sites={[...new Set(robots.map((key) => key.split("/")[1] ?? ""))]} />
+      </div>
+      {shown.length === 0 && (robots.length > 0 ? <NoMatch all={robots.length} /> : settled ? <p class="empty">{t("no_robots")}</p> : <Skeletons />)}
+      {[...bySite].map(([name, keys]) => (
+        <section key={name} class="site" aria-label={`${t("site")} ${name}`}>
+          <SiteHead site={name} robots={keys.length} />
+          <div class={`tiles ${size}`}>
+            {keys.map((key) => (
+              <Tile key={key} robotKey={key} />
+            ))}
+          </div>
+        </section>
+      ))}
+      <Replays />
+    </div>
+  );
+}
+
+function count(robots: number): string {
+  return robots === 1 ? f("robot_one") : f("robots", { count: robots });
+}
+
+function chosen(robots: readonly string[], states: ReadonlyMap<string, StateWord>): string[] {
+  const wanted = text.value.trim().toLowerCase();
+  const alarmed = (key: string) => alarmsOf.value.get(key)?.length ?? 0;
+  const level = (key: string) => states.get(key)?.level ?? "warning";
+  const passes = {
+    any_state: () => true,
+    needs_look: (key: string) => level(key) !== "normal" || alarmed(key) > 0,
+    faulty: (key: string) => level(key) === "alarm",
+    with_alarm: (key: string) => alarmed(key) > 0,
+  }[state.value];
+  const some = robots.filter(
+    (key) => key.toLowerCase().includes(wanted) && (!site.value || key.split("/")[1] === site.value) && passes(key),
+  );
+  if (order.value === "by_name") return some;
+  const worst = (key: string) => Math.max(0, ...(alarmsOf.value.get(key) ?? []).map(({ priority }) => priority));
+  return some.sort((a, b) => LEVELS.indexOf(level(a)) - LEVELS.indexOf(level(b)) || worst(b) - worst(a));
+}
+
+function Filter({ sites }: { sites: readonly string[] }) {
+  return (
+    <div class="fleet-filter">
+      {sites.length > 1 && (
+        <select aria-label={f("site")} value={site.value} onChange={(event) => (site.value = event.currentTarget.value)}>
+          <option value="">{f("every_site")}</option>
+          {sites.map((name) => (
+            <option key={name} value={name}>
+              {name}
+            </option>
+          ))}
+        </select>
+      )}
+      <select
+        aria-label={f("state")}
+        value={state.value}
+        onChange={(event) => (state.value = event.currentTarget.value as typeof state.value)}
+      >
+        {STATES.map((name) => (
+          <option key={name} value={name}>
+            {f(name)}
+          </option>
+        ))}
+      </select>
+      <select
+        aria-label={f("sort")}
+        value={order.value}
+        onChange={(event) => (order.value = event.currentTarget.value as typeof order.value)}
+      >
+        {ORDERS.map((name) => (
+          <option key={name} value={name}>
+            {f(name)}
+          </option>
+        ))}
+      </select>
+      <input
+        type="search"
+        placeholder={t("filter")}
+        aria-label={t("filter")}
+        value={text.value}
+        onInput={(event) => (text.value = event.currentTarget.value)}
+      />
+    </div>
+  );
+}
+
+function NoMatch({ all }: { all: number }) {
+  const clear = () => {
+    text.value = site.value = "";
+    state.value = "any_state";
+  };
+  return (
+    <div class="empty">
+      <p>{f("no_match", { count: all })}</p>
+      <button class="action" onClick={clear}>
+        {f("clear")}
+      </button>
+    </div>
+  );
+}
+
+/** Places of tiles until it is known what there is. */
+function Skeletons() {
+  return (
+    <div class="tiles some skeletons" aria-hidden="true">
+      {[0, 1, 2].map((i) => (
+        <div key={i} class="tile">
+          <div class="tile-picture" />
+          <div class="tile-body" />
+        </div>
+      ))}
+    </div>
+  );
+}
+
+/** Whether there was a connection for so long that robots would have told of themselves. */
+function useSettled(): boolean {
+  const [settled, setSettled] = useState(false);
+  const connected = lostAt.value === null;
+  useEffect(() => {
+    if (!connected) return;
+    const timer = setTimeout(() => setSettled(true), EMPTY_AFTER_MS);
+    return () => clearTimeout(timer);
+  }, [connected]);
+  return settled;
+}
+
+/** How many robots are how, the most urgent first: what a glance from across the room needs. */
+function Summary({ states }: { states: readonly StateWord[] }) {
+  const groups = Map.groupBy(states, ({ word }) => word);
+  const sorted = [...groups.values()].sort(
+    ([a], [b]) => LEVELS.indexOf(a?.level ?? "normal") - LEVELS.indexOf(b?.level ?? "normal"),
+  );
+  return (
+    <ul class="summary">
+      {sorted.map(([first, ...others]) => first && (
+        <li key={first.word}>
+          <State state={first} count={others.length + 1} />
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+/** A site's name and how it is: what is missing, off or different, by its watch; else what is there. */
+function SiteHead({ site: name, robots }: { site: string; robots: number }) {
+  const latest = useMesh().get(name);
+  const problems = latest && !isMeshStale(latest) ? siteProblems(latest) : [];
+  return (
+    <div class="site-head">
+      <h2>{name}</h2>
+      <span class="dim small">{count(robots)}</span>
+      {problems.map((words) => (
+        <span key={words} class="state warning small">
+          <span class="shape warning" aria-hidden="true" />
+          {words}
+        </span>
+      ))}
+      {!latest ? (
+        <Services of={`robomesh/${name}/-`} />
+      ) : isMeshStale(latest) ? (
+        <span class="age">{f("health_stale", { age: ageText(ageOf(latest) ?? 0) })}</span>
+      ) : (
+        problems.length === 0 && (
+          <span class="dim small">{f("services_all", { count: latest.message.services.filter(({ site }) => site === name).length })}</span>
+        )
+      )}
+    </div>
+  );
+}
+
+function siteProblems(latest: NonNullable<ReturnType<ReturnType<typeof useMesh>["get"]>>): string[] {
+  const { services, site: name } = latest.message;
+  const own = services.filter((seen) => seen.site === name);
+  const silent = own.filter((seen) => isSilent(seen, latest));
+  const off = new Map(own.filter(isClockOff).map((seen) => [seen.host, seen.clockOffsetS ?? 0]));
+  const versions = [...new Set(own.map(({ version }) => version).filter(Boolean))].sort();
+  const [first] = silent;
+  return [
+    ...(silent.length > 1
+      ? [f("services_silent", { count: silent.length })]
+      : first
+        ? [f("service_silent", { name: first.service, age: ageText(seenAge(first, latest)) })]
+        : []),
+    ...[...off].map(([host, seconds]) => f("clock_off", { host, seconds: seconds.toFixed(1) })),
+    ...(versions.length > 1 ? [f("versions_differ", { versions: versions.join(", ") })] : []),
+  ];
+}

@@ -1,0 +1,223 @@
+// Every tile's arm, drawn by one WebGL context: some tiles at a time, the longest not drawn first, within a budget.
+
+import * as THREE from "three";
+import { effect } from "@preact/signals";
+import { floorOf } from "../../mesh/clearance";
+import type { Description } from "../../gen/robomesh_pb";
+import { drawsInSoftware } from "../../scene/scene";
+import { palette } from "../../scene/surroundings";
+import { theme } from "../../ui/theme";
+import { Rig, rigOf } from "./rig";
+
+const FIELD_OF_VIEW = 28; // degrees, upright
+const LOOK_FROM = new THREE.Vector3(1.1, -1.7, 0.8).normalize();
+const MOST_AT_ONCE = 6;
+const COLUMNS = 3;
+const FEW = 6; // tiles that are drawn as smoothly as the display goes
+const FEW_EACH_MS = 15;
+const MANY_EACH_MS = 90;
+const DEAR_MS = 12; // a batch that takes longer is made smaller, and followed by as long a rest
+const SCROLLED_MS = 150;
+const REST = 3; // times as long as the page itself was held up
+
+/** One tile's picture. */
+export class TilePicture {
+  drawnAt = 0;
+  dirty = true;
+  stale = false;
+  private from: readonly number[] = [];
+  private to: readonly number[] = [];
+  private arrived = 0;
+  private span = 0;
+
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    readonly rig: Rig,
+    private readonly smooth: boolean,
+    readonly floor: THREE.Matrix4 | null,
+  ) {}
+
+  /** Takes joint positions [rad] or [m] that arrived at a time of the page's clock [ms]. */
+  take(positions: readonly number[], arrived: number): void {
+    if (this.to.length && positions.every((value, i) => value === this.to[i])) return;
+    this.span = Math.min(arrived - this.arrived, 250);
+    this.from = this.smooth && this.to.length ? this.to : positions;
+    this.to = positions;
+    this.arrived = arrived;
+    this.dirty = true;
+  }
+
+  setStale(stale: boolean): void {
+    this.dirty ||= stale !== this.stale;
+    this.stale = stale;
+  }
+
+  /** Whether there is anything to draw; a place that nobody knows is not drawn. */
+  get ready(): boolean {
+    return this.rig.complete && this.to.length > 0;
+  }
+
+  /** Joint positions at a time: between the last two states, as late as the newer one is after the older. */
+  at(time: number): readonly number[] {
+    const share = this.span > 0 ? Math.min(1, (time - this.arrived) / this.span) : 1;
+    this.dirty = share < 1 && this.from !== this.to;
+    return this.to.map((end, i) => (this.from[i] ?? end) + (end - (this.from[i] ?? end)) * share);
+  }
+}
+
+/** Places a level disc on the floor of a robot's cell, in its base frame; null: there is none. */
+function floorInBase(description: Description): THREE.Matrix4 | null {
+  const height = floorOf(description);
+  if (height === null) return null;
+  const base = new THREE.Matrix4();
+  if (description.baseToSite.length === 16) base.fromArray(description.baseToSite).transpose();
+  const { x, y } = new THREE.Vector3().setFromMatrixPosition(base);
+  return base.invert().multiply(new THREE.Matrix4().makeTranslation(x, y, height));
+}
+
+class Pictures {
+  private readonly software = drawsInSoftware();
+  private readonly renderer = new THREE.WebGLRenderer({ antialias: !this.software, alpha: false });
+  private readonly scene = new THREE.Scene();
+  private readonly camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW, 16 / 9, 0.05, 40);
+  private readonly floor = new THREE.Mesh(new THREE.CircleGeometry(1, 48), new THREE.MeshBasicMaterial());
+  private readonly tiles = new Set<TilePicture>();
+  private width = 0;
+  private height = 0;
+  private atOnce = 2;
+  private request = 0;
+  private drawing: WebGLSync | null = null;
+  private began = 0;
+  private nextAt = 0;
+
+  constructor() {
+    this.camera.up.set(0, 0, 1);
+    this.floor.matrixAutoUpdate = false;
+    this.renderer.setPixelRatio(1);
+    this.renderer.setScissorTest(true);
+    const key = new THREE.DirectionalLight("#fff8ee", 2.2);
+    key.position.set(1.6, -2.2, 3.4);
+    const sky = new THREE.HemisphereLight("#f4f7fa", "#5b5f63", 2);
+    sky.position.set(0, 0, 1);
+    this.scene.add(key, sky, this.floor);
+    this.renderer.domElement.addEventListener("webglcontextrestored", () => this.drawAll());
+    // Where the main processor draws, it draws what is scrolled first.
+    const scrolled = () => (this.nextAt = performance.now() + SCROLLED_MS);
+    if (this.software) addEventListener("scroll", scrolled, { capture: true, passive: true });
+    effect(() => {
+      void theme.value;
+      queueMicrotask(() => {
+        const colours = palette();
+        this.scene.background = new THREE.Color(colours.background);
+        this.floor.material.color.set(colours.floor);
+        this.drawAll();
+      });
+    });
+  }
+
+  private drawAll(): void {
+    for (const tile of this.tiles) tile.dirty = true;
+  }
+
+  add(canvas: HTMLCanvasElement, prefix: string, description: Description): TilePicture {
+    const rig = rigOf(prefix, description, () => this.drawAll());
+    const tile = new TilePicture(canvas, rig, !this.software, floorInBase(description));
+    this.tiles.add(tile);
+    this.request ||= requestAnimationFrame(this.frame);
+    return tile;
+  }
+
+  remove(tile: TilePicture): void {
+    this.tiles.delete(tile);
+  }
+
+  private readonly frame = (): void => {
+    this.request = this.tiles.size ? requestAnimationFrame(this.frame) : 0;
+    const at = performance.now();
+    if (!this.isDone(at) || at < this.nextAt) return;
+    const each = this.tiles.size <= FEW ? FEW_EACH_MS : MANY_EACH_MS;
+    const due = [...this.tiles].filter((tile) => tile.dirty && tile.ready && at - tile.drawnAt >= each);
+    if (due.length) this.draw(due.sort((a, b) => a.drawnAt - b.drawnAt).slice(0, this.atOnce), at);
+  };
+
+  private isDone(at: number): boolean {
+    if (!this.drawing) return true;
+    const gl = this.renderer.getContext() as WebGL2RenderingContext;
+    if (gl.getSyncParameter(this.drawing, gl.SYNC_STATUS) !== gl.SIGNALED && !gl.isContextLost()) return false;
+    gl.deleteSync(this.drawing);
+    this.drawing = null;
+    const took = at - this.began;
+    const dear = took > 2 * DEAR_MS; // a display's frame is in it
+    this.atOnce = Math.min(MOST_AT_ONCE, Math.max(1, this.atOnce + (dear ? -1 : 1)));
+    if (dear) this.nextAt = Math.max(this.nextAt, at + took);
+    return true;
+  }
+
+  private draw(tiles: readonly TilePicture[], at: number): void {
+    this.fit(tiles);
+    const { width, height, renderer } = this;
+    tiles.forEach((tile, i) => {
+      this.look(tile, tile.canvas.width / tile.canvas.height);
+      tile.rig.pose(tile.at(at));
+      tile.rig.setStale(tile.stale);
+      this.scene.add(tile.rig.group);
+      const [x, y] = [(i % COLUMNS) * width, Math.floor(i / COLUMNS) * height];
+      renderer.setViewport(x, y, tile.canvas.width, tile.canvas.height);
+      renderer.setScissor(x, y, tile.canvas.width, tile.canvas.height);
+      renderer.render(this.scene, this.camera);
+      this.scene.remove(tile.rig.group);
+      tile.drawnAt = at;
+    });
+    const source = renderer.domElement;
+    tiles.forEach(({ canvas }, i) => {
+      const [x, y] = [(i % COLUMNS) * width, source.height - Math.floor(i / COLUMNS) * height - canvas.height];
+      canvas.getContext("2d", { alpha: false })?.drawImage(source, x, y, canvas.width, canvas.height, 0, 0, canvas.width, canvas.height);
+      canvas.dataset["drawn"] = String(Number(canvas.dataset["drawn"] ?? 0) + 1);
+    });
+    const gl = renderer.getContext() as WebGL2RenderingContext;
+    this.drawing = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+    this.began = at;
+    this.nextAt = at + REST * (performance.now() - at);
+  }
+
+  /** Makes the canvases as large as their tiles, and the drawing as some of the largest. */
+  private fit(tiles: readonly TilePicture[]): void {
+    const ratio = this.software ? 1 : Math.min(devicePixelRatio, 1.5);
+    for (const { canvas } of tiles) {
+      const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((side) => Math.max(1, Math.round(side * ratio)));
+      if (canvas.width !== width) canvas.width = width ?? 1;
+      if (canvas.height !== height) canvas.height = height ?? 1;
+    }
+    const width = Math.max(...tiles.map((tile) => tile.canvas.width));
+    const height = Math.max(...tiles.map((tile) => tile.canvas.height));
+    if (width === this.width && height === this.height) return;
+    this.width = width;
+    this.height = height;
+    this.renderer.setSize(width * COLUMNS, height * Math.ceil(MOST_AT_ONCE / COLUMNS), false);
+  }
+
+  private look({ rig: { bounds }, floor }: TilePicture, aspect: number): void {
+    const distance = bounds.radius / Math.sin(THREE.MathUtils.degToRad(FIELD_OF_VIEW / 2));
+    this.camera.aspect = aspect;
+    this.camera.position.copy(bounds.center).addScaledVector(LOOK_FROM, distance);
+    this.camera.lookAt(bounds.center);
+    this.camera.updateProjectionMatrix();
+    this.floor.visible = floor !== null;
+    if (floor) this.floor.matrix.copy(floor).scale(new THREE.Vector3().setScalar(bounds.radius * 0.8));
+  }
+}
+
+let pictures: Pictures | null | undefined;
+
+/** The one that draws all tiles; null: this browser has no WebGL. */
+export function tilePictures(): Pictures | null {
+  if (pictures === undefined) {
+    try {
+      pictures = new Pictures();
+    } catch {
+      pictures = null;
+    }
+  }
+  return pictures;
+}

@@ -1,0 +1,159 @@
+// One robot of the fleet. Off the screen it is its name and nothing else: it is neither watched nor drawn.
+
+import { fromBinary } from "@bufbuild/protobuf";
+import { useEffect, useRef, useState } from "preact/hooks";
+import { alarmsOf } from "../../mesh/alarms";
+import { PriorityMark } from "../../ui/priority";
+import { staleText, stampFull, stampTime } from "../../i18n/format";
+import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
+import { DescriptionSchema } from "../../gen/robomesh_pb";
+import type { Description } from "../../gen/robomesh_pb";
+import { hello, watch } from "../../mesh/connection";
+import { Silhouette, State, Tag } from "../../ui/parts";
+import { problemOf, stateWord } from "../../mesh/robot-state";
+import { robotLink } from "../../ui/route";
+import { t } from "../../i18n/texts";
+import { ageOf, isStale, now, staleAfter, useTopic } from "../../mesh/topics";
+import { robotNow } from "../../mesh/robot-snapshots";
+import { Services } from "../../ui/alive-services";
+import { f } from "../../i18n/fleet";
+import { useVisible } from "./visible";
+
+export function Tile({ robotKey }: { robotKey: string }) {
+  const place = useRef<HTMLAnchorElement>(null);
+  const visible = useVisible(place);
+  const [, site = "", robot = ""] = robotKey.split("/");
+  const level = visible ? stateWord(robotNow(robotKey).controller.value).level : "";
+  return (
+    <a ref={place} class={`tile ${level}`} href={robotLink(site, robot)} data-robot={robotKey}>
+      {visible ? <Shown robotKey={robotKey} site={site} robot={robot} /> : <Unseen robot={robot} />}
+    </a>
+  );
+}
+
+function Unseen({ robot }: { robot: string }) {
+  return (
+    <>
+      <div class="tile-picture">
+        <span class="dim">{f("loading")}</span>
+      </div>
+      <div class="tile-body">
+        <div class="tile-line">
+          <strong>{robot}</strong>
+        </div>
+      </div>
+    </>
+  );
+}
+
+function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robot: string }) {
+  const known = robotNow(robotKey);
+  const [controller, lease] = [known.controller.value, known.lease.value];
+  const told = useTopic(DescriptionSchema, `${robotKey}/description`)?.message;
+  if (told) known.description = told;
+  const description = known.description;
+  const state = stateWord(controller);
+  const age = ageOf(controller);
+  const unitAge = age === null ? null : age + (controller?.message.lastUnitAgeS ?? 0);
+  const stale = isStale("controller", unitAge);
+  const leaseKnown = lease !== undefined && !isStale("lease", ageOf(lease));
+  const holder = lease?.message.holder;
+  // What it said last of its link is no longer so.
+  const problem = state.word === "state_stale" ? f("nothing_comes") : problemOf(controller?.message);
+  const alarms = alarmsOf.value.get(robotKey) ?? [];
+  const worst = alarms.reduce((most, { priority }) => Math.max(most, priority), 0);
+  const far = hello.value !== null && hello.value.site !== site;
+  return (
+    <>
+      <Picture robotKey={robotKey} description={description} stale={stale} />
+      <div class="tile-body">
+        <div class="tile-line">
+          <strong>{robot}</strong>
+          <State state={state} />
+        </div>
+        <div class="tile-line dim">
+          <span class="tile-title">
+            {description?.title || "\u00a0"}
+            {far && <span title={f("far_hint")}> · {f("far")}</span>}
+          </span>
+          {stale ? (
+            <span class="age">{staleText(unitAge)}</span>
+          ) : (
+            description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>
+          )}
+        </div>
+        <div class="tile-line dim">
+          <span class="tile-holder" title={leaseKnown && holder ? stampFull(lease.message.since) : ""}>
+            {!leaseKnown
+              ? t("holder_unknown")
+              : holder
+                ? `${t("somebody", { name: holder })}, ${t("since", { time: stampTime(lease.message.since) })}`
+                : t("nobody")}
+          </span>
+        </div>
+        {/* One line for any of them, so that a tile never changes its height. */}
+        <div class="tile-line">
+          {state.level !== "normal" && problem ? (
+            <p class={`tile-problem ${state.level}`} title={problem}>
+              {problem}
+            </p>
+          ) : (
+            <Services of={robotKey} />
+          )}
+          {alarms.length > 0 && (
+            <span class="tile-alarms" title={f("alarm_count", { count: alarms.length })}>
+              <PriorityMark of={worst} />
+              {alarms.length > 1 && ` ×${alarms.length}`}
+            </span>
+          )}
+        </div>
+      </div>
+    </>
+  );
+}
+
+/** The arm where its slow joint states say: those are thinned for many watchers, and for far ones. */
+function Picture(props: { robotKey: string; description: Description | undefined; stale: boolean }) {
+  const { robotKey, description } = props;
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const [picture, setPicture] = useState<import("./pictures").TilePicture | null>(null);
+  const [drawable, setDrawable] = useState(true);
+  const [last] = useState<{ newAt: number | null }>({ newAt: null });
+  const kind = description && `${description.urdf.length} ${description.links.map((link) => link.meshSha256).join()}`;
+  useEffect(() => {
+    if (!description || !canvas.current) return;
+    let end: (() => void) | undefined;
+    let wanted = true;
+    void import("./pictures").then(({ tilePictures }) => {
+      const pictures = tilePictures();
+      setDrawable(pictures !== null);
+      if (!pictures || !wanted || !canvas.current) return;
+      const made = pictures.add(canvas.current, robotKey.slice(robotKey.indexOf("/") + 1), description);
+      setPicture(made);
+      const stop = watch(`${robotKey}/joints/slow`, (sample) => {
+        last.newAt = sample.newAt;
+        const { joints } = fromBinary(JointStatesSchema, sample.payload);
+        const positions = new Map(joints.map((joint) => [joint.name, joint.position]));
+        made.take(description.joints.map((joint) => positions.get(joint.name) ?? joint.home), sample.arrived);
+      });
+      end = () => {
+        stop();
+        pictures.remove(made);
+      };
+    });
+    return () => {
+      wanted = false;
+      end?.();
+    };
+  }, [robotKey, kind]);
+  const at = now.value; // read in any case: it is what draws this again
+  const age = last.newAt === null ? null : Math.max(0, (at - last.newAt) / 1000);
+  const stale = props.stale || age === null || age > (description?.staleAfterS ?? staleAfter("joints/slow"));
+  useEffect(() => picture?.setStale(stale), [picture, stale]);
+  return (
+    <div class={`tile-picture ${stale ? "stale" : ""}`}>
+      {drawable ? <canvas ref={canvas} /> : <Silhouette label={t("no_picture")} />}
+      {drawable && age === null && !props.stale && <span class="picture-word dim">{f("loading")}</span>}
+    </div>
+  );
+}

@@ -1,0 +1,88 @@
+// What is being taught: a pose of the ghost, set by sliders, by numbers or by the gizmo. It moves nothing.
+
+import { computed, signal } from "@preact/signals";
+import { reasonOf } from "../../mesh/control";
+import { rollPitchYaw, toDegrees, toRadians } from "../../i18n/format";
+import { InverseAnswerSchema, InverseRequestSchema, InverseRequest_Task as Task } from "../../gen/robomesh_pb";
+import { ask } from "../../mesh/connection";
+import { robotKey, toolAt } from "./subject";
+
+const WITHIN_S = 5;
+const FULL_POSE = 6; // joints from which on all of a pose can be wanted
+
+/** Joint positions [rad] or [m]; null: nothing is being taught. */
+export const aim = signal<readonly number[] | null>(null);
+/** Why the wanted pose cannot be, in words; "" when it can. */
+export const aimProblem = signal("");
+const wantedPose = signal<readonly number[] | null>(null);
+/** The tool in the base frame, 16 by rows, where it is wanted or where the joints put it; null: not known. */
+export const aimPose = computed(() => wantedPose.value ?? (aim.value && toolAt.value(aim.value)));
+
+let solving = false;
+
+/** Aims at joint positions; null ends it. */
+export function aimAt(positions: readonly number[] | null): void {
+  aim.value = positions;
+  wantedPose.value = null;
+  aimProblem.value = "";
+}
+
+/** Aims at a pose of the tool, by the joint positions nearest to those aimed at now. */
+export function aimAtPose(pose: readonly number[]): void {
+  wantedPose.value = pose;
+  if (!solving) void solve();
+}
+
+/** Lets go of a wanted pose: the tool is where the joints put it. */
+export function settle(): void {
+  wantedPose.value = null;
+  aimProblem.value = "";
+}
+
+/** One question at a time, the newest next. */
+async function solve(): Promise<void> {
+  solving = true;
+  let pose = wantedPose.value;
+  while (pose) {
+    const near = aim.value ?? [];
+    const task = near.length < FULL_POSE ? Task.POSITION_AND_AXIS_5D : Task.POSE_6D;
+    let found: readonly number[] | undefined;
+    let problem = "";
+    try {
+      const request = { pose: [...pose], task, near: [...near] };
+      const key = `${robotKey.value}/kinematics/inverse`;
+      const answer = await ask(key, InverseRequestSchema, request, InverseAnswerSchema, WITHIN_S);
+      found = answer.solutions[0]?.jointPositions;
+      problem = answer.reason;
+    } catch (error) {
+      problem = reasonOf(error);
+    }
+    if (wantedPose.value) {
+      if (found) aim.value = found;
+      aimProblem.value = found ? "" : problem;
+    }
+    pose = wantedPose.value === pose ? null : wantedPose.value;
+  }
+  solving = false;
+}
+
+/** X, Y, Z [mm], roll, pitch, yaw [degrees] of a placement, as people and programs write it. */
+export function poseNumbers(pose: readonly number[]): number[] {
+  const at = [pose[3], pose[7], pose[11]].map((each) => (each ?? 0) * 1000);
+  return [...at, ...rollPitchYaw(pose).map(toDegrees)];
+}
+
+/** The placement (16, by rows) of X, Y, Z [mm] and roll, pitch, yaw [degrees]. */
+export function poseOf(numbers: readonly number[]): number[] {
+  const [x = 0, y = 0, z = 0] = numbers.map((each) => each / 1000);
+  const [roll = 0, pitch = 0, yaw = 0] = numbers.slice(3).map(toRadians);
+  const [cr, sr] = [Math.cos(roll), Math.sin(roll)];
+  const [cp, sp] = [Math.cos(pitch), Math.sin(pitch)];
+  const [cy, sy] = [Math.cos(yaw), Math.sin(yaw)];
+  return [
+    ...[cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, x],
+    ...[sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, y],
+    ...[-sp, cp * sr, cp * cr, z],
+    ...[0, 0, 0, 1],
+  ];
+}

@@ -1,0 +1,128 @@
+// What the check found: the verdict in words, what it assumed, and a row a violation.
+
+import { timeOfDay } from "../../i18n/format";
+import type { CheckAnswer } from "../../gen/robomesh_pb";
+import { Panel } from "../../ui/parts";
+import { reasonText } from "../../i18n/reasons";
+import { t } from "../../i18n/texts";
+import { checkFailed, checkNow, checked, checking, errorsOf, isCurrent } from "./check";
+import { draft, goToLine } from "./draft";
+import { grouped } from "./grouped";
+import type { Group } from "./grouped";
+import { chosen, showMoment } from "./showing";
+import { kindText, severityOf } from "./severity";
+import { distanceText, seconds } from "./numbers";
+import { p } from "../../i18n/program";
+import "./check-panel.css";
+
+export function CheckPanel({ moved }: { moved: boolean }) {
+  const answer = checked.value?.answer;
+  const violations = answer?.violations ?? [];
+  return (
+    <Panel
+      name="check-panel"
+      title={p("check")}
+      end={
+        <button class="quiet" disabled={!draft.value?.text.trim()} onClick={checkNow}>
+          {p("check_again")}
+        </button>
+      }
+    >
+      <Verdict moved={moved} />
+      {violations.length > 0 && (
+        <ol class={`violations ${isCurrent() ? "" : "old"}`} aria-label={p("violations")}>
+          {grouped(violations, checked.value?.text ?? "").map((group, index) => (
+            <li key={index}>
+              <Row group={group} />
+            </li>
+          ))}
+        </ol>
+      )}
+      {answer && <Notes answer={answer} />}
+    </Panel>
+  );
+}
+
+function Verdict({ moved }: { moved: boolean }) {
+  const answer = checked.value?.answer;
+  const busy = checking.value || (checked.value !== null && !isCurrent());
+  if (checkFailed.value && !checking.value) {
+    return (
+      <p class="verdict warning" role="alert">
+        <span class="shape warning" aria-hidden="true" />
+        <span>{p("check_failed", { text: checkFailed.value })}</span>
+      </p>
+    );
+  }
+  if (!answer || !checked.value) {
+    const idle = draft.value?.text.trim() ? p("checking") : p("check_empty");
+    return <p class="verdict dim" role="status">{idle}</p>;
+  }
+  const errors = errorsOf(answer).length;
+  const count = answer.violations.length;
+  const refused = answer.violations.some((each) => each.refuses);
+  const level = refused ? "alarm" : count || answer.alone ? "warning" : "normal";
+  const duration = seconds(answer.durationS);
+  const words = errors
+    ? p(errors === 1 ? "verdict_error" : "verdict_errors", { count: errors })
+    : refused
+      ? p(count === 1 ? "verdict_one" : "verdict_many", { count, duration })
+      : p(count ? "verdict_warns" : answer.alone ? "verdict_alone" : "verdict_ok", { count, duration });
+  return (
+    <p class={`verdict ${level} ${busy ? "busy" : ""}`} role="status" data-ok={!refused} data-busy={busy}>
+      <span class={`shape ${level}`} aria-hidden="true" />
+      <strong>{words}</strong>
+      <span class="dim small">
+        {busy ? p("checking") : errors ? "" : moved ? p("moved_since") : p("checked_at", { time: timeOfDay(checked.value.at) })}
+      </span>
+    </p>
+  );
+}
+
+function Notes({ answer }: { answer: CheckAnswer }) {
+  const { notes, interpolation } = answer;
+  return (
+    <>
+      {notes.length > 0 && (
+        <ul class="check-notes" aria-label={p("notes")} tabIndex={0}>
+          {notes.map((note) => (
+            <li key={note}>{note}</li>
+          ))}
+        </ul>
+      )}
+      {interpolation && errorsOf(answer).length === 0 && (
+        <details class="assumed">
+          <summary>{p("assumed")}</summary>
+          <p>{interpolation}</p>
+        </details>
+      )}
+    </>
+  );
+}
+
+function Row({ group: { worst, first, last, fromS, untilS } }: { group: Group }) {
+  const { line, timeS, kind, pair, text, distance } = worst;
+  const current = chosen.value === worst;
+  const level = severityOf(worst);
+  const known = kindText(kind);
+  const isText = kind === "program";
+  const show = () => {
+    chosen.value = worst;
+    if (!isText) showMoment(timeS);
+    if (line > 0) goToLine(line);
+  };
+  return (
+    <button class="violation" aria-current={current} data-kind={kind} onClick={show}>
+      <span class={`violation-kind ${level}`}>
+        <span class={`shape ${level}`} aria-hidden="true" />
+        {known ? p(known) : kind}
+      </span>
+      <span class="violation-where dim">
+        {line > 0 && (first < last ? p("lines_to", { first, last }) : p("line", { line }))}
+        {!isText && ` · ${untilS > fromS + 0.05 ? p("from_to", { from: seconds(fromS), to: seconds(untilS) }) : seconds(fromS)}`}
+        {distance !== undefined && pair.length > 0 && ` · ${distance > 0 ? distanceText(distance) : p("touch")}`}
+      </span>
+      <span class="violation-text">{reasonText(worst.reason, text) || pair.join(" – ") || t("state_unknown")}</span>
+    </button>
+  );
+}

@@ -1,0 +1,88 @@
+// The check of the text as it stands: asked of the mesh when typing ends, the newest only.
+
+import { effect, signal } from "@preact/signals";
+import { CheckAnswerSchema, CheckRequestSchema } from "../../gen/robomesh_pb";
+import type { CheckAnswer, CheckAnswer_Violation } from "../../gen/robomesh_pb";
+import { reasonOf } from "../../mesh/control";
+import { ask, inOwnName } from "../../mesh/connection";
+import { draft } from "./draft";
+
+const TYPING_ENDS_MS = 800;
+const WITHIN_S = 30;
+
+export interface Checked {
+  text: string;
+  answer: CheckAnswer;
+  /** When it was asked for, ms since the Unix epoch: it began where the robot was then. */
+  at: number;
+}
+
+export const checked = signal<Checked | null>(null);
+export const checking = signal(false);
+/** Why there is no check, in words; "" when there is. */
+export const checkFailed = signal("");
+
+let wanted: { robotKey: string; text: string } | null = null;
+
+/** Checks whenever typing ends, until the returned function is called. */
+export function keepChecking(): () => void {
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  let last: string | undefined;
+  const end = effect(() => {
+    const now = draft.value;
+    if (!now || now.text === last) return;
+    last = now.text;
+    clearTimeout(timer);
+    timer = setTimeout(checkNow, TYPING_ENDS_MS);
+  });
+  return () => {
+    end();
+    clearTimeout(timer);
+    wanted = checked.value = null;
+    checkFailed.value = "";
+  };
+}
+
+export function checkNow(): void {
+  const now = draft.value;
+  if (!now?.text.trim()) {
+    wanted = checked.value = null;
+    return;
+  }
+  wanted = { robotKey: now.robotKey, text: now.text };
+  if (!checking.value) void askNext();
+}
+
+async function askNext(): Promise<void> {
+  checking.value = true;
+  while (wanted) {
+    const asked: { robotKey: string; text: string } = wanted;
+    const at = Date.now();
+    try {
+      const key = inOwnName(`${asked.robotKey}/kinematics/check`);
+      const request = { program: asked.text, path: true };
+      const answer = await ask(key, CheckRequestSchema, request, CheckAnswerSchema, WITHIN_S);
+      if (wanted === asked) {
+        checked.value = { text: asked.text, answer, at };
+        checkFailed.value = "";
+      }
+    } catch (error) {
+      if (wanted === asked) {
+        checked.value = null;
+        checkFailed.value = reasonOf(error);
+      }
+    }
+    if (wanted === asked) wanted = null;
+  }
+  checking.value = false;
+}
+
+/** Whether what is shown is of the text as it stands. */
+export function isCurrent(): boolean {
+  return checked.value !== null && checked.value.text === draft.value?.text;
+}
+
+/** The text's own errors: such a program is not run. */
+export function errorsOf(answer: CheckAnswer | undefined): readonly CheckAnswer_Violation[] {
+  return answer?.violations.filter((each) => each.kind === "program") ?? [];
+}

@@ -1,0 +1,111 @@
+// The text: a plain text field over its coloured lines, with line numbers and marks beside them.
+
+import { Component } from "preact";
+import { useLayoutEffect, useRef } from "preact/hooks";
+import { Panel } from "../../ui/parts";
+import { checked, isCurrent } from "./check";
+import { LINE_PX, download, draft, insert, keepingFailed, redo, typed, undo, setField } from "./draft";
+import { lineNow } from "./motion";
+import { runningLine } from "./running";
+import { severityOf } from "./severity";
+import { coloured } from "./text";
+import { p } from "../../i18n/program";
+import "./editor.css";
+
+type Mark = "shown" | "warning" | "alarm" | "running";
+
+const SIGNS: Record<Mark, string> = { shown: "", warning: "▲", alarm: "■", running: "▶" };
+
+export function Editor() {
+  const field = useRef<HTMLTextAreaElement>(null);
+  const key = draft.value?.robotKey;
+  useLayoutEffect(() => {
+    // From here on the page writes its value only where it changes the text itself.
+    if (field.current) field.current.value = draft.value?.text ?? "";
+    setField(field.current);
+    return () => setField(null);
+  }, [key]);
+  const lines = (draft.value?.text ?? "").split("\n");
+  const digits = String(lines.length).length;
+  return (
+    <Panel
+      name="editor-panel"
+      title={p("text")}
+      end={<span class="dim small">{p(lines.length === 1 ? "one_line" : "lines", { count: lines.length })}</span>}
+    >
+      <div class="editor" style={{ "--digits": String(digits) }}>
+        <div class="editor-lines">
+          {[...marksOf(lines)].map(([line, mark]) => (
+            <div key={line} class={`editor-band ${mark}`} style={{ top: `${8 + (line - 1) * LINE_PX}px` }}>
+              <span class="editor-sign" aria-hidden="true">
+                {SIGNS[mark]}
+              </span>
+            </div>
+          ))}
+          <pre class="editor-numbers" aria-hidden="true">
+            {lines.map((_, index) => String(index + 1).padStart(digits)).join("\n")}
+          </pre>
+          <pre class="editor-paint" aria-hidden="true">
+            {lines.map((line, index) => (
+              <Line key={index} text={line} />
+            ))}
+          </pre>
+          <textarea
+            ref={field}
+            class="editor-field"
+            aria-label={p("text")}
+            spellcheck={false}
+            autocomplete="off"
+            autocapitalize="off"
+            wrap="off"
+            readOnly={!draft.value}
+            onInput={typed}
+            onBeforeInput={(event) => {
+              const step = { historyUndo: undo, historyRedo: redo }[event.inputType];
+              if (step) (event.preventDefault(), step());
+            }}
+            onKeyDown={(event) => {
+              const letter = event.ctrlKey || event.metaKey ? event.key.toLowerCase() : "";
+              const action = letter === "z" ? (event.shiftKey ? redo : undo) : { y: redo, s: download }[letter];
+              if (action && !event.altKey) (event.preventDefault(), action());
+            }}
+            onPaste={(event) => {
+              // By itself the field takes seconds for a thousand lines.
+              event.preventDefault();
+              insert((event.clipboardData?.getData("text/plain") ?? "").replace(/\r\n?/g, "\n"));
+            }}
+          />
+        </div>
+      </div>
+      {keepingFailed.value && <p class="notice refused">{p("not_kept", { text: keepingFailed.value })}</p>}
+    </Panel>
+  );
+}
+
+/** Lines that are marked, with what for: the line that runs before all. */
+function marksOf(lines: readonly string[]): ReadonlyMap<number, Mark> {
+  const marks = new Map<number, Mark>();
+  const running = runningLine(lines);
+  if (running === null && lineNow.value !== null) marks.set(lineNow.value, "shown");
+  for (const violation of isCurrent() ? (checked.value?.answer.violations ?? []) : []) {
+    if (marks.get(violation.line) !== "alarm") marks.set(violation.line, severityOf(violation));
+  }
+  if (running !== null) marks.set(running, "running");
+  return marks;
+}
+
+/** Painted anew only when it changes: a program may have thousands. */
+class Line extends Component<{ text: string }> {
+  override shouldComponentUpdate(next: { text: string }): boolean {
+    return next.text !== this.props.text;
+  }
+
+  override render() {
+    return (
+      <>
+        {coloured(this.props.text).map(({ text, is }, index) => (is ? <span key={index} class={is}>{text}</span> : text))}
+        {"\n"}
+      </>
+    );
+  }
+}

@@ -1,0 +1,40 @@
+// Violations that one cause has: of the same kind and pair, on neighbouring lines, they are one row.
+
+import type { CheckAnswer_Violation } from "../../gen/robomesh_pb";
+
+export interface Group {
+  /** The nearest one: what the row says and leads to. */
+  worst: CheckAnswer_Violation;
+  first: number;
+  last: number;
+  fromS: number;
+  untilS: number;
+}
+
+const MOVES = /^\s*(home|move_)/;
+
+/** In the order of their first ones. Lines are neighbours where none between them moves the robot.
+ *
+ * Errors of the text are one row only where their words are the same. */
+export function grouped(violations: readonly CheckAnswer_Violation[], text: string): readonly Group[] {
+  const lines = text.split("\n");
+  const none = (from: number, to: number) => !lines.slice(from, Math.max(from, to - 1)).some((line) => MOVES.test(line));
+  const groups: Group[] = [];
+  const newest = new Map<string, Group>();
+  for (const each of violations) {
+    const { kind, pair, refuses, line, timeS, untilS } = each;
+    const cause = [kind, refuses, ...pair, kind === "program" ? each.text : ""].join("\n");
+    const before = newest.get(cause);
+    if (before && none(before.last, line) && none(line, before.first)) {
+      if ((each.distance ?? 0) < (before.worst.distance ?? 0)) before.worst = each;
+      before.first = Math.min(before.first, line);
+      before.last = Math.max(before.last, line);
+      before.untilS = Math.max(before.untilS, untilS);
+      continue;
+    }
+    const begun = { worst: each, first: line, last: line, fromS: timeS, untilS };
+    newest.set(cause, begun);
+    groups.push(begun);
+  }
+  return groups;
+}

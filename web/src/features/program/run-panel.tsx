@@ -1,0 +1,92 @@
+// Running the program: by whoever is in control, step by step, for everybody to see.
+
+import { useState } from "preact/hooks";
+import { Command, command } from "../../mesh/command";
+import { holds, ms } from "../../mesh/control";
+import type { Notice } from "../../mesh/control";
+import { clock, stampTime } from "../../i18n/format";
+import { reasonText } from "../../i18n/reasons";
+import { ProgramState_Outcome as Outcome } from "../../gen/robomesh_pb";
+import type { ControllerState, ProgramState } from "../../gen/robomesh_pb";
+import { NoticeLine, Panel } from "../../ui/parts";
+import { whyNoMotion } from "../../mesh/robot-state";
+import { checked, errorsOf, isCurrent } from "./check";
+import { draft } from "./draft";
+import type { Draft } from "./draft";
+import { program } from "./running";
+import { hideMoment } from "./showing";
+import { p } from "../../i18n/program";
+import "./run-panel.css";
+
+export function RunPanel(props: { robotKey: string; controller: ControllerState | undefined }) {
+  const { robotKey } = props;
+  const [told, setTold] = useState<{ notice: Notice; of: Draft | null } | null>(null);
+  // Of another text or name it would say what is not so.
+  const notice = told && (told.notice.kind === "busy" || told.of === draft.value) ? told.notice : null;
+  const state = program.value;
+  const running = state?.outcome === Outcome.RUNNING;
+  const why = whyNotRun(robotKey, props.controller, running);
+  const name = draft.value?.name.trim() || "program";
+  const run = () => {
+    hideMoment(); // the ghost would stand in the robot's way on the picture
+    const of = draft.value;
+    const values = { program: of?.text ?? "", programName: name };
+    void command(robotKey, Command.RUN_PROGRAM, name, values, (notice) => {
+      // Once it runs, its progress says so.
+      if (notice.kind === "done" && !notice.mind) setTold(null);
+      else setTold({ notice: notice.kind === "busy" ? { ...notice, text: p("asking_run") } : notice, of });
+    });
+  };
+  const busy = notice?.kind === "busy";
+  return (
+    <Panel name="run-panel" title={p("run")}>
+      {state && state.outcome !== Outcome.OUTCOME_UNSPECIFIED && <Progress state={state} />}
+      <div class="run-row">
+        <button class="action primary run" disabled={why !== "" || busy} title={why} onClick={run}>
+          {p("run_named", { name })}
+        </button>
+      </div>
+      <NoticeLine notice={notice} idle={why || p("run_hint")} />
+    </Panel>
+  );
+}
+
+/** Why it cannot be run now, in words; "" when it can. What collides, the gateway refuses. */
+function whyNotRun(robotKey: string, controller: ControllerState | undefined, running: boolean): string {
+  if (!draft.value?.text.trim()) return p("run_empty");
+  const error = isCurrent() ? errorsOf(checked.value?.answer)[0] : undefined;
+  if (error) return p("run_error", { line: error.line, text: error.text });
+  if (running) return p("run_running");
+  if (!holds(robotKey)) return p("run_take");
+  return whyNoMotion(controller);
+}
+
+function Progress({ state }: { state: ProgramState }) {
+  const { outcome, name, operator, line, statement, step, steps, durationS, text } = state;
+  const level = outcome === Outcome.ENDED ? "alarm" : "normal";
+  const word = p(outcome === Outcome.RUNNING ? "is_running" : outcome === Outcome.DONE ? "is_done" : "is_ended");
+  // Both times are the gateway's, which says so each second.
+  const gone = (ms(state.timestamp) - ms(state.since)) / 1000;
+  const left = outcome === Outcome.RUNNING ? durationS - gone : 0;
+  return (
+    <div class="progress" role="status" data-outcome={Outcome[outcome]}>
+      <p class="progress-head">
+        <span class={`state ${level}`}>
+          <span class={`shape ${level}`} aria-hidden="true" />
+          {word}
+        </span>
+        <strong>{name}</strong>
+        <span class="dim small">{p("by_since", { name: operator, time: stampTime(state.since) })}</span>
+      </p>
+      <progress max={Math.max(1, steps)} value={outcome === Outcome.DONE ? steps : Math.max(0, step - 1)} aria-label={p("progress")} />
+      <p class="progress-line">
+        {line > 0 && <span class="dim">{p("line", { line })}</span>} <code>{statement}</code>
+        <span class="dim small">
+          {p("step_of", { step, steps })}
+          {left > 0 && ` · ${p("time_left", { left: clock(left), all: clock(durationS) })}`}
+        </span>
+      </p>
+      {text && <p class="progress-text">{reasonText(state.reason, text)}</p>}
+    </div>
+  );
+}

@@ -1,0 +1,111 @@
+// The checked motion over time: a scrubber that moves the ghost, and the joints and the clearance as curves.
+
+import { useEffect } from "preact/hooks";
+import { Panel } from "../../ui/parts";
+import { checked } from "./check";
+import { Curves } from "./curves";
+import { clearanceNow, duration, lineNow, moment, path, playing } from "./motion";
+import { distanceText, seconds } from "./numbers";
+import { severityOf } from "./severity";
+import { hideMoment, showMoment } from "./showing";
+import { p } from "../../i18n/program";
+import "./timeline.css";
+
+const STEP_S = 0.05;
+
+export function Timeline() {
+  const any = path.value !== null;
+  const time = moment.value;
+  usePlaying();
+  const play = () => {
+    if (playing.value) {
+      playing.value = false;
+      return;
+    }
+    showMoment(time === null || time >= duration.value ? 0 : time);
+    playing.value = true;
+  };
+  const line = lineNow.value;
+  const clearance = clearanceNow.value;
+  const words = time === null ? p("scrub_hint") : [
+    line ? p("line", { line }) : "",
+    clearance === null ? "" : p("clearance_now", { distance: distanceText(clearance) }),
+  ].filter(Boolean).join(" · "); // prettier-ignore
+  return (
+    <Panel
+      name="timeline"
+      title={p("timeline")}
+      end={
+        <button class="quiet" disabled={time === null} onClick={hideMoment}>
+          {p("hide_ghost")}
+        </button>
+      }
+    >
+      <div class="scrub-row">
+        <button class="action play" disabled={!any} onClick={play} aria-label={p(playing.value ? "pause" : "play")}>
+          <span class={playing.value ? "pause-shape" : "play-shape"} aria-hidden="true" />
+        </button>
+        <div class="scrub">
+          <input
+            type="range"
+            min={0}
+            max={duration.value || 1}
+            step={STEP_S}
+            value={time ?? 0}
+            disabled={!any}
+            aria-label={p("moment")}
+            aria-valuetext={seconds(time ?? 0)}
+            onInput={(event) => {
+              playing.value = false;
+              showMoment(Number(event.currentTarget.value));
+            }}
+          />
+          <Bands />
+        </div>
+        <span class="scrub-time">
+          {seconds(time ?? 0)} <span class="dim">/ {seconds(duration.value)}</span>
+        </span>
+      </div>
+      <p class="scrub-words dim small">{any ? words : p("no_motion_yet")}</p>
+      <Curves />
+    </Panel>
+  );
+}
+
+/** Where in time the violations are. */
+function Bands() {
+  const total = duration.value;
+  const violations = checked.value?.answer.violations ?? [];
+  if (!total) return null;
+  const share = (time: number) => `${(100 * Math.min(total, Math.max(0, time))) / total}%`;
+  return (
+    <div class="bands" aria-hidden="true">
+      {violations
+        .filter(({ kind }) => kind !== "program")
+        .map((each, index) => (
+          <span
+            key={index}
+            class={severityOf(each)}
+            style={{ left: share(each.timeS), width: share(Math.max(0, each.untilS - each.timeS)) }}
+          />
+        ))}
+    </div>
+  );
+}
+
+/** Runs the moment on at the robot's own pace. */
+function usePlaying(): void {
+  const on = playing.value;
+  useEffect(() => {
+    if (!on) return;
+    let last = performance.now();
+    let request = requestAnimationFrame(function step(at) {
+      const next = (moment.peek() ?? 0) + (at - last) / 1000;
+      last = at;
+      showMoment(next);
+      if (next >= duration.value) playing.value = false;
+      else request = requestAnimationFrame(step);
+    });
+    return () => cancelAnimationFrame(request);
+  }, [on]);
+}

@@ -1,0 +1,165 @@
+// What a recording's file holds, asked of its recorder: what it is, its events, its numbers.
+
+import { create, fromBinary } from "@bufbuild/protobuf";
+import { timestampFromMs, timestampMs } from "@bufbuild/protobuf/wkt";
+import { useEffect, useState } from "preact/hooks";
+import { entryText } from "../../i18n/audit-text";
+import {
+  AuditEntrySchema,
+  AuditEntry_Outcome as Outcome,
+  EventSchema,
+  Event_Severity as Severity,
+  RangeRequestSchema,
+  RecordedMessagesSchema,
+  RecordingQuerySchema,
+  RecordingSchema,
+  SeriesAnswerSchema,
+  SeriesRequestSchema,
+} from "../../gen/robomesh_pb";
+import type { AuditEntry, Event, Recording, SeriesAnswer, SeriesAnswer_Series } from "../../gen/robomesh_pb";
+import { AskError, ask, inOwnName, lostAt } from "../../mesh/connection";
+import type { RecordingName } from "../../ui/route";
+import { startMs, topicOf } from "../../i18n/recording-format";
+import { r } from "../../i18n/recordings";
+
+const WITHIN_S = 20;
+const MOST_EVENTS = 1000;
+
+/** Something asked for: null: not told yet. */
+export interface Asked<T> {
+  value: T | null;
+  problem: string;
+}
+
+/** Asks when what it depends on changes; the last answer stays until the next. */
+function useAsked<T>(question: (() => Promise<T>) | null, depends: readonly unknown[]): Asked<T> {
+  const [asked, setAsked] = useState<Asked<T>>({ value: null, problem: "" });
+  const connected = lostAt.value === null;
+  useEffect(() => {
+    if (!question || !connected) return;
+    let wanted = true;
+    question().then(
+      (value) => wanted && setAsked({ value, problem: "" }),
+      (error: unknown) => wanted && setAsked((before) => ({ ...before, problem: reason(error) })),
+    );
+    return () => void (wanted = false);
+  }, [connected, ...depends]);
+  return asked;
+}
+
+function reason(error: unknown): string {
+  if (error instanceof AskError && error.noAnswer) return r("record_no_answer");
+  return error instanceof Error ? error.message : String(error);
+}
+
+/** What a recording is. */
+export function useInfo(name: RecordingName | null): Asked<Recording> {
+  return useAsked(
+    name && (() => ask(keyOf(name, "info"), RecordingQuerySchema, { file: name.file }, RecordingSchema, WITHIN_S)),
+    [name?.site, name?.file],
+  );
+}
+
+/** An event, and when it came [s from the recording's start]. */
+export interface Happened {
+  at: number;
+  event: Event;
+}
+
+/** The events of a recording, oldest first, of every service, and what was asked of the robot. */
+export function useHappened(name: RecordingName | null, info: Recording | null): Asked<{ list: readonly Happened[]; cut: boolean }> {
+  return useAsked(
+    name && info
+      ? async () => {
+          const start = startMs(info);
+          const channels = info.topics.map(({ topic }) => topic).filter((topic) => /^(events(\/.*)?|audit)$/.test(topicOf(topic)));
+          const answers = await Promise.all(
+            channels.map((topic) =>
+              ask(inOwnName(keyOf(name, "range")), RangeRequestSchema, { file: name.file, topic, most: MOST_EVENTS }, RecordedMessagesSchema, WITHIN_S),
+            ),
+          );
+          const list = answers
+            .flatMap(({ messages }, i) => {
+              const audited = topicOf(channels[i] ?? "") === "audit";
+              return messages.map(({ received, data }) => ({
+                at: received ? (timestampMs(received) - start) / 1000 : 0,
+                event: audited ? askedFor(fromBinary(AuditEntrySchema, data)) : fromBinary(EventSchema, data),
+              }));
+            })
+            .sort((first, second) => first.at - second.at);
+          return { list, cut: answers.some(({ more }) => more) };
+        }
+      : null,
+    [name?.site, name?.file, info],
+  );
+}
+
+/** What somebody asked of the robot, told as an event. */
+function askedFor(entry: AuditEntry): Event {
+  const { timestamp, operator, source, request, outcome, text } = entry;
+  const words = outcome === Outcome.REFUSED ? "asked_refused" : outcome === Outcome.FAILED ? "asked_failed" : "asked";
+  const said = r(words, { who: operator || source, what: request.toLowerCase().replaceAll("_", " ") });
+  const severity = words === "asked" ? Severity.INFO : Severity.WARNING;
+  const event = create(EventSchema, { severity, source, code: request, text: text ? `${said}: ${entryText(entry)}` : said });
+  if (timestamp) event.timestamp = timestamp;
+  return event;
+}
+
+/** When a recording's first frames came [s from its start]; 0: it has none. */
+export function useFirst(name: RecordingName | null, info: Recording | null): number {
+  return (
+    useAsked(
+      name && info
+        ? async () => {
+            const topic = info.topics.find((each) => topicOf(each.topic) === "frames")?.topic;
+            if (!topic) return 0;
+            const request = { file: name.file, topic, most: 1 };
+            const { messages } = await ask(inOwnName(keyOf(name, "range")), RangeRequestSchema, request, RecordedMessagesSchema, WITHIN_S);
+            const received = messages[0]?.received;
+            return received ? (timestampMs(received) - startMs(info)) / 1000 : 0;
+          }
+        : null,
+      [name?.site, name?.file, info],
+    ).value ?? 0
+  );
+}
+
+/** Which numbers a recording holds. */
+export function useKnown(name: RecordingName | null): Asked<readonly string[]> {
+  return useAsked(name && (async () => (await askSeries(name, {})).known), [name?.site, name?.file]);
+}
+
+/** A part of a recording [s from its start]. */
+export interface Window {
+  from: number;
+  to: number;
+}
+
+/** Numbers of a recording over a part of it. */
+export function useSeries(
+  name: RecordingName | null,
+  info: Recording | null,
+  values: readonly string[],
+  window: Window,
+  points: number,
+): Asked<readonly SeriesAnswer_Series[]> {
+  return useAsked(
+    name && info && values.length
+      ? async () => {
+          const start = startMs(info);
+          const at = (seconds: number) => timestampFromMs(Math.round(start + seconds * 1000));
+          const request = { values: [...values], start: at(window.from), end: at(window.to), points };
+          return (await askSeries(name, request)).series;
+        }
+      : null,
+    [name?.site, name?.file, info, values.join(" "), window.from, window.to, points],
+  );
+}
+
+function askSeries(name: RecordingName, request: object): Promise<SeriesAnswer> {
+  return ask(inOwnName(keyOf(name, "series")), SeriesRequestSchema, { file: name.file, ...request }, SeriesAnswerSchema, WITHIN_S);
+}
+
+function keyOf({ site }: RecordingName, what: string): string {
+  return `robomesh/${site}/-/recordings/${what}`;
+}

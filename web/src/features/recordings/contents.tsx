@@ -1,0 +1,116 @@
+// What a recording's file holds, and what can be taken out of it.
+
+import { useState } from "preact/hooks";
+import { count } from "../../i18n/format";
+import type { Recording } from "../../gen/robomesh_pb";
+import { Panel } from "../../ui/parts";
+import type { RecordingName } from "../../ui/route";
+import { Download } from "./card";
+import { lostText, sizeText, startedText, topicOf } from "../../i18n/recording-format";
+import { r, viewName } from "../../i18n/recordings";
+import "./contents.css";
+
+export function Contents(props: {
+  name: RecordingName;
+  info: Recording | null;
+  /** Of the replay; null: none is open. */
+  robotKey: string | null;
+  /** Views that can be saved as they are played. */
+  views: readonly string[];
+}) {
+  const { name, info } = props;
+  const title = info?.name || name.file;
+  return (
+    <Panel name="contents" title={r("contents")} end={info && <span class="dim">{sizeText(info.bytes)}</span>}>
+      {info ? <Topics info={info} /> : <p class="skeleton contents-waiting">{"\u00a0"}</p>}
+      <div class="export">
+        <h3>{r("export")}</h3>
+        <div class="export-row">
+          <Download {...name} name={title} kind="MCAP" hint={r("download_mcap_hint")} />
+          <Download {...name} name={title} kind="CSV" hint={r("download_csv_hint")} rest="/values.csv" />
+        </div>
+        {props.robotKey && <LiveVideo robotKey={props.robotKey} views={props.views} title={title} />}
+        <p class="dim small">{r("export_line")}</p>
+        <Copyable text={exportLine(name)} />
+      </div>
+    </Panel>
+  );
+}
+
+/** Anywhere on the mesh; the view may be any other, and the size is `--size`. */
+function exportLine({ site, file }: RecordingName): string {
+  return `robomesh recordings export ${site}/${file} ${file.replace(/\.mcap$/, ".mp4")} --view close`;
+}
+
+function Topics({ info }: { info: Recording }) {
+  const lost = lostText(info);
+  return (
+    <>
+      {lost && (
+        <p class="contents-lost state warning">
+          <span class="shape warning" aria-hidden="true" />
+          {lost}
+        </p>
+      )}
+      <table class="topics">
+        <thead>
+          <tr>
+            <th scope="col">{r("topic")}</th>
+            <th scope="col">{r("topic_messages")}</th>
+            <th scope="col">{r("topic_lost")}</th>
+          </tr>
+        </thead>
+        <tbody>
+          {info.topics.map(({ topic, messages, lost: missing }) => (
+            <tr key={topic} class={missing > 0n ? "is-lost" : ""}>
+              <th scope="row">{topicOf(topic)}</th>
+              <td>{count(messages)}</td>
+              <td>{count(missing)}</td>
+            </tr>
+          ))}
+        </tbody>
+      </table>
+      <p class="footnote dim">
+        {[startedText(info), info.cause && r("cause", { text: info.cause })].filter(Boolean).join(" · ")}
+      </p>
+      {info.attachments.length > 0 && <p class="footnote dim">{r("attached", { names: info.attachments.join(", ") })}</p>}
+    </>
+  );
+}
+
+/** A view's video as it is played from now on. */
+function LiveVideo({ robotKey, views, title }: { robotKey: string; views: readonly string[]; title: string }) {
+  const [view, setView] = useState("");
+  const chosen = views.includes(view) ? view : (views[0] ?? "");
+  if (!chosen) return null;
+  const path = [...robotKey.split("/").slice(1), chosen].map(encodeURIComponent).join("/");
+  return (
+    <div class="export-row">
+      <select aria-label={r("record_views")} value={chosen} onChange={(event) => setView(event.currentTarget.value)}>
+        {views.map((each) => (
+          <option key={each} value={each}>
+            {viewName(each)}
+          </option>
+        ))}
+      </select>
+      <a class="action" href={`/video/${path}.mp4`} download={`${title}-${chosen}.mp4`} title={r("export_mp4_live")}>
+        {r("export_mp4", { view: viewName(chosen) })}
+      </a>
+      <p class="dim small">{r("export_mp4_live")}</p>
+    </div>
+  );
+}
+
+function Copyable({ text }: { text: string }) {
+  const [copied, setCopied] = useState(false);
+  return (
+    <div class="copyable">
+      <code tabIndex={0}>{text}</code>
+      {"clipboard" in navigator && (
+        <button class="action" onClick={() => void navigator.clipboard.writeText(text).then(() => setCopied(true))}>
+          {r(copied ? "copied" : "copy")}
+        </button>
+      )}
+    </div>
+  );
+}

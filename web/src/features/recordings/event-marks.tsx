@@ -1,0 +1,103 @@
+// The events of a recording: marks on its line of time, and the same in words.
+
+import { useComputed, useSignal } from "@preact/signals";
+import type { ReadonlySignal } from "@preact/signals";
+import { useEffect } from "preact/hooks";
+import { eventText } from "../../i18n/event-text";
+import { SEVERITIES } from "../../ui/event-mark";
+import { count, fullTime } from "../../i18n/format";
+import { timestampMs } from "@bufbuild/protobuf/wkt";
+import { Panel } from "../../ui/parts";
+import { t } from "../../i18n/texts";
+import type { Asked, Happened } from "./asked";
+import { momentText } from "../../i18n/recording-format";
+import { r } from "../../i18n/recordings";
+import "./contents.css";
+
+const NONE: readonly Happened[] = [];
+const MOST_MARKS = 200; // more cannot be told apart; the gravest are shown
+
+function severityOf({ event }: Happened): [string, string] {
+  const [word, level] = SEVERITIES[event.severity] ?? ["severity_info", "normal"];
+  return [t(word), level];
+}
+
+/** Near an end of the line, its words lean away from it. */
+function sideOf(share: number): string {
+  return share < 0.15 ? "early" : share > 0.85 ? "late" : "";
+}
+
+export function EventMarks(props: { events: readonly Happened[]; duration: number; seek: (to: number) => void }) {
+  const { duration } = props;
+  const shown = [...props.events]
+    .sort((first, second) => second.event.severity - first.event.severity)
+    .slice(0, MOST_MARKS)
+    .sort((first, second) => first.at - second.at);
+  return (
+    <div class="event-marks">
+      {duration > 0 &&
+        shown.map((happened, i) => {
+          const [word, level] = severityOf(happened);
+          const text = `${momentText(happened.at)} ${word}: ${eventText(happened.event)}`;
+          return (
+            <button
+              key={i}
+              class={`event-mark ${sideOf(happened.at / duration)}`}
+              style={{ left: `${(100 * Math.min(duration, Math.max(0, happened.at))) / duration}%` }}
+              data-text={text}
+              aria-label={r("go_to_event", { time: momentText(happened.at), text: eventText(happened.event) })}
+              onClick={() => props.seek(happened.at)}
+            >
+              <span class={`shape ${level}`} aria-hidden="true" />
+            </button>
+          );
+        })}
+    </div>
+  );
+}
+
+/** In words, the one that happened last marked. */
+export function EventList(props: {
+  asked: Asked<{ list: readonly Happened[]; cut: boolean }>;
+  moment: ReadonlySignal<number>;
+  seek: (to: number) => void;
+}) {
+  const { value, problem } = props.asked;
+  const list = value?.list ?? NONE;
+  const times = useSignal<readonly number[]>([]);
+  useEffect(() => void (times.value = list.map(({ at }) => at)), [list]);
+  const last = useComputed(() => {
+    const moment = props.moment.value + 1e-3; // read in any case: with it the computed goes on
+    return times.value.findLastIndex((at) => at <= moment);
+  }).value;
+  return (
+    <Panel name="events" title={r("events")} end={list.length > 0 && <span class="dim">{count(list.length)}</span>}>
+      <ol class="event-list recorded-events" tabIndex={0} aria-label={r("events")}>
+        {!value && !problem && <li class="skeleton">{"\u00a0"}</li>}
+        {problem && <li class="state warning">{r("events_refused", { text: problem })}</li>}
+        {value && list.length === 0 && <li class="dim">{r("no_events")}</li>}
+        {list.map((happened, i) => {
+          const [word, level] = severityOf(happened);
+          const { event, at } = happened;
+          return (
+            <li key={i} aria-current={i === last ? "true" : undefined}>
+              <button title={`${event.timestamp ? fullTime(timestampMs(event.timestamp)) : ""} · ${event.source} · ${event.code}`} onClick={() => props.seek(at)}>
+                <time>{momentText(at)}</time>
+                <span class="event-text">
+                  {level !== "normal" && (
+                    <span class={`mark state ${level}`}>
+                      <span class={`shape ${level}`} aria-hidden="true" />
+                      {word}
+                    </span>
+                  )}
+                  {eventText(event)}
+                </span>
+              </button>
+            </li>
+          );
+        })}
+        {value?.cut && <li class="dim">{r("events_cut", { count: count(list.length) })}</li>}
+      </ol>
+    </Panel>
+  );
+}

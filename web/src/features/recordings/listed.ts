@@ -1,0 +1,90 @@
+// The recordings of every site, asked of its recorder, with what the open ones tell of themselves.
+
+import { signal } from "@preact/signals";
+import { useEffect } from "preact/hooks";
+import { EmptySchema } from "@bufbuild/protobuf/wkt";
+import { RecordingListSchema, RecordingSchema } from "../../gen/robomesh_pb";
+import type { Recording, RecordingList } from "../../gen/robomesh_pb";
+import { AskError, ask, hello, lostAt, presence } from "../../mesh/connection";
+import { ageOf, isStale, useTopics } from "../../mesh/topics";
+import { startMs } from "../../i18n/recording-format";
+import { r } from "../../i18n/recordings";
+
+const AGAIN_MS = 5000;
+const LIST_S = 10;
+
+/** What a site's recorder told last. */
+export interface Told {
+  list: RecordingList | null;
+  problem: string;
+}
+const told = signal<ReadonlyMap<string, Told>>(new Map());
+
+/** Sites that have a recorder, and the console's own, which should. */
+function sitesOf(keys: ReadonlySet<string>, own: string): readonly string[] {
+  const sites = new Set(own ? [own] : []);
+  for (const key of keys) {
+    const [, site, , , service] = key.split("/");
+    if (site && service === "recorder") sites.add(site);
+  }
+  return [...sites].sort();
+}
+
+async function look(site: string): Promise<void> {
+  let now: Told;
+  try {
+    const key = `robomesh/${site}/-/recordings/list`;
+    now = { list: await ask(key, EmptySchema, {}, RecordingListSchema, LIST_S), problem: "" };
+  } catch (error) {
+    const silent = error instanceof AskError && error.noAnswer;
+    const text = error instanceof Error ? error.message : String(error);
+    const problem = silent ? r("no_recorder", { site }) : r("list_refused", { site, text });
+    now = { list: told.value.get(site)?.list ?? null, problem };
+  }
+  told.value = new Map(told.value).set(site, now);
+}
+
+/** A recording in the list, and whose it is: the file alone is not unique over sites. */
+export interface Row {
+  site: string;
+  recording: Recording;
+}
+
+export interface Listed {
+  sites: ReadonlyMap<string, Told>;
+  /** Newest first. */
+  rows: readonly Row[];
+  /** Nothing was told yet. */
+  waiting: boolean;
+}
+
+/** Every recording of every site, the open ones as they are now. */
+export function useListed(): Listed {
+  const live = useTopics(RecordingSchema, "robomesh/*/*/recording");
+  const sites = sitesOf(presence.value, hello.value?.site ?? "");
+  // One that began or ended is a change of the list.
+  const changes = [...live.values()].map(({ message }) => `${message.file}:${message.open}`).join(" ");
+  const connected = lostAt.value === null;
+  useEffect(() => {
+    if (!connected) return;
+    const lookAll = () => sites.forEach((site) => void look(site));
+    lookAll();
+    const timer = setInterval(() => document.hidden || lookAll(), AGAIN_MS);
+    return () => clearInterval(timer);
+  }, [sites.join(" "), changes, connected]);
+  const rows = new Map<string, Row>();
+  for (const site of sites) {
+    for (const recording of told.value.get(site)?.list?.recordings ?? []) rows.set(`${site}/${recording.file}`, { site, recording });
+  }
+  for (const latest of live.values()) {
+    const [, site = ""] = latest.key.split("/");
+    if (latest.message.open && !isStale("recording", ageOf(latest))) {
+      rows.set(`${site}/${latest.message.file}`, { site, recording: latest.message });
+    }
+  }
+  return {
+    sites: new Map(sites.map((site) => [site, told.value.get(site) ?? { list: null, problem: "" }])),
+    rows: [...rows.values()].sort((first, second) => startMs(second.recording) - startMs(first.recording)),
+    waiting: sites.some((site) => !told.value.has(site)) || sites.length === 0,
+  };
+}

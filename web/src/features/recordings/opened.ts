@@ -1,0 +1,101 @@
+// Replays that this page opens: closed when it goes, and by the player when its connection does.
+
+import { useSignal } from "@preact/signals";
+import type { Signal } from "@preact/signals";
+import { useEffect, useState } from "preact/hooks";
+import { PlayRequestSchema, ReplayStateSchema } from "../../gen/robomesh_pb";
+import { AskError, ask, hello, presence } from "../../mesh/connection";
+import type { RecordingName } from "../../ui/route";
+import { Replay } from "../../mesh/replay";
+import { r } from "../../i18n/recordings";
+
+const WITHIN_S = 15; // a long file is read first
+const COMES_WITHIN_MS = 1500; // presence is told after the greeting
+const MOMENT_EACH_MS = 40;
+const FOLLOW_EACH_MS = 200;
+const APART_S = 0.12; // farther, and the second is brought back
+
+export interface Opened {
+  replay: Replay | null;
+  problem: string;
+  again: () => void;
+}
+
+/** Opens a recording and follows its replay; null: none is wanted. */
+export function useOpened(name: RecordingName | null, paused = false): Opened {
+  const [replay, setReplay] = useState<Replay | null>(null);
+  const [problem, setProblem] = useState("");
+  const [tries, setTries] = useState(0);
+  const session = hello.value?.session ?? "";
+  const there = name !== null && [...presence.value].some((key) => key.startsWith(`robomesh/${name.site}/-/alive/player/`));
+  useEffect(() => {
+    if (!name || !session) return;
+    let wanted = true;
+    let made: Replay | null = null;
+    if (!there) {
+      const timer = setTimeout(() => setProblem(r("no_player", { site: name.site })), COMES_WITHIN_MS);
+      return () => clearTimeout(timer);
+    }
+    setProblem("");
+    const open = async () => {
+      try {
+        const request = { file: name.file, paused, session };
+        const key = `robomesh/${name.site}/-/player/open`;
+        const state = await ask(key, PlayRequestSchema, request, ReplayStateSchema, WITHIN_S);
+        made = new Replay(`robomesh/${name.site}/${state.robot}`, state);
+        if (wanted) setReplay(made);
+        else made.close();
+      } catch (error) {
+        if (!wanted) return;
+        const silent = error instanceof AskError && error.noAnswer;
+        const text = error instanceof Error ? error.message : String(error);
+        setProblem(silent ? r("no_player", { site: name.site }) : r("not_opened", { text }));
+      }
+    };
+    void open();
+    return () => {
+      wanted = false;
+      made?.close();
+      setReplay(null);
+    };
+  }, [name?.site, name?.file, session, there, tries]);
+  return { replay, problem, again: () => setTries(tries + 1) };
+}
+
+/** Where a replay is, at the pace that a screen shows. */
+export function useMoment(replay: Replay | null): Signal<number> {
+  const moment = useSignal(0);
+  useEffect(() => {
+    if (!replay) return;
+    let told = 0;
+    let request = requestAnimationFrame(function step(at) {
+      request = requestAnimationFrame(step);
+      if (at - told < MOMENT_EACH_MS) return;
+      told = at;
+      moment.value = replay.position();
+    });
+    return () => cancelAnimationFrame(request);
+  }, [replay]);
+  return moment;
+}
+
+/** Lets a second replay go as the first does, `shift` s ahead of it; beyond its ends it waits. */
+export function useFollowing(first: Replay | null, second: Replay | null, shift: number): void {
+  useEffect(() => {
+    if (!first || !second) return;
+    const follow = () => {
+      const { playing, speed } = first.state.peek();
+      const own = second.state.peek();
+      const wanted = first.position() + shift;
+      const within = wanted >= 0 && wanted < own.durationS;
+      if (own.speed !== speed) second.setSpeed(speed);
+      const near = APART_S * Math.max(1, playing ? speed : 0);
+      if (Math.abs(second.position() - Math.min(own.durationS, Math.max(0, wanted))) > (playing ? near : 1e-3)) {
+        second.seek(wanted);
+      }
+      if (own.playing !== (playing && within)) (own.playing ? second.pause : second.play)();
+    };
+    const timer = setInterval(follow, FOLLOW_EACH_MS);
+    return () => clearInterval(timer);
+  }, [first, second, shift]);
+}

@@ -1,0 +1,132 @@
+// Any values of a recording as curves, a chart a unit, all linked to the moment that is played.
+
+import type { ReadonlySignal } from "@preact/signals";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import type { Recording, SeriesAnswer_Series as Series } from "../../gen/robomesh_pb";
+import { Panel, Toggle } from "../../ui/parts";
+import type { RecordingName } from "../../ui/route";
+import { useKnown, useSeries } from "./asked";
+import type { Window } from "./asked";
+import { Chart } from "./chart";
+import type { Curve } from "./chart";
+import { savePicture } from "./picture";
+import { r } from "../../i18n/recordings";
+import { Values } from "./values";
+import "./plots.css";
+
+const POINTS = 1000;
+const MOST = 14;
+const FIRST = /^joints\/.*\/position$/;
+const NARROWEST_S = 0.2;
+
+/** The second recording beside the first: its time is `shift` s more. */
+export interface Beside {
+  name: RecordingName;
+  info: Recording | null;
+  shift: number;
+}
+
+export function Plots(props: {
+  name: RecordingName;
+  info: Recording | null;
+  duration: number;
+  beside: Beside | null;
+  moment: ReadonlySignal<number>;
+  seek: (to: number) => void;
+}) {
+  const { name, info, duration, beside } = props;
+  const known = useKnown(name);
+  const [chosen, setChosen] = useState<readonly string[] | null>(null);
+  const [choosing, setChoosing] = useState(false);
+  const [zoomed, setZoomed] = useState<Window | null>(null);
+  const charts = useRef<HTMLDivElement>(null);
+  const values = useMemo(() => {
+    if (chosen) return chosen;
+    const first = (known.value ?? []).filter((value) => FIRST.test(value));
+    return (first.length ? first : (known.value ?? [])).slice(0, 7);
+  }, [known.value, chosen]);
+  const shown = useMemo(() => zoomed ?? { from: 0, to: duration || 1 }, [zoomed, duration]);
+  const asked = useSeries(name, info, values, shown, POINTS);
+  const shift = beside?.shift ?? 0;
+  const later = useMemo(() => ({ from: shown.from + shift, to: shown.to + shift }), [shown, shift]);
+  const second = useSeries(beside?.name ?? null, beside?.info ?? null, values, later, POINTS);
+  const units = useMemo(() => byUnit(values, asked.value ?? [], second.value ?? [], shift), [asked.value, second.value, shift, values]);
+  const zoom = ({ from, to }: Window) => {
+    const middle = (from + to) / 2;
+    const half = Math.max(NARROWEST_S, to - from) / 2;
+    setZoomed({ from: Math.max(0, middle - half), to: Math.min(duration, middle + half) });
+  };
+  const problem = known.problem || asked.problem || second.problem;
+  useEffect(() => setZoomed(null), [name.file]);
+  return (
+    <Panel
+      name="plots"
+      title={r("plots")}
+      end={
+        <>
+          {zoomed && (
+            <button class="toggle" onClick={() => setZoomed(null)}>
+              {r("zoom_out")}
+            </button>
+          )}
+          <button
+            class="toggle"
+            disabled={units.length === 0}
+            title={r("save_picture_hint")}
+            onClick={() => charts.current && savePicture(charts.current, `${info?.name || name.file}.png`)}
+          >
+            {r("save_picture")}
+          </button>
+          <Toggle on={choosing} set={setChoosing}>
+            {r(choosing ? "values_done" : "values")}
+          </Toggle>
+        </>
+      }
+    >
+      {choosing && known.value && <Values known={known.value} chosen={values} most={MOST} choose={setChosen} />}
+      <div class="charts" ref={charts}>
+        {units.map(([unit, curves]) => (
+          <Chart
+            key={unit}
+            unit={unit}
+            curves={curves}
+            window={shown}
+            moment={props.moment}
+            seek={props.seek}
+            zoom={zoom}
+          />
+        ))}
+        {problem ? (
+          <p class="charts-word state warning">
+            <span class="shape warning" aria-hidden="true" />
+            {r("plots_refused", { text: problem })}
+          </p>
+        ) : !known.value || (values.length > 0 && !asked.value) ? (
+          <p class="charts-word dim">{r("plots_waiting")}</p>
+        ) : known.value.length === 0 ? (
+          <p class="charts-word dim">{r("values_none")}</p>
+        ) : values.length === 0 ? (
+          <p class="charts-word dim">{r("values_choose")}</p>
+        ) : null}
+      </div>
+      <p class="footnote dim">
+        {beside && `${r("dashed", { first: info?.name || name.file, second: beside.info?.name || beside.name.file })} `}
+        {r("plot_hint")}
+      </p>
+    </Panel>
+  );
+}
+
+/** Curves by their unit, each value in a colour of its own, the second recording's in the same. */
+function byUnit(
+  values: readonly string[],
+  first: readonly Series[],
+  second: readonly Series[],
+  shift: number,
+): [string, Curve[]][] {
+  const curves = [
+    ...first.map((series): Curve => ({ series, colour: values.indexOf(series.name), second: false, shift: 0 })),
+    ...second.map((series): Curve => ({ series, colour: values.indexOf(series.name), second: true, shift })),
+  ].filter(({ colour }) => colour >= 0);
+  return [...Map.groupBy(curves, ({ series }) => series.unit)];
+}

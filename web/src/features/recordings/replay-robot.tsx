@@ -1,0 +1,89 @@
+// The page of a robot that is a replay: as the robot was, driven as the replay is, and nothing to command.
+
+import { timestampMs } from "@bufbuild/protobuf/wkt";
+import { useEffect, useState } from "preact/hooks";
+import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
+import { DescriptionSchema, KinematicStateSchema, ReplayStateSchema } from "../../gen/robomesh_pb";
+import type { ReplayState } from "../../gen/robomesh_pb";
+import { Missing, useMissing } from "../../ui/robot-not-found";
+import { Panel } from "../../ui/parts";
+import { recordingsLink } from "../../ui/route";
+import type { RobotName } from "../../mesh/robot-name";
+import { SceneView } from "../../scene/scene-view";
+import { ToolPanel } from "../../ui/tool-panel";
+import { isStale, ageOf, useTopic } from "../../mesh/topics";
+import { useOfMoment } from "../../mesh/replay-moment";
+import { useMoment } from "./opened";
+import { RecordedJoints } from "./recorded-joints";
+import { Replay } from "../../mesh/replay";
+import { ReplayTag } from "../../ui/replay-tag";
+import { ReplayVideo } from "./replay-video";
+import { r } from "../../i18n/recordings";
+import { Transport } from "./transport";
+import "../../ui/replay.css";
+import "./player.css";
+
+const NONE: readonly never[] = [];
+
+export function ReplayRobot({ site, robot }: RobotName) {
+  const key = `robomesh/${site}/${robot}`;
+  const latest = useTopic(ReplayStateSchema, `${key}/replay`);
+  const description = useTopic(DescriptionSchema, `${key}/description`)?.message;
+  const joints = useTopic(JointStatesSchema, `${key}/joints`)?.message;
+  const kinematics = useTopic(KinematicStateSchema, `${key}/kinematics`);
+  const replay = useReplay(key, latest?.message);
+  const moment = useMoment(replay);
+  const arm = useOfMoment(replay, "frames", 1);
+  const gone = latest !== undefined && isStale("replay", ageOf(latest));
+  if (useMissing(key, Boolean(latest ?? description))) return <Missing site={site} robot={robot} />;
+  const state = latest?.message;
+  return (
+    <div class="player of-robot" data-replay={robot}>
+      <div class="player-head">
+        <div class="headline">
+          <h1>{robot}</h1>
+          <ReplayTag robot={state?.ofRobot ?? description?.replay?.robot ?? ""} start={state?.start ? timestampMs(state.start) : 0} />
+          <span class="dim small">{r("replay_words")}</span>
+          {state && (
+            <a class="page-link" href={recordingsLink({ site, file: state.file })}>
+              {r("to_recording")}
+            </a>
+          )}
+        </div>
+        {gone && (
+          <p class="player-trouble" role="alert">
+            <span class="shape warning" aria-hidden="true" />
+            {r("player_gone")}
+          </p>
+        )}
+      </div>
+      <SceneView key={key} robotKey={key} description={description} stale={gone} age={undefined} lostAt={null} arm={arm} />
+      <div class="player-videos">
+        <ReplayVideo replay={replay} arm={arm} description={description} recorded={NONE} title={r("video")} />
+      </div>
+      <div class="player-side">
+        <Panel name="joints" title={r("joints")}>
+          <RecordedJoints description={description} joints={arm === "here" ? joints : undefined} />
+        </Panel>
+        <ToolPanel robotKey={key} kinematics={kinematics} description={description} />
+      </div>
+      {replay && <Transport replay={replay} moment={moment} events={NONE} />}
+    </div>
+  );
+}
+
+/** Follows a replay that somebody has opened, and leaves it to them. */
+function useReplay(key: string, state: ReplayState | undefined): Replay | null {
+  const [replay, setReplay] = useState<Replay | null>(null);
+  const known = state !== undefined;
+  useEffect(() => {
+    if (!state) return;
+    const made = new Replay(key, state);
+    setReplay(made);
+    return () => {
+      made.letGo();
+      setReplay(null);
+    };
+  }, [key, known]);
+  return replay;
+}

@@ -1,0 +1,65 @@
+// Video of a replay: as it was recorded, or drawn now from the recorded joints.
+
+import { useState } from "preact/hooks";
+import type { Description } from "../../gen/robomesh_pb";
+import { useLive } from "../../video/live-video";
+import { standing } from "../../video/own-view";
+import { Panel } from "../../ui/parts";
+import { viewsOf } from "../../scene/scene-view";
+import { t } from "../../i18n/texts";
+import { useOfMoment } from "../../mesh/replay-moment";
+import type { OfMoment } from "../../mesh/replay-moment";
+import type { Replay } from "../../mesh/replay";
+import { r, viewName } from "../../i18n/recordings";
+
+const PICTURE_HOLDS_S = 2; // a busy renderer films less often than it is asked to
+
+export function ReplayVideo(props: {
+  replay: Replay | null;
+  /** Whether its joints are of this moment: views are drawn of them. */
+  arm: OfMoment;
+  description: Description | undefined;
+  /** Names of its recorded views. */
+  recorded: readonly string[];
+  title: string;
+}) {
+  const { replay, description, recorded } = props;
+  const [view, setView] = useState("");
+  const names = description ? [...recorded, ...viewsOf(description).map(({ name }) => name)] : [];
+  const shown = names.includes(view) ? view : (names[0] ?? "");
+  const live = useLive(replay?.robotKey ?? "robomesh/-/-", replay && shown ? standing(shown) : null, `${props.title}: ${viewName(shown)}`);
+  const filmed = recorded.includes(shown);
+  const picture = useOfMoment(replay, filmed ? `video/${shown}` : "", PICTURE_HOLDS_S);
+  const state = filmed ? picture : props.arm;
+  const waiting = t("camera_waiting", { view: viewName(shown) });
+  const word =
+    live.problem ||
+    (filmed && !live.video ? r("not_decoded") : "") ||
+    (state === "absent" ? r(filmed ? "no_picture_then" : "no_joints_then") : live.any ? "" : waiting);
+  return (
+    <Panel
+      name="camera replayed"
+      title={props.title}
+      end={
+        <>
+          <span class="tag replay">{r("replay")}</span>
+          {names.length > 0 && (
+            <select aria-label={t("view")} value={shown} onChange={(event) => setView(event.currentTarget.value)}>
+              {names.map((name) => (
+                <option key={name} value={name}>
+                  {viewName(name)}
+                </option>
+              ))}
+            </select>
+          )}
+        </>
+      }
+    >
+      <div class="picture" data-moment={state}>
+        {live.picture}
+        {shown && word && <p class="picture-word dim">{word}</p>}
+      </div>
+      {!live.video && <p class="footnote dim">{live.problem || t("camera_still")}</p>}
+    </Panel>
+  );
+}

@@ -1,0 +1,84 @@
+// What happened to the robot, who asked what of it, newest first, and how its link does.
+
+import { useState } from "preact/hooks";
+import { count, stampFull, stampTime } from "../../i18n/format";
+import { entryText } from "../../i18n/audit-text";
+import type { AuditEntry, ControllerState, Event } from "../../gen/robomesh_pb";
+import { eventText } from "../../i18n/event-text";
+import { LinkFacts } from "./link-facts";
+import { Mark, OUTCOMES, SEVERITIES } from "../../ui/event-mark";
+import { Choice, Panel } from "../../ui/parts";
+import { t } from "../../i18n/texts";
+import { useAudit } from "../../mesh/topics";
+import type { Latest } from "../../mesh/topics";
+
+const SHOWN = ["events", "requests", "link"] as const;
+
+export function EventsPanel(props: {
+  robotKey: string;
+  events: readonly Event[];
+  controller: Latest<ControllerState> | undefined;
+}) {
+  const { robotKey, events } = props;
+  const [shown, setShown] = useState<(typeof SHOWN)[number]>("events");
+  const audit = useAudit(robotKey);
+  const empty = (shown === "events" ? events : audit).length === 0;
+  return (
+    <Panel
+      name="events"
+      title={t(shown)}
+      end={
+        <Choice
+          label={t("events")}
+          values={SHOWN}
+          chosen={shown}
+          text={(each) => t(each)}
+          choose={setShown}
+        />
+      }
+    >
+      {shown === "link" ? (
+        <LinkFacts controller={props.controller} />
+      ) : (
+        <ol class="event-list" tabIndex={0} aria-label={t(shown)}>
+          {empty && <li class="dim">{t("no_events")}</li>}
+          {shown === "events" ? events.map(EventLine) : audit.map(AuditLine)}
+        </ol>
+      )}
+    </Panel>
+  );
+}
+
+function EventLine(event: Event) {
+  const [word, level] = SEVERITIES[event.severity] ?? ["severity_info", "normal"];
+  const text = eventText(event);
+  return (
+    <li title={`${stampFull(event.timestamp)} · ${event.source} · ${event.code}`}>
+      <time>{stampTime(event.timestamp)}</time>
+      <span class="event-text">
+        {level !== "normal" && <Mark word={word} level={level} />}
+        <span lang={text === event.text ? "en" : undefined}>{text}</span>
+      </span>
+    </li>
+  );
+}
+
+function AuditLine(entry: AuditEntry) {
+  const text = entryText(entry);
+  const [word, level] = OUTCOMES[entry.outcome] ?? ["state_unknown", "normal"];
+  return (
+    <li title={`${stampFull(entry.timestamp)} · ${entry.source}`}>
+      <time>{stampTime(entry.timestamp)}</time>
+      <span class="event-text">
+        <Mark word={word} level={level} />
+        <strong>{entry.operator || entry.source}</strong> {entry.request}
+        {entry.repeatedCount > 0n && (
+          <strong class="repeated" title={t("repeated", { count: count(entry.repeatedCount) })}>
+            {` × ${count(entry.repeatedCount)}`}
+          </strong>
+        )}
+        {text && <span lang={text === entry.text ? "en" : undefined}>{`: ${text}`}</span>}
+      </span>
+    </li>
+  );
+}

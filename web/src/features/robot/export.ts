@@ -1,0 +1,91 @@
+// What one takes home from a live picture: a still as PNG, or a piece of the video as MP4.
+
+import { useEffect, useRef, useState } from "preact/hooks";
+import { t } from "../../i18n/texts";
+
+// A browser keeps what it records in memory.
+const MOST_BYTES = 512 * 1024 * 1024;
+
+/** A file for the browser to save. */
+export function saveBlob(blob: Blob, name: string): void {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = dated(name);
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+/** With when it was taken: pt600-front-20261121-140211.png */
+function dated(name: string): string {
+  const at = new Date();
+  const two = (value: number) => String(value).padStart(2, "0");
+  const day = `${at.getFullYear()}${two(at.getMonth() + 1)}${two(at.getDate())}`;
+  const time = `${two(at.getHours())}${two(at.getMinutes())}${two(at.getSeconds())}`;
+  return name.replace(/(\.\w+)$/, `-${day}-${time}$1`);
+}
+
+/** The picture that is shown, as PNG.
+ *
+ * @throws Error where there is none. */
+export async function saveStill(shown: HTMLCanvasElement | HTMLImageElement | null): Promise<Blob> {
+  let canvas = shown instanceof HTMLCanvasElement ? shown : null;
+  if (shown instanceof HTMLImageElement) {
+    canvas = document.createElement("canvas");
+    canvas.width = shown.naturalWidth;
+    canvas.height = shown.naturalHeight;
+    canvas.getContext("2d")?.drawImage(shown, 0, 0);
+  }
+  const blob = canvas && (await new Promise<Blob | null>((done) => canvas.toBlob(done, "image/png")));
+  if (!blob) throw new Error(t("no_picture"));
+  return blob;
+}
+
+export interface VideoRecording {
+  on: boolean;
+  seconds: number;
+  problem: string;
+  toggle: () => void;
+}
+
+/** A view's live MP4, kept from one press to the next, then saved; it ends by itself where there is no more room. */
+export function useRecording(address: string, name: string): VideoRecording {
+  const [since, setSince] = useState<number | null>(null); // 0: nothing has come yet
+  const [seconds, setSeconds] = useState(0);
+  const [problem, setProblem] = useState("");
+  const end = useRef<AbortController | null>(null);
+  useEffect(() => () => end.current?.abort(), [address]);
+  useEffect(() => {
+    if (!since) return;
+    const timer = setInterval(() => setSeconds((performance.now() - since) / 1000), 500);
+    return () => clearInterval(timer);
+  }, [since]);
+  const record = async () => {
+    const stop = new AbortController();
+    end.current = stop;
+    setProblem("");
+    setSeconds(0);
+    setSince(0);
+    const pieces: Uint8Array<ArrayBuffer>[] = [];
+    let bytes = 0;
+    try {
+      const answer = await fetch(address, { signal: stop.signal });
+      if (!answer.ok || !answer.body) throw new Error(await answer.text());
+      const reader = answer.body.getReader();
+      while (bytes < MOST_BYTES) {
+        const { done, value } = await reader.read();
+        if (done) break;
+        if (pieces.length === 0) setSince(performance.now());
+        pieces.push(value);
+        bytes += value.byteLength;
+      }
+      stop.abort();
+    } catch (error) {
+      if (!stop.signal.aborted) setProblem(t("record_failed", { text: error instanceof Error ? error.message : String(error) }));
+    }
+    end.current = null;
+    setSince(null);
+    if (bytes) saveBlob(new Blob(pieces, { type: "video/mp4" }), name);
+  };
+  const toggle = () => (end.current ? end.current.abort() : void record());
+  return { on: since !== null, seconds, problem, toggle };
+}

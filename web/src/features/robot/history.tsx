@@ -1,0 +1,167 @@
+// The joints of the last 60 seconds as curves.
+
+import { fromBinary } from "@bufbuild/protobuf";
+import { useEffect, useRef, useState } from "preact/hooks";
+import uPlot from "uplot";
+import "uplot/dist/uPlot.min.css";
+import { ageClock } from "../../mesh/age-clock";
+import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
+import { jointUnit } from "../../i18n/format";
+import type { Description } from "../../gen/robomesh_pb";
+import { watch } from "../../mesh/connection";
+import { Panel, Toggle } from "../../ui/parts";
+import { jointsTopic } from "../../scene/topic-selection";
+import { t } from "../../i18n/texts";
+import { theme } from "../../ui/theme";
+
+const SPAN_S = 60;
+const STEP_MS = 100; // finer than a pixel shows
+const CLOCK_SET_MS = 5000;
+const CURVES = ["--curve-1", "--curve-2", "--curve-3", "--curve-4", "--curve-5", "--curve-6", "--curve-7"];
+
+export function History({ robotKey, description }: { robotKey: string; description: Description | undefined }) {
+  const place = useRef<HTMLDivElement>(null);
+  const [paused, setPaused] = useState(false);
+  const [any, setAny] = useState(false);
+  const stopped = useRef(false);
+  stopped.current = paused;
+  const [rows] = useState<{ time: number[]; values: (number | null)[][] }>({ time: [], values: [] });
+  const joints = description?.joints ?? [];
+  const names = joints.map((joint) => joint.name).join(" ");
+  const topic = jointsTopic(robotKey);
+  // Angles to the left, lengths, where there are any, to the right, each at its own scale.
+  const units = [...new Set(joints.map((joint) => jointUnit(joint).unit))].sort().reverse();
+
+  useEffect(() => {
+    rows.time = [];
+    rows.values = joints.map(() => []);
+    const factors = joints.map((joint) => jointUnit(joint).factor);
+    let ahead = Infinity; // this page's clock before the source's, less the quickest way here, in ms
+    return watch(`${robotKey}/${topic}`, (sample) => {
+      if (!sample.live) return;
+      const early = ageClock() - sample.sourceTime;
+      if (early < ahead || early - ahead > CLOCK_SET_MS) ahead = early;
+      const last = rows.time.at(-1);
+      // By the source's time: what the network held back is drawn when it was.
+      const at = (sample.sourceTime + ahead) / 1000;
+      if (last !== undefined && at - last < STEP_MS / 1000) return;
+      // A gap is a gap: no line is drawn through what was not seen.
+      if (last !== undefined && at - last > 1) append(last + 0.1, () => null);
+      const states = new Map(
+        fromBinary(JointStatesSchema, sample.payload).joints.map((joint) => [joint.name, joint.position]),
+      );
+      append(at, (i) => {
+        const position = states.get(joints[i]?.name ?? "");
+        return position === undefined ? null : position * (factors[i] ?? 1);
+      });
+      setAny(true);
+    });
+    function append(time: number, value: (index: number) => number | null): void {
+      rows.time.push(time);
+      rows.values.forEach((column, i) => column.push(value(i)));
+      while ((rows.time[0] ?? time) < time - SPAN_S - 2) {
+        rows.time.shift();
+        for (const column of rows.values) column.shift();
+      }
+    }
+  }, [robotKey, names, topic]);
+
+  useEffect(() => {
+    const element = place.current;
+    if (!element || joints.length === 0) return;
+    let end = ageClock() / 1000;
+    const shown = (): [number, number] => [end - SPAN_S, end];
+    const style = getComputedStyle(document.documentElement);
+    const colour = (name: string) => style.getPropertyValue(name).trim();
+    const axis = { stroke: colour("--dim"), grid: { stroke: colour("--line"), width: 1 }, ticks: { show: false } };
+    const font = "12px system-ui, sans-serif";
+    const plot = new uPlot(
+      {
+        width: element.clientWidth,
+        height: element.clientHeight,
+        legend: { show: false },
+        cursor: { y: false, drag: { x: false, y: false } },
+        scales: {
+          x: { time: false, auto: false, range: shown },
+          ...Object.fromEntries(units.map((unit) => [unit, { range: padded }])),
+        },
+        axes: [
+          {
+            ...axis,
+            font,
+            size: 26,
+            splits: () => [-60, -45, -30, -15, 0].map((back) => end + back),
+            values: (_, splits) => splits.map((at) => `${Math.round(at - end)} s`.replace("-", "−")),
+          },
+          ...units.map((unit, i) => ({
+            ...axis,
+            scale: unit,
+            side: (i === 0 ? 3 : 1) as uPlot.Axis.Side,
+            grid: { ...axis.grid, show: i === 0 },
+            font,
+            size: unit === "°" ? 46 : 64,
+            values: (_: uPlot, splits: number[]) =>
+              splits.map((at) => `${at}${unit === "°" ? "" : "\u202f"}${unit}`.replace("-", "−")),
+          })),
+        ],
+        series: [
+          {},
+          ...joints.map((joint, i) => ({
+            label: joint.name,
+            scale: jointUnit(joint).unit,
+            stroke: colour(CURVES[i % CURVES.length] ?? "--text"),
+            width: 1.5,
+            points: { show: false },
+          })),
+        ],
+      },
+      [[], ...joints.map(() => [])],
+      element,
+    );
+    const draw = () => {
+      if (stopped.current) return;
+      end = ageClock() / 1000;
+      plot.setData([rows.time, ...rows.values] as uPlot.AlignedData, true);
+    };
+    const timer = setInterval(draw, 200);
+    const observer = new ResizeObserver(() =>
+      plot.setSize({ width: element.clientWidth, height: element.clientHeight }),
+    );
+    observer.observe(element);
+    return () => {
+      clearInterval(timer);
+      observer.disconnect();
+      plot.destroy();
+    };
+  }, [names, theme.value]);
+  return (
+    <Panel
+      name="history"
+      title={t("history")}
+      end={
+        <Toggle on={paused} set={setPaused}>
+          {t("pause")}
+        </Toggle>
+      }
+    >
+      <div class="legend">
+        {joints.map((joint, i) => (
+          <span key={joint.name}>
+            <span class={`curve curve-${(i % CURVES.length) + 1}`} aria-hidden="true" />
+            {joint.name}
+          </span>
+        ))}
+      </div>
+      <div class="plot" ref={place}>
+        {!any && <p class="plot-word dim">{t("plot_empty")}</p>}
+      </div>
+    </Panel>
+  );
+}
+
+/** A scale's range: what was seen and a little more, never so little that noise fills it. */
+function padded(_: uPlot, min: number | null, max: number | null): [number, number] {
+  if (min === null || max === null) return [-90, 90];
+  const room = Math.max(5, (max - min) * 0.08);
+  return [min - room, max + room];
+}

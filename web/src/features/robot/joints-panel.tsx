@@ -1,0 +1,205 @@
+// Joint values between their limits, and the targets that move them.
+
+import { useEffect, useState } from "preact/hooks";
+import { onlyWatches } from "../../mesh/account";
+import { Command, command } from "../../mesh/command";
+import { controlNotice, holds } from "../../mesh/control";
+import type { Notice } from "../../mesh/control";
+import { fixed, jointText, jointUnit } from "../../i18n/format";
+import type { JointStates } from "../../gen/foxglove/JointStates_pb";
+import { ControllerState_Activity as Activity } from "../../gen/robomesh_pb";
+import type { ControllerState, Description, Description_Joint } from "../../gen/robomesh_pb";
+import { ghostAt } from "../../scene/ghost";
+import { JointTrack } from "../../ui/joint-track";
+import { JointValue } from "../../ui/joint-value";
+import { useNoticeEnd } from "../../mesh/notice-end";
+import type { Motion } from "../../mesh/notice-end";
+import { Age, Choice, NoticeLine, Panel } from "../../ui/parts";
+import { whyNoMove } from "../../mesh/robot-state";
+import { useSteps } from "../../mesh/joint-steps";
+import { t } from "../../i18n/texts";
+
+const REACHED = 0.002; // rad or m: half of what a person reads off
+const ABANDONED_MS = 1500;
+const DEGREE = Math.PI / 180;
+const STEPS = ["0.1", "1", "5"] as const; // degrees or mm
+const MOVES = new Set([Activity.MOVING, Activity.HOMING, Activity.HOLDING]);
+
+export function JointsPanel(props: {
+  robotKey: string;
+  description: Description | undefined;
+  joints: JointStates | undefined;
+  controller: ControllerState | undefined;
+  motion: Motion;
+  stale: boolean;
+  age: number | null | undefined;
+}) {
+  const { description, robotKey, stale } = props;
+  const [notice, setNotice] = useState<Notice | null>(null);
+  const [targets, setTargets] = useState<readonly (number | undefined)[]>([]);
+  const [preview, setPreview] = useState<{ index: number; value: number } | null>(null);
+  const positions = new Map(props.joints?.joints.map((joint) => [joint.name, joint.position]));
+  const rows: readonly Description_Joint[] = description?.joints ?? [];
+  const current = rows.map((joint) => positions.get(joint.name));
+  const mine = holds(robotKey);
+  const why = whyNoMove(props.controller);
+  const enabled = mine && !stale && !why;
+  useNoticeEnd(notice, setNotice, props.motion);
+
+  // A target is shown until it is reached, or until nothing will reach it.
+  const resting = props.controller?.activity !== Activity.MOVING && props.controller?.activity !== Activity.HOLDING;
+  const off = targets.some((target, i) => target !== undefined && Math.abs(target - (current[i] ?? target)) > REACHED);
+  useEffect(() => {
+    if (!enabled || (resting && !off)) setTargets([]);
+    // Homing, a stop or the controller's refusal left it behind.
+    const abandoned = resting && off ? setTimeout(() => setTargets([]), ABANDONED_MS) : undefined;
+    return () => clearTimeout(abandoned);
+  }, [enabled, resting, off]);
+  useEffect(() => {
+    if (!mine) setNotice(null);
+  }, [mine]);
+
+  // Only a motion that runs keeps its other targets: an abandoned one must not move a joint that nobody touched.
+  const running = resting ? [] : targets;
+  const wantedAt = (index: number, value: number) =>
+    rows.map((_, i) => (i === index ? value : (running[i] ?? current[i])));
+  const show = (index: number, value: number | undefined) => {
+    setPreview(value === undefined ? null : { index, value });
+    const wanted = value === undefined ? null : wantedAt(index, value);
+    ghostAt(robotKey, wanted?.every((each) => each !== undefined) ? (wanted as number[]) : null);
+  };
+  useEffect(() => () => ghostAt(robotKey, null), [robotKey, enabled]);
+
+  const send = async (index: number, value: number) => {
+    show(index, undefined);
+    const joint = rows[index];
+    const wanted = wantedAt(index, value);
+    if (!joint || wanted.some((each) => each === undefined)) return;
+    setTargets(wanted.map((each, i) => (i === index || running[i] !== undefined ? each : undefined)));
+    const what = `${joint.name} ${jointText(joint, value)}`;
+    const accepted = await command(
+      robotKey,
+      Command.MOVE_ABSOLUTE,
+      what,
+      { jointPositions: wanted as number[] },
+      setNotice,
+    );
+    if (!accepted) setTargets([]);
+  };
+  const [size, setSize] = useState<(typeof STEPS)[number]>("1");
+  const unmoved = !MOVES.has(props.controller?.activity ?? Activity.ACTIVITY_UNKNOWN);
+  const steps = useSteps({ robotKey, joints: rows, current, enabled, resting: unmoved, tell: setNotice });
+  // In the middle of another motion a step would lead nobody knows where.
+  const canStep = enabled && (unmoved || steps.going);
+  const units = [...new Set(rows.map((joint) => jointUnit(joint).unit))].join(" / ");
+
+  const set = preview && rows[preview.index];
+  // On a phone the control panel may be out of sight.
+  const lost = controlNotice.value?.kind === "lost" ? controlNotice.value : null;
+  const idle = set
+    ? t("target_unsent", { joint: set.name, value: jointText(set, preview.value) })
+    : steps.waiting
+      ? t("steps_wait", { count: steps.waiting })
+      : enabled
+        ? t("joint_hint")
+        : mine
+          ? why
+          : onlyWatches.value
+            ? ""
+            : t("joint_hint_take");
+  return (
+    <Panel
+      name={`joints ${enabled ? "can-move" : ""}`}
+      title={t("joints")}
+      end={
+        <>
+          {props.age === undefined ? <span class="dim">{t("no_data")}</span> : <Age stale={stale} age={props.age} />}
+          {onlyWatches.value || (
+            <>
+              <span class="step-label dim">{t("step")}</span>
+              <Choice label={t("step")} values={STEPS} chosen={size} text={(each) => each} choose={setSize} />
+            </>
+          )}
+          <span class="step-unit dim">{units}</span>
+        </>
+      }
+    >
+      <div class="joint-rows">
+        {rows.length === 0 && Array.from({ length: 5 }, (_, i) => <div key={i} class="joint-row skeleton" />)}
+        {rows.map((joint, index) => {
+          const position = current[index];
+          const { unit, factor } = jointUnit(joint);
+          const beyond = position !== undefined && (position < joint.lower || position > joint.upper);
+          const refused = steps.refused?.index === index ? Math.sign(steps.refused.offset) : 0;
+          const stepBy = (sign: 1 | -1) => onlyWatches.value ? <span /> : (
+            <StepButton
+              name={t(sign > 0 ? "step_plus" : "step_minus", { joint: joint.name, step: unit === "°" ? `${size}°` : `${size}\u202f${unit}` })}
+              sign={sign}
+              enabled={canStep}
+              press={() => steps.press(index, (sign * Number(size)) / factor)}
+            />
+          );
+          return (
+            <div key={joint.name} class={`joint-row ${beyond ? "beyond" : ""}`}>
+              <span class="joint-name">{joint.name}</span>
+              {stepBy(-1)}
+              <div class="joint-range">
+                <JointTrack
+                  label={t("joint_target", { joint: joint.name })}
+                  lower={joint.lower}
+                  upper={joint.upper}
+                  position={position}
+                  target={targets[index]}
+                  stale={stale}
+                  enabled={enabled}
+                  step={unit === "°" ? DEGREE : 0.001}
+                  text={(value) => jointText(joint, value)}
+                  preview={(value) => show(index, value)}
+                  send={(value) => void send(index, value)}
+                />
+                <Limit text={fixed(joint.lower * factor, 0)} refused={refused < 0} />
+                <Limit text={fixed(joint.upper * factor, 0)} refused={refused > 0} />
+              </div>
+              {stepBy(1)}
+              <JointValue
+                joint={joint}
+                position={position}
+                stale={stale}
+                enabled={enabled}
+                preview={(value) => show(index, value)}
+                send={(value) => void send(index, value)}
+                wrong={(text) => setNotice({ kind: "refused", text })}
+              />
+            </div>
+          );
+        })}
+      </div>
+      <NoticeLine notice={preview || (steps.waiting && notice?.kind !== "refused") ? null : (notice ?? lost)} idle={idle} />
+    </Panel>
+  );
+}
+
+/** A step a press: a key that is held down presses once. Space presses nothing here, it asks for a stop. */
+function StepButton(props: { name: string; sign: 1 | -1; enabled: boolean; press: () => void }) {
+  return (
+    <button
+      class="step"
+      aria-label={props.name}
+      title={props.name}
+      disabled={!props.enabled}
+      onClick={props.press}
+      onKeyDown={(event) => event.repeat && event.preventDefault()}
+    >
+      {props.sign > 0 ? "+" : "−"}
+    </button>
+  );
+}
+
+function Limit({ text, refused }: { text: string; refused: boolean }) {
+  return (
+    <span class={`limit ${refused ? "refused" : "dim"}`}>
+      {refused && <span class="shape warning" aria-hidden="true" />}
+      {text}
+    </span>
+  );
+}

@@ -1,0 +1,56 @@
+// How the link to the controller does, what old client programs are attached, where the audit log ends.
+
+import { count, fixed } from "../../i18n/format";
+import type { ControllerState } from "../../gen/robomesh_pb";
+import { Unit } from "../../ui/parts";
+import { t } from "../../i18n/texts";
+import type { TextName } from "../../i18n/texts";
+import { ageOf, isStale } from "../../mesh/topics";
+import type { Latest } from "../../mesh/topics";
+
+const HASH_SHOWN = 4; // bytes of the log's end: enough to compare by eye
+
+type Fact = [name: TextName, value: string, unit?: string];
+
+/** Only what is known: a controller of the old kind tells little. */
+export function LinkFacts({ controller }: { controller: Latest<ControllerState> | undefined }) {
+  const state = controller?.message;
+  if (!state) return <p class="footnote dim">{t("no_data")}</p>;
+  const { health, counters, legacyClients, auditHead } = state;
+  const facts: Fact[] = [];
+  const milliseconds = (name: TextName, seconds: number | undefined) => {
+    if (seconds !== undefined) facts.push([name, fixed(seconds * 1000, 1), "ms"]);
+  };
+  if (state.rateHz !== undefined) facts.push(["link_rate", fixed(state.rateHz, 1), "/s"]);
+  milliseconds("link_jitter", health?.jitterS);
+  milliseconds("link_round_trip", health?.networkRoundTripS);
+  milliseconds("link_answer", health?.answerS);
+  if (counters) {
+    facts.push(["link_units", count(counters.unitsReceived)], ["link_lost", count(counters.unitsLost)]);
+    facts.push(["link_malformed", count(counters.unitsMalformed)], ["link_unknown", count(counters.recordsUnknown)]);
+    facts.push(["link_refusals", count(counters.refusals)], ["link_connections", count(counters.connections)]);
+    if (counters.unitsSkipped) facts.push(["link_skipped", count(counters.unitsSkipped)]);
+  }
+  if (legacyClients) {
+    facts.push(["legacy_attached", count(legacyClients.attached)], ["legacy_refused", count(legacyClients.unitsRefused)]);
+    facts.push(["legacy_turned_away", count(legacyClients.turnedAway)], ["legacy_closed", count(legacyClients.closed)]);
+  }
+  if (auditHead) {
+    const hash = [...auditHead.hash.slice(0, HASH_SHOWN)].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+    facts.push(["audit_entries", count(auditHead.number)], ["audit_head", `${hash}…`]);
+  }
+  const stale = isStale("controller", ageOf(controller));
+  return (
+    <dl class={`facts-list ${stale ? "stale" : ""}`} tabIndex={0} aria-label={t("link")}>
+      {facts.map(([name, value, unit]) => (
+        <div key={name}>
+          <dt>{t(name)}</dt>
+          <dd>
+            {value}
+            {unit && <Unit of={unit} />}
+          </dd>
+        </div>
+      ))}
+    </dl>
+  );
+}

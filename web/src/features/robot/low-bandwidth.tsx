@@ -1,0 +1,35 @@
+// Of a robot at another site: how much of it is taken; and whether that site's times can be trusted.
+
+import { Choice } from "../../ui/parts";
+import { REACHES, askReach, isFar, reachOf } from "../../scene/topic-selection";
+import { isClockOff, useMesh } from "../../mesh/site-health";
+import { t } from "../../i18n/texts";
+
+export function FarChoice({ robotKey }: { robotKey: string }) {
+  if (!isFar(robotKey)) return null;
+  return (
+    <span class="far-choice" title={t("far_hint")}>
+      <span class="dim">{t("far_link")}</span>
+      <Choice
+        label={t("far_link")}
+        values={REACHES}
+        chosen={reachOf(robotKey)}
+        text={(reach) => t(`far_${reach}`)}
+        choose={(reach) => askReach(robotKey, reach)}
+      />
+    </span>
+  );
+}
+
+/** By that site's own watch; nothing is said where there is none. */
+export function ClockHint({ site }: { site: string }) {
+  const off = useMesh().get(site)?.message.services.find((seen) => seen.site === site && isClockOff(seen));
+  if (!off) return null;
+  const seconds = Math.abs(off.clockOffsetS ?? 0).toFixed(1);
+  return (
+    <span class="trouble warning">
+      <span class="shape warning" aria-hidden="true" />
+      {t("clock_off", { host: off.host || off.service, seconds, site })}
+    </span>
+  );
+}

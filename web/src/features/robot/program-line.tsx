@@ -1,0 +1,62 @@
+// The program that the gateway runs, or ran just now, in one line for everybody.
+
+import { timestampMs } from "@bufbuild/protobuf/wkt";
+import type { Timestamp } from "@bufbuild/protobuf/wkt";
+import { clock, staleText } from "../../i18n/format";
+import { reasonText } from "../../i18n/reasons";
+import { ProgramState_Outcome as Outcome } from "../../gen/robomesh_pb";
+import type { Event, ProgramState } from "../../gen/robomesh_pb";
+import { t } from "../../i18n/texts";
+import { ageOf, isStale } from "../../mesh/topics";
+import type { Latest } from "../../mesh/topics";
+
+const SHOWN_MS = 60_000; // after its end
+const ENDS = new Set(["program.done", "program.ended"]);
+
+/** Whether there is a run to speak of: one that goes on, or one that ended within the last minute. */
+export function isTold(latest: Latest<ProgramState> | undefined, events: readonly Event[]): latest is Latest<ProgramState> {
+  if (!latest) return false;
+  const { outcome, timestamp } = latest.message;
+  if (outcome === Outcome.RUNNING) return true;
+  if (outcome !== Outcome.DONE && outcome !== Outcome.ENDED) return false;
+  const end = events.find(({ code }) => ENDS.has(code));
+  // Both times are the gateway's.
+  return end !== undefined && between(end.timestamp, timestamp) < SHOWN_MS;
+}
+
+export function ProgramLine({ latest }: { latest: Latest<ProgramState> }) {
+  const { outcome } = latest.message;
+  const age = ageOf(latest);
+  const stale = outcome === Outcome.RUNNING && isStale("program", age);
+  const words = programText(latest);
+  return (
+    <p class={`program-line ${stale ? "stale" : ""} ${outcome === Outcome.ENDED ? "ended" : ""}`}>
+      {(stale || outcome === Outcome.ENDED) && <span class="shape warning" aria-hidden="true" />}
+      <span class="program-words" title={words}>
+        {words}
+      </span>
+      {stale && <span class="age">{staleText(age)}</span>}
+    </p>
+  );
+}
+
+function programText({ message, sample }: Latest<ProgramState>): string {
+  const { name, operator, line, statement, step, steps, durationS, text } = message;
+  const at = t("program_at", { line, statement });
+  switch (message.outcome) {
+    case Outcome.DONE:
+      return t("program_done", { name, operator });
+    case Outcome.ENDED:
+      return t("program_ended", { name, operator, at, text: reasonText(message.reason, text) });
+    default: {
+      const told = between(message.since, message.timestamp) / 1000;
+      const gone = clock(told + (performance.now() - sample.arrived) / 1000);
+      const time = durationS > 0 ? t("program_of", { gone, all: clock(durationS) }) : gone;
+      return t("program_runs", { name, operator, at, time, step, steps });
+    }
+  }
+}
+
+function between(from: Timestamp | undefined, to: Timestamp | undefined): number {
+  return from && to ? timestampMs(to) - timestampMs(from) : 0;
+}

@@ -1,0 +1,175 @@
+// Recording from the robot's page: begin with a name and views, see what is written and lost, end.
+
+import { signal } from "@preact/signals";
+import type { JSX } from "preact";
+import { useState } from "preact/hooks";
+import { ageText, count } from "../../i18n/format";
+import { RecordingSchema } from "../../gen/robomesh_pb";
+import type { Description, Recording } from "../../gen/robomesh_pb";
+import { presence } from "../../mesh/connection";
+import { durationS, lostText, messagesOf, momentText, sizeText, startedText } from "../../i18n/recording-format";
+import { Action, askRecorder } from "../../mesh/recorder";
+import { r } from "../../i18n/recordings";
+import { recordingsLink } from "../../ui/route";
+import { viewsOf } from "../../scene/scene-view";
+import { viewText } from "../../i18n/texts";
+import { ageOf, isStale, useTopic } from "../../mesh/topics";
+import "../../ui/replay.css";
+import "./record-panel.css";
+
+const NO_VIDEO = "-";
+const AS_THE_SITE = "";
+
+/** Whether the panel is open; it stays so from robot to robot. */
+const shown = signal(false);
+
+/** What is being recorded of a robot, or was last, and for how long nothing was heard of it. */
+function useRecording(robotKey: string): { recording: Recording | undefined; open: boolean; staleFor: number | null } {
+  const latest = useTopic(RecordingSchema, `${robotKey}/recording`);
+  const age = ageOf(latest);
+  const open = latest?.message.open === true;
+  return { recording: latest?.message, open, staleFor: open && isStale("recording", age) ? (age ?? 0) : null };
+}
+
+/** Opens the panel, and tells meanwhile what is recorded. */
+export function RecordButton({ robotKey }: { robotKey: string }) {
+  const { recording, open, staleFor } = useRecording(robotKey);
+  const lost = open && recording ? lostText(recording) : "";
+  return (
+    <button
+      class={`record-button ${open ? "open" : ""}`}
+      aria-expanded={shown.value}
+      onClick={() => (shown.value = !shown.value)}
+    >
+      <span class="record-dot" aria-hidden="true" />
+      {open && recording ? (
+        <>
+          {r("recording_now")}
+          {staleFor === null && <span class="figure">{momentText(durationS(recording), 0)}</span>}
+        </>
+      ) : (
+        r("record")
+      )}
+      {(lost || staleFor !== null) && <span class="shape warning" title={lost} aria-hidden="true" />}
+    </button>
+  );
+}
+
+export function RecordPanel({ robotKey, description }: { robotKey: string; description: Description | undefined }) {
+  const [, site = ""] = robotKey.split("/");
+  const { recording, open, staleFor } = useRecording(robotKey);
+  const there = [...presence.value].some((key) => key.startsWith(`robomesh/${site}/-/alive/recorder/`));
+  const [notice, setNotice] = useState<{ kind: "busy" | "refused"; text: string } | null>(null);
+  const does = async (action: Action, busy: string, values = {}) => {
+    setNotice({ kind: "busy", text: busy });
+    try {
+      await askRecorder(robotKey, action, values);
+      setNotice(null);
+    } catch (error) {
+      setNotice({ kind: "refused", text: r("record_refused", { text: error instanceof Error ? error.message : String(error) }) });
+    }
+  };
+  if (!shown.value) return null;
+  const busy = notice?.kind === "busy";
+  const words =
+    notice?.text ?? (!there ? r("record_gone") : staleFor !== null ? r("record_stale", { age: ageText(staleFor) }) : "");
+  return (
+    <section class="panel record-panel" aria-label={r("record")}>
+      {open && recording ? (
+        <div class="record-row">
+          <strong class="record-name">{recording.name}</strong>
+          <Counts recording={recording} />
+          <button class="action" disabled={busy} onClick={() => void does(Action.TRACE_OFF, r("record_stopping"))}>
+            {r("record_stop")}
+          </button>
+        </div>
+      ) : (
+        <Start
+          last={<Last site={site} recording={recording} />}
+          description={description}
+          busy={busy}
+          start={(name, views) => void does(Action.TRACE_ON, r("record_starting"), { name, views })}
+        />
+      )}
+      {words && (
+        <p class={`notice ${notice?.kind ?? ""}`} role={notice?.kind === "refused" ? "alert" : "status"}>
+          {!busy && <span class="shape warning" aria-hidden="true" />}
+          {words}
+        </p>
+      )}
+    </section>
+  );
+}
+
+function Start(props: {
+  description: Description | undefined;
+  busy: boolean;
+  last: JSX.Element;
+  start: (name: string, views: string[]) => void;
+}) {
+  const [name, setName] = useState("");
+  const [views, setViews] = useState(AS_THE_SITE);
+  return (
+    <form
+      class="record-row"
+      onSubmit={(event) => {
+        event.preventDefault();
+        props.start(name.trim().replace(/\s+/g, "-"), views ? [views] : []);
+      }}
+    >
+      <input
+        type="text"
+        autocomplete="off"
+        maxLength={80}
+        aria-label={r("record_name")}
+        placeholder={r("record_name_hint")}
+        value={name}
+        onInput={(event) => setName(event.currentTarget.value)}
+      />
+      <label>
+        <span class="dim small">{r("record_views")}</span>
+        <select value={views} onChange={(event) => setViews(event.currentTarget.value)}>
+          <option value={AS_THE_SITE}>{r("record_views_site")}</option>
+          <option value={NO_VIDEO}>{r("record_views_none")}</option>
+          {viewsOf(props.description).map((view) => (
+            <option key={view.name} value={view.name}>
+              {viewText(view.name)}
+            </option>
+          ))}
+        </select>
+      </label>
+      <button class="action primary" disabled={props.busy} type="submit">
+        {r("record_start")}
+      </button>
+      {props.last}
+    </form>
+  );
+}
+
+/** The last one, to be looked at. */
+function Last({ site, recording }: { site: string; recording: Recording | undefined }) {
+  if (!recording?.name) return <a class="record-last" href={recordingsLink()}>{r("back")}</a>;
+  return (
+    <span class="record-last dim">
+      {r("record_last")}
+      <a href={recordingsLink({ site, file: recording.file })}>{recording.name}</a>
+    </span>
+  );
+}
+
+function Counts({ recording }: { recording: Recording }) {
+  const lost = lostText(recording);
+  return (
+    <p class="record-counts">
+      <span class="figure">{momentText(durationS(recording), 0)}</span>
+      <span class="figure">{r("messages", { count: count(messagesOf(recording)) })}</span>
+      <span class="figure">{sizeText(recording.bytes)}</span>
+      <span>{startedText(recording)}</span>
+      <span class={lost ? "state warning" : "dim"}>
+        {lost && <span class="shape warning" aria-hidden="true" />}
+        {lost || r("lost_none")}
+      </span>
+      {recording.problem && <span class="state warning">{recording.problem}</span>}
+    </p>
+  );
+}

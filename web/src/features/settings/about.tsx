@@ -1,0 +1,13 @@
+// What this is, and under which terms.
+
+import { Panel } from "../../ui/parts";
+import { s } from "../../i18n/settings";
+
+export function About() {
+  return (
+    <Panel name="about" title={s("about")}>
+      <p class="footnote">{s("about_words")}</p>
+      <p class="footnote dim">{s("licence")}</p>
+    </Panel>
+  );
+}

@@ -1,0 +1,196 @@
+// The console's accounts, for an administrator: added, given another role or password, disabled, removed.
+
+import { useEffect, useState } from "preact/hooks";
+import { me, post } from "../../mesh/account";
+import { refusalText } from "../../ui/change-password";
+import type { Notice } from "../../mesh/control";
+import { fullTime } from "../../i18n/format";
+import { Select } from "../../ui/select";
+import { NoticeLine, Panel } from "../../ui/parts";
+import { s } from "../../i18n/settings";
+
+type Role = "monitor" | "operator" | "admin";
+const ROLES: readonly Role[] = ["monitor", "operator", "admin"];
+
+interface Account {
+  name: string;
+  role: Role;
+  created: string;
+  disabled: boolean;
+  sessions: number;
+}
+
+type Change = (action: string, name: string, values?: { role?: Role; password?: string }) => Promise<void>;
+
+export function Accounts() {
+  const [accounts, setAccounts] = useState<readonly Account[]>([]);
+  const [notice, setNotice] = useState<Notice | null>(null);
+  useEffect(() => {
+    fetch("/account/accounts", { cache: "no-store" })
+      .then(async (answer) => answer.ok && setAccounts(((await answer.json()) as { accounts: Account[] }).accounts))
+      .catch(() => undefined); // the page says itself that the console is gone
+  }, []);
+  const change: Change = async (action, name, values = {}) => {
+    try {
+      setAccounts((await post<{ accounts: Account[] }>("accounts", { action, name, ...values })).accounts);
+      setNotice({ kind: "done", text: s("done") });
+    } catch (error) {
+      setNotice({ kind: "refused", text: s("not_done", { text: refusalText(error) }) });
+      throw error;
+    }
+  };
+  return (
+    <Panel name="accounts" title={s("accounts")}>
+      <p class="footnote dim">{s("accounts_words")}</p>
+      <div class="table-place" tabIndex={0} role="region" aria-label={s("accounts")}>
+        <table class="seen-table">
+          <thead>
+            <tr>
+              {(["account", "role", "state", "created"] as const).map((name) => (
+                <th key={name} scope="col">
+                  {s(name)}
+                </th>
+              ))}
+              <td />
+            </tr>
+          </thead>
+          <tbody>
+            {accounts.map((account) => (
+              <Row key={account.name} account={account} change={change} />
+            ))}
+          </tbody>
+        </table>
+      </div>
+      <AddAccount change={change} />
+      <NoticeLine notice={notice} />
+    </Panel>
+  );
+}
+
+function Row({ account, change }: { account: Account; change: Change }) {
+  const { name, role, disabled } = account;
+  const [open, setOpen] = useState<"password" | "remove" | null>(null);
+  const own = name === me.value?.account; // nobody locks themselves out by a slip
+  const run = (action: string, values?: { role?: Role; password?: string }) =>
+    void change(action, name, values).then(() => setOpen(null), () => undefined);
+  return (
+    <tr class={disabled ? "gone" : ""}>
+      <th scope="row">{name}</th>
+      <td>
+        {own ? (
+          s(`role_${role}`)
+        ) : (
+          <Select
+            label={s("role_of", { name })}
+            value={role}
+            values={ROLES}
+            text={(each) => s(`role_${each}`)}
+            choose={(chosen) => run("role", { role: chosen })}
+          />
+        )}
+      </td>
+      <td>{disabled ? s("disabled") : account.sessions ? s("sessions_of", { count: account.sessions }) : s("active")}</td>
+      <td>{fullTime(Date.parse(account.created))}</td>
+      <td class="account-actions">
+        {own ? null : open === "password" ? (
+          <Password of={name} set={(password) => run("password", { password })} close={() => setOpen(null)} />
+        ) : open === "remove" ? (
+          <>
+            <span>{s("remove_sure", { name })}</span>
+            <button class="action" onClick={() => run("remove")}>
+              {s("remove")}
+            </button>
+            <button class="quiet" onClick={() => setOpen(null)}>
+              {s("cancel")}
+            </button>
+          </>
+        ) : (
+          <>
+            <button class="quiet" onClick={() => setOpen("password")}>
+              {s("set_password")}
+            </button>
+            <button class="quiet" onClick={() => run(disabled ? "enable" : "disable")}>
+              {s(disabled ? "enable" : "disable")}
+            </button>
+            <button class="quiet" onClick={() => setOpen("remove")}>
+              {s("remove")}
+            </button>
+          </>
+        )}
+      </td>
+    </tr>
+  );
+}
+
+function Password(props: { of: string; set: (password: string) => void; close: () => void }) {
+  const [password, setPassword] = useState("");
+  return (
+    <form
+      class="account-form"
+      onSubmit={(event) => {
+        event.preventDefault();
+        props.set(password);
+      }}
+    >
+      <input
+        type="password"
+        autocomplete="new-password"
+        aria-label={s("set_password_of", { name: props.of })}
+        placeholder={s("new_password")}
+        value={password}
+        onInput={(event) => setPassword(event.currentTarget.value)}
+      />
+      <button type="submit" class="action" disabled={!password}>
+        {s("set_password")}
+      </button>
+      <button type="button" class="quiet" onClick={props.close}>
+        {s("cancel")}
+      </button>
+    </form>
+  );
+}
+
+function AddAccount({ change }: { change: Change }) {
+  const [name, setName] = useState("");
+  const [password, setPassword] = useState("");
+  const [role, setRole] = useState<Role>("monitor");
+  const add = () =>
+    void change("add", name.trim(), { role, password }).then(
+      () => (setName(""), setPassword("")),
+      () => undefined,
+    );
+  return (
+    <form
+      class="account-form"
+      aria-label={s("add")}
+      onSubmit={(event) => {
+        event.preventDefault();
+        add();
+      }}
+    >
+      <strong>{s("add")}</strong>
+      <input
+        type="text"
+        autocomplete="off"
+        spellcheck={false}
+        maxLength={40}
+        placeholder={s("name")}
+        aria-label={s("name")}
+        value={name}
+        onInput={(event) => setName(event.currentTarget.value)}
+      />
+      <input
+        type="password"
+        autocomplete="new-password"
+        placeholder={s("password")}
+        aria-label={s("password")}
+        value={password}
+        onInput={(event) => setPassword(event.currentTarget.value)}
+      />
+      <Select label={s("role")} value={role} values={ROLES} text={(each) => s(`role_${each}`)} choose={setRole} />
+      <button type="submit" class="action" disabled={!name.trim() || !password}>
+        {s("add_do")}
+      </button>
+    </form>
+  );
+}

@@ -1,0 +1,46 @@
+// When the certificates of the mesh's processes end, as they tell it themselves; nothing where there are none.
+
+import { ageText } from "../../i18n/format";
+import { Panel } from "../../ui/parts";
+import { useMesh } from "../../mesh/site-health";
+import { Marked } from "./this-console";
+import { s } from "../../i18n/settings";
+
+/** As robomesh/session.py names it in a process's health. */
+const SECONDS = "certificate_seconds";
+const SOON_S = 10 * 86_400;
+const DAY_S = 86_400;
+
+export function Certificates() {
+  const told = [...useMesh()].flatMap(([site, { message }]) =>
+    message.services.flatMap((seen) => {
+      const left = seen.values[SECONDS];
+      // Each watch tells of its own site's: one is told once.
+      return left === undefined || seen.site !== site ? [] : [{ key: `${site} ${seen.id}`, site, seen, left }];
+    }),
+  );
+  if (told.length === 0) return null;
+  return (
+    <Panel name="certificates" title={s("certificates")}>
+      <p class="footnote dim">{s("certificates_words")}</p>
+      <ul class="presence-list">
+        {told
+          .sort((a, b) => a.left - b.left)
+          .map(({ key, site, seen, left }) => (
+            <li key={key}>
+              <span>{site}</span>
+              <strong>{seen.service}</strong>
+              <span class="dim">{seen.host}</span>
+              <Marked wrong={left < SOON_S}>
+                {left > 0 ? s("certificate_ends", { age: leftText(left) }) : s("certificate_ended")}
+              </Marked>
+            </li>
+          ))}
+      </ul>
+    </Panel>
+  );
+}
+
+function leftText(seconds: number): string {
+  return seconds < 2 * DAY_S ? ageText(seconds) : `${Math.floor(seconds / DAY_S)}\u202fd`;
+}

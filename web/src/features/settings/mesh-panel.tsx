@@ -1,0 +1,101 @@
+// Every service of every site, as the sites' watches see them.
+
+import type { MeshState_Seen as Seen } from "../../gen/robomesh_pb";
+import { ageText } from "../../i18n/format";
+import type { MeshState } from "../../gen/robomesh_pb";
+import { presence } from "../../mesh/connection";
+import { Panel } from "../../ui/parts";
+import { Services } from "../../ui/alive-services";
+import { isMeshStale, useMesh } from "../../mesh/site-health";
+import { ageOf } from "../../mesh/topics";
+import type { Latest } from "../../mesh/topics";
+import { Hops } from "./hops";
+import { COLUMNS, SeenRow } from "./seen-row";
+import { s } from "../../i18n/settings";
+
+const GONE_TOLD_MS = 900_000;
+
+interface Known {
+  seen: Seen;
+  /** When it was told of last, on this machine's clock [ms]. */
+  at: number;
+}
+
+/** What each watch told of since this page was opened: a service that it no longer tells of is gone, and shown so. */
+const known = new Map<string, Map<string, Known>>();
+
+const nameOf = ({ site, service, id }: Seen): string => `${site} ${service} ${id}`;
+
+function remember(site: string, { services }: MeshState): readonly Known[] {
+  const told = known.get(site) ?? new Map<string, Known>();
+  known.set(site, told);
+  const now = Date.now();
+  for (const seen of services) told.set(nameOf(seen), { seen, at: now });
+  for (const [name, { at }] of told) if (now - at > GONE_TOLD_MS) told.delete(name);
+  return [...told].sort(([a], [b]) => a.localeCompare(b)).map(([, each]) => each);
+}
+
+export function MeshPanel() {
+  const meshes = useMesh();
+  const present = [...presence.value].map((token) => token.split("/")[1] ?? "");
+  const sites = [...new Set([...meshes.keys(), ...present])].sort();
+  return (
+    <Panel name="mesh" title={s("mesh")}>
+      {meshes.size === 0 && <p class="footnote dim">{s("no_mesh")}</p>}
+      {sites.map((site) => {
+        const latest = meshes.get(site);
+        return latest ? <SiteTable key={site} site={site} latest={latest} /> : <PresentSite key={site} site={site} />;
+      })}
+    </Panel>
+  );
+}
+
+/** A site that no watch tells of. */
+function PresentSite({ site }: { site: string }) {
+  return (
+    <div class="site-seen">
+      <h3>{site}</h3>
+      <Services of={`robomesh/${site}/-`} />
+    </div>
+  );
+}
+
+function SiteTable({ site, latest }: { site: string; latest: Latest<MeshState> }) {
+  const { services, hops } = latest.message;
+  const told = new Set(services.map(nameOf));
+  const stale = isMeshStale(latest);
+  return (
+    <div class={`site-seen ${stale ? "stale" : ""}`}>
+      <div class="site-head">
+        <h3>{site}</h3>
+        <span class="dim small">{s("seen_by", { site })}</span>
+        {stale && <span class="age">{s("report_stale", { age: ageText(ageOf(latest) ?? 0) })}</span>}
+      </div>
+      <div class="table-place" tabIndex={0} role="region" aria-label={`${s("mesh")}, ${site}`}>
+        <table class="seen-table">
+          <thead>
+            <tr>
+              {COLUMNS.map((name) => (
+                <th key={name} scope="col">
+                  {s(name)}
+                </th>
+              ))}
+            </tr>
+          </thead>
+          <tbody>
+            {remember(site, latest.message).map(({ seen, at }) => (
+              <SeenRow
+                key={nameOf(seen)}
+                of={site}
+                seen={seen}
+                latest={latest}
+                goneAt={told.has(nameOf(seen)) ? null : at}
+              />
+            ))}
+          </tbody>
+        </table>
+      </div>
+      {hops.length > 0 && <Hops hops={hops} />}
+    </div>
+  );
+}

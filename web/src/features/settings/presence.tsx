@@ -1,0 +1,50 @@
+// Who is attached besides the services: monitors, consoles, and whoever is in control.
+
+import { presence } from "../../mesh/connection";
+import { OPERATOR } from "../../mesh/known-robots";
+import { Panel } from "../../ui/parts";
+import { robotNow } from "../../mesh/robot-snapshots";
+import { robotLink } from "../../ui/route";
+import { s } from "../../i18n/settings";
+
+const WATCHERS = new Set(["monitor", "console", "foxglove", "ros2"]);
+
+export function Presence() {
+  const lines = [...presence.value].sort().flatMap((token) => {
+    const [, site = "", robot = "", , service = "", id = ""] = token.split("/");
+    if (service !== OPERATOR && !WATCHERS.has(service)) return [];
+    return [{ token, site, robot, service, id }];
+  });
+  return (
+    <Panel name="presence" title={s("presence")}>
+      <p class="footnote dim">{s("presence_words")}</p>
+      {lines.length === 0 ? (
+        <p class="footnote">{s("nobody")}</p>
+      ) : (
+        <ul class="presence-list">
+          {lines.map(({ token, site, robot, service, id }) => (
+            <li key={token}>
+              <span>{site}</span>
+              {service === OPERATOR ? (
+                <a href={robotLink(site, robot)}>
+                  {`${holder(site, robot)} ${s("in_control_of", { robot })}`.trim()}
+                </a>
+              ) : (
+                <strong>{word(service)}</strong>
+              )}
+              <span class="dim">{id}</span>
+            </li>
+          ))}
+        </ul>
+      )}
+    </Panel>
+  );
+}
+
+function word(service: string): string {
+  return service === "monitor" || service === "console" ? s(service) : service;
+}
+
+function holder(site: string, robot: string): string {
+  return robotNow(`robomesh/${site}/${robot}`).lease.value?.message.holder ?? "";
+}

@@ -1,0 +1,74 @@
+// The browsers that are signed in: one's own, to an administrator everybody's; any of them can be ended.
+
+import { useEffect, useState } from "preact/hooks";
+import { post } from "../../mesh/account";
+import { refusalText } from "../../ui/change-password";
+import { fullTime } from "../../i18n/format";
+import { NoticeLine, Panel } from "../../ui/parts";
+import type { Notice } from "../../mesh/control";
+import { s } from "../../i18n/settings";
+
+const LOOK_EACH_MS = 5000;
+
+interface Session {
+  id: string;
+  account: string;
+  address: string;
+  agent: string;
+  began: string;
+  resting: boolean;
+  this: boolean;
+}
+
+export function Sessions() {
+  const [sessions, setSessions] = useState<readonly Session[]>([]);
+  const [notice, setNotice] = useState<Notice | null>(null);
+  const look = async () => {
+    const answer = await fetch("/account/sessions", { cache: "no-store" });
+    if (answer.ok) setSessions(((await answer.json()) as { sessions: Session[] }).sessions);
+  };
+  useEffect(() => {
+    const again = () => void look().catch(() => undefined); // the page says itself that the console is gone
+    again();
+    const timer = setInterval(again, LOOK_EACH_MS);
+    return () => clearInterval(timer);
+  }, []);
+  const end = async ({ id }: Session) => {
+    try {
+      await post("sessions", { end: id });
+      await look();
+      setNotice({ kind: "done", text: s("done") });
+    } catch (error) {
+      setNotice({ kind: "refused", text: s("not_done", { text: refusalText(error) }) });
+    }
+  };
+  return (
+    <Panel name="sessions" title={s("sessions")}>
+      <p class="footnote dim">{s("sessions_words")}</p>
+      <ul class="presence-list">
+        {sessions.map((session) => (
+          <li key={session.id}>
+            <strong>{session.account}</strong>
+            <span>{session.address}</span>
+            <span class="dim" title={session.agent}>
+              {`${s("began")} ${fullTime(Date.parse(session.began))}`}
+            </span>
+            {session.resting && <span class="dim">{s("session_resting")}</span>}
+            {session.this ? (
+              <span class="tag">{s("session_this")}</span>
+            ) : (
+              <button
+                class="quiet"
+                aria-label={s("end_session_of", { account: session.account, address: session.address })}
+                onClick={() => void end(session)}
+              >
+                {s("end_session")}
+              </button>
+            )}
+          </li>
+        ))}
+      </ul>
+      {notice && <NoticeLine notice={notice} />}
+    </Panel>
+  );
+}

@@ -1,0 +1,28 @@
+// How the mesh is, who is on it, and what one may set: of this browser, and of the console's accounts.
+
+import { me } from "../../mesh/account";
+import { hello } from "../../mesh/connection";
+import { About } from "./about";
+import { Accounts } from "./accounts";
+import { Certificates } from "./certificates";
+import { Look } from "./look";
+import { MeshPanel } from "./mesh-panel";
+import { Presence } from "./presence";
+import { Sessions } from "./sessions";
+import { ThisConsole } from "./this-console";
+import "./settings.css";
+
+export function Settings() {
+  return (
+    <div class="settings-page">
+      <ThisConsole hello={hello.value} />
+      <Look />
+      <MeshPanel />
+      <Presence />
+      <Certificates />
+      {me.value?.account && <Sessions />}
+      {me.value?.role === "admin" && <Accounts />}
+      <About />
+    </div>
+  );
+}

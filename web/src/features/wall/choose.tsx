@@ -1,0 +1,61 @@
+// Which pictures the wall shows: a row a robot, a button a view.
+
+import { Toggle } from "../../ui/parts";
+import type { ViewName } from "../../ui/route";
+import { viewText } from "../../i18n/texts";
+import { w } from "../../i18n/wall";
+
+export interface RobotViews {
+  site: string;
+  robot: string;
+  views: readonly string[];
+}
+
+export function Choose(props: {
+  robots: readonly RobotViews[];
+  shown: readonly ViewName[];
+  show: (shown: readonly ViewName[]) => void;
+}) {
+  const { robots, shown, show } = props;
+  const is = (one: ViewName) => (other: ViewName) =>
+    one.site === other.site && one.robot === other.robot && one.view === other.view;
+  const set = (one: ViewName, on: boolean) => show(on ? [...shown, one] : shown.filter((other) => !is(one)(other)));
+  const every = [...new Set(robots.flatMap((robot) => robot.views))];
+  return (
+    <div class="wall-choose panel">
+      <div class="wall-every">
+        <span class="dim">{w("every")}</span>
+        {every.map((view) => (
+          <button
+            key={view}
+            class="action"
+            onClick={() =>
+              show(robots.flatMap(({ site, robot, views }) => (views.includes(view) ? [{ site, robot, view }] : [])))
+            }
+          >
+            {viewText(view)}
+          </button>
+        ))}
+      </div>
+      <div class="wall-robots">
+        {robots.map(({ site, robot, views }) => (
+          <div key={`${site}/${robot}`} class="wall-robot" role="group" aria-label={`${site}/${robot}`}>
+            <span class="wall-robot-name">
+              <span class="dim">{site}/</span>
+              {robot}
+            </span>
+            {views.map((view) => {
+              const one = { site, robot, view };
+              return (
+                <Toggle key={view} on={shown.some(is(one))} set={(on) => set(one, on)}>
+                  {viewText(view)}
+                </Toggle>
+              );
+            })}
+          </div>
+        ))}
+      </div>
+      <p class="footnote dim">{w("chosen_kept")}</p>
+    </div>
+  );
+}

@@ -1,0 +1,100 @@
+// One picture of the wall: live while it is on the screen, with the robot's state and the picture's age in words.
+
+import { useEffect, useRef, useState } from "preact/hooks";
+import type { ControllerState, Description } from "../../gen/robomesh_pb";
+import { useLive } from "../../video/live-video";
+import { Age, State, Tag } from "../../ui/parts";
+import { problemOf, stateWord } from "../../mesh/robot-state";
+import { isReplay } from "../../mesh/robot-name";
+import { robotLink } from "../../ui/route";
+import type { ViewName } from "../../ui/route";
+import { t, viewText } from "../../i18n/texts";
+import type { Latest } from "../../mesh/topics";
+import { wantedFor } from "./grid";
+import { w } from "../../i18n/wall";
+
+export function WallTile(props: {
+  shown: ViewName;
+  controller: Latest<ControllerState> | undefined;
+  description: Description | undefined;
+  known: boolean;
+  remove: () => void;
+}) {
+  const { shown, controller, description } = props;
+  const place = useRef<HTMLElement>(null);
+  const pictured = useRef<HTMLDivElement>(null);
+  const [seen, setSeen] = useState(false);
+  const [{ width, height }, setSize] = useState({ width: 0, height: 0 });
+  useEffect(() => {
+    const tile = place.current;
+    if (!tile || !pictured.current) return;
+    let onScreen = false;
+    const look = () => setSeen(onScreen && document.visibilityState === "visible");
+    const entering = new IntersectionObserver(([entry]) => ((onScreen = entry?.isIntersecting ?? false), look()));
+    const sizing = new ResizeObserver(([entry]) => {
+      const box = entry?.contentRect;
+      if (box) setSize({ width: Math.round(box.width), height: Math.round(box.height) });
+    });
+    entering.observe(tile);
+    sizing.observe(pictured.current);
+    document.addEventListener("visibilitychange", look);
+    return () => {
+      entering.disconnect();
+      sizing.disconnect();
+      document.removeEventListener("visibilitychange", look);
+    };
+  }, []);
+  const robotKey = `robomesh/${shown.site}/${shown.robot}`;
+  const view = viewText(shown.view);
+  const label = `${shown.robot}, ${view}`;
+  const watched = seen && width > 0 && height > 0 && props.known;
+  const live = useLive(robotKey, watched ? wantedFor(shown.view, width, height) : null, label);
+  const state = stateWord(controller);
+  const problem = state.level === "normal" ? "" : problemOf(controller?.message);
+  const word = !props.known ? w("gone") : !seen && live.any ? w("hidden") : live.any ? "" : live.problem || w("waiting");
+  return (
+    <article
+      ref={place}
+      class={`wall-tile ${state.level} ${live.stale || !watched ? "stale" : ""}`}
+      tabIndex={0}
+      aria-label={`${label}: ${t(state.word)}`}
+      onDblClick={() => (location.hash = robotLink(shown.site, shown.robot))}
+    >
+      <div ref={pictured} class="wall-picture">
+        {live.picture}
+        {word && <p class="picture-word dim">{word}</p>}
+        {live.stale && (
+          <p class="wall-stale">
+            <span class="shape warning" aria-hidden="true" />
+            <Age stale age={live.age} />
+          </p>
+        )}
+        {problem && (
+          <p class={`wall-problem ${state.level}`} title={problem}>
+            {problem}
+          </p>
+        )}
+        <button class="wall-remove" aria-label={w("remove", { robot: shown.robot, view })} onClick={props.remove}>
+          ×
+        </button>
+      </div>
+      <div class="wall-line">
+        <a href={robotLink(shown.site, shown.robot)} title={`${shown.site}/${shown.robot}`}>
+          {shown.robot}
+        </a>
+        <span class="dim">{view}</span>
+        {live.step > 0 && (
+          <span class="reduced" title={t("reduced_hint")}>
+            {t("reduced")}
+          </span>
+        )}
+        {isReplay(shown.robot) ? (
+          <Tag kind="replay">{w("replay")}</Tag>
+        ) : (
+          description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>
+        )}
+        <State state={state} />
+      </div>
+    </article>
+  );
+}

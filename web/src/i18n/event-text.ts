@@ -1,0 +1,104 @@
+// Events in Chinese, by their code: a sentence with what their values tell, or the alarm that is over. In English
+// they are in their own words.
+
+import { Event_Severity as Severity } from "../gen/robomesh_pb";
+import type { Event } from "../gen/robomesh_pb";
+import { isolated } from "./foreign-text";
+import { language, t } from "./texts";
+import { alarmTitle } from "./alarm-words";
+
+// What nobody has to act on; a code that may be an alarm's too stands here as it is when it is none.
+const CHINESE: Record<string, string> = {
+  "mesh.key_ignored": "已忽略不符合网络命名规则的键：{key}。",
+  "link.up": "与控制器的连接正常。",
+  "link.silent": "已连接控制器，尚未收到数据。",
+  "link.flooding_ended": "控制器数据不再过载。",
+  "joints.back": "重新收到关节位置。",
+  "status.back": "重新收到控制器状态。",
+  "controller.remote": "控制器恢复远程模式。",
+  "motion.foreign": "机器人开始运动，并非由网关命令。",
+  "lease.ended": "{holder} 的控制权结束。",
+  "program.started": "{operator} 开始运行程序 {program}。",
+  "program.done": "程序 {program} 已完成。",
+  "audit.rotated": "审计日志换用新文件：{file}。",
+  "audit.mended": "审计日志恢复写入。",
+  "legacy.attached": "旧客户端程序已接入：{client}。",
+  "legacy.gone": "旧客户端程序已离开：{client}。",
+  "kinematics.singularity": "接近奇异位形（裕度 {margin}）：走直线时关节速度会很快。",
+  "kinematics.singularity.over": "已离开奇异位形。",
+  "recorder.trace_joined": "控制器的跟踪写入正在进行的录制 {recording}。",
+  "recorder.recovered": "录制 {file} 上次未正常关闭，现已完整。",
+  "recorder.saved": "最近几分钟的录制现已保存。",
+  "renderer.keeps_up": "渲染重新跟上所有观看的画面。",
+  "router.rules": "路由器已采用新的规则和密钥。",
+  "account.signed_in": "{account} 从 {address} 登录。",
+  "account.unlocked": "{account} 在 {address} 再次输入了密码。",
+  "account.signed_out": "{account}（{address}）已登出：{reason}。",
+  "account.changed": "{account} 更改了账户 {changed}：{action}。",
+  "alarm.acknowledged": "{by} 确认了报警 {id}。",
+  "alarm.shelved": "{by} 将报警 {id} 搁置 {minutes} 分钟：{reason}",
+  "alarm.unshelved": "{by} 取消搁置报警 {id}。",
+};
+
+// Values that are words of a program.
+const VALUES: Record<string, string> = {
+  "reason:signed_out": "本人登出",
+  "reason:replaced": "重新登录",
+  "reason:too_many": "登录地点过多",
+  "reason:expired": "会话已满一周",
+  "reason:idle": "一小时内没有打开的页面",
+  "reason:removed": "账户已删除",
+  "reason:disabled": "账户已停用",
+  "reason:password": "密码已更改",
+  "reason:ended": "由管理员结束",
+  "action:add": "添加",
+  "action:role": "更改角色",
+  "action:password": "更改密码",
+  "action:disable": "停用",
+  "action:enable": "启用",
+  "action:remove": "删除",
+};
+
+// Of what an alarm is, where there may be several.
+const OF_WHAT = ["joint", "second", "robot", "service", "site"] as const;
+
+/** An event that asks nobody to act, in the page's language; null: its own words do. */
+function eventInChinese({ code, severity, values }: Event): string | null {
+  if (language.value !== "zh" || severity > Severity.INFO) return null;
+  const sentence = CHINESE[code];
+  if (sentence) return filled(sentence, values);
+  const title = alarmTitle(code.replace(/\.over$/, ""));
+  if (!title) return null;
+  const of = OF_WHAT.map((name) => values[name]).find(Boolean);
+  return `已解除：${title}${of ? `（${of}）` : ""}`;
+}
+
+/** Null: an older program told it without a value that the sentence needs. */
+function filled(sentence: string, values: Record<string, string>): string | null {
+  let all = true;
+  const text = sentence.replace(/\{(\w+)\}/g, (_, name: string) => {
+    const value = values[name];
+    all &&= value !== undefined;
+    return VALUES[`${name}:${value}`] ?? isolated(value ?? "");
+  });
+  return all ? text : null;
+}
+
+/** The page's own words for what people meet most; the event's for the rest. */
+export function eventText(event: Event): string {
+  const { code, values } = event;
+  const by = values["by"] ?? "";
+  const reason = values["reason"];
+  switch (code) {
+    case "stop.latched": {
+      const said = t(values["sent"] === "True" ? "event_stop" : "event_stop_unsent", { by });
+      return reason && reason !== "console" ? `${said} ${reason}` : said;
+    }
+    case "stop.sent":
+      return t("event_stop_sent");
+    case "stop.reset":
+      return t("event_stop_reset");
+    default:
+      return eventInChinese(event) ?? event.text;
+  }
+}

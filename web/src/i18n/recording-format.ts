@@ -1,0 +1,87 @@
+// What is told of a recording, in words and numbers for people.
+
+import { timestampMs } from "@bufbuild/protobuf/wkt";
+import type { Recording } from "../gen/robomesh_pb";
+import { count, fixed } from "./format";
+import { r } from "./recordings";
+
+const UNITS = ["B", "kB", "MB", "GB", "TB"];
+
+/** A size: 912 B, 4.3 MB. */
+export function sizeText(bytes: number | bigint): string {
+  let value = Number(bytes);
+  let unit = 0;
+  while (value >= 1000 && unit < UNITS.length - 1) [value, unit] = [value / 1000, unit + 1];
+  return `${fixed(value, unit === 0 || value >= 100 ? 0 : 1)}\u202f${UNITS[unit] ?? ""}`;
+}
+
+export function startMs({ start }: Recording): number {
+  return start ? timestampMs(start) : 0;
+}
+
+export function durationS({ duration }: Recording): number {
+  return duration ? Number(duration.seconds) + duration.nanos / 1e9 : 0;
+}
+
+/** Local date and time of day: 2026-11-21 14:03:09. */
+export function dateText(ms: number): string {
+  if (!ms) return "–";
+  const date = new Date(ms);
+  const pad = (value: number) => String(value).padStart(2, "0");
+  const day = [date.getFullYear(), pad(date.getMonth() + 1), pad(date.getDate())].join("-");
+  return `${day} ${date.toLocaleTimeString("en-GB", { hour12: false })}`;
+}
+
+/** A time within a recording: 00:03.25, 1:02:03.00. */
+export function momentText(seconds: number, decimals = 2): string {
+  const hundredths = Math.round(Math.max(0, seconds) * 10 ** decimals);
+  const whole = Math.floor(hundredths / 10 ** decimals);
+  const pad = (value: number) => String(value).padStart(2, "0");
+  const hours = Math.floor(whole / 3600);
+  const text = [...(hours ? [String(hours)] : []), pad(Math.floor(whole / 60) % 60), pad(whole % 60)].join(":");
+  return decimals ? `${text}.${String(hundredths % 10 ** decimals).padStart(decimals, "0")}` : text;
+}
+
+/** A channel of a recording by its topic: robomesh/hall/arm/events/renderer is events/renderer. */
+export function topicOf(channel: string): string {
+  const chunks = channel.split("/");
+  return chunks[0] === "robomesh" && chunks.length > 3 ? chunks.slice(3).join("/") : channel;
+}
+
+export function messagesOf({ topics }: Recording): bigint {
+  return topics.reduce((sum, { messages }) => sum + messages, 0n);
+}
+
+/** Whether there is nothing in it to be played. */
+export function isEmpty(recording: Recording): boolean {
+  return !recording.open && messagesOf(recording) === 0n;
+}
+
+/** What was lost, in words; empty: nothing. */
+export function lostText({ topics }: Recording): string {
+  const lost = topics.filter((each) => each.lost > 0n);
+  if (lost.length === 0) return "";
+  return r("lost", {
+    topics: lost.map((each) => r("lost_of", { count: count(each.lost), topic: topicOf(each.topic) })).join(", "),
+  });
+}
+
+/** Who or what had it begun. */
+export function startedText({ startedBy }: Recording): string {
+  if (startedBy === "trace") return r("by_trace");
+  if (startedBy === "flight" || startedBy === "flight recorder") return r("by_flight");
+  return startedBy === "request" ? r("by_request") : startedBy;
+}
+
+/** Views whose video is in it. */
+export function recordedViews({ topics }: Recording): readonly string[] {
+  return topics
+    .map((each) => topicOf(each.topic))
+    .filter((topic) => topic.startsWith("video/"))
+    .map((topic) => topic.slice("video/".length));
+}
+
+/** Where the console gives a recording's file, or what belongs to it. */
+export function fileUrl(site: string, file: string, rest = ""): string {
+  return `/recordings/${encodeURIComponent(site)}/${encodeURIComponent(file)}${rest}`;
+}

@@ -1,0 +1,109 @@
+// The alarms of every site, after ISA-18.2, as each site's watch tells them; what a person does about them.
+
+import { fromBinary } from "@bufbuild/protobuf";
+import { timestampMs } from "@bufbuild/protobuf/wkt";
+import { computed, signal } from "@preact/signals";
+import { operator } from "./control";
+import {
+  AlarmListSchema,
+  AlarmRequestSchema,
+  AlarmRequest_Action as Action,
+  Alarm_Priority as Priority,
+  Alarm_State as State,
+} from "../gen/robomesh_pb";
+import type { Alarm, AlarmList } from "../gen/robomesh_pb";
+import { ask, hello, watch } from "./connection";
+import { ageOf, isStale } from "./topics";
+import type { Latest } from "./topics";
+
+export { Action, Priority, State };
+export type { Alarm };
+
+export const PRIORITIES = [Priority.CRITICAL, Priority.HIGH, Priority.MEDIUM, Priority.LOW] as const;
+
+const lists = signal<ReadonlyMap<string, Latest<AlarmList>>>(new Map());
+
+/** Follows them for as long as the page is there: the header counts them everywhere. */
+export function followAlarms(): () => void {
+  return watch("robomesh/*/-/alarms", (sample) => {
+    const site = sample.key.split("/")[1] ?? "";
+    const message = fromBinary(AlarmListSchema, sample.payload);
+    lists.value = new Map(lists.value).set(site, { key: sample.key, sample, message });
+  });
+}
+
+// What nobody knows yet asks first.
+const STATES = [State.UNACKNOWLEDGED, State.RETURNED, State.ACKNOWLEDGED, State.SHELVED];
+
+/** Every alarm, the most urgent first. */
+export const alarms = computed<readonly Alarm[]>(() =>
+  [...lists.value]
+    .flatMap(([site, { message }]) => message.alarms.map((alarm) => ({ ...alarm, site: alarm.site || site })))
+    .sort(
+      (a, b) =>
+        STATES.indexOf(a.state) - STATES.indexOf(b.state) || b.priority - a.priority || lastMs(b) - lastMs(a),
+    ),
+);
+
+/** Those that are not put aside and not over, by `robomesh/<site>/<robot>`. */
+export const alarmsOf = computed(() =>
+  Map.groupBy(
+    alarms.value.filter(({ state }) => state === State.UNACKNOWLEDGED || state === State.ACKNOWLEDGED),
+    ({ site, robot }) => `robomesh/${site}/${robot}`,
+  ),
+);
+
+export const isUnacknowledged = ({ state }: Alarm): boolean =>
+  state === State.UNACKNOWLEDGED || state === State.RETURNED;
+
+export const unacknowledged = computed(() => alarms.value.filter(isUnacknowledged));
+
+/** How many alarms nobody has acknowledged, by priority, the most urgent first. */
+export const counts = computed(() =>
+  PRIORITIES.map((priority) => ({
+    priority,
+    count: unacknowledged.value.filter((alarm) => alarm.priority === priority).length,
+  })).filter(({ count }) => count > 0),
+);
+
+/** Sites whose alarms were known and are so no longer. */
+export function silentSites(): string[] {
+  return [...lists.value].filter(([, list]) => isStale("alarms", ageOf(list))).map(([site]) => site);
+}
+
+/** Whether any site tells its alarms. */
+export const anyWatch = computed(() => lists.value.size > 0);
+
+export function lastMs({ last, since }: Alarm): number {
+  const stamp = last ?? since;
+  return stamp ? timestampMs(stamp) : 0;
+}
+
+/** One alarm among all sites'. */
+export const nameOf = ({ site, id }: Alarm): string => `${site}/${id}`;
+
+/** The name that this page asks in; empty: nobody has given one. */
+export const asker = computed(() => hello.value?.operator || operator.value.trim());
+
+/** Whether whoever is signed in may acknowledge at all; a console without accounts leaves it to the mesh. */
+export const mayAct = computed(() => !hello.value?.account || hello.value.mayCommand);
+
+/** Asks each site's watch for the same of its own alarms.
+ *
+ * @throws AskError with the reason in words, of the first site that refused. */
+export async function act(
+  chosen: readonly Alarm[],
+  action: Action,
+  values: { reason?: string; shelveS?: number } = {},
+): Promise<void> {
+  const bySite = Map.groupBy(chosen, ({ site }) => site);
+  const outcomes = await Promise.allSettled(
+    [...bySite].map(([site, some]) => {
+      const request = { action, ids: some.map(({ id }) => id), ...values };
+      const key = `robomesh/${site}/-/alarms/request/${asker.value}`;
+      return ask(key, AlarmRequestSchema, request, AlarmListSchema);
+    }),
+  );
+  const failed = outcomes.find((outcome) => outcome.status === "rejected");
+  if (failed) throw failed.reason;
+}

@@ -1,0 +1,51 @@
+// How near a robot is to what stands around it, and to itself: level and words.
+
+import { fixed } from "../i18n/format";
+import { DescriptionSchema } from "../gen/robomesh_pb";
+import type { Clearance, Description } from "../gen/robomesh_pb";
+import type { Level } from "./robot-state";
+import { t } from "../i18n/texts";
+import { useTopic } from "./topics";
+
+/** The floor in a pair of two that are near each other; the contract's word. */
+const FLOOR = "the floor";
+
+/** Height of the floor of a robot's cell, in the site's frame [m]; null: there is none. */
+export function floorOf({ floor, baseToSite }: Description): number | null {
+  // An older sender tells of none: the robot stands on it.
+  return floor ? (floor.height ?? null) : (baseToSite[11] ?? 0);
+}
+
+/** How much a robot's distance to fixtures and other robots asks to be looked at: of two robots, the larger counts. */
+export function useClearanceLevel(robotKey: string, clearance: Clearance | undefined): Level {
+  const [site, robot, link] = clearance?.second.split("/") ?? [];
+  const ownKey = `${robotKey}/description`;
+  const own = useTopic(DescriptionSchema, ownKey)?.message;
+  const other = useTopic(DescriptionSchema, link ? `robomesh/${site}/${robot}/description` : ownKey)?.message;
+  const [ownOf, otherOf] = clearance?.second.endsWith(`/${FLOOR}`) ? [own?.floor, undefined] : [own, other];
+  const within = (of: "stopDistance" | "warningDistance") =>
+    clearance !== undefined && clearance.distance < Math.max(ownOf?.[of] ?? 0, otherOf?.[of] ?? 0);
+  if (clearance && (clearance.distance <= 0 || within("stopDistance"))) return "alarm";
+  return within("warningDistance") ? "warning" : "normal";
+}
+
+/** Two links of one arm: only touching counts. */
+export function ownLevel(clearance: Clearance): Level {
+  return clearance.distance <= 0 ? "alarm" : "normal";
+}
+
+/** "flange – table", "forearm – pt600-2 wrist": frame ids `<site>/<robot>/<link>`, `<site>/<fixture>` in words. */
+export function pairText({ first, second }: Clearance, robotKey: string): string {
+  const [, site = "", robot = ""] = robotKey.split("/");
+  const name = (frame: string) => {
+    const chunks = frame.split("/").slice(frame.startsWith(`${site}/`) ? 1 : 0);
+    if (chunks[0] === FLOOR) return t("floor");
+    return (chunks.length > 1 && chunks[0] === robot ? chunks.slice(1) : chunks).join(" ");
+  };
+  return `${name(first)} – ${name(second)}`;
+}
+
+/** "12.3 mm", or that they touch. */
+export function distanceText({ distance }: Clearance): string {
+  return distance <= 0 ? t("touching") : `${fixed(distance * 1000, 1)}\u202fmm`;
+}

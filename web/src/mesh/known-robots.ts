@@ -1,0 +1,26 @@
+// Which robots there are, by presence or by what they published; no replays.
+
+import { computed, signal } from "@preact/signals";
+import { presence } from "./connection";
+import { isReplay } from "./robot-name";
+
+/** In the service's place: presence of whoever is in control. */
+export const OPERATOR = "operator";
+
+const seen = signal<ReadonlySet<string>>(new Set());
+
+/** Keys `robomesh/<site>/<robot>`, sorted. */
+export const fleetRobots = computed<readonly string[]>(() => {
+  const keys = new Set(seen.value);
+  for (const key of presence.value) {
+    const [root, site, robot, , service] = key.split("/");
+    if (robot !== "-" && service !== OPERATOR) keys.add(`${root}/${site}/${robot}`);
+  }
+  return [...keys].filter((key) => !isReplay(key.split("/")[2] ?? "")).sort();
+});
+
+/** Takes note of the robots that keys of topics are of. */
+export function seeRobots(topicKeys: Iterable<string>): void {
+  const robots = [...topicKeys].map((key) => key.split("/").slice(0, 3).join("/"));
+  if (robots.some((key) => !seen.value.has(key))) seen.value = new Set([...seen.value, ...robots]);
+}

@@ -1,0 +1,54 @@
+// A message ends with what it is about: a motion's when the motion does, the others' after a while.
+
+import { useEffect, useRef } from "preact/hooks";
+import { newestMotion } from "./command";
+import type { Notice } from "./control";
+import { t } from "../i18n/texts";
+
+const REACHED = 0.002; // rad or m: half of what a person reads off
+const BEGINS_WITHIN_MS = 1500;
+const TOLD_MS = { done: 8_000, refused: 30_000 };
+
+/** What is known of the holder's motion. */
+export interface Motion {
+  /** It is under way, or on hold. */
+  running: boolean;
+  /** A stop or a fault has ended it, and says so itself. */
+  stopped: boolean;
+  /** Where the joints are [rad] or [m]. */
+  positions: readonly (number | undefined)[];
+}
+
+export function useNoticeEnd(notice: Notice | null, tell: (notice: Notice | null) => void, motion: Motion): void {
+  const ran = useRef<Notice | null>(null);
+  const positions = useRef(motion.positions);
+  positions.current = motion.positions;
+  const { running, stopped } = motion;
+  const overtaken = !!notice?.target && notice.target.id < newestMotion.value;
+  useEffect(() => {
+    if (!notice || notice.kind === "busy" || notice.kind === "lost") return;
+    const { target, mind } = notice;
+    const warned = mind ? { mind } : {};
+    if (!target) {
+      const timer = setTimeout(() => tell(null), TOLD_MS[mind ? "refused" : notice.kind]);
+      return () => clearTimeout(timer);
+    }
+    if (stopped) return tell(null);
+    const isThere = () =>
+      target.positions.every((each, i) => Math.abs(each - (positions.current[i] ?? NaN)) < REACHED);
+    // Another motion goes on from here: if this one was not done yet, it never will be, as was wanted.
+    if (overtaken) return tell(isThere() ? { kind: "done", text: t("motion_done", { what: target.what }), ...warned } : null);
+    if (running) {
+      ran.current = notice;
+      return;
+    }
+    const end = () => {
+      const there = isThere();
+      const text = t(there ? "motion_done" : "motion_ended", { what: target.what });
+      tell({ kind: there ? "done" : "refused", text, ...warned });
+    };
+    // The state that says so may still be on its way.
+    const timer = setTimeout(end, ran.current === notice ? 0 : BEGINS_WITHIN_MS);
+    return () => clearTimeout(timer);
+  }, [notice, running, stopped, overtaken]);
+}

@@ -1,0 +1,26 @@
+// What is asked of a robot's recorder: begin, end, keep the last minutes.
+
+import { AskError, ask } from "./connection";
+import { RecorderRequestSchema, RecorderRequest_Action as Action, RecordingSchema } from "../gen/robomesh_pb";
+import type { Recording } from "../gen/robomesh_pb";
+import { r } from "../i18n/recordings";
+
+// Closing writes the file again.
+const WITHIN_S = 20;
+
+/** Asks a robot's recorder.
+ *
+ * @throws Error with the reason in words. */
+export async function askRecorder(
+  robotKey: string,
+  action: Action,
+  values: { name?: string; views?: string[] } = {},
+): Promise<Recording> {
+  try {
+    return await ask(`${robotKey}/recorder/request`, RecorderRequestSchema, { action, ...values }, RecordingSchema, WITHIN_S);
+  } catch (error) {
+    throw error instanceof AskError && error.noAnswer ? new Error(r("record_no_answer")) : error;
+  }
+}
+
+export { Action };

@@ -1,0 +1,45 @@
+// Whether what came last of a topic is of the moment at which a replay is: nothing of another is shown as of this one.
+
+import { useEffect, useState } from "preact/hooks";
+import { watch } from "./connection";
+import type { Replay } from "./replay";
+
+/** `coming`: the replay has just gone elsewhere, and what was recorded there may be on its way. */
+export type OfMoment = "here" | "coming" | "absent";
+
+const COMES_WITHIN_MS = 2000;
+const LOOK_EACH_MS = 50;
+/** Passing to here takes time, in which a quick replay goes far [s]. */
+const ON_ITS_WAY_S = 0.5;
+
+/** Follows a topic of a replay whose messages hold for so long [s]; an empty one is absent. */
+export function useOfMoment(replay: Replay | null, topic: string, holdsS: number): OfMoment {
+  const [state, setState] = useState<OfMoment>("coming");
+  useEffect(() => {
+    setState("coming");
+    if (!replay || !topic) return;
+    const opened = performance.now();
+    let source: number | null = null;
+    let offset = 0; // of the recorder's clock to the publisher's [ms]
+    const away = (from: number) => replay.recordedMs() - from;
+    const look = () => {
+      const { playing, speed } = replay.state.peek();
+      const within = holdsS + (playing ? ON_ITS_WAY_S * Math.max(1, speed) : 0);
+      const here = source !== null && Math.abs(away(source) - offset) <= within * 1000;
+      const waiting = performance.now() - Math.max(opened, replay.movedAt) < COMES_WITHIN_MS;
+      setState(here ? "here" : waiting || replay.seeking ? "coming" : "absent");
+    };
+    const stop = watch(`${replay.robotKey}/${topic}`, (sample) => {
+      if (!sample.sourceTime) return;
+      source = sample.sourceTime;
+      if (replay.steadyFor() > COMES_WITHIN_MS) offset = away(source); // in play each comes at its moment
+      look();
+    });
+    const timer = setInterval(look, LOOK_EACH_MS);
+    return () => {
+      stop();
+      clearInterval(timer);
+    };
+  }, [replay, topic]);
+  return replay && topic ? state : "absent";
+}

@@ -1,0 +1,133 @@
+// A replay: where it is, and what is asked of it.
+
+import { fromBinary } from "@bufbuild/protobuf";
+import type { MessageInitShape } from "@bufbuild/protobuf";
+import { timestampMs } from "@bufbuild/protobuf/wkt";
+import { signal } from "@preact/signals";
+import { ReplayRequestSchema, ReplayRequest_Action as Action, ReplayStateSchema } from "../gen/robomesh_pb";
+import type { ReplayState } from "../gen/robomesh_pb";
+import { ask, watch } from "./connection";
+import { isStale, now } from "./topics";
+
+export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 20, 50, 100] as const;
+const WITHIN_S = 5;
+const FIRST_WITHIN_S = 0.5;
+const JUMP_S = 0.5; // farther from where it should be, and it has gone elsewhere
+
+/** Follows a replay until it is let go; times are in s from the recording's start. */
+export class Replay {
+  readonly state;
+  /** Why the last request was not done, in words. */
+  readonly problem = signal("");
+  private arrived = performance.now();
+  private wanted: number | null = null; // a seek that is on its way
+  /** When it went elsewhere last, on the page's clock [ms]. */
+  movedAt = performance.now();
+  private changedAt = performance.now(); // how it goes
+  private firstS = 0;
+  seeking = false;
+  private readonly stop: () => void;
+
+  constructor(
+    readonly robotKey: string,
+    first: ReplayState,
+  ) {
+    this.state = signal(first);
+    this.stop = watch(`${robotKey}/replay`, (sample) => {
+      if (sample.live) this.take(fromBinary(ReplayStateSchema, sample.payload), sample.arrived);
+    });
+  }
+
+  private take(state: ReplayState, arrived: number): void {
+    const [before, after] = [this.state.peek().timestamp, state.timestamp];
+    // What was told before the answer to a request is not what came of it.
+    if (before && after && timestampMs(after) < timestampMs(before)) return;
+    const was = this.state.peek();
+    const jumped = Math.abs(state.positionS - this.position(arrived)) > JUMP_S * Math.max(1, state.speed);
+    if (jumped) this.movedAt = arrived;
+    if (jumped || state.playing !== was.playing || state.speed !== was.speed) this.changedAt = arrived;
+    this.arrived = arrived;
+    this.state.value = state;
+  }
+
+  /** Where it is now, between what it tells. */
+  position(at = performance.now()): number {
+    if (this.wanted !== null) return this.wanted;
+    const { positionS, playing, speed, durationS } = this.state.peek();
+    return Math.min(durationS, positionS + (playing ? (Math.max(0, at - this.arrived) / 1000) * speed : 0));
+  }
+
+  /** The recorded time at which it is [ms since the Unix epoch]. */
+  recordedMs(): number {
+    const { start } = this.state.peek();
+    return (start ? timestampMs(start) : 0) + this.position() * 1000;
+  }
+
+  /** For how long it has passed as time does [ms]; 0: it does not. */
+  steadyFor(): number {
+    const { playing, speed } = this.state.peek();
+    return playing && speed === 1 && !this.seeking ? performance.now() - this.changedAt : 0;
+  }
+
+  /** Whether its player says nothing any more. */
+  get gone(): boolean {
+    void now.value; // it is what draws this again
+    return isStale("replay", (performance.now() - this.arrived) / 1000);
+  }
+
+  readonly play = (): void => {
+    const { positionS, durationS } = this.state.peek();
+    if (positionS >= durationS - 1e-3) this.seek(0);
+    void this.request({ action: Action.PLAY });
+  };
+  readonly pause = (): void => void this.request({ action: Action.PAUSE });
+  readonly setSpeed = (speed: number): void => void this.request({ action: Action.SPEED, speed });
+  readonly setLoop = (loop: boolean): void => void this.request({ action: Action.LOOP, loop });
+
+  /** Tells when its first joints came [s]: a little after its start, where nothing would be seen yet. */
+  beginAt(firstS: number): void {
+    this.firstS = firstS < FIRST_WITHIN_S ? firstS : 0;
+    if (!this.state.peek().playing && this.position() < this.firstS) this.seek(this.firstS);
+  }
+
+  /** Goes to a time: one request is on its way at most, and after it the newest wish. */
+  readonly seek = (to: number): void => {
+    this.wanted = Math.min(this.state.peek().durationS, Math.max(this.firstS, to));
+    if (!this.seeking) void this.goThere();
+  };
+
+  private async goThere(): Promise<void> {
+    this.seeking = true;
+    while (this.wanted !== null) {
+      const positionS = this.wanted;
+      const done = await this.request({ action: Action.SEEK, positionS });
+      if (!done || this.wanted === positionS) this.wanted = null;
+    }
+    this.seeking = false;
+    this.movedAt = this.changedAt = performance.now();
+  }
+
+  private async request(values: MessageInitShape<typeof ReplayRequestSchema>): Promise<boolean> {
+    try {
+      const key = `${this.robotKey}/replay/request`;
+      const state = await ask(key, ReplayRequestSchema, values, ReplayStateSchema, WITHIN_S);
+      this.take(state, performance.now());
+      this.problem.value = "";
+      return true;
+    } catch (error) {
+      this.problem.value = error instanceof Error ? error.message : String(error);
+      return false;
+    }
+  }
+
+  /** Follows it no more; it goes on for whoever else does. */
+  letGo(): void {
+    this.stop();
+  }
+
+  /** Ends it. */
+  close(): void {
+    this.stop();
+    void this.request({ action: Action.CLOSE });
+  }
+}

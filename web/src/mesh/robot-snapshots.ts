@@ -1,0 +1,69 @@
+// What the fleet knows of each robot, kept apart by robot: one that changes has one tile drawn, not two hundred.
+
+import { fromBinary } from "@bufbuild/protobuf";
+import type { DescMessage, MessageShape } from "@bufbuild/protobuf";
+import { batch, signal } from "@preact/signals";
+import type { Signal } from "@preact/signals";
+import { useEffect } from "preact/hooks";
+import { ControllerStateSchema, LeaseSchema } from "../gen/robomesh_pb";
+import type { ControllerState, Description, Lease } from "../gen/robomesh_pb";
+import { watch } from "./connection";
+import type { Sample } from "./connection";
+import type { Latest } from "./topics";
+import { seeRobots } from "./known-robots";
+
+const TAKEN_EACH_MS = 250;
+
+export interface RobotNow {
+  controller: Signal<Latest<ControllerState> | undefined>;
+  lease: Signal<Latest<Lease> | undefined>;
+  /** As it was when the tile was last on the screen. */
+  description: Description | undefined;
+}
+
+const robots = new Map<string, RobotNow>();
+
+/** What is known of a robot; the same object each time. */
+export function robotNow(robotKey: string): RobotNow {
+  const present = robots.get(robotKey);
+  if (present) return present;
+  const made: RobotNow = { controller: signal(undefined), lease: signal(undefined), description: undefined };
+  robots.set(robotKey, made);
+  return made;
+}
+
+/** Follows the states and leases of every robot while it is mounted. */
+export function useFleetNow(): void {
+  useEffect(() => {
+    const ends = [
+      follow("robomesh/*/*/controller", ControllerStateSchema, (now) => now.controller),
+      follow("robomesh/*/*/lease", LeaseSchema, (now) => now.lease),
+    ];
+    return () => ends.forEach((end) => end());
+  }, []);
+}
+
+/** Of each key only the newest is decoded, a few times a second. */
+function follow<S extends DescMessage>(
+  expression: string,
+  schema: S,
+  place: (now: RobotNow) => Signal<Latest<MessageShape<S>> | undefined>,
+): () => void {
+  const waiting = new Map<string, Sample>();
+  const stop = watch(expression, (sample) => waiting.set(sample.key, sample));
+  const timer = setInterval(() => {
+    if (waiting.size === 0) return;
+    batch(() => {
+      seeRobots(waiting.keys());
+      for (const [key, sample] of waiting) {
+        const robotKey = key.slice(0, key.lastIndexOf("/"));
+        place(robotNow(robotKey)).value = { key, sample, message: fromBinary(schema, sample.payload) };
+      }
+    });
+    waiting.clear();
+  }, TAKEN_EACH_MS);
+  return () => {
+    clearInterval(timer);
+    stop();
+  };
+}

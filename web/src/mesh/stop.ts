@@ -1,0 +1,43 @@
+// The stop request: needs no control, waits for nothing.
+
+import { signal } from "@preact/signals";
+import { operator, reasonOf } from "./control";
+import type { Notice } from "./control";
+import { StopAnswerSchema, StopRequestSchema } from "../gen/robomesh_pb";
+import { AskError, ask, reopenIfSilent } from "./connection";
+import { reasonText } from "../i18n/reasons";
+import { t } from "../i18n/texts";
+
+const TOLD_MS = 15_000; // how long a stop that went well is told of
+
+export const stopNotice = signal<Notice | null>(null);
+
+/** Asks robots to stop, each by itself: one that does not answer delays no other. */
+export async function stop(robotKeys: readonly string[]): Promise<void> {
+  const name = (key: string) => key.split("/").slice(1).join("/");
+  stopNotice.value = { kind: "busy", text: t("stop_sending", { robot: robotKeys.map(name).join(", ") }) };
+  const by = operator.value.trim();
+  const askedAt = performance.now();
+  const outcomes = await Promise.all(
+    robotKeys.map(async (key): Promise<Notice> => {
+      const robot = name(key);
+      try {
+        const answer = await ask(`${key}/stop`, StopRequestSchema, { reason: "the page", by }, StopAnswerSchema);
+        return answer.sent
+          ? { kind: "done", text: t("stop_done", { robot, id: String(answer.stopId) }) }
+          : { kind: "refused", text: t("stop_latched", { robot, text: reasonText(answer.reason, answer.text) }) };
+      } catch (error) {
+        // The next one must not go the same way.
+        if (error instanceof AskError && error.noAnswer) reopenIfSilent(askedAt);
+        return { kind: "refused", text: t("stop_failed", { robot, text: reasonOf(error) }) };
+      }
+    }),
+  );
+  const failed = outcomes.filter((outcome) => outcome.kind === "refused");
+  const told: Notice = {
+    kind: failed.length ? "refused" : "done",
+    text: (failed.length ? failed : outcomes).map((outcome) => outcome.text).join(" "),
+  };
+  stopNotice.value = told;
+  if (told.kind === "done") setTimeout(() => stopNotice.value === told && (stopNotice.value = null), TOLD_MS);
+}

@@ -1,0 +1,185 @@
+// What the page knows of the mesh: the newest message per key, and how old it is.
+
+import { fromBinary } from "@bufbuild/protobuf";
+import type { DescMessage, MessageShape } from "@bufbuild/protobuf";
+import { timestampMs } from "@bufbuild/protobuf/wkt";
+import type { Timestamp } from "@bufbuild/protobuf/wkt";
+import { signal } from "@preact/signals";
+import type { Signal } from "@preact/signals";
+import { useEffect, useMemo } from "preact/hooks";
+import { ageClock } from "./age-clock";
+import { AuditListSchema, AuditEntrySchema, EventListSchema, EventSchema } from "../gen/robomesh_pb";
+import type { AuditEntry, ControllerState, Event } from "../gen/robomesh_pb";
+import { hello, watch } from "./connection";
+import type { Sample } from "./connection";
+
+export interface Latest<M> {
+  key: string;
+  message: M;
+  sample: Sample;
+}
+
+/** The clock of ages in ms, four times a second: what ages are drawn by. */
+export const now = signal(ageClock());
+const tick = () => (now.value = ageClock());
+setInterval(tick, 250);
+// A page that is hidden has few ticks: what it showed is old before anybody sees it again.
+document.addEventListener("visibilitychange", tick);
+
+const REDRAW_MS = 50; // a person reads no faster; 3-D and plots take samples as they come
+const LIST_LENGTH = 200;
+
+interface Watched<M> {
+  entries: Signal<ReadonlyMap<string, Latest<M>>>;
+  users: number;
+  stop: () => void;
+}
+const watched = new Map<string, Watched<unknown>>();
+
+function follow<M>(expression: string): Watched<M> {
+  const present = watched.get(expression);
+  if (present) return present as Watched<M>;
+  const entries = signal<ReadonlyMap<string, Latest<M>>>(new Map());
+  const fresh: Watched<M> = { entries, users: 0, stop: () => undefined };
+  watched.set(expression, fresh as Watched<unknown>);
+  return fresh;
+}
+
+function start<S extends DescMessage>(schema: S, expression: string, topic: Watched<MessageShape<S>>): void {
+  const dirty = new Map<string, Sample>();
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  const flush = () => {
+    timer = undefined;
+    const next = new Map(topic.entries.value);
+    for (const [key, sample] of dirty) next.set(key, { key, sample, message: fromBinary(schema, sample.payload) });
+    dirty.clear();
+    topic.entries.value = next;
+  };
+  const stop = watch(expression, (sample) => {
+    dirty.set(sample.key, sample);
+    timer ??= setTimeout(flush, REDRAW_MS);
+  });
+  topic.stop = () => {
+    clearTimeout(timer);
+    stop();
+  };
+}
+
+/** The newest message of every key that a key expression covers. */
+export function useTopics<S extends DescMessage>(
+  schema: S,
+  expression: string,
+): ReadonlyMap<string, Latest<MessageShape<S>>> {
+  const topic = useMemo(() => follow<MessageShape<S>>(expression), [expression]);
+  useEffect(() => {
+    // Another component may have let it go between this one's drawing and now.
+    watched.set(expression, topic as Watched<unknown>);
+    if (topic.users++ === 0) start(schema, expression, topic);
+    return () => {
+      if (--topic.users === 0) {
+        topic.stop();
+        watched.delete(expression);
+      }
+    };
+  }, [topic]);
+  return topic.entries.value;
+}
+
+/** The newest message of one key. */
+export function useTopic<S extends DescMessage>(schema: S, key: string): Latest<MessageShape<S>> | undefined {
+  return useTopics(schema, key).get(key);
+}
+
+/** The last events of a robot, newest first: the gateway's, and those of every other service. */
+export function useEvents(robotKey: string): readonly Event[] {
+  return useList([`${robotKey}/events`, `${robotKey}/events/*`], (sample) =>
+    sample.live ? [fromBinary(EventSchema, sample.payload)] : fromBinary(EventListSchema, sample.payload).events,
+  );
+}
+
+/** The last audit entries of a robot, newest first. */
+export function useAudit(robotKey: string): readonly AuditEntry[] {
+  return useList([`${robotKey}/audit`], (sample) =>
+    sample.live
+      ? [fromBinary(AuditEntrySchema, sample.payload)]
+      : fromBinary(AuditListSchema, sample.payload).entries,
+  );
+}
+
+interface Dated {
+  timestamp?: Timestamp | undefined;
+}
+const timeOf = ({ timestamp }: Dated): number => (timestamp ? timestampMs(timestamp) : 0);
+
+function useList<M extends Dated>(
+  expressions: readonly string[],
+  decode: (sample: Sample) => readonly M[],
+): readonly M[] {
+  const list = useMemo(() => signal<readonly M[]>([]), expressions);
+  useEffect(() => {
+    const lists = new Map<string, { entries: readonly M[]; seen: Set<string>; last: Sample }>();
+    const take = (sample: Sample) => {
+      const before = lists.get(sample.key);
+      const entries = decode(sample);
+      const told = (before && goesOn(before.last, sample, entries.length) && before) || {
+        entries: [],
+        seen: new Set(),
+        last: sample,
+      };
+      const id = `${sample.publisher}:${sample.sequence}`;
+      if (told.seen.has(id)) return; // sent again after a new connection
+      if (sample.live) told.seen.add(id);
+      told.last = sample;
+      told.entries = [...[...entries].reverse(), ...told.entries].slice(0, LIST_LENGTH);
+      lists.set(sample.key, told);
+      // The sort is stable: what one publisher told keeps its order.
+      const merged = [...lists.values()].flatMap(({ entries }) => entries);
+      if (lists.size > 1) merged.sort((first, second) => timeOf(second) - timeOf(first));
+      list.value = merged.slice(0, LIST_LENGTH);
+    };
+    const stops = expressions.map((expression) => watch(expression, take));
+    return () => stops.forEach((stop) => stop());
+  }, [list]);
+  return list.value;
+}
+
+/** Whether a sample's entries follow the last sample's. A list after an outage holds only new entries; a list over a
+ * new connection holds all of them again. */
+function goesOn(last: Sample, sample: Sample, count: number): boolean {
+  const more = sample.sequence - last.sequence;
+  return sample.live || (sample.publisher === last.publisher && more >= BigInt(count) && more > 0n);
+}
+
+/** Age [s] of a sample now; null: not known. */
+export function ageOf(latest: Latest<unknown> | undefined, at = now.value): number | null {
+  if (!latest || latest.sample.newAt === null) return null;
+  return Math.max(0, (at - latest.sample.newAt) / 1000);
+}
+
+/** Age [s] of joint states, with what the gateway itself says of the last unit's age; null: not known. */
+export function jointsAge(
+  joints: Latest<unknown> | undefined,
+  controller: Latest<ControllerState> | undefined,
+  at = now.value,
+): number | null {
+  if (!joints) return null;
+  const own = ageOf(joints, at);
+  const reportAge = ageOf(controller, at);
+  const lastUnit = controller?.message.lastUnitAgeS;
+  if (reportAge === null || lastUnit === undefined || controller === undefined) return own;
+  const reported = reportAge + lastUnit;
+  if (own === null) return reported;
+  // A report made before the newest states came says nothing of them.
+  return controller.sample.arrived >= joints.sample.arrived ? Math.max(own, reported) : own;
+}
+
+/** Age [s] from which a topic is stale; infinite where it does not age. */
+export function staleAfter(topic: string): number {
+  const rows = hello.value?.stale ?? [];
+  const row = rows.find((r) => r.topic === topic) ?? rows.find((r) => r.topic === topic.replace(/\/.*/, "/*"));
+  return row?.afterS ?? Number.POSITIVE_INFINITY;
+}
+
+export function isStale(topic: string, age: number | null): boolean {
+  return age === null || age > staleAfter(topic);
+}

@@ -1,0 +1,126 @@
+// Plays frames at the display's rate: between the two newest by source time, at most 100 ms behind.
+
+import * as THREE from "three";
+import type { FrameTransforms } from "../gen/foxglove/FrameTransforms_pb";
+
+interface Pose {
+  position: THREE.Vector3;
+  rotation: THREE.Quaternion;
+}
+interface Keyed {
+  time: number; // source time, ms
+  poses: Map<string, Pose>; // in the site's frame
+}
+
+const BEHIND_MS = 60;
+const KEPT = 12;
+const GAP_MS = 1000; // of source time as it passes here
+
+/** Frames as they come, placements as they are drawn. */
+export class FramePlayer {
+  private readonly frames: Keyed[] = [];
+  private skew = Number.POSITIVE_INFINITY; // page's clock minus source clock as it passes here, of the least delayed frame, ms
+  private rate = 1;
+  private readonly placements = new Map<string, THREE.Matrix4>();
+  private settled = false;
+  private shownTime = Number.NEGATIVE_INFINITY; // source time of what was told last, ms
+  private passedTime = Number.NEGATIVE_INFINITY;
+
+  add(message: FrameTransforms, sourceTime: number, arrived: number): void {
+    const newest = this.frames.at(-1);
+    const early = arrived - sourceTime / this.rate;
+    if (newest && (sourceTime <= newest.time || sourceTime - newest.time > GAP_MS * Math.max(1, this.rate))) {
+      this.begin(); // a new publisher, a replay that goes elsewhere, or a long gap: no motion is made up between
+    }
+    // A replay that stood still: from now on, its frames are as much later.
+    if (early - this.skew > GAP_MS) this.skew = early;
+    this.frames.push({ time: sourceTime, poses: inSite(message) });
+    if (this.frames.length > KEPT) this.frames.shift();
+    // Forgets slowly, so that clocks that drift apart do not matter.
+    this.skew = Math.min(this.skew + 0.05, early);
+    this.settled = false;
+  }
+
+  /** How much faster than here time passes at the source: other than 1 in replays only. */
+  setRate(rate: number): void {
+    if (rate === this.rate) return;
+    this.rate = rate;
+    const newest = this.frames.at(-1);
+    this.begin();
+    if (newest) this.frames.push(newest);
+  }
+
+  private begin(): void {
+    this.frames.length = 0;
+    this.skew = Number.POSITIVE_INFINITY;
+    this.passedTime = Number.NEGATIVE_INFINITY;
+  }
+
+  /** Source time [ms] of what was told last. */
+  get shown(): number {
+    return this.shownTime;
+  }
+
+  /** Has the placements told again although nothing moved. */
+  touch(): void {
+    this.settled = false;
+  }
+
+  /** Where a frame was on its way to where it is shown, each place once, however seldom it is drawn. */
+  passed(name: string): readonly THREE.Vector3[] {
+    const from = this.passedTime;
+    this.passedTime = this.shownTime;
+    return this.frames
+      .filter((frame) => frame.time > from && frame.time <= this.shownTime)
+      .flatMap((frame) => frame.poses.get(name)?.position ?? []);
+  }
+
+  /** Placements at a time of the page's clock [ms]; null: as before. */
+  at(time: number): ReadonlyMap<string, THREE.Matrix4> | null {
+    const newest = this.frames.at(-1);
+    if (!newest || this.settled) return null;
+    const wanted = (time - this.skew - BEHIND_MS) * this.rate;
+    const after = this.frames.find((frame) => frame.time >= wanted) ?? newest;
+    const before = this.frames[this.frames.indexOf(after) - 1] ?? after;
+    this.shownTime = Math.min(wanted, newest.time);
+    const span = after.time - before.time;
+    const share = span > 0 ? THREE.MathUtils.clamp((wanted - before.time) / span, 0, 1) : 1;
+    this.settled = after === newest && share === 1;
+    for (const [name, end] of after.poses) {
+      const start = before.poses.get(name) ?? end;
+      const position = start.position.clone().lerp(end.position, share);
+      const rotation = start.rotation.clone().slerp(end.rotation, share);
+      const placement = this.placements.get(name) ?? new THREE.Matrix4();
+      this.placements.set(name, placement.compose(position, rotation, ONE));
+    }
+    return this.placements;
+  }
+}
+
+const ONE = new THREE.Vector3(1, 1, 1);
+
+/** Poses in the site's frame, whatever frame each was given in. */
+function inSite(message: FrameTransforms): Map<string, Pose> {
+  const given = new Map(message.transforms.map((transform) => [transform.childFrameId, transform]));
+  const poses = new Map<string, Pose>();
+  const poseOf = (name: string, depth: number): Pose | null => {
+    const known = poses.get(name);
+    if (known) return known;
+    const transform = given.get(name);
+    if (!transform || depth > given.size) return null;
+    const { translation: p, rotation: r } = transform;
+    const own: Pose = {
+      position: new THREE.Vector3(p?.x ?? 0, p?.y ?? 0, p?.z ?? 0),
+      rotation: new THREE.Quaternion(r?.x ?? 0, r?.y ?? 0, r?.z ?? 0, r?.w ?? 1),
+    };
+    const parent = poseOf(transform.parentFrameId, depth + 1);
+    if (parent) {
+      own.position.applyQuaternion(parent.rotation).add(parent.position);
+      own.rotation.premultiply(parent.rotation);
+    }
+    poses.set(name, own);
+    return own;
+  };
+  for (const name of given.keys()) poseOf(name, 0);
+  return poses;
+}

@@ -1,0 +1,135 @@
+// Lines in the 3-D view: the tool's trail, a path that it would take, the nearest two points.
+
+import * as THREE from "three";
+import type { Level } from "../mesh/robot-state";
+import type { Palette } from "./surroundings";
+
+const TRAIL_POINTS = 900;
+const END_RADIUS = 0.006; // m
+const MOST_WAITING = 20; // a second of what is told
+const NEAR_MS = 25; // half of the time between two
+
+/** A line over everything that is there: a way behind a link is still a way. */
+function line(points: number): THREE.Line<THREE.BufferGeometry, THREE.LineBasicMaterial> {
+  const made = new THREE.Line(
+    new THREE.BufferGeometry().setAttribute(
+      "position",
+      new THREE.BufferAttribute(new Float32Array(points * 3), 3),
+    ),
+    new THREE.LineBasicMaterial({ transparent: true, opacity: 0.9 }),
+  );
+  made.frustumCulled = false;
+  made.visible = false;
+  return made;
+}
+
+/** The last places of the tool, in the site's frame. */
+export class Trail {
+  readonly line = line(TRAIL_POINTS);
+  private length = 0;
+
+  show(shown: boolean): void {
+    this.line.visible = shown;
+    this.length = 0;
+    this.line.geometry.setDrawRange(0, 0);
+  }
+
+  extend(at: THREE.Vector3): void {
+    if (!this.line.visible) return;
+    const points = this.line.geometry.getAttribute("position") as THREE.BufferAttribute;
+    if (this.length === TRAIL_POINTS) {
+      points.array.copyWithin(0, 3);
+      this.length--;
+    }
+    points.setXYZ(this.length++, at.x, at.y, at.z);
+    points.needsUpdate = true;
+    this.line.geometry.setDrawRange(0, this.length);
+  }
+}
+
+/** A path through any number of points, in the frame of `group`'s matrix. */
+export class Path {
+  readonly line = line(0);
+
+  constructor() {
+    this.line.matrixAutoUpdate = false;
+    this.line.material.depthTest = false;
+  }
+
+  show(points: readonly (readonly [number, number, number])[] | null): void {
+    this.line.visible = points !== null && points.length > 1;
+    this.line.geometry.dispose();
+    this.line.geometry = new THREE.BufferGeometry().setAttribute(
+      "position",
+      new THREE.Float32BufferAttribute((points ?? []).flat(), 3),
+    );
+  }
+}
+
+/** The nearest two points, in the site's frame [m], how much they ask to be looked at, and their distance in words. */
+export interface Nearest {
+  points: readonly [THREE.Vector3, THREE.Vector3];
+  level: Level;
+  text: string;
+}
+
+/** A line between the nearest two points with a ball at each end and its words, played beside the arm's frames. */
+export class Gap {
+  readonly group = new THREE.Group();
+  private readonly line = line(2);
+  private readonly material = new THREE.MeshBasicMaterial({ depthTest: false, transparent: true });
+  private readonly ends = [0, 1].map(
+    () => new THREE.Mesh(new THREE.SphereGeometry(END_RADIUS, 12, 8), this.material),
+  );
+  private words: { text: string; level: Level } = { text: "", level: "normal" };
+  private waiting: { time: number; nearest: Nearest }[] = []; // by source time, ms
+
+  constructor(private readonly label: HTMLElement) {
+    this.line.visible = true;
+    this.line.material.depthTest = false;
+    this.group.add(this.line, ...this.ends);
+    this.group.visible = false;
+  }
+
+  /** Takes what is nearest at a source time [ms]. */
+  add(nearest: Nearest, time: number): void {
+    if (time < (this.waiting.at(-1)?.time ?? time)) this.waiting = []; // a new publisher
+    this.waiting.push({ time, nearest });
+    if (this.waiting.length > MOST_WAITING) this.waiting.shift();
+  }
+
+  hide(): void {
+    this.waiting = [];
+    this.group.visible = false;
+  }
+
+  /** Shows what was nearest when the arm was where it is drawn [ms of source time]. */
+  showAt(time: number, { dim, warning, alarm }: Palette): void {
+    const next = this.waiting.findIndex((each) => each.time > time + NEAR_MS);
+    const shown = this.waiting.at(next < 0 ? -1 : next - 1);
+    if (!shown || next === 0) return;
+    const { points, level, text } = shown.nearest;
+    const positions = this.line.geometry.getAttribute("position") as THREE.BufferAttribute;
+    points.forEach((point, i) => {
+      positions.setXYZ(i, point.x, point.y, point.z);
+      this.ends[i]?.position.copy(point);
+    });
+    positions.needsUpdate = true;
+    const colour = { normal: dim, warning, alarm }[level];
+    this.line.material.color.set(colour);
+    this.material.color.set(colour);
+    this.group.visible = true;
+    this.words = { text, level };
+  }
+
+  /** Puts the words beside the line's middle in the picture that was drawn now, of a size [px]. */
+  placeLabel(camera: THREE.Camera, width: number, height: number): void {
+    const [first, second] = this.ends.map((end) => end.position);
+    this.label.hidden = !this.group.visible;
+    if (this.label.hidden || !first || !second) return;
+    this.label.textContent = this.words.text;
+    this.label.dataset["level"] = this.words.level;
+    const { x, y } = first.clone().lerp(second, 0.5).project(camera);
+    this.label.style.translate = `${((x + 1) / 2) * width}px ${((1 - y) / 2) * height}px`;
+  }
+}

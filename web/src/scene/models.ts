@@ -1,0 +1,154 @@
+// Models of the 3-D view: asked of the mesh, given the page's materials, painted, copied as ghosts.
+
+import * as THREE from "three";
+import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+import { toCreasedNormals } from "three/addons/utils/BufferGeometryUtils.js";
+import { t } from "../i18n/texts";
+
+const NOT_YET: readonly number[] = [503, 504]; // the mesh's service is busy, or did not answer
+const ASK_AGAIN_MS = 2000;
+const CREASE_ANGLE = 0.6; // rad: sharper edges stay sharp
+const STALE_COLOUR = new THREE.Color("#7d8387");
+const MUTED = 0.6;
+const STALE_OPACITY = 0.38;
+const FIXTURE_OPACITY = 0.7;
+const FIXTURE_COLOUR = "#6f7c88";
+const NO_COLOUR = 0xcccccc; // a model says so where it has none of its own: see robots/meshes/mesh.py
+const EDGE_ANGLE = 30; // degrees: sharper ones are drawn
+const MOST_CORNERS = 100_000; // more of them, and their edges take too long to find
+
+/** How a model is drawn. */
+export interface Paint {
+  stale: boolean;
+  red: boolean;
+  /** What is not looked at for itself: a neighbour is muted, a fixture lets the arm be seen through it. */
+  kind: Kind;
+}
+export type Kind = "arm" | "neighbour" | "fixture";
+
+/** Asks for a GLB until there is one; null: nobody wants it any more.
+ *
+ * `failed` hears why it cannot be yet. @throws Error with the reason why it cannot be at all. */
+export async function loadModel(
+  url: string,
+  wanted: () => boolean,
+  failed: (why: string) => void,
+): Promise<THREE.Group | null> {
+  let glb: ArrayBuffer | null = null;
+  // Its service, or the console, may be starting or busy: said at once, and asked until it is there.
+  while (wanted() && !(glb = await fetched(url, failed))) {
+    await new Promise((resolve) => setTimeout(resolve, ASK_AGAIN_MS));
+  }
+  if (!wanted() || !glb) return null;
+  const { scene } = await new GLTFLoader().parseAsync(glb, "");
+  return wanted() ? scene : null;
+}
+
+/** A GLB; null, and why, where it cannot be had yet. */
+async function fetched(url: string, failed: (why: string) => void): Promise<ArrayBuffer | null> {
+  let answer: Response;
+  try {
+    answer = await fetch(url);
+    if (answer.ok) return await answer.arrayBuffer();
+  } catch {
+    failed(t("not_connected"));
+    return null;
+  }
+  const why = await answer.text();
+  if (!NOT_YET.includes(answer.status)) throw new Error(why);
+  failed(why);
+  return null;
+}
+
+/** A group that holds a model with materials of the page's own; its matrix is set by hand. */
+export function dressed(model: THREE.Group, colour: string): THREE.Group {
+  model.traverse((part) => {
+    if (!(part instanceof THREE.Mesh)) return;
+    part.castShadow = true;
+    part.receiveShadow = true;
+    if (!part.geometry.getAttribute("normal")) part.geometry = toCreasedNormals(part.geometry, CREASE_ANGLE);
+    const own = part.material instanceof THREE.MeshStandardMaterial ? part.material : null;
+    const material = new THREE.MeshStandardMaterial({
+      color: own?.color ?? new THREE.Color(colour || "#8a8f94"),
+      vertexColors: part.geometry.hasAttribute("color"),
+      map: own?.map ?? null,
+      roughness: 0.55,
+      metalness: 0.1,
+      side: THREE.DoubleSide,
+    });
+    part.material = material;
+    part.userData["colour"] = material.color.clone();
+  });
+  const group = new THREE.Group();
+  group.add(model);
+  group.matrixAutoUpdate = false;
+  return group;
+}
+
+/** A dressed fixture: of a colour that stands out from the floor where it has none, with its edges drawn. */
+export function dressedFixture(model: THREE.Group, colour: string): THREE.Group {
+  const group = dressed(model, colour);
+  const parts: THREE.Mesh[] = [];
+  group.traverse((part) => part instanceof THREE.Mesh && parts.push(part));
+  for (const part of parts) {
+    const { color, map } = part.material as THREE.MeshStandardMaterial;
+    const geometry = part.geometry as THREE.BufferGeometry;
+    const own = part.userData["colour"] as THREE.Color;
+    if (!colour && !map && !geometry.hasAttribute("color") && color.getHex() === NO_COLOUR) own.set(FIXTURE_COLOUR);
+    if (geometry.getAttribute("position").count > MOST_CORNERS) continue;
+    const edges = new THREE.LineSegments(new THREE.EdgesGeometry(geometry, EDGE_ANGLE), new THREE.LineBasicMaterial());
+    part.add(edges);
+  }
+  return group;
+}
+
+/** Gives the edges of a fixture a colour. */
+export function colourEdges(group: THREE.Group, colour: string): void {
+  group.traverse((part) => {
+    if (part instanceof THREE.LineSegments) (part.material as THREE.LineBasicMaterial).color.set(colour);
+  });
+}
+
+/** Paints a dressed model: grey and translucent when what is known of it is old. */
+export function paint(group: THREE.Group, { stale, red, kind }: Paint, alarm: string): void {
+  const opacity = stale ? STALE_OPACITY : kind === "fixture" ? FIXTURE_OPACITY : 1;
+  group.traverse((part) => {
+    if (!(part instanceof THREE.Mesh)) return;
+    const material = part.material as THREE.MeshStandardMaterial;
+    material.color.copy(part.userData["colour"] as THREE.Color);
+    if (kind === "neighbour") material.color.lerp(STALE_COLOUR, MUTED);
+    if (stale) material.color.copy(STALE_COLOUR);
+    if (red) material.color.set(alarm);
+    material.vertexColors = !stale && !red && part.geometry.hasAttribute("color");
+    material.transparent = opacity < 1;
+    material.opacity = opacity;
+    // Of what is seen through, the inside would only confuse.
+    material.side = kind === "fixture" ? THREE.FrontSide : THREE.DoubleSide;
+    material.needsUpdate = true;
+    part.castShadow = opacity === 1;
+  });
+}
+
+/** A translucent copy, hidden yet; `colourGhost` gives it its colour. */
+export function ghostOf(group: THREE.Group): THREE.Group {
+  const copy = group.clone();
+  copy.visible = false;
+  copy.matrixAutoUpdate = false;
+  const material = new THREE.MeshStandardMaterial({ transparent: true, opacity: 0.4, depthWrite: false });
+  copy.traverse((part) => {
+    if (!(part instanceof THREE.Mesh)) return;
+    part.material = material;
+    part.castShadow = false;
+  });
+  return copy;
+}
+
+/** Gives a ghost another colour. */
+export function colourGhost(copy: THREE.Group, colour: string, opacity: number): void {
+  copy.traverse((part) => {
+    if (!(part instanceof THREE.Mesh)) return;
+    const material = part.material as THREE.MeshStandardMaterial;
+    material.color.set(colour);
+    material.opacity = opacity;
+  });
+}

@@ -1,0 +1,47 @@
+// The other robots of the cell in the 3-D view of one of them.
+
+import { useEffect, useRef } from "preact/hooks";
+import { useFramesAge } from "./frames-age";
+import { DescriptionSchema } from "../gen/robomesh_pb";
+import type { Description } from "../gen/robomesh_pb";
+import { watch } from "../mesh/connection";
+import type { RobotScene } from "./scene";
+import type { Arm } from "./arm";
+import { isStale, useTopics } from "../mesh/topics";
+
+/** The other robots of a cell. */
+export function Neighbours(props: { robotKey: string; cell: string; scene: RobotScene }) {
+  const [root, site] = props.robotKey.split("/");
+  const descriptions = useTopics(DescriptionSchema, `${root}/${site}/*/description`);
+  const mates = [...descriptions.values()]
+    .filter(({ message }) => message.cell === props.cell && !message.replay)
+    .map(({ key, message }) => ({ key: key.replace(/\/description$/, ""), message }))
+    .filter(({ key }) => key !== props.robotKey);
+  return (
+    <>
+      {mates.map(({ key, message }) => (
+        <Neighbour key={key} robotKey={key} description={message} scene={props.scene} />
+      ))}
+    </>
+  );
+}
+
+/** One of them: dimmed; grey when what is known of it is old. */
+function Neighbour(props: { robotKey: string; description: Description; scene: RobotScene }) {
+  const { robotKey, description, scene } = props;
+  const stale = isStale("frames", useFramesAge(robotKey, "frames"));
+  const arm = useRef<Arm | null>(null);
+  useEffect(() => {
+    const made = scene.addNeighbour(robotKey.split("/").slice(1).join("/"), description);
+    arm.current = made;
+    const stop = watch(`${robotKey}/frames`, (sample) =>
+      made.placeFrames(sample.payload, sample.sourceTime, sample.arrived),
+    );
+    return () => {
+      stop();
+      scene.removeNeighbour(made);
+    };
+  }, [robotKey, description, scene]);
+  useEffect(() => arm.current?.setStale(stale), [stale, description, scene]);
+  return null;
+}

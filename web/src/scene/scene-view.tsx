@@ -1,0 +1,224 @@
+// The live 3-D panel: views of the description, trail and frames, and a word when it is stale.
+
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { create } from "@bufbuild/protobuf";
+import { Vector3 } from "three";
+import { distanceText, useClearanceLevel } from "../mesh/clearance";
+import { staleText, timeOfDay } from "../i18n/format";
+import { KinematicStateSchema, ReplayStateSchema, ViewSchema, View_Projection } from "../gen/robomesh_pb";
+import type { Description, Vector3 as Point, View } from "../gen/robomesh_pb";
+import { forwardOf } from "./forward-kinematics";
+import { ghost, redLinks, toolPath } from "./ghost";
+import { watch } from "../mesh/connection";
+import { Choice, Toggle } from "../ui/parts";
+import { RobotScene } from "./scene";
+import type { Stage } from "./scene";
+import type { Nearest } from "./lines";
+import { Neighbours } from "./neighbours";
+import type { OfMoment } from "../mesh/replay-moment";
+import { framesOf, framesTopic } from "./topic-selection";
+import { r } from "../i18n/recordings";
+import { t, viewText } from "../i18n/texts";
+import { theme } from "../ui/theme";
+import { useFramesAge } from "./frames-age";
+import { ageOf, isStale, useTopic } from "../mesh/topics";
+
+// Where the free camera stands, from the target, in lengths of the arm's reach.
+const FREE_EYE = { x: 1.2, y: -1.69, z: 0.72 };
+const NOMINAL_REACH = 1.1; // m, until the description is there
+
+/** Views of a description, the free one first. */
+export function viewsOf(description: Description | undefined): readonly View[] {
+  const named = description?.views ?? [];
+  const free = named.find((view) => view.name === "free") ?? freeView(named);
+  return [free, ...named.filter((view) => view.name !== "free")];
+}
+
+/** A free view as far away as the others, which stand three reaches from their target. */
+function freeView(others: readonly View[]): View {
+  const front = others.find((view) => view.name === "front");
+  const { eye, target } = front ?? {};
+  const away = eye && target ? Math.hypot(eye.x - target.x, eye.y - target.y, eye.z - target.z) : 0;
+  const reach = away / 3 || NOMINAL_REACH;
+  const at = target ?? { x: 0, y: 0, z: 0.45 * reach };
+  return create(ViewSchema, {
+    name: "free",
+    eye: { x: at.x + FREE_EYE.x * reach, y: at.y + FREE_EYE.y * reach, z: at.z + FREE_EYE.z * reach },
+    target: { x: at.x, y: at.y, z: at.z },
+    up: { x: 0, y: 0, z: 1 },
+    projection: View_Projection.PERSPECTIVE,
+  });
+}
+
+export function SceneView(props: {
+  robotKey: string;
+  description: Description | undefined;
+  stale: boolean;
+  age: number | null | undefined;
+  lostAt: number | null;
+  /** Of a replay: whether its joints are of the moment at which it is. */
+  arm?: OfMoment;
+  /** Told of each scene that is made, and of its end: somebody else's parts may stand in it. */
+  staged?: (stage: Stage | null) => void;
+}) {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const label = useRef<HTMLSpanElement>(null);
+  const scene = useRef<RobotScene | null>(null);
+  const [problem, setProblem] = useState("");
+  const [loaded, setLoaded] = useState(false);
+  const [view, setView] = useState("free");
+  const [trail, setTrail] = useState(false);
+  const [frames, setFrames] = useState(false);
+  const { robotKey, description } = props;
+  const prefix = robotKey.split("/").slice(1).join("/");
+  const topic = framesTopic(robotKey);
+  const framesAge = useFramesAge(robotKey, topic);
+  const replayed = description?.replay !== undefined;
+  // A replay that is paused sends no frames, and they are not old; whether it is there its page says.
+  const absent = props.arm === "absent" || props.arm === "coming";
+  const stale = props.stale || absent || (!replayed && isStale(topic, framesAge));
+  const age = props.stale ? props.age : framesAge;
+  const rate = useTopic(ReplayStateSchema, `${robotKey}/replay`)?.message.speed || 1;
+
+  // One scene for one description: a changed one begins anew.
+  const identity = useMemo(
+    () => description && JSON.stringify([description.links, description.fixtures, description.baseToSite]),
+    [description],
+  );
+  const forward = useMemo(
+    () => description && forwardOf(description.urdf, description.joints.map((joint) => joint.name)),
+    [description],
+  );
+  useEffect(() => {
+    if (!canvas.current || !label.current || !description) return;
+    setProblem("");
+    setLoaded(false);
+    let made: RobotScene;
+    try {
+      made = new RobotScene(canvas.current, prefix, label.current);
+    } catch {
+      setProblem(t("no_webgl"));
+      return;
+    }
+    scene.current = made;
+    props.staged?.(made.stage());
+    const missing = new Map<string, string>();
+    void made
+      .load(description, (link, text) => {
+        if (text) missing.set(link, t("model_failed", { link, text }));
+        else missing.delete(link);
+        setProblem([...missing.values()][0] ?? "");
+      })
+      .then(() => setLoaded(true));
+    return () => {
+      props.staged?.(null);
+      made.dispose();
+      scene.current = null;
+    };
+  }, [identity]);
+  useEffect(() => {
+    const made = scene.current;
+    if (!made || !description || !forward) return;
+    const read = topic === "frames" ? (payload: Uint8Array) => payload : framesOf(prefix, description, forward);
+    return watch(`${robotKey}/${topic}`, (sample) =>
+      made.placeFrames(read(sample.payload), sample.sourceTime, sample.arrived),
+    );
+  }, [identity, topic]);
+  useEffect(() => scene.current?.setStale(stale), [stale, identity, loaded]);
+  useEffect(() => scene.current?.setRate(rate), [rate, identity]);
+  useEffect(() => scene.current?.setColours(), [theme.value]);
+  useEffect(() => scene.current?.showTrail(trail), [trail, identity]);
+  useEffect(() => scene.current?.showFrames(frames), [frames, identity]);
+  const shown = ghost.value?.robotKey === robotKey ? ghost.value.positions : null;
+  useEffect(() => scene.current?.showGhost(shown && (forward?.(shown) ?? null)), [shown, forward, loaded]);
+  useEffect(() => scene.current?.setRed(redLinks.value), [redLinks.value, identity]);
+  useEffect(() => scene.current?.showPath(toolPath.value), [toolPath.value, identity]);
+  const near = useNearest(robotKey);
+  useEffect(() => scene.current?.showGap(near?.nearest ?? null, near?.sourceTime), [near, identity]);
+  const views = viewsOf(description);
+  const chosen = views.find((each) => each.name === view) ?? freeView([]);
+  useEffect(() => scene.current?.look(chosen), [chosen.name, identity]);
+
+  const onKey = (event: KeyboardEvent) => {
+    const step = 0.1;
+    const turns: Record<string, [number, number]> = {
+      ArrowLeft: [-step, 0],
+      ArrowRight: [step, 0],
+      ArrowUp: [0, -step],
+      ArrowDown: [0, step],
+    };
+    const turn = turns[event.key];
+    if (!turn) return;
+    event.preventDefault();
+    scene.current?.turn(...turn);
+  };
+  const waiting = !description ? t("waiting_description") : !loaded && !problem ? t("loading_model") : "";
+  return (
+    <section class={`panel scene ${stale && loaded ? "is-stale" : ""}`} aria-label={t("scene")} data-moment={props.arm}>
+      <div class="canvas-place">
+        <canvas
+          key={identity ?? "none"}
+          ref={canvas}
+          tabIndex={0}
+          role="img"
+          aria-label={`${t("scene")}. ${t("scene_hint")}`}
+          onKeyDown={onKey}
+          data-loaded={loaded}
+        />
+        <span class="scene-label" ref={label} hidden />
+      </div>
+      <div class="scene-tools">
+        <Choice
+          label={t("view")}
+          values={views.map((each) => each.name)}
+          chosen={chosen.name}
+          text={viewText}
+          choose={setView}
+        />
+        <div class="scene-toggles">
+          <Toggle on={trail} set={setTrail}>
+            {t("show_trail")}
+          </Toggle>
+          <Toggle on={frames} set={setFrames}>
+            {t("show_frames")}
+          </Toggle>
+        </div>
+      </div>
+      {replayed && <span class="replay-mark">{t("replay")}</span>}
+      {scene.current && loaded && description?.cell && !replayed && topic === "frames" && (
+        <Neighbours robotKey={robotKey} cell={description.cell} scene={scene.current} />
+      )}
+      {waiting && <p class="scene-word dim">{waiting}</p>}
+      {problem && <p class="scene-word trouble">{problem}</p>}
+      {!props.stale && props.arm === "absent" && (loaded || problem) && (
+        <p class="scene-stale" role="status">
+          {r("no_joints_then")}
+        </p>
+      )}
+      {stale && (props.stale || !absent) && (loaded || problem) && (
+        <p class="scene-stale" role="status">
+          <span class="shape warning" aria-hidden="true" />
+          {age === undefined ? t("no_data") : staleText(age)}
+          {props.lostAt !== null && <span class="dim">{t("no_link_since", { time: timeOfDay(props.lostAt) })}</span>}
+        </p>
+      )}
+    </section>
+  );
+}
+
+/** The nearest two points of the arm and what stands around it, while that is known. */
+function useNearest(robotKey: string): { nearest: Nearest; sourceTime: number } | null {
+  const latest = useTopic(KinematicStateSchema, `${robotKey}/kinematics`);
+  const clearance = latest?.message.clearance;
+  const level = useClearanceLevel(robotKey, clearance);
+  const known = clearance && !isStale("kinematics", ageOf(latest));
+  return useMemo(() => {
+    if (!known) return null;
+    const points = [at(clearance.firstPoint), at(clearance.secondPoint)] as const;
+    return { nearest: { points, level, text: distanceText(clearance) }, sourceTime: latest.sample.sourceTime };
+  }, [known, clearance, level]);
+}
+
+function at(point: Point | undefined): Vector3 {
+  return new Vector3(point?.x, point?.y, point?.z);
+}

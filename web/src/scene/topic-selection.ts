@@ -1,0 +1,71 @@
+// How much of a robot is taken: of one at another site what fits a slow link, unless a person asks for all.
+
+import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
+import { signal } from "@preact/signals";
+import * as THREE from "three";
+import type { Forward } from "./forward-kinematics";
+import { FrameTransformsSchema } from "../gen/foxglove/FrameTransforms_pb";
+import { JointStatesSchema } from "../gen/foxglove/JointStates_pb";
+import type { Description } from "../gen/robomesh_pb";
+import { hello } from "../mesh/connection";
+import { isReplay } from "../mesh/robot-name";
+
+export const REACHES = ["slow", "all"] as const;
+export type Reach = (typeof REACHES)[number];
+
+const asked = signal<ReadonlyMap<string, Reach>>(new Map());
+
+/** Whether it is at another site than this console. */
+export function isFar(robotKey: string): boolean {
+  const [, site, robot = ""] = robotKey.split("/");
+  return hello.value !== null && hello.value.site !== site && !isReplay(robot);
+}
+
+export function reachOf(robotKey: string): Reach {
+  return asked.value.get(robotKey) ?? (isFar(robotKey) ? "slow" : "all");
+}
+
+export function askReach(robotKey: string, reach: Reach): void {
+  asked.value = new Map(asked.value).set(robotKey, reach);
+}
+
+/** The topic of the robot's joint states, whole or thinned. */
+export function jointsTopic(robotKey: string): "joints" | "joints/slow" {
+  return reachOf(robotKey) === "slow" ? "joints/slow" : "joints";
+}
+
+/** Where the 3-D view's placements come from. */
+export function framesTopic(robotKey: string): "frames" | "joints/slow" {
+  return reachOf(robotKey) === "slow" ? "joints/slow" : "frames";
+}
+
+/** Makes a FrameTransforms payload of a JointStates payload: over a slow link placements are computed here. */
+export function framesOf(prefix: string, description: Description, forward: Forward): (joints: Uint8Array) => Uint8Array {
+  const base = matrixOf(description.baseToSite);
+  const { joints, frames } = description;
+  return (payload) => {
+    const told = new Map(fromBinary(JointStatesSchema, payload).joints.map(({ name, position }) => [name, position]));
+    const placements = forward(joints.map(({ name, home }) => told.get(name) ?? home));
+    const named = frames.flatMap(({ name, link, frameToLink }): [string, THREE.Matrix4][] => {
+      const placement = placements.get(link);
+      return placement ? [[name, placement.clone().multiply(matrixOf(frameToLink))]] : [];
+    });
+    const transforms = [...placements, ...named].map(([name, placement]) => {
+      const [translation, rotation] = [new THREE.Vector3(), new THREE.Quaternion()];
+      base.clone().multiply(placement).decompose(translation, rotation, new THREE.Vector3());
+      const { x, y, z, w } = rotation;
+      return {
+        childFrameId: `${prefix}/${name}`,
+        translation: { x: translation.x, y: translation.y, z: translation.z },
+        rotation: { x, y, z, w },
+      };
+    });
+    return toBinary(FrameTransformsSchema, create(FrameTransformsSchema, { transforms }));
+  };
+}
+
+/** Of 16 doubles by rows; anything else stands still. */
+function matrixOf(rows: readonly number[]): THREE.Matrix4 {
+  const matrix = new THREE.Matrix4();
+  return rows.length === 16 ? matrix.fromArray(rows).transpose() : matrix;
+}

@@ -1,0 +1,44 @@
+// A short tone when an alarm comes that nobody has acknowledged; off unless this browser was told otherwise.
+
+import { effect, signal } from "@preact/signals";
+import { anyWatch, nameOf, unacknowledged } from "../mesh/alarms";
+
+const KEPT = "robomesh.alarm-sound";
+const TONES_HZ = [880, 660];
+const TONE_S = 0.16;
+
+export const sound = signal(localStorage.getItem(KEPT) === "on");
+
+export function setSound(on: boolean): void {
+  sound.value = on;
+  localStorage.setItem(KEPT, on ? "on" : "off");
+  if (on) play(); // so that one hears what will be heard, and the browser lets it be heard
+}
+
+/** Plays it for each alarm that is new, from now on. */
+export function followSound(): () => void {
+  let known: ReadonlySet<string> | null = null;
+  return effect(() => {
+    const names = new Set(unacknowledged.value.map(nameOf));
+    if (known && sound.peek() && [...names].some((name) => !known?.has(name))) play();
+    if (anyWatch.value) known = names; // what is there at first is no news
+  });
+}
+
+let context: AudioContext | null = null;
+
+function play(): void {
+  const audio = (context ??= new AudioContext());
+  void audio.resume();
+  TONES_HZ.forEach((frequency, i) => {
+    const tone = audio.createOscillator();
+    const volume = audio.createGain();
+    const begin = audio.currentTime + i * TONE_S;
+    tone.frequency.value = frequency;
+    volume.gain.setValueAtTime(0.2, begin);
+    volume.gain.exponentialRampToValueAtTime(0.001, begin + TONE_S);
+    tone.connect(volume).connect(audio.destination);
+    tone.start(begin);
+    tone.stop(begin + TONE_S);
+  });
+}

@@ -1,0 +1,29 @@
+// Services alive for a robot or a site, by presence.
+
+import { presence } from "../mesh/connection";
+import { t } from "../i18n/texts";
+import { OPERATOR } from "../mesh/known-robots";
+
+/** `of`: `robomesh/<site>/<robot>`. */
+export function Services({ of: key }: { of: string }) {
+  const names = new Map<string, number>();
+  for (const token of presence.value) {
+    if (!token.startsWith(`${key}/alive/`)) continue;
+    const service = token.split("/")[4] ?? "";
+    if (service === OPERATOR) continue;
+    names.set(service, (names.get(service) ?? 0) + 1);
+  }
+  const shown = [...names].sort(([a], [b]) => a.localeCompare(b));
+  return (
+    <span class="services">
+      {shown.length
+        ? shown.map(([name, count]) => (
+            <span key={name}>
+              {name}
+              {count > 1 && ` ×${count}`}
+            </span>
+          ))
+        : t("no_services")}
+    </span>
+  );
+}

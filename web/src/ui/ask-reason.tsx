@@ -1,0 +1,60 @@
+// Asks for a reason before something is done. It is no modal dialog: STOP stays within reach.
+
+import type { ComponentChildren } from "preact";
+import { useEffect, useRef, useState } from "preact/hooks";
+import { t } from "../i18n/texts";
+
+export function Reason(props: {
+  title: string;
+  text: string;
+  does: string;
+  required?: boolean;
+  /** What else is chosen, between the text and the reason. */
+  children?: ComponentChildren;
+  close: () => void;
+  done: (reason: string) => void;
+}) {
+  const [reason, setReason] = useState("");
+  const input = useRef<HTMLInputElement>(null);
+  const opener = useRef(document.activeElement);
+  useEffect(() => {
+    input.current?.focus();
+    return () => opener.current instanceof HTMLElement && opener.current.focus();
+  }, []);
+  const missing = props.required === true && !reason.trim();
+  return (
+    <form
+      class="reason"
+      aria-label={props.title}
+      onKeyDown={(event) => event.key === "Escape" && props.close()}
+      onSubmit={(event) => {
+        event.preventDefault();
+        if (missing) return;
+        props.close();
+        props.done(reason.trim());
+      }}
+    >
+      <p>{props.text}</p>
+      {props.children}
+      <label>
+        <span class="dim">{t(props.required ? "reason_required" : "reason_optional")}</span>
+        <input
+          ref={input}
+          type="text"
+          autocomplete="off"
+          maxLength={120}
+          value={reason}
+          onInput={(event) => setReason(event.currentTarget.value)}
+        />
+      </label>
+      <div class="reason-row">
+        <button type="button" class="action" onClick={props.close}>
+          {t("cancel")}
+        </button>
+        <button type="submit" class="action primary" disabled={missing}>
+          {props.does}
+        </button>
+      </div>
+    </form>
+  );
+}

@@ -1,0 +1,67 @@
+// A new password of one's own.
+
+import { useEffect, useRef, useState } from "preact/hooks";
+import { AccountError, me, post } from "../mesh/account";
+import type { Me } from "../mesh/account";
+import { PasswordField } from "./password-field";
+import { a, refusedText } from "../i18n/account";
+
+export function ChangePassword({ close }: { close: () => void }) {
+  const [old, setOld] = useState("");
+  const [fresh, setFresh] = useState("");
+  const [again, setAgain] = useState("");
+  const [told, setTold] = useState<{ done: boolean; text: string } | null>(null);
+  const form = useRef<HTMLFormElement>(null);
+  // Escape must reach the sheet, and typing the first field.
+  useEffect(() => form.current?.querySelector<HTMLInputElement>("input:not([hidden])")?.focus(), []);
+  const send = async () => {
+    if (fresh !== again) {
+      setTold({ done: false, text: a("differ") });
+      return;
+    }
+    try {
+      me.value = await post<Me>("password", { password: old, new: fresh });
+      setTold({ done: true, text: a("changed") });
+    } catch (error) {
+      setTold({ done: false, text: a("not_changed", { text: refusalText(error) }) });
+    }
+  };
+  return (
+    <form
+      ref={form}
+      aria-label={a("change_password")}
+      onSubmit={(event) => {
+        event.preventDefault();
+        void send();
+      }}
+    >
+      {/* For password managers: whose it is. */}
+      <input type="text" name="username" autocomplete="username" value={me.value?.account} readOnly hidden />
+      <PasswordField label={a("old_password")} kind="current-password" value={old} set={setOld} />
+      <PasswordField label={a("new_password")} kind="new-password" value={fresh} set={setFresh} hint={a("new_hint")} />
+      <PasswordField label={a("new_again")} kind="new-password" value={again} set={setAgain} />
+      <p class={told && !told.done ? "sign-in-problem" : ""} role="status">
+        {told?.text ?? "\u00a0"}
+      </p>
+      <div class="account-row">
+        <button type="button" class="action" onClick={close}>
+          {a(told?.done ? "close" : "cancel")}
+        </button>
+        {!told?.done && (
+          <button type="submit" class="action primary">
+            {a("change")}
+          </button>
+        )}
+      </div>
+    </form>
+  );
+}
+
+/** A refusal in the page's language where it has words for it, in the server's where not. */
+export function refusalText(error: unknown): string {
+  if (!(error instanceof AccountError)) return String(error);
+  const { word, seconds } = error;
+  if (word === "wait") return a("wait", { seconds });
+  if (word === "wrong" || word === "busy" || word === "unreachable") return a(word);
+  return refusedText(word) || error.message;
+}

@@ -1,0 +1,92 @@
+// Who controls the robot, and the commands of whoever does.
+
+import { onlyWatches } from "../../mesh/account";
+import { mayNotCommand } from "./no-control";
+import { Command, command } from "../../mesh/command";
+import type { CommandValues } from "../../mesh/command";
+import { controlNotice, holds } from "../../mesh/control";
+import { ControllerState_Activity as Activity, ControllerState_Known as Known } from "../../gen/robomesh_pb";
+import type { ControllerState, Description, Lease } from "../../gen/robomesh_pb";
+import { useNoticeEnd } from "../../mesh/notice-end";
+import type { Motion } from "../../mesh/notice-end";
+import { NoticeLine, Panel } from "../parts";
+import { stoppedByItself, whyNoMotion } from "../../mesh/robot-state";
+import { Speed } from "./speed";
+import { Stopped } from "./stopped";
+import { t } from "../../i18n/texts";
+import type { Latest } from "../../mesh/topics";
+import { Holder, WhoControls } from "./who-controls";
+
+export function ControlPanel(props: {
+  robotKey: string;
+  controller: Latest<ControllerState> | undefined;
+  /** Who is in control, empty: nobody, null: not known. */
+  holder: string | null;
+  lease: Lease | undefined;
+  description: Description | undefined;
+  motion: Motion;
+  disobeyed: boolean;
+}) {
+  const { robotKey, holder } = props;
+  const state = props.controller?.message;
+  const mine = holds(robotKey);
+  const why = whyNoMotion(state);
+  const canMove = mine && !why;
+  const canSend = mine && !state?.stop && !state?.readOnly;
+  const send = (name: Command, what: string, values?: CommandValues, positions?: number[]) =>
+    void command(robotKey, name, what, values, undefined, positions);
+  const home = () => send(Command.HOME, t("home"), {}, props.description?.joints.map((joint) => joint.home));
+  useNoticeEnd(controlNotice.value, (notice) => (controlNotice.value = notice), props.motion);
+  const holding = state?.activity === Activity.HOLDING;
+  const tracing = state?.trace === Known.YES;
+  return (
+    <Panel
+      name={`control ${mine ? "mine" : ""}`}
+      title={t("control")}
+      end={<Holder robotKey={robotKey} holder={holder} lease={props.lease} />}
+    >
+      <WhoControls robotKey={robotKey} holder={holder} lease={props.lease} readOnly={state?.readOnly ?? false} />
+      {onlyWatches.value || (
+        <div class="command-row">
+          <button class="action" disabled={!canMove} title={mine ? why : ""} onClick={home}>
+            {t("home")}
+          </button>
+          {holding ? (
+            <button class="action primary" disabled={!canMove} onClick={() => send(Command.RESUME, t("resume"))}>
+              {t("resume")}
+            </button>
+          ) : (
+            <button class="action" disabled={!canSend} onClick={() => send(Command.HOLD, t("hold"))}>
+              {t("hold")}
+            </button>
+          )}
+          <button
+            class="action"
+            disabled={!mine || state?.readOnly}
+            aria-pressed={tracing}
+            onClick={() =>
+              tracing ? send(Command.TRACE_OFF, t("trace_off")) : send(Command.TRACE_ON, t("trace_on"))
+            }
+          >
+            {t(tracing ? "trace_off" : "trace_on")}
+          </button>
+        </div>
+      )}
+      {state && (state.stop || stoppedByItself(state)) ? (
+        <Stopped state={state} mine={mine} disobeyed={props.disobeyed} send={send} />
+      ) : (
+        onlyWatches.value || (
+          <Speed
+            percent={state?.speedPercent}
+            enabled={canSend}
+            send={(value) => command(robotKey, Command.SPEED, t("what_speed", { value }), { speedPercent: value })}
+          />
+        )
+      )}
+      <NoticeLine
+        notice={controlNotice.value}
+        idle={state?.readOnly ? why : !mine ? (mayNotCommand() ? "" : t("take_first")) : state?.stop ? "" : why || t("taken")}
+      />
+    </Panel>
+  );
+}

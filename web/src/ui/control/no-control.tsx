@@ -1,0 +1,50 @@
+// In the place of taking control: why this account cannot, and what it can do about it.
+
+import { useState } from "preact/hooks";
+import { hello } from "../../mesh/connection";
+import { me, onlyWatches, rests, unlock } from "../../mesh/account";
+import { refusalText } from "../change-password";
+import { PasswordField } from "../password-field";
+import { a } from "../../i18n/account";
+import "../account.css";
+
+/** Whether whoever is signed in may not ask for control now. */
+export function mayNotCommand(): boolean {
+  return onlyWatches.value || rests.value || (!!hello.value?.account && !hello.value.mayCommand);
+}
+
+export function NoControl() {
+  const [password, setPassword] = useState("");
+  const [problem, setProblem] = useState("");
+  if (onlyWatches.value) return <p class="no-control">{a("monitor_only", { account: me.value?.account ?? "" })}</p>;
+  const send = async () => {
+    try {
+      await unlock(password);
+    } catch (error) {
+      setProblem(refusalText(error));
+    }
+    setPassword("");
+  };
+  return (
+    <form
+      class="no-control"
+      aria-label={a("unlock")}
+      onSubmit={(event) => {
+        event.preventDefault();
+        void send();
+      }}
+    >
+      <p>{a("unlock_says")}</p>
+      <input type="text" name="username" autocomplete="username" value={me.value?.account} readOnly hidden />
+      <PasswordField label={a("password")} kind="current-password" value={password} set={setPassword} />
+      {problem && (
+        <p class="sign-in-problem" role="alert">
+          {problem}
+        </p>
+      )}
+      <button type="submit" class="action primary">
+        {a("unlock")}
+      </button>
+    </form>
+  );
+}

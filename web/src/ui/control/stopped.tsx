@@ -1,0 +1,48 @@
+// What keeps the robot from moving until it is reset: a latched stop, or the controller's own stop or fault.
+
+import { Command } from "../../mesh/command";
+import type { CommandValues } from "../../mesh/command";
+import { stampFull } from "../../i18n/format";
+import { ControllerState_Activity as Activity } from "../../gen/robomesh_pb";
+import type { ControllerState } from "../../gen/robomesh_pb";
+import { moves, stopText } from "../../mesh/robot-state";
+import { t } from "../../i18n/texts";
+
+export function Stopped(props: {
+  state: ControllerState;
+  mine: boolean;
+  disobeyed: boolean;
+  send: (name: Command, what: string, values: CommandValues) => void;
+}) {
+  const { state, mine } = props;
+  const { stop } = state;
+  const moving = props.disobeyed || moves(state);
+  const what = stop ? t("reset", { id: String(stop.id) }) : t("reset_own");
+  const needs = moving ? t("reset_moving") : t(stop ? "reset_needs" : "own_reset_needs");
+  return (
+    <div class="stopped">
+      <div>
+        <strong>
+          <span class="shape alarm" aria-hidden="true" />
+          <span title={stampFull(stop?.since)}>
+            {stop ? stopText(state, props.disobeyed) : t(state.activity === Activity.FAULT ? "own_fault" : "own_stop")}
+          </span>
+        </strong>
+        <p>
+          {stop && !stop.sent && `${t("stopped_unsent")} `}
+          {stop?.reason && stop.reason !== "console" && `${stop.reason}. `}
+          {!stop && state.fault && `${state.fault}. `}
+          {needs}
+        </p>
+      </div>
+      <button
+        class="action"
+        disabled={!mine || moving}
+        title={moving ? t("reset_moving") : mine ? "" : t("reset_take")}
+        onClick={() => props.send(Command.RESET, what, { stopId: stop?.id ?? 0n })}
+      >
+        {what}
+      </button>
+    </div>
+  );
+}

@@ -1,0 +1,191 @@
+// Who is in control, who asks for it, to whom it is offered; and how one gets it, from nobody or from somebody.
+
+import { useEffect, useState } from "preact/hooks";
+import type { ComponentChildren } from "preact";
+import { mayNotCommand, NoControl } from "./no-control";
+import { accept, askFor, holds, ms, offer, operator, ownName, release, setOperator, take, takeOver } from "../../mesh/control";
+import { ageText, stampFull, stampTime } from "../../i18n/format";
+import type { Lease, Lease_Asker } from "../../gen/robomesh_pb";
+import { hello } from "../../mesh/connection";
+import { Reason } from "../ask-reason";
+import { t } from "../../i18n/texts";
+
+const MOST_ASKERS_SHOWN = 3;
+
+/** In the panel's head: who is in control, since when. */
+export function Holder(props: { robotKey: string; holder: string | null; lease: Lease | undefined }) {
+  const { holder } = props;
+  const mine = holds(props.robotKey);
+  const elsewhere = holder && holder === operator.value.trim();
+  const who = mine
+    ? t("in_control")
+    : holder === null
+      ? t("holder_unknown")
+      : !holder
+        ? t("nobody")
+        : t(elsewhere ? "elsewhere" : "somebody", { name: holder });
+  return (
+    <>
+      <span class={`holder ${mine ? "mine" : holder === null ? "dim" : ""}`}>
+        {mine && <span class="shape mine" aria-hidden="true" />}
+        {who}
+      </span>
+      {holder && (
+        <span class="since dim" title={stampFull(props.lease?.since)}>
+          {t("since", { time: stampTime(props.lease?.since) })}
+        </span>
+      )}
+    </>
+  );
+}
+
+export function WhoControls(props: {
+  robotKey: string;
+  /** Who is in control, empty: nobody, null: not known. */
+  holder: string | null;
+  lease: Lease | undefined;
+  readOnly: boolean;
+}) {
+  const { robotKey, lease } = props;
+  const mine = holds(robotKey);
+  // While it is not known who is in control, the buttons stay as they were: none changes under the pointer.
+  const other = (!mine && (props.holder ?? lease?.holder)) || "";
+  const [sheet, setSheet] = useState<"ask" | "take" | null>(null);
+  // What it says of somebody is not asked of somebody else.
+  useEffect(() => setSheet(null), [other, ms(lease?.since)]);
+  const open = (which: "ask" | "take") => ownName() && setSheet(which);
+  if (mayNotCommand() && !mine) return <NoControl />;
+  return (
+    <>
+      {props.holder && lease && <Wishes mine={mine} robotKey={robotKey} lease={lease} />}
+      <div class="take-row">
+        <label class="operator">
+          <span class="dim">{t("operator")}</span>
+          <input
+            type="text"
+            name="operator"
+            autocomplete="username"
+            spellcheck={false}
+            maxLength={40}
+            placeholder={t("operator")}
+            title={t("operator_hint")}
+            value={operator.value}
+            disabled={mine || !!hello.value?.operator}
+            onInput={(event) => setOperator(event.currentTarget.value)}
+            onKeyDown={(event) => event.key === "Enter" && !other && void take(robotKey)}
+          />
+        </label>
+        {mine ? (
+          <button class="action" onClick={() => void release()}>
+            {t("release")}
+          </button>
+        ) : other ? (
+          <>
+            {other !== operator.value.trim() && (
+              <button class="action primary" disabled={props.readOnly} onClick={() => open("ask")}>
+                {t("ask")}
+              </button>
+            )}
+            <button class="action" disabled={props.readOnly} onClick={() => open("take")}>
+              {t("take_over")}
+            </button>
+          </>
+        ) : (
+          <button class="action primary" onClick={() => void take(robotKey)} disabled={props.readOnly}>
+            {t("take")}
+          </button>
+        )}
+      </div>
+      {sheet === "ask" && other && (
+        <Reason
+          title={t("ask_from", { name: other })}
+          text={t("ask_says", { name: other })}
+          does={t("ask")}
+          close={() => setSheet(null)}
+          done={(reason) => void askFor(robotKey, other, reason)}
+        />
+      )}
+      {sheet === "take" && other && (
+        <Reason
+          required
+          title={t("take_from", { name: other })}
+          text={t(lease?.motion ? "take_says_moving" : "take_says", { name: other })}
+          does={t("take_from", { name: other })}
+          close={() => setSheet(null)}
+          done={(reason) => void takeOver(robotKey, reason)}
+        />
+      )}
+    </>
+  );
+}
+
+/** Who would like to have control, and to whom it is offered: for everybody to see, for some to answer. */
+function Wishes({ mine, robotKey, lease }: { mine: boolean; robotKey: string; lease: Lease }) {
+  const me = operator.value.trim();
+  const { holder, offeredTo } = lease;
+  const [declined, setDeclined] = useState<readonly string[]>([]);
+  const idOf = (asker: Lease_Asker) => `${asker.operator} ${ms(asker.since)}`;
+  const age = (asker: Lease_Asker) => ageText(Math.max(0, ms(lease.timestamp) - ms(asker.since)) / 1000);
+  // An offer that was withdrawn and made again is a new one.
+  useEffect(() => setDeclined((old) => old.filter((each) => each !== "offer")), [offeredTo]);
+  const decline = (what: string) => setDeclined([...declined, what]);
+  const handOver = (asker: Lease_Asker) => {
+    decline(idOf(asker)); // answered: an offer that is withdrawn does not bring it back
+    void offer(asker.operator);
+  };
+  const toMe = !mine && offeredTo !== "" && offeredTo === me;
+  const asking = lease.askedBy.filter((each) => each.operator !== offeredTo && !declined.includes(idOf(each)));
+  const shown = asking.slice(0, MOST_ASKERS_SHOWN);
+  return (
+    <div role="status">
+      {offeredTo && !(toMe && declined.includes("offer")) && (
+        <Wish strong={toMe || mine} text={t(toMe ? "offers_you" : mine ? "offer_open" : "offers", { holder, name: offeredTo })}>
+          {toMe && (
+            <>
+              <button class="action primary" onClick={() => void accept(robotKey)}>
+                {t("accept")}
+              </button>
+              <button class="action" onClick={() => decline("offer")}>
+                {t("not_now")}
+              </button>
+            </>
+          )}
+          {mine && (
+            <button class="action" onClick={() => void offer(null)}>
+              {t("withdraw")}
+            </button>
+          )}
+        </Wish>
+      )}
+      {shown.map((asker) => (
+        <Wish
+          key={idOf(asker)}
+          strong={mine}
+          text={t(asker.operator === me ? "you_ask" : "asks", { name: asker.operator, holder, age: age(asker) })}
+          reason={asker.reason}
+        >
+          {mine && (
+            <>
+              <button class="action primary" onClick={() => handOver(asker)}>
+                {t("hand_over", { name: asker.operator })}
+              </button>
+              <button class="action" onClick={() => decline(idOf(asker))}>
+                {t("not_now")}
+              </button>
+            </>
+          )}
+        </Wish>
+      ))}
+      {asking.length > shown.length && <Wish text={t("more_ask", { count: asking.length - shown.length })} />}
+    </div>
+  );
+}
+
+function Wish(props: { strong?: boolean; text: string; reason?: string; children?: ComponentChildren }) {
+  return (
+    <div class={`wish ${props.strong ? "strong" : ""}`}>
+      <p>{props.reason ? t("with_reason", { text: props.text, reason: props.reason }) : props.text}</p>
+      {props.children}
+    </div>
+  );
+}

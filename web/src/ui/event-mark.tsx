@@ -1,0 +1,28 @@
+// The mark of an event's severity and of an audit entry's outcome: a word, with a shape where a person must look.
+
+import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "../gen/robomesh_pb";
+import { t } from "../i18n/texts";
+import type { TextName } from "../i18n/texts";
+
+export const SEVERITIES: Partial<Record<Severity, [TextName, string]>> = {
+  [Severity.DEBUG]: ["severity_debug", "normal"],
+  [Severity.INFO]: ["severity_info", "normal"],
+  [Severity.WARNING]: ["severity_warning", "warning"],
+  [Severity.ERROR]: ["severity_error", "alarm"],
+  [Severity.CRITICAL]: ["severity_critical", "alarm"],
+};
+export const OUTCOMES: Partial<Record<Outcome, [TextName, string]>> = {
+  [Outcome.ACCEPTED]: ["outcome_accepted", "normal"],
+  [Outcome.REFUSED]: ["outcome_refused", "warning"],
+  [Outcome.FAILED]: ["outcome_failed", "alarm"],
+};
+
+/** A word that asks to be looked at; what is as it should be has no shape. */
+export function Mark({ word, level }: { word: TextName; level: string }) {
+  return (
+    <span class={`mark state ${level}`}>
+      {level !== "normal" && <span class={`shape ${level}`} aria-hidden="true" />}
+      {t(word)}
+    </span>
+  );
+}

@@ -1,0 +1,122 @@
+// How far the arm is from what it must not come to, as bars: grey while there is room, amber where it is short.
+
+import type { ComponentChildren } from "preact";
+import { distanceText, ownLevel, pairText, useClearanceLevel } from "../mesh/clearance";
+import { fixed, toDegrees } from "../i18n/format";
+import { Description_Joint_Type } from "../gen/robomesh_pb";
+import type { Description, KinematicState } from "../gen/robomesh_pb";
+import { Unit } from "./parts";
+import type { Level } from "../mesh/robot-state";
+import { t } from "../i18n/texts";
+
+// A bar is full from here on; what lies beyond is room enough.
+const FULL_CLEARANCE_M = 0.3;
+const FULL_SINGULARITY = 0.25;
+// Below these a bar is amber, and kinematics has an event.
+const LOW_LIMIT = 0.02; // of the range
+const LOW_SINGULARITY = 0.02;
+
+export function Margins(props: {
+  robotKey: string;
+  state: KinematicState | undefined;
+  description: Description | undefined;
+  stale: boolean;
+}) {
+  const { state, description, robotKey, stale } = props;
+  const around = state?.clearance;
+  const level = useClearanceLevel(robotKey, around);
+  const own = state?.ownClearance;
+  const limit = nearestLimit(state, description);
+  const singularity = state?.singularityMargin;
+  const missing = state?.notCounted ?? [];
+  return (
+    <ul class={`margins ${stale && state ? "stale" : ""}`}>
+      <Margin
+        name="clearance"
+        label={t("clearance")}
+        of={around && pairText(around, robotKey)}
+        level={level}
+        share={around && around.distance / Math.max(FULL_CLEARANCE_M, description?.warningDistance ?? 0)}
+      >
+        {around ? distanceText(around) : state && t("nothing_around")}
+      </Margin>
+      <Margin
+        name="own-clearance"
+        label={t("own_clearance")}
+        of={own && pairText(own, robotKey)}
+        level={own ? ownLevel(own) : "normal"}
+        share={own && own.distance / FULL_CLEARANCE_M}
+      >
+        {own && distanceText(own)}
+      </Margin>
+      <Margin
+        name="limit"
+        label={t("margin")}
+        of={limit?.name}
+        level={!limit ? "normal" : limit.value < 0 ? "alarm" : limit.share < LOW_LIMIT ? "warning" : "normal"}
+        share={limit && limit.share * 2}
+      >
+        {limit && (
+          <>
+            {fixed(limit.value, limit.unit === "mm" ? 1 : 2)}
+            <Unit of={limit.unit} />
+          </>
+        )}
+      </Margin>
+      <Margin
+        name="singularity"
+        label={t("singularity")}
+        level={singularity !== undefined && singularity < LOW_SINGULARITY ? "warning" : "normal"}
+        share={singularity !== undefined ? singularity / FULL_SINGULARITY : undefined}
+      >
+        {singularity !== undefined && fixed(singularity, 3)}
+      </Margin>
+      {missing.length > 0 && (
+        <li class="not-counted warning">
+          <span class="shape warning" aria-hidden="true" />
+          {t("not_counted", { robots: missing.join(", ") })}
+        </li>
+      )}
+    </ul>
+  );
+}
+
+/** A label, what it is measured to, a bar, and the number or words; without them a dash. */
+function Margin(props: {
+  name: string;
+  label: string;
+  of?: string | undefined;
+  level: Level;
+  share: number | undefined;
+  children: ComponentChildren;
+}) {
+  const { name, label, of, level, share } = props;
+  const full = Math.min(1, Math.max(0, share ?? 0));
+  return (
+    <li class={`margin ${level}`} data-margin={name}>
+      <span class="margin-label">
+        {level !== "normal" && <span class={`shape ${level}`} aria-hidden="true" />}
+        {label}
+        {of && <span class="margin-of" title={of}>{of}</span>}
+      </span>
+      <span class="margin-bar" aria-hidden="true">
+        {share !== undefined && <span style={{ width: `${100 * full}%` }} />}
+      </span>
+      <span class="margin-value">{props.children || "–"}</span>
+    </li>
+  );
+}
+
+/** The joint or constraint nearest to one of its limits, by its share of the range. */
+function nearestLimit(state: KinematicState | undefined, description: Description | undefined) {
+  let nearest: { name: string; value: number; unit: string; share: number } | undefined;
+  for (const { name, lower, upper } of state?.limitMargins ?? []) {
+    const margin = Math.min(lower, upper);
+    const share = margin / Math.max(1e-9, lower + upper);
+    if (nearest && nearest.share <= share) continue;
+    const joint = description?.joints.find((each) => each.name === name);
+    const slides = joint?.type === Description_Joint_Type.PRISMATIC;
+    nearest = { name, share, value: slides ? margin * 1000 : toDegrees(margin), unit: slides ? "mm" : "°" };
+  }
+  return nearest;
+}

@@ -1,0 +1,117 @@
+// A joint between its limits: where it is, and a handle for where it shall go.
+//
+// Only dragging the handle itself sets a target, and only letting go of it sends one; a tap on the
+// track does nothing. By keys: arrows set, Enter sends, Escape takes back.
+
+import { useRef, useState } from "preact/hooks";
+import { t } from "../i18n/texts";
+
+export interface TrackProps {
+  label: string;
+  lower: number;
+  upper: number;
+  position: number | undefined;
+  /** A target that was set or sent; undefined: none. */
+  target: number | undefined;
+  stale: boolean;
+  enabled: boolean;
+  /** Steps of the arrow keys, fine with Shift, coarse with Page up and down; in the joint's unit. */
+  step: number;
+  text: (value: number) => string;
+  /** While it is being set; undefined: taken back. */
+  preview: (value: number | undefined) => void;
+  send: (value: number) => void;
+}
+
+export function JointTrack(props: TrackProps) {
+  const { lower, upper, position, target, enabled } = props;
+  const track = useRef<HTMLDivElement>(null);
+  const [dragged, setDragged] = useState<number | undefined>(undefined);
+  const [typed, setTyped] = useState<number | undefined>(undefined);
+  const drag = useRef<{ pointer: number; offset: number; value?: number } | null>(null);
+
+  const clamp = (value: number) => Math.min(upper, Math.max(lower, value));
+  const share = (value: number) => `${(100 * (clamp(value) - lower)) / (upper - lower)}%`;
+  const shown = dragged ?? typed ?? target ?? position;
+  const unsent = dragged ?? typed;
+
+  const valueAt = (x: number) => {
+    const box = track.current?.getBoundingClientRect();
+    return box ? lower + ((x - box.left) / box.width) * (upper - lower) : lower;
+  };
+  const take = (value: number | undefined) => {
+    setDragged(undefined);
+    setTyped(undefined);
+    drag.current = null;
+    if (value === undefined) props.preview(undefined);
+    else props.send(value);
+  };
+  const onDown = (event: PointerEvent & { currentTarget: HTMLElement }) => {
+    if (!enabled || shown === undefined || event.button !== 0) return;
+    event.currentTarget.setPointerCapture(event.pointerId);
+    drag.current = { pointer: event.pointerId, offset: valueAt(event.clientX) - shown };
+    setTyped(undefined);
+  };
+  const onMove = (event: PointerEvent) => {
+    if (drag.current?.pointer !== event.pointerId) return;
+    const value = clamp(valueAt(event.clientX) - drag.current.offset);
+    drag.current.value = value;
+    setDragged(value);
+    props.preview(value);
+  };
+  const onUp = (event: PointerEvent) => {
+    if (drag.current?.pointer !== event.pointerId) return;
+    take(enabled ? drag.current.value : undefined);
+  };
+  const onKey = (event: KeyboardEvent) => {
+    if (!enabled || shown === undefined) return;
+    const step = event.shiftKey ? props.step / 10 : props.step;
+    const steps: Record<string, number> = {
+      ArrowRight: step,
+      ArrowUp: step,
+      ArrowLeft: -step,
+      ArrowDown: -step,
+      PageUp: props.step * 10,
+      PageDown: -props.step * 10,
+    };
+    const by = steps[event.key];
+    if (by !== undefined) {
+      const value = clamp(shown + by);
+      setTyped(value);
+      props.preview(value);
+    } else if (event.key === "Enter" && typed !== undefined) take(typed);
+    else if (event.key === "Escape") take(undefined);
+    else return;
+    event.preventDefault();
+  };
+  return (
+    <div class={`track ${props.stale ? "stale" : ""}`} ref={track}>
+      <div class="track-bar" />
+      {lower < 0 && upper > 0 && <div class="track-zero" style={{ left: share(0) }} />}
+      {position !== undefined && (
+        <div class="track-position" style={{ left: share(position) }} />
+      )}
+      {shown !== undefined && enabled && (
+        <div
+          class={`track-handle ${unsent !== undefined ? "unsent" : ""}`}
+          style={{ left: share(shown) }}
+          role="slider"
+          tabIndex={0}
+          aria-label={props.label}
+          title={t("joint_keys")}
+          aria-valuemin={lower}
+          aria-valuemax={upper}
+          aria-valuenow={shown}
+          aria-valuetext={props.text(shown)}
+          onPointerDown={onDown}
+          onPointerMove={onMove}
+          onPointerUp={onUp}
+          onPointerCancel={() => take(undefined)}
+          onLostPointerCapture={() => drag.current && take(undefined)}
+          onKeyDown={onKey}
+          onBlur={() => typed !== undefined && take(undefined)}
+        />
+      )}
+    </div>
+  );
+}

@@ -1,0 +1,82 @@
+// A joint's value; pressed, it becomes a field for an exact target: Enter sends, Escape takes back.
+
+import { useState } from "preact/hooks";
+import { DASH, fixed, jointUnit } from "../i18n/format";
+import type { Description_Joint } from "../gen/robomesh_pb";
+import { Unit } from "./parts";
+import { t } from "../i18n/texts";
+
+export function JointValue(props: {
+  joint: Description_Joint;
+  position: number | undefined;
+  stale: boolean;
+  enabled: boolean;
+  /** While it is being typed, where it is a number within the limits; undefined: taken back. */
+  preview: (value: number | undefined) => void;
+  send: (value: number) => void;
+  wrong: (text: string) => void;
+}) {
+  const { joint, position, enabled } = props;
+  const { unit, decimals, factor } = jointUnit(joint);
+  const [typed, setTyped] = useState<string | null>(null);
+  const text = position === undefined ? DASH : fixed(position * factor, decimals);
+  const end = () => {
+    setTyped(null);
+    props.preview(undefined);
+  };
+  const enter = () => {
+    const value = numberOf(typed ?? "");
+    end();
+    if (Number.isFinite(value)) props.send(value / factor);
+    else props.wrong(t("no_number", { text: typed ?? "" }));
+  };
+  const type = (text: string) => {
+    setTyped(text);
+    const value = numberOf(text) / factor;
+    props.preview(value >= joint.lower && value <= joint.upper ? value : undefined);
+  };
+  return (
+    <span class={`value ${props.stale ? "stale" : ""}`} data-joint={joint.name}>
+      {!enabled ? (
+        text
+      ) : typed === null ? (
+        <button
+          class="value-button"
+          title={t("type_target")}
+          aria-label={`${t("joint_type", { joint: joint.name })}: ${text}`}
+          onClick={() => setTyped("")}
+        >
+          {text}
+        </button>
+      ) : (
+        <input
+          class="value-field"
+          type="text"
+          inputMode="decimal"
+          autocomplete="off"
+          maxLength={12}
+          placeholder={text}
+          aria-label={t("joint_type", { joint: joint.name })}
+          title={t("type_target")}
+          ref={focus}
+          value={typed}
+          onInput={(event) => type(event.currentTarget.value)}
+          onBlur={end}
+          onKeyDown={(event) => {
+            if (event.key === "Enter") enter();
+            else if (event.key === "Escape") end();
+          }}
+        />
+      )}
+      <Unit of={unit} />
+    </span>
+  );
+}
+
+const focus = (field: HTMLInputElement | null) => field?.focus();
+
+/** A number as people type it: a comma for the point, a true minus sign. Not a number where it is none. */
+function numberOf(text: string): number {
+  const plain = text.trim().replace("−", "-").replace(",", ".");
+  return plain ? Number(plain) : NaN;
+}

@@ -1,0 +1,50 @@
+// A password that can be looked at, with a word when Caps Lock is on.
+
+import { useId, useState } from "preact/hooks";
+import { a } from "../i18n/account";
+
+export function PasswordField(props: {
+  label: string;
+  kind: "current-password" | "new-password";
+  value: string;
+  set: (value: string) => void;
+  hint?: string;
+}) {
+  const id = useId();
+  const [shown, setShown] = useState(false);
+  const [caps, setCaps] = useState(false);
+  const look = (event: KeyboardEvent) => setCaps(event.getModifierState?.("CapsLock") ?? false);
+  return (
+    <div class="field">
+      <label for={id}>
+        <span>{props.label}</span>
+      </label>
+      <span class="password-field">
+        <input
+          {...(shown ? ({ type: "text" } as const) : ({ type: "password" } as const))}
+          id={id}
+          name={props.kind}
+          autocomplete={props.kind}
+          autocapitalize="none"
+          autocorrect="off"
+          spellcheck={false}
+          maxLength={256}
+          required
+          value={props.value}
+          onInput={(event) => props.set(event.currentTarget.value)}
+          onKeyDown={look}
+          onKeyUp={look}
+        />
+        <button type="button" class="quiet" aria-pressed={shown} onClick={() => setShown(!shown)}>
+          {a(shown ? "hide" : "show")}
+        </button>
+      </span>
+      {caps && (
+        <span class="state warning" role="status">
+          {a("caps")}
+        </span>
+      )}
+      {props.hint && <span class="dim">{props.hint}</span>}
+    </div>
+  );
+}

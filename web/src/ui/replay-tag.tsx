@@ -1,0 +1,16 @@
+// What marks everything that is played back, in magenta and in words.
+
+import { fullTime } from "../i18n/format";
+import { Tag } from "./parts";
+import { dateText } from "../i18n/recording-format";
+import { r } from "../i18n/recordings";
+
+/** Of which robot, and when it was. */
+export function ReplayTag({ robot, start }: { robot: string; start: number }) {
+  return (
+    <Tag kind="replay">
+      <span class="replay-shape" aria-hidden="true" />
+      <span title={start ? fullTime(start) : ""}>{r("replay_of", { robot, time: dateText(start) })}</span>
+    </Tag>
+  );
+}

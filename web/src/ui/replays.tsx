@@ -1,0 +1,47 @@
+// The recordings that are being played back now, apart from the robots that are live.
+
+import { timestampMs } from "@bufbuild/protobuf/wkt";
+import { ReplayStateSchema } from "../gen/robomesh_pb";
+import type { ReplayState } from "../gen/robomesh_pb";
+import { recordingsLink, robotLink } from "./route";
+import { ageOf, isStale, useTopics } from "../mesh/topics";
+import { momentText } from "../i18n/recording-format";
+import { ReplayTag } from "./replay-tag";
+import { r } from "../i18n/recordings";
+import "./replay.css";
+
+export function Replays() {
+  const states = useTopics(ReplayStateSchema, "robomesh/*/*/replay");
+  const shown = [...states.values()].filter((latest) => !isStale("replay", ageOf(latest)));
+  if (shown.length === 0) return null;
+  return (
+    <section class="site replays" aria-label={r("replays")}>
+      <div class="site-head">
+        <h2>{r("replays")}</h2>
+        <span class="dim small">{r("replays_words")}</span>
+      </div>
+      <ul>
+        {shown.map(({ key, message }) => (
+          <Line key={key} site={key.split("/")[1] ?? ""} state={message} />
+        ))}
+      </ul>
+    </section>
+  );
+}
+
+function Line({ site, state }: { site: string; state: ReplayState }) {
+  return (
+    <li class="replay-line">
+      <a href={robotLink(site, state.robot)}>
+        <ReplayTag robot={state.ofRobot} start={state.start ? timestampMs(state.start) : 0} />
+      </a>
+      <span class="figure">
+        {r("position_of", { position: momentText(state.positionS, 0), duration: momentText(state.durationS, 0) })}
+      </span>
+      <span class="dim">{state.playing ? `${r("playing")}, ${state.speed}×` : r("paused")}</span>
+      <a class="page-link" href={recordingsLink({ site, file: state.file })}>
+        {r("to_recording")}
+      </a>
+    </li>
+  );
+}

@@ -1,0 +1,38 @@
+// What must be seen at once, over the robot's page: an arm that does not heed its stop, a critical event.
+
+import { timestampMs } from "@bufbuild/protobuf/wkt";
+import { useState } from "preact/hooks";
+import { stampFull, stampTime } from "../i18n/format";
+import { Event_Severity as Severity } from "../gen/robomesh_pb";
+import type { ControllerState, Event } from "../gen/robomesh_pb";
+import { DISOBEYED, before, disobeys } from "../mesh/robot-state";
+import { t } from "../i18n/texts";
+
+const SHOWN_MS = 600_000; // unless it is dismissed before
+
+export function Alarm({ state, events }: { state: ControllerState | undefined; events: readonly Event[] }) {
+  const [dismissed, setDismissed] = useState(0);
+  if (disobeys(state, events)) {
+    return (
+      <div class="alarm-band" role="alert">
+        <span class="shape alarm" aria-hidden="true" />
+        {t("disobeys")}
+      </div>
+    );
+  }
+  const event = events.find(({ severity }) => severity === Severity.CRITICAL);
+  const at = event?.timestamp ? timestampMs(event.timestamp) : 0;
+  if (!event || at <= dismissed || (state && before(state, event.timestamp) > SHOWN_MS)) return null;
+  const time = stampTime(event.timestamp);
+  return (
+    <div class="alarm-band past" role="alert">
+      <span class="shape alarm" aria-hidden="true" />
+      <span title={stampFull(event.timestamp)}>
+        {event.code === DISOBEYED ? t("disobeyed", { time }) : t("critical_at", { time, text: event.text })}
+      </span>
+      <button class="quiet" onClick={() => setDismissed(at)}>
+        {t("dismiss")}
+      </button>
+    </div>
+  );
+}

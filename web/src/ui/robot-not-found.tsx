@@ -1,0 +1,41 @@
+// A robot that is not there: said, with those that are.
+
+import { useEffect, useState } from "preact/hooks";
+import { fleetRobots } from "../mesh/known-robots";
+import { hello, lostAt } from "../mesh/connection";
+import { robotLink } from "./route";
+import type { RobotName } from "../mesh/robot-name";
+import { t } from "../i18n/texts";
+
+const SHOWS_WITHIN_MS = 4000;
+
+/** Whether nothing was heard of a robot for some seconds of a connection that stands; `known`: something was. */
+export function useMissing(robotKey: string, known: boolean): boolean {
+  const [waited, setWaited] = useState(false);
+  const there = known || fleetRobots.value.includes(robotKey);
+  const connected = lostAt.value === null && hello.value?.connected === true;
+  useEffect(() => {
+    setWaited(false);
+    if (there || !connected) return;
+    const timer = setTimeout(() => setWaited(true), SHOWS_WITHIN_MS);
+    return () => clearTimeout(timer);
+  }, [robotKey, there, connected]);
+  return waited && !there;
+}
+
+export function Missing({ site, robot }: RobotName) {
+  const robots = fleetRobots.value.map((key) => key.split("/").slice(1) as [string, string]);
+  return (
+    <div class="missing" role="status">
+      <h1>{t("no_robot", { site, robot })}</h1>
+      <p>{t(robots.length ? "there_are" : "none_at_all")}</p>
+      <ul>
+        {robots.map(([at, name]) => (
+          <li key={`${at}/${name}`}>
+            <a href={robotLink(at, name)}>{`${at} / ${name}`}</a>
+          </li>
+        ))}
+      </ul>
+    </div>
+  );
+}

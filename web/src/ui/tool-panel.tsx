@@ -1,0 +1,55 @@
+// Where the tool is, how fast, and how far the arm is from what it must not come to.
+
+import { fixed, rollPitchYaw, toDegrees } from "../i18n/format";
+import type { Description, KinematicState } from "../gen/robomesh_pb";
+import { Margins } from "./joint-limits-panel";
+import { Age, Panel, Unit } from "./parts";
+import { t } from "../i18n/texts";
+import { ageOf, isStale } from "../mesh/topics";
+import type { Latest } from "../mesh/topics";
+
+export function ToolPanel(props: {
+  robotKey: string;
+  kinematics: Latest<KinematicState> | undefined;
+  description: Description | undefined;
+}) {
+  const state = props.kinematics?.message;
+  const age = ageOf(props.kinematics);
+  const stale = isStale("kinematics", age);
+  const pose = state?.toolToBase.length === 16 ? state.toolToBase : undefined;
+  const at = pose ? [pose[3], pose[7], pose[11]] : [];
+  const angles = pose ? rollPitchYaw(pose).map(toDegrees) : [];
+  const v = state?.linearVelocity;
+  const speed = v ? Math.hypot(v.x, v.y, v.z) * 1000 : undefined;
+  return (
+    <Panel
+      name="tool"
+      title={t("tool")}
+      end={props.kinematics ? <Age stale={stale} age={age} /> : <span class="dim">{t("no_data")}</span>}
+    >
+      <dl class={`numbers ${stale && state ? "stale" : ""}`}>
+        {(["x", "y", "z"] as const).map((axis, i) => (
+          <Number key={axis} label={axis} text={fixed(at[i] === undefined ? undefined : at[i]! * 1000, 1)} unit="mm" />
+        ))}
+        {(["roll", "pitch", "yaw"] as const).map((axis, i) => (
+          <Number key={axis} label={t(axis)} text={fixed(angles[i], 2)} unit="°" />
+        ))}
+        <Number label={t("tool_speed")} text={fixed(speed, 1)} unit="mm/s" />
+        <Number label={t("manipulability")} text={fixed(state?.manipulability, 4)} unit="" />
+      </dl>
+      <Margins robotKey={props.robotKey} state={state} description={props.description} stale={stale} />
+    </Panel>
+  );
+}
+
+function Number(props: { label: string; text: string; unit: string }) {
+  return (
+    <div>
+      <dt title={props.label}>{props.label}</dt>
+      <dd>
+        {props.text}
+        <Unit of={props.unit} />
+      </dd>
+    </div>
+  );
+}

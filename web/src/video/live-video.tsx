@@ -1,0 +1,107 @@
+// A live picture of a robot: video where this browser decodes it, one still after another where not.
+
+import { fromBinary } from "@bufbuild/protobuf";
+import type { JSX, RefObject } from "preact";
+import { useEffect, useRef, useState } from "preact/hooks";
+import { CompressedImageSchema } from "../gen/foxglove/CompressedImage_pb";
+import { watch } from "../mesh/connection";
+import { isStanding, withView } from "./own-view";
+import type { Wanted } from "./own-view";
+import { t } from "../i18n/texts";
+import { isStale, now } from "../mesh/topics";
+import { decodesVideo, playVideo } from "./video-canvas";
+
+const QUIET_MS = 4000;
+const STILL_FPS = 10;
+const REDUCED_STILL = { width: 640, height: 360 };
+
+export interface Live {
+  picture: JSX.Element | null;
+  /** Its canvas or image, to be saved. */
+  place: RefObject<HTMLCanvasElement | null> | RefObject<HTMLImageElement | null>;
+  /** Whether there is a picture at all. */
+  any: boolean;
+  /** Of the picture [s]; null: not known. */
+  age: number | null;
+  stale: boolean;
+  /** How far it is reduced for this browser's line; 0: not at all. */
+  step: number;
+  /** Whether it is video. */
+  video: boolean;
+  /** Why there is none, or no video; empty: nothing is wrong. */
+  problem: string;
+}
+
+/** The live picture of what is wanted; null: nothing for now. */
+export function useLive(robotKey: string, wanted: Wanted | null, label: string): Live {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const image = useRef<HTMLImageElement>(null);
+  const [video, setVideo] = useState(decodesVideo);
+  const [problem, setProblem] = useState("");
+  const [still, setStill] = useState<string | null>(null);
+  const [any, setAny] = useState(false);
+  const [step, setStep] = useState(0);
+  // Read when it is drawn, not a reason to draw.
+  const [drawn] = useState<{ newAt: number | null; at: number }>({ newAt: null, at: 0 });
+  const identity = wanted && JSON.stringify(wanted);
+
+  useEffect(() => {
+    drawn.newAt = null;
+    setProblem("");
+    setStep(0);
+    if (!wanted) return;
+    drawn.at = performance.now();
+    const saw = (newAt: number | null, reduced: number) => {
+      drawn.newAt = newAt;
+      drawn.at = performance.now();
+      setAny(true);
+      setProblem("");
+      setStep(reduced);
+    };
+    // Stills are many times the bytes of video: never larger and more often than needed.
+    const asked = video || !isStanding(wanted) ? wanted : { ...wanted, ...REDUCED_STILL, fps: STILL_FPS };
+    return withView(
+      robotKey,
+      asked,
+      (keys) => {
+        if (video && canvas.current) {
+          return playVideo(keys.video, canvas.current, {
+            drawn: saw,
+            failed: (text) => {
+              setProblem(t("camera_failed", { text }));
+              setVideo(false);
+            },
+          });
+        }
+        return watch(keys.image, (sample) => {
+          const { data, format } = fromBinary(CompressedImageSchema, sample.payload);
+          const blob = new Blob([data as Uint8Array<ArrayBuffer>], { type: `image/${format || "jpeg"}` });
+          setStill((old) => (old && URL.revokeObjectURL(old), URL.createObjectURL(blob)));
+          saw(sample.newAt, 0);
+        });
+      },
+      () => performance.now() - drawn.at > QUIET_MS,
+      setProblem,
+    );
+  }, [robotKey, identity, video]);
+  // What another robot's or view's picture was is none of this one's.
+  useEffect(() => () => setAny(false), [robotKey, wanted?.of]);
+
+  const at = now.value; // read in any case: it is what draws this again
+  const age = drawn.newAt === null ? null : Math.max(0, (at - drawn.newAt) / 1000);
+  const picture = video ? (
+    <canvas ref={canvas} data-drawn={any} role="img" aria-label={label} />
+  ) : (
+    still && <img ref={image} src={still} alt={label} />
+  );
+  return {
+    picture: picture || null,
+    place: video ? canvas : image,
+    any,
+    age,
+    stale: any && isStale("video/*", age),
+    step,
+    video,
+    problem,
+  };
+}

@@ -1,0 +1,92 @@
+// Rendered video on a canvas, by WebCodecs: decoded as it comes, drawn newest first.
+
+import { fromBinary } from "@bufbuild/protobuf";
+import { CompressedVideoSchema } from "../gen/foxglove/CompressedVideo_pb";
+import { VideoFramesSchema } from "../gen/robomesh_pb";
+import { codecName, isKeyFrame } from "./h264";
+import { watch } from "../mesh/connection";
+import type { Sample } from "../mesh/connection";
+
+/** Whether this browser decodes video here (it does so only over https, or on localhost). */
+export const decodesVideo = "VideoDecoder" in window;
+
+export interface VideoListener {
+  /** A picture was drawn; `newAt` is when it was new on this page's clock [ms], null: not known; `step`: how
+   * far the video is reduced for this browser's line. */
+  drawn: (newAt: number | null, step: number) => void;
+  failed: (text: string) => void;
+}
+
+/** Plays a video key on a canvas until the returned function is called. */
+export function playVideo(key: string, canvas: HTMLCanvasElement, listener: VideoListener): () => void {
+  const context = canvas.getContext("2d", { alpha: false, desynchronized: true });
+  let decoder: VideoDecoder | null = null;
+  let codec = "";
+  let waiting: VideoFrame | null = null;
+  let drawing = 0;
+  let clock = 0; // decode order; source times may repeat
+  let step = 0;
+  const newAt = new Map<number, number | null>();
+
+  const draw = () => {
+    drawing = 0;
+    const frame = waiting;
+    waiting = null;
+    if (!frame) return;
+    if (canvas.width !== frame.displayWidth) canvas.width = frame.displayWidth;
+    if (canvas.height !== frame.displayHeight) canvas.height = frame.displayHeight;
+    context?.drawImage(frame, 0, 0);
+    listener.drawn(newAt.get(frame.timestamp) ?? null, step);
+    for (const time of newAt.keys()) if (time <= frame.timestamp) newAt.delete(time);
+    frame.close();
+  };
+  const begin = (name: string) => {
+    if (decoder && decoder.state !== "closed") decoder.close();
+    codec = name;
+    decoder = new VideoDecoder({
+      output: (frame) => {
+        waiting?.close();
+        waiting = frame;
+        drawing ||= requestAnimationFrame(draw);
+      },
+      error: (error) => {
+        codec = ""; // the next key frame begins anew
+        listener.failed(error.message);
+      },
+    });
+    decoder.configure({ codec: name, optimizeForLatency: true });
+  };
+  const decode = (data: Uint8Array, at: number | null) => {
+    const key = isKeyFrame(data);
+    const name = key ? codecName(data) : null;
+    if (name && name !== codec) begin(name);
+    if (!codec || decoder?.state !== "configured") return;
+    newAt.set(++clock, at);
+    decoder.decode(new EncodedVideoChunk({ type: key ? "key" : "delta", timestamp: clock, data }));
+  };
+  const take = (sample: Sample) => {
+    try {
+      if (sample.step !== step) {
+        step = sample.step;
+        codec = ""; // another stream: it begins with a key frame
+      }
+      if (sample.live) {
+        decode(fromBinary(CompressedVideoSchema, sample.payload).data, sample.newAt);
+        return;
+      }
+      for (const frame of fromBinary(VideoFramesSchema, sample.payload).frames) {
+        decode(fromBinary(CompressedVideoSchema, frame.data).data, null);
+      }
+    } catch (error) {
+      codec = "";
+      listener.failed(error instanceof Error ? error.message : String(error));
+    }
+  };
+  const stop = watch(key, take);
+  return () => {
+    stop();
+    cancelAnimationFrame(drawing);
+    waiting?.close();
+    if (decoder && decoder.state !== "closed") decoder.close();
+  };
+}
