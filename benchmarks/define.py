@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from robots.description import LIBRARY
-from robots.save import read_robot
+from robots.save_description import read_robot
 from services.console.define.store import lay_out, open_store, put
-from services.console.define.workshop import Limits, Workshop
+from services.console.define.worker_pool import Limits, Workshop
 
 
 def main() -> None:

@@ -17,11 +17,11 @@ import zenoh
 from latency import free_port
 from prometheus_client import CollectorRegistry, generate_latest
 
-from robomesh.answering import Request
 from robomesh.endpoints import router_config
 from robomesh.health import Served, health_of
 from robomesh.metrics import SessionMetrics
 from robomesh.schemas.robomesh_pb2 import LeaseAnswer
+from robomesh.server import Request
 from robomesh.session import Session, SessionSettings, open_session
 
 _TOPICS = ("joints", "joints/slow", "controller", "raw", "lease", "events", "audit", "program")

@@ -31,8 +31,8 @@ from robots.joints import FloatArray, violations
 from robots.model import RobotModel, build_model, tool_jacobian, tool_placement
 from robots.poses import inverse
 from robots.programs.check import check_program
-from services.site_fixtures import Fixture as FixtureSettings
-from services.site_fixtures import fixture_shape
+from services.site_file.fixtures import Fixture as FixtureSettings
+from services.site_file.fixtures import fixture_shape
 
 ARMS = {
     "ur5": Task.POSE_6D,

@@ -41,9 +41,9 @@ from plant import cpu_s, rss_mib
 
 from mcap_files.capture import Capture
 from mcap_files.files import describe_file
-from mcap_files.finish import index
 from mcap_files.reading import RecordingFile
 from mcap_files.recover import State, state_of
+from mcap_files.reindex import index
 from robomesh import topics
 from robomesh.endpoints import client_config
 from robomesh.errors import NoAnswerError

@@ -44,7 +44,7 @@ from benchmarks.latency import process, service, until_connectable
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import SessionSettings, open_session
 from robomesh.topics import Role
-from services.keys import Folder, deeds
+from services.pki import Folder, authority
 from tests.conftest import free_port
 
 ROBOTS = ("arm", "other")
@@ -162,8 +162,8 @@ def site(*, with_keys: bool) -> Iterator[tuple[Site, Any]]:
         folder = Path(name)
         keys = Folder(folder / "keys")
         if with_keys:
-            deeds.prepare(keys, "bench", robots=list(ROBOTS), border="open", routers=[endpoint])
-            deeds.issue(keys, "zhao", Role.OPERATOR)
+            authority.prepare(keys, "bench", robots=list(ROBOTS), border="open", routers=[endpoint])
+            authority.issue(keys, "zhao", Role.OPERATOR)
         robots = "".join(
             f'[[robot]]\nname = "{robot}"\nmodel = "pt600"\ncontroller = "tcp://127.0.0.1:{port}"\n'
             "stop_proven = true\n"

@@ -20,8 +20,8 @@ from mcap.records import Attachment, Channel, Metadata, Schema
 from mcap_protobuf.schema import build_file_descriptor_set
 
 from mcap_files import records
+from mcap_files.channel_names import ABOUT, INDEXING, LOST
 from mcap_files.errors import CaptureError
-from mcap_files.names import ABOUT, INDEXING, LOST
 from robomesh.header import Header
 from robomesh.topics import Topic
 

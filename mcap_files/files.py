@@ -9,9 +9,9 @@ from google.protobuf.duration_pb2 import Duration
 from google.protobuf.message import DecodeError
 from google.protobuf.timestamp_pb2 import Timestamp
 
+from mcap_files.channel_names import ABOUT, LOST
 from mcap_files.errors import RecordingError
 from mcap_files.layout import Layout, layout_of
-from mcap_files.names import ABOUT, LOST
 from mcap_files.reading import RecordingFile
 from mcap_files.records import number_in
 from robomesh.schemas import robomesh_pb2 as schema

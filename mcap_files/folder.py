@@ -3,8 +3,8 @@
 import re
 from pathlib import Path
 
+from mcap_files.channel_names import SUFFIX
 from mcap_files.errors import RecordingError
-from mcap_files.names import SUFFIX
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.:+-]*")
 

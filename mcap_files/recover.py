@@ -15,9 +15,9 @@ from mcap.records import Metadata
 
 from mcap_files import records
 from mcap_files.capture import is_being_written
+from mcap_files.channel_names import ABOUT, LOST
 from mcap_files.errors import CaptureError
-from mcap_files.finish import rewrite
-from mcap_files.names import ABOUT, LOST
+from mcap_files.reindex import rewrite
 
 
 class State(Enum):

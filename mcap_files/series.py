@@ -12,8 +12,8 @@ from google.protobuf.message import DecodeError
 from numpy.typing import NDArray
 
 from mcap_files.errors import RecordingError
+from mcap_files.publisher_time import PublisherTimes
 from mcap_files.reading import RecordingFile
-from mcap_files.times import PublisherTimes
 from mcap_files.values import has_values, unit_of, values_of
 from robomesh import keys
 from robomesh.errors import KeyNameError

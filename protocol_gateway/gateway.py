@@ -5,10 +5,10 @@ import gc
 import logging
 from contextlib import AsyncExitStack
 
-from protocol_gateway.checking.cell_mates import CellMates
+from protocol_gateway.checking.cell_occupancy import CellMates
 from protocol_gateway.checking.checker import checkers_of
 from protocol_gateway.checking.policy import Policy
-from protocol_gateway.link.measures import measure_links
+from protocol_gateway.link.metrics import measure_links
 from protocol_gateway.robot import Robot
 from protocol_gateway.settings import RobotSettings, Settings, check
 from robomesh.session import Session

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from protocol_gateway.texts import LONGEST_SENTENCE, one_line
+from protocol_gateway.foreign_text import LONGEST_SENTENCE, one_line
 from robomesh.messages import reason_message
 from robomesh.publisher import Publisher
 from robomesh.reasons import Reason

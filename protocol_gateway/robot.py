@@ -10,39 +10,39 @@ from functools import partial
 from pathlib import Path
 
 from protocol_gateway.audit.entry import audit_entry
-from protocol_gateway.audit.find import Query, Searches, find
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome
-from protocol_gateway.audit.restart import ROTATE
-from protocol_gateway.authority.obstacles import Controller
-from protocol_gateway.authority.rules import Authority, Now
-from protocol_gateway.checking.cell_mates import CellMates
+from protocol_gateway.audit.persisted_state import ROTATE
+from protocol_gateway.audit.search import Query, Searches, find
+from protocol_gateway.authority.lease_rules import Authority, Now
+from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.checking.cell_occupancy import CellMates
 from protocol_gateway.checking.checker import Checker
 from protocol_gateway.checking.policy import Policy
+from protocol_gateway.control.audit_trail import Ledger, entry_of
 from protocol_gateway.control.checks import Checks
 from protocol_gateway.control.control import Control
-from protocol_gateway.control.ledger import Ledger, entry_of
+from protocol_gateway.control.deadlines import date
 from protocol_gateway.control.program import Programs
-from protocol_gateway.control.stops import Guarded
-from protocol_gateway.control.waits import date
+from protocol_gateway.control.stop_handler import Guarded
 from protocol_gateway.core.codes import code_table
 from protocol_gateway.drivers.driver import Driver
 from protocol_gateway.drivers.registry import DRIVERS
 from protocol_gateway.errors import GatewaySettingsError
+from protocol_gateway.foreign_text import LONGEST, LONGEST_SENTENCE, one_line
 from protocol_gateway.journal import Journal
 from protocol_gateway.legacy.clients import LegacyClients
 from protocol_gateway.link.link import JOINT_COUNT, ControllerLink, LinkSettings, LinkState, LinkStatus
 from protocol_gateway.link.status import news
 from protocol_gateway.settings import RobotSettings
-from protocol_gateway.states import controller_state, lease_state, timestamp
+from protocol_gateway.state_messages import controller_state, lease_state, timestamp
 from protocol_gateway.telemetry import Telemetry
-from protocol_gateway.texts import LONGEST, LONGEST_SENTENCE, one_line
 from robomesh import reason_codes as codes
-from robomesh.answering import Answerer, Handler, Request
 from robomesh.errors import KeyNameError, RefusedError
 from robomesh.keys import presence_key
 from robomesh.publisher import LIST_LENGTH, Publisher
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.server import Answerer, Handler, Request
 from robomesh.session import Session
 from robomesh.topics import Role, check_operator
 from robots.description import load

@@ -5,7 +5,6 @@
 
 from collections.abc import Callable
 
-from protocol_gateway.beat import STALE_S, Beat
 from protocol_gateway.drivers.driver import (
     Activity,
     ControllerEvent,
@@ -19,7 +18,8 @@ from protocol_gateway.drivers.driver import (
 from protocol_gateway.journal import Journal
 from protocol_gateway.link.link import Received
 from protocol_gateway.motion import PositionWatch, is_moving
-from protocol_gateway.states import JointStatesMessage, raw_record
+from protocol_gateway.state_messages import JointStatesMessage, raw_record
+from protocol_gateway.watchdog import STALE_S, Beat
 from robomesh import reason_codes as codes
 from robomesh.publisher import Publisher
 from robomesh.reasons import Reason

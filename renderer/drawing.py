@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from renderer.backdrop import EDGE_ON, Backdrops
 from renderer.body_shaders import KEY
 from renderer.cameras import Camera, site_to_clip
-from renderer.lamp import Lamp
+from renderer.lighting import Lamp
 from renderer.mesh import Mesh
 from renderer.obstruction import contains, hides
 from renderer.opengl import Uploaded, columns, compile_programs, set_uniforms, upload

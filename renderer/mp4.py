@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from renderer.errors import Mp4Error
-from renderer.sps import picture_size
+from renderer.h264_sps import picture_size
 
 # Ticks a second of every time in the file: as video has it everywhere.
 TIMESCALE = 90_000

@@ -10,10 +10,10 @@ from typing import Protocol
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
+from renderer.appearance import look_of, mesh_name
 from renderer.cache import store_glb, stored_glb
 from renderer.errors import RendererError
-from renderer.look import look_of, mesh_name
-from renderer.state import Ages, RobotState
+from renderer.robot_state import Ages, RobotState
 from robomesh.errors import BusError, MessageError
 from robomesh.keys import ROOT, robot_key
 from robomesh.schemas.robomesh_pb2 import ControllerState, Description, KinematicState

@@ -12,23 +12,23 @@ from pathlib import Path
 from typing import ParamSpec, TypeVar
 
 from renderer.cache import cache_folder
-from renderer.composing import Composition
+from renderer.composition import Composition
 from renderer.errors import NoRoomError, RendererError
-from renderer.finishing import Finished, Finishing, Order
-from renderer.pace import Pace, next_of
-from renderer.requested import FAR, Shot, far, requested, standing
+from renderer.frame_scheduler import Pace, next_of
+from renderer.post_processing import Finished, Finishing, Order
+from renderer.requested_views import FAR, Shot, far, requested, standing
+from renderer.robot_state import Ages, RobotState
 from renderer.robots import Robots
-from renderer.room import Room
-from renderer.state import Ages, RobotState
 from renderer.stream import Stream
 from renderer.studio import Drawn, Studio, open_thread
+from renderer.view_budget import Room
 from renderer.views import CLOSE, FREE, camera_of, view_names
 from robomesh import reason_codes as codes
-from robomesh.answering import Answerer, Request
 from robomesh.errors import RefusedError
 from robomesh.keys import WHOLE_SITE
 from robomesh.quotas import DEFAULT_QUOTAS, Quota, Quotas
 from robomesh.schemas.robomesh_pb2 import Event, KeyFrameAnswer, ViewAnswer, ViewRequest
+from robomesh.server import Answerer, Request
 from robomesh.session import Session
 
 log = logging.getLogger(__name__)

@@ -10,14 +10,14 @@ from typing import Any, Protocol
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from renderer.composing import Composition, Known, composed
+from renderer.composition import Composition, Known, composed
 from renderer.errors import RendererError
-from renderer.finishing import Finished, Order
+from renderer.frame_scheduler import next_due
 from renderer.key_frames import KeyFrameClock
 from renderer.overlay import inside
-from renderer.pace import next_due
-from renderer.requested import IMAGE_HZ, Shot
-from renderer.state import Ages, RobotState
+from renderer.post_processing import Finished, Order
+from renderer.requested_views import IMAGE_HZ, Shot
+from renderer.robot_state import Ages, RobotState
 from renderer.studio import Drawn
 from robomesh.session import Session
 

@@ -8,9 +8,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.appearance import Look, frame_placements, home_placements
 from renderer.cameras import FIELD_OF_VIEW, Camera, fitted
 from renderer.errors import CameraError, UnknownViewError
-from renderer.look import Look, frame_placements, home_placements
 from robomesh.schemas.robomesh_pb2 import Vector3, View
 
 FloatArray = NDArray[np.float64]

@@ -15,8 +15,8 @@ from typing import Any, Literal, get_args
 import zenoh
 
 from robomesh import keys
+from robomesh.certificate_identity import Identity
 from robomesh.errors import KeyNameError
-from robomesh.identity import Identity
 from robomesh.topics import PEOPLE, REQUESTS, SERVICES, TOPICS, Request, Role, Topic
 
 Act = Literal[

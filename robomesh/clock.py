@@ -16,12 +16,12 @@ from dataclasses import dataclass, field
 
 import zenoh
 
-from robomesh.answering import Answerer, Request
 from robomesh.endpoints import first_line
 from robomesh.errors import MessageError, NoAnswerError
 from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.messages import PROTOBUF, decode
 from robomesh.schemas.robomesh_pb2 import ClockAnswer, ClockRequest
+from robomesh.server import Answerer, Request
 from robomesh.session import Session
 
 _KEPT = 8

@@ -16,11 +16,11 @@ from prometheus_client.core import (
 from prometheus_client.process_collector import ProcessCollector
 from prometheus_client.registry import Collector
 
+from robomesh.counters import Measure
 from robomesh.errors import SessionError
 from robomesh.keys import WHOLE_SITE, parse_key
 from robomesh.latencies import STEPS_S, Latencies
 from robomesh.session import Session
-from robomesh.tally import Measure
 
 _COUNTS = {
     "published": "Messages published",

@@ -12,15 +12,15 @@ from functools import partial
 import zenoh
 from google.protobuf.message import Message
 
-from robomesh import access, answering, asking, keys, presence, refused, topics
+from robomesh import access, client, connect_errors, keys, presence, server, topics
 from robomesh import reason_codes as codes
+from robomesh.counters import Measure, Tally
 from robomesh.endpoints import DEFAULT_ROUTER, Tls, client_config, first_line
 from robomesh.errors import BrokenAnswerError, NoAnswerError, NoRightError, SessionError
 from robomesh.ignored import REPLY, Ignored
-from robomesh.intake import Turns
 from robomesh.publisher import OnGet, Publisher
+from robomesh.request_queue import Turns
 from robomesh.subscription import Subscription
-from robomesh.tally import Measure, Tally
 
 log = logging.getLogger(__name__)
 
@@ -28,7 +28,7 @@ _RETRY_S = 0.25
 # A measure of whoever has one [s].
 CERTIFICATE = "certificate_seconds"
 
-_Declared = Publisher | Subscription | answering.Answerer | presence.PresenceWatch
+_Declared = Publisher | Subscription | server.Answerer | presence.PresenceWatch
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,13 +117,13 @@ class Session:
             NoAnswerError: If nobody answered in time.
         """
         payload = b"" if request is None else request.SerializeToString()
-        return asking.decode_answer(key, await self.ask_bytes(key, payload, timeout_s=timeout_s))
+        return client.decode_answer(key, await self.ask_bytes(key, payload, timeout_s=timeout_s))
 
     async def ask_bytes(self, key: str, payload: bytes = b"", *, timeout_s: float = 2.0) -> bytes:
         """As `ask`, with bytes both ways."""
         self._check("query", key)
         try:
-            return await asking.ask_bytes(self.zenoh_session, key, payload, timeout_s=timeout_s)
+            return await client.ask_bytes(self.zenoh_session, key, payload, timeout_s=timeout_s)
         except NoAnswerError as error:
             if self.principal is None or isinstance(error, BrokenAnswerError):
                 raise
@@ -132,14 +132,14 @@ class Session:
 
     async def ask_all(
         self, key: str, request: Message | None = None, *, timeout_s: float = 2.0
-    ) -> list[asking.Answer]:
+    ) -> list[client.Answer]:
         """Every owner's answer to a request on a key with a wildcard."""
         self._check("query", key)
         payload = b"" if request is None else request.SerializeToString()
-        answers = await asking.ask_all(self.zenoh_session, key, payload, timeout_s=timeout_s)
+        answers = await client.ask_all(self.zenoh_session, key, payload, timeout_s=timeout_s)
         # Of a refusal the key that was asked is known, and no owner's.
         fits = (each for each in answers if each[0] == key or self.ignored.key(REPLY, each[0]) is not None)
-        return [asking.answer_of(*each) for each in fits]
+        return [client.answer_of(*each) for each in fits]
 
     async def last(self, key: str, *, timeout_s: float = 2.0) -> Message | None:
         """The last value of a topic (its history message where it has one); None: nobody has one."""
@@ -161,10 +161,10 @@ class Session:
         site: str,
         robot: str,
         name: str,
-        handler: answering.Handler,
+        handler: server.Handler,
         *,
-        on_refused: answering.OnRefused = lambda chunk, text: None,
-    ) -> answering.Answerer:
+        on_refused: server.OnRefused = lambda chunk, text: None,
+    ) -> server.Answerer:
         """Answer a request of the table: `stop`, `command/*`; `on_refused` is told of what cannot be read.
 
         Raises:
@@ -175,7 +175,7 @@ class Session:
         over = self.connection(topics.request(name).own_link)
         if self._turns is None:
             self._turns = Turns()
-        answerer = answering.Answerer(
+        answerer = server.Answerer(
             over,
             site,
             robot,
@@ -215,10 +215,10 @@ class Session:
         # To a session that watches presence too, Zenoh leaves out tokens in 1 to 5 of 100 answers.
         watches = any(isinstance(each, presence.PresenceWatch) for each in self._declared)
         try:
-            asking = await asyncio.to_thread(self.connection, "presence" if watches else "")
+            client = await asyncio.to_thread(self.connection, "presence" if watches else "")
         except SessionError as error:
             raise NoAnswerError(str(error)) from None
-        return await presence.present(asking, ignored=self.ignored)
+        return await presence.present(client, ignored=self.ignored)
 
     def _check(self, act: access.Act, key: str) -> None:
         """Say at once, and in words, what the router would refuse in silence."""
@@ -295,7 +295,7 @@ async def open_session(settings: SessionSettings) -> AsyncIterator[Session]:
     Raises:
         SessionError: If an endpoint is wrong, the certificate is not good, or no router came in time.
     """
-    identity, warning = refused.own_certificate(settings.tls)
+    identity, warning = connect_errors.own_certificate(settings.tls)
     if warning:
         log.warning("%s", warning)
     principal = None if identity is None else access.principal_of(identity)
@@ -326,7 +326,7 @@ async def open_session(settings: SessionSettings) -> AsyncIterator[Session]:
     if told:
         log.info("router found at %s", routers)
     if settings.tls is not None and identity is not None and identity.expires is not None:
-        left_s = partial(refused.left_s, settings.tls.certificate, identity.expires)
+        left_s = partial(connect_errors.left_s, settings.tls.certificate, identity.expires)
         session.measure(CERTIFICATE, "Until the own certificate expires", left_s)
     try:
         yield session
@@ -336,4 +336,6 @@ async def open_session(settings: SessionSettings) -> AsyncIterator[Session]:
 
 def _refusal(settings: SessionSettings) -> str | None:
     """Why the first router that is there does not let us in."""
-    return next((reason for each in settings.connect if (reason := refused.why(each, settings.tls))), None)
+    return next(
+        (reason for each in settings.connect if (reason := connect_errors.why(each, settings.tls))), None
+    )

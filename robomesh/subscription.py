@@ -18,11 +18,11 @@ import zenoh.ext
 from google.protobuf.message import Message
 
 from robomesh import keys
+from robomesh.delay import Lateness
 from robomesh.endpoints import settle
 from robomesh.errors import MessageError
 from robomesh.header import Header, unpack
 from robomesh.ignored import PUBLICATION, REPLY, Ignored
-from robomesh.lateness import Lateness
 from robomesh.messages import decode
 from robomesh.topics import History, Topic, topic
 

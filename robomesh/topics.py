@@ -15,7 +15,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from robomesh.errors import KeyNameError, UnknownTopicError
 from robomesh.keys import check_chunk
 from robomesh.schemas import robomesh_pb2 as schema
-from robomesh.topic_rows import EVERYONE, PEOPLE, SERVICES, History, Priority, Request, Role, Topic
+from robomesh.topic_schema import EVERYONE, PEOPLE, SERVICES, History, Priority, Request, Role, Topic
 
 __all__ = [
     "EVERYONE",

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robots.joints import FloatArray
+from robots.kinematic_tree import Shape
 from robots.meshes.mesh import Color
-from robots.tree import Shape
 
 # How near an arm may come to what stands around it, unless a site says otherwise.
 WARNING_M = 0.05

@@ -15,7 +15,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from robots.bounded_toml import MOST_CHARACTERS, parse_toml
-from robots.checks import Problem, Step, file_problems, row_problems, type_problem
+from robots.description_checks import Problem, Step, file_problems, row_problems, type_problem
 from robots.errors import DescriptionError, MeshError
 from robots.example_robots import EXAMPLES, ExampleRobot, example_names, example_robot, example_values
 from robots.schema import DhDescription, JointType, Pose, RobotDescription, UrdfDescription, nearest

@@ -1,7 +1,7 @@
 """D-H rows of a chain of joints: those that it was made of, else those that its axes give.
 
 A chain is what is known at position zero: each joint's frame in the base's, with z as its axis.
-Frames of row i stand as in `robots.tree`: z of frame i is the axis of joint i + 1.
+Frames of row i stand as in `robots.kinematic_tree`: z of frame i is the axis of joint i + 1.
 
 Source: Denavit, Hartenberg 1955; Paul 1981 for the standard form.
 """
@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robots.kinematic_tree import Tree, TreeJoint, TreeLink
 from robots.poses import FloatArray, dh_fixed_part, inverse, rpy_rotation
 from robots.schema import JointType
-from robots.tree import Tree, TreeJoint, TreeLink
 
 # Axes nearer to parallel than this count as parallel: people write 1.5708 for a right angle, and the
 # common normal of two such lines would be kilometres away [rad].

@@ -16,12 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
-from robots.meshes.lighten import lightened
+from robots.kinematic_tree import Shape, tree_of
 from robots.meshes.mesh import PAINT, Mesh, Part, Wire, transformed_mesh
 from robots.meshes.read import read_mesh
+from robots.meshes.simplify import lightened
 from robots.meshes.write_glb import glb_of
 from robots.schema import RobotDescription
-from robots.tree import Shape, tree_of
 
 __all__ = [
     "MOST_TRIANGLES",

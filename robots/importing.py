@@ -8,13 +8,13 @@ from typing import Any
 
 from robots.bounded_toml import parse_toml
 from robots.description import ROBOT_FILES, described, load, robot_name
-from robots.dh import dh_form
 from robots.errors import DescriptionError
 from robots.glb import collision_meshes, glb_of, link_mesh, link_meshes
+from robots.kinematic_tree import tree_of
 from robots.meshes.read import read_mesh
 from robots.schema import DhDescription, RobotDescription, UrdfDescription
-from robots.tree import tree_of
 from robots.urdf.write import collision_beside, glb_beside, tree_urdf
+from robots.urdf_to_dh import dh_form
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robots.errors import JointCountError
+from robots.kinematic_tree import tree_of
 from robots.poses import FloatArray
 from robots.schema import DhDescription, JointSettings, JointType, RobotDescription, UrdfDescription
-from robots.tree import tree_of
 from robots.units import angle_factor, length_factor, position_factor
 
 __all__ = [

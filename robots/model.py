@@ -8,8 +8,8 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from robots.joints import FloatArray, Joints, as_positions, joints_of
+from robots.kinematic_tree import TreeJoint, named_frames, position_factors, tree_of
 from robots.schema import JointType, RobotDescription
-from robots.tree import TreeJoint, named_frames, position_factors, tree_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from robots.joints import FloatArray
+from robots.kinematic_tree import BASE, chain_to, tool_frame, tree_of
 from robots.model import RobotModel, tool_jacobian
 from robots.schema import JointType, RobotDescription
-from robots.tree import BASE, chain_to, tool_frame, tree_of
 
 
 def reach_of(description: RobotDescription) -> float:

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from robots.dh import dh_form
 from robots.errors import DescriptionError
 from robots.joints import joints_of
+from robots.kinematic_tree import Shape, named_frames, tree_of
 from robots.meshes.mesh import Mesh, bounds
 from robots.schema import DhDescription, RobotDescription, UrdfDescription
-from robots.tree import Shape, named_frames, tree_of
 from robots.units import angle_factor, length_factor
+from robots.urdf_to_dh import dh_form
 from robots.views import reach, views_of
 
 

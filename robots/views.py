@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from robots.joints import FloatArray, joints_of
+from robots.kinematic_tree import chain_to, tool_frame, tree_of
 from robots.schema import JointType, RobotDescription
-from robots.tree import chain_to, tool_frame, tree_of
 from robots.units import length_factor
 
 # A robot whose rows are all still zero reaches nowhere, and is looked at all the same.

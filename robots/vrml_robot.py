@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from robots.errors import MeshError
+from robots.kinematic_tree import BASE, FloatArray, Shape, Tree, TreeJoint, TreeLink
 from robots.meshes.mesh import Mesh
 from robots.meshes.vrml.drawing import Drawing
 from robots.meshes.vrml.files import Files
@@ -24,7 +25,6 @@ from robots.meshes.vrml.protos import found_proto, instance
 from robots.meshes.vrml.transform import transform_matrix
 from robots.meshes.vrml.values import nodes_of, number, numbers, strings
 from robots.schema import JointType
-from robots.tree import BASE, FloatArray, Shape, Tree, TreeJoint, TreeLink
 
 _TYPES = {
     "rotate": JointType.ROTARY,

@@ -9,8 +9,8 @@ import pytest
 from ruamel.yaml import YAML
 from typer.main import get_command
 
-from services import site as site_file
 from services.command_line.main import app
+from services.site_file import site as site_file
 
 ROOT = Path(__file__).parents[1]
 COMPOSE = (ROOT / "compose.yaml", *sorted((ROOT / "deploy").glob("*/*.yaml")))

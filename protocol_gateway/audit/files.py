@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from protocol_gateway.audit.entry import NOTHING_BEFORE, Entry, Link, link_of, parse_line
-from protocol_gateway.audit.restart import begins_file
+from protocol_gateway.audit.persisted_state import begins_file
 from protocol_gateway.errors import AuditError
 
 # No entry is nearly as long; whoever reads somebody's file must not fill the memory with its one line.

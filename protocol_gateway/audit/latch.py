@@ -24,8 +24,8 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from protocol_gateway.authority.rules import Stop
-from protocol_gateway.texts import one_line
+from protocol_gateway.authority.lease_rules import Stop
+from protocol_gateway.foreign_text import one_line
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 

@@ -26,7 +26,7 @@ from pathlib import Path
 from protocol_gateway.audit.entry import Entry, Outcome, chained
 from protocol_gateway.audit.files import Verification, older_parts, part_name, read_entries, verify
 from protocol_gateway.audit.latch import LatchFile, reason_of
-from protocol_gateway.audit.restart import (
+from protocol_gateway.audit.persisted_state import (
     LATCH_UNKNOWN,
     ROTATE,
     UNKNOWN,
@@ -36,7 +36,7 @@ from protocol_gateway.audit.restart import (
     merged,
     with_stop,
 )
-from protocol_gateway.audit.start import Start, find_end
+from protocol_gateway.audit.recovery import Start, find_end
 from protocol_gateway.errors import AuditError
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason

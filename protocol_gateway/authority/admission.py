@@ -15,7 +15,7 @@ import hmac
 from dataclasses import replace
 from typing import NamedTuple
 
-from protocol_gateway.authority.rules import (
+from protocol_gateway.authority.lease_rules import (
     MOTION_COMMANDS,
     Answer,
     Authority,

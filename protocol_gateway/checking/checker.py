@@ -6,7 +6,7 @@ import logging
 import time
 from collections.abc import Collection, Mapping
 
-from protocol_gateway.checking.questions import PENDING, Checked, CheckMotion, CheckProgram, Prepare
+from protocol_gateway.checking.worker_messages import PENDING, Checked, CheckMotion, CheckProgram, Prepare
 from protocol_gateway.errors import CheckError
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from protocol_gateway.checking.questions import (
+from protocol_gateway.checking.worker_messages import (
     PENDING,
     Cells,
     Checked,

@@ -15,13 +15,13 @@ from collections.abc import Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
 from dataclasses import dataclass, replace
 
-from protocol_gateway.authority.obstacles import Controller, after, target_of
-from protocol_gateway.authority.rules import MOTION_COMMANDS, Answer, not_sent, refused
-from protocol_gateway.checking.cell_mates import CellMates, Whereabouts
+from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, not_sent, refused
+from protocol_gateway.authority.preconditions import Controller, after, target_of
+from protocol_gateway.checking.cell_occupancy import CellMates, Whereabouts
 from protocol_gateway.checking.checker import Checker
 from protocol_gateway.checking.policy import Policy
-from protocol_gateway.checking.questions import Checked, CheckMotion, CheckProgram, Positions
-from protocol_gateway.control.stops import Guarded
+from protocol_gateway.checking.worker_messages import Checked, CheckMotion, CheckProgram, Positions
+from protocol_gateway.control.stop_handler import Guarded
 from protocol_gateway.drivers.driver import Activity
 from protocol_gateway.errors import CheckError
 from protocol_gateway.motion import has_arrived

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from protocol_gateway.audit.log import GATEWAY, Entry, Outcome
-from protocol_gateway.authority import holders_motion, rules
+from protocol_gateway.authority import lease_rules, motion_owner
 from protocol_gateway.authority.admission import (
     Verdict,
     admit,
@@ -25,12 +25,18 @@ from protocol_gateway.authority.admission import (
     stop_refusal,
     used_up,
 )
-from protocol_gateway.authority.obstacles import Controller, after, controller_command, obstacle, target_of
-from protocol_gateway.authority.rules import MOTION_COMMANDS, Answer, Authority, Now, not_sent
+from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, Authority, Now, not_sent
+from protocol_gateway.authority.preconditions import (
+    Controller,
+    after,
+    controller_command,
+    obstacle,
+    target_of,
+)
+from protocol_gateway.control.audit_trail import command_entry
 from protocol_gateway.control.checks import Checks, Finding
 from protocol_gateway.control.leases import Leases
-from protocol_gateway.control.ledger import command_entry
-from protocol_gateway.control.stops import Guarded, Stops, both_clocks
+from protocol_gateway.control.stop_handler import Guarded, Stops, both_clocks
 from protocol_gateway.drivers.driver import Activity
 from protocol_gateway.errors import AuditError, CheckError, CommandError, LinkError
 from protocol_gateway.motion import has_arrived, motion_may_be_held
@@ -181,7 +187,7 @@ class Control:
         async with self._one_at_a_time:
             self.leases.expire()
             problem = None
-            if not rules.holds(self.authority, operator, request.lease):
+            if not lease_rules.holds(self.authority, operator, request.lease):
                 problem = not_sent(codes.COMMAND_CONTROL_ENDED())
             return await self._do(_Attempt((request,), entries, arrived_s, step=True), problem)
 
@@ -240,7 +246,7 @@ class Control:
             self._note(attempt.entries, Outcome.FAILED, problem)
             return problem
         now = both_clocks()
-        alone = now.monotonic_s - self._unit_s >= holders_motion.ANSWERED_WITHIN_S
+        alone = now.monotonic_s - self._unit_s >= motion_owner.ANSWERED_WITHIN_S
         self._unit_s = now.monotonic_s
         names = ", ".join(_C.Name(request.command) for request in attempt.requests)
         if attempt.begin is None:
@@ -261,7 +267,7 @@ class Control:
     def _second_thoughts(self, attempt: _Attempt, finding: Finding) -> Answer | None:
         """Why what was allowed before it was written down must not be sent now; None: it may."""
         self.leases.expire()
-        if not rules.holds(self.authority, attempt.entries[0].operator, attempt.requests[0].lease):
+        if not lease_rules.holds(self.authority, attempt.entries[0].operator, attempt.requests[0].lease):
             return not_sent(codes.COMMAND_CONTROL_ENDED_MEANWHILE())
         if refusal := self._held_up(attempt) or self._refusal(attempt):
             return refusal
@@ -337,7 +343,7 @@ class Control:
     def _sent(self, request: schema.CommandRequest, now: Now, controller: Controller, *, alone: bool) -> None:
         latched = self.authority.stop
         target = target_of(request, controller, self._joints)
-        self._guarded.authority = holders_motion.command_sent(
+        self._guarded.authority = motion_owner.command_sent(
             self.authority,
             request,
             now,
@@ -375,7 +381,7 @@ class Control:
         """The controller refused a unit."""
         self.speed_percent = None  # which unit is not said; it may have been that
         before = self.authority
-        self._guarded.authority = holders_motion.refused(before)
+        self._guarded.authority = motion_owner.refused(before)
         if before is not self.authority:
             self._guarded.on_change()
 
@@ -386,7 +392,7 @@ class Control:
         now = both_clocks()
         self._stop_orphan(moving)
         before = self.authority
-        self._guarded.authority, foreign = holders_motion.observe(
+        self._guarded.authority, foreign = motion_owner.observe(
             before,
             moving=moving,
             pending=motion_may_be_held(self._guarded.controller().status.activity),
@@ -394,7 +400,7 @@ class Control:
             now=now,
         )
         lease = self.authority.lease
-        if foreign and not rules.moved_recently(before, now):
+        if foreign and not lease_rules.moved_recently(before, now):
             self._journal.say(
                 _S.INFO if lease is None else _S.WARNING,
                 "motion.foreign",
@@ -412,7 +418,7 @@ class Control:
         if lease is None or lease.motion is None:
             return
         resting = activity is Activity.IDLE and self._has_arrived()
-        self._guarded.authority = holders_motion.reported(self.authority, resting=resting, dated_s=dated_s)
+        self._guarded.authority = motion_owner.reported(self.authority, resting=resting, dated_s=dated_s)
 
     def _stop_orphan(self, moving: bool) -> None:
         """Stop what still moves of a motion that a killed gateway's holder commanded: nobody holds it now."""

@@ -12,12 +12,12 @@ from collections.abc import Callable
 from functools import partial
 
 from protocol_gateway.audit.log import GATEWAY, Entry, Outcome
-from protocol_gateway.authority import rules
-from protocol_gateway.authority.rules import Authority, LeaseEnd, LeaseOutcome, refused
-from protocol_gateway.control.ledger import entry_of, lease_entry
-from protocol_gateway.control.stops import Guarded, Stops, both_clocks
+from protocol_gateway.authority import lease_rules
+from protocol_gateway.authority.lease_rules import Authority, LeaseEnd, LeaseOutcome, refused
+from protocol_gateway.control.audit_trail import entry_of, lease_entry
+from protocol_gateway.control.stop_handler import Guarded, Stops, both_clocks
 from protocol_gateway.errors import AuditError
-from protocol_gateway.states import lease_answer
+from protocol_gateway.state_messages import lease_answer
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
 from robomesh.reasons import Reason
@@ -72,7 +72,7 @@ class Leases:
         read_only = self._guarded.controller().read_only
         if read_only is not None and request.action in (_A.ACQUIRE, _A.TAKE):
             return LeaseOutcome(self._guarded.authority, refused(codes.ROBOT_READ_ONLY(read_only)))
-        return rules.request_lease(
+        return lease_rules.request_lease(
             self._guarded.authority, request, operator=operator, now=both_clocks(), secret=secret
         )
 
@@ -87,7 +87,7 @@ class Leases:
 
     def expire(self) -> None:
         """End a lease whose time is over."""
-        authority, ended = rules.expire(self._guarded.authority, both_clocks())
+        authority, ended = lease_rules.expire(self._guarded.authority, both_clocks())
         if ended is not None:
             self._end(authority, ended, "EXPIRE")
         elif authority is not self._guarded.authority:
@@ -95,13 +95,13 @@ class Leases:
 
     def end_session(self, session: str) -> None:
         """A program's or page's session is gone: end the lease that was its."""
-        authority, ended = rules.end_session(self._guarded.authority, session)
+        authority, ended = lease_rules.end_session(self._guarded.authority, session)
         if ended is not None:
             self._end(authority, ended, "REVOKE")
 
     def end(self, why: Reason, *, foreign: bool = False) -> None:
         """End the lease, if there is one, for a reason of the gateway's; `foreign`: of foreign motion."""
-        authority, ended = rules.end_lease(self._guarded.authority, why, foreign=foreign)
+        authority, ended = lease_rules.end_lease(self._guarded.authority, why, foreign=foreign)
         if ended is not None:
             self._end(authority, ended, "REVOKE")
 

@@ -17,17 +17,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from protocol_gateway.audit.log import Outcome
-from protocol_gateway.authority import rules
-from protocol_gateway.authority.rules import Answer, refused
-from protocol_gateway.checking.questions import Checked
+from protocol_gateway.authority import lease_rules
+from protocol_gateway.authority.lease_rules import Answer, refused
+from protocol_gateway.checking.worker_messages import Checked
+from protocol_gateway.control.audit_trail import entry_of
 from protocol_gateway.control.checks import Checks
 from protocol_gateway.control.control import PROGRAM, Control, command_answer, refusal
-from protocol_gateway.control.ledger import entry_of
-from protocol_gateway.control.stops import Guarded, Running
+from protocol_gateway.control.stop_handler import Guarded, Running
 from protocol_gateway.drivers.driver import Activity
 from protocol_gateway.errors import CheckError
-from protocol_gateway.states import timestamp
-from protocol_gateway.texts import LONGEST, one_line
+from protocol_gateway.foreign_text import LONGEST, one_line
+from protocol_gateway.state_messages import timestamp
 from robomesh import reason_codes as codes
 from robomesh.messages import reason_message
 from robomesh.reasons import Reason
@@ -293,7 +293,7 @@ class Programs:
             return codes.PROGRAM_STOPPED_BY_NUMBER(id=authority.last_stop_id)
         if self._guarded.program is not None and self._guarded.program.given_up:
             return codes.PROGRAM_GIVEN_UP()
-        if not rules.holds(authority, run.operator, run.secret):
+        if not lease_rules.holds(authority, run.operator, run.secret):
             return codes.PROGRAM_CONTROL_ENDED(authority.ended or codes.ENDED_UNKNOWN())
         return None
 

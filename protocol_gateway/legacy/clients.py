@@ -14,9 +14,9 @@ import asyncio
 import os
 
 from protocol_gateway.audit.log import Outcome
+from protocol_gateway.control.audit_trail import entry_of
 from protocol_gateway.control.control import Control
-from protocol_gateway.control.ledger import entry_of
-from protocol_gateway.control.stops import Guarded
+from protocol_gateway.control.stop_handler import Guarded
 from protocol_gateway.core.codes import CodeTable
 from protocol_gateway.core.records import Error, write_unit
 from protocol_gateway.core.stream import Malformed, StreamEvent, Unit, printable

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 from protocol_gateway.authority.admission import LONGEST_WAIT_S
-from protocol_gateway.authority.rules import holds
+from protocol_gateway.authority.lease_rules import holds
 from protocol_gateway.control.control import Control
 from protocol_gateway.core.records import Error
 from protocol_gateway.core.stream import Unit

@@ -7,7 +7,7 @@ anything else                               refused
 
 from collections.abc import Sequence
 
-from protocol_gateway.authority.rules import Answer, Authority
+from protocol_gateway.authority.lease_rules import Answer, Authority
 from protocol_gateway.core.records import (
     AbsolutePositions,
     Command,

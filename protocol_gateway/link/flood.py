@@ -12,7 +12,7 @@ from collections.abc import Callable, Hashable, Sequence
 from functools import partial
 
 from protocol_gateway.drivers.driver import ControllerEvent, JointsReceived, Refused, StatusReceived
-from protocol_gateway.link.dating import Received
+from protocol_gateway.link.timestamping import Received
 
 # Twice what the fastest controllers send (1,000 units a second, of 300 bytes), within half a second.
 _BIN_S = 0.5

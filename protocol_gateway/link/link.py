@@ -34,10 +34,10 @@ from protocol_gateway.drivers.driver import (
 )
 from protocol_gateway.errors import LinkDownError
 from protocol_gateway.link.connection import READ_BYTES, Connection, reason_of
-from protocol_gateway.link.dating import Dating, Received
 from protocol_gateway.link.flood import Flood, HandOver
 from protocol_gateway.link.health import Answers, Arrivals, LinkHealth, Losses
 from protocol_gateway.link.status import LinkState, LinkStatus
+from protocol_gateway.link.timestamping import Dating, Received
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robomesh.wall_clock import WallClock

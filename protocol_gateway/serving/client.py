@@ -14,7 +14,7 @@ from typing import Protocol
 
 from protocol_gateway.core.codes import CodeTable
 from protocol_gateway.core.stream import StreamEvent, UnitStream
-from protocol_gateway.serving.budget import Budget, Limits
+from protocol_gateway.serving.rate_limit import Budget, Limits
 from protocol_gateway.sockets import configure
 
 # Small, so that a client that does not read is noticed before it is given old states for minutes.

@@ -3,7 +3,6 @@
 Pairs are named "<robot>/<link>" or "<fixture>". Coal stays behind this package.
 """
 
-from robots.collision.along import Along, Encounter, near_along
 from robots.collision.cell import (
     Arm,
     Cell,
@@ -14,13 +13,8 @@ from robots.collision.cell import (
     unshaped,
     unshaped_moving,
 )
-from robots.collision.nearest import (
-    Nearest,
-    outside_clearance,
-    outside_nearest,
-    own_contacts,
-    own_nearest,
-)
+from robots.collision.continuous import Along, Encounter, near_along
+from robots.collision.distance import Nearest, outside_clearance, outside_nearest, own_contacts, own_nearest
 from robots.collision.sampling import allowed_positions
 
 __all__ = [

@@ -12,16 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.cells import FLOOR, CellDescription, CellRobot, Fixture, Floor
-from robots.collision.bodies import Body, exact_bodies, hull_bodies, piece_bodies
+from robots.collision.geometry import Body, exact_bodies, hull_bodies, piece_bodies
+from robots.collision.link_pairs import PairPlan, plan_pairs
 from robots.collision.obstacles import Balls, Obstacles, balls_of, joined
-from robots.collision.own import OwnPairs, own_pairs
-from robots.collision.pairs import PairPlan, plan_pairs
+from robots.collision.self_collision import OwnPairs, own_pairs
 from robots.description import load
 from robots.errors import MeshError
 from robots.joints import FloatArray, Joints
+from robots.kinematic_tree import BASE, Tree, bare_links, tree_of
 from robots.model import RobotModel, build_model
 from robots.schema import RobotDescription, UrdfDescription, nearest
-from robots.tree import BASE, Tree, bare_links, tree_of
 
 
 @dataclass(frozen=True, eq=False)

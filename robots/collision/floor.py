@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.cells import Floor
-from robots.collision.between import ROUND
-from robots.collision.bodies import TOUCH_M
 from robots.collision.cell import Arm
+from robots.collision.geometry import TOUCH_M
+from robots.collision.interpolated import ROUND
 from robots.collision.path import SAMPLE_M, placements_along
 from robots.joints import FloatArray
 

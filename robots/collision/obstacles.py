@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.collision.bodies import Body
+from robots.collision.geometry import Body
 from robots.joints import FloatArray
 
 

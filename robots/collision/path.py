@@ -8,11 +8,11 @@ from itertools import product
 
 import numpy as np
 
-from robots.collision.bodies import Body
 from robots.collision.cell import Arm
+from robots.collision.geometry import Body
 from robots.joints import FloatArray, JointType
+from robots.kinematic_tree import BASE, Tree
 from robots.poses import axis_rotation
-from robots.tree import BASE, Tree
 
 # No body moves farther between two samples of a path.
 SAMPLE_M = 0.005

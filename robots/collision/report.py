@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from robots.collision.bodies import surface
-from robots.collision.pairs import plan_pairs
+from robots.collision.geometry import surface
+from robots.collision.link_pairs import plan_pairs
 from robots.description import load
 from robots.joints import FloatArray
-from robots.tree import tree_of
+from robots.kinematic_tree import tree_of
 
 # Visual geometry that stands out by less is rounding [m].
 _STANDS_OUT_M = 0.005

@@ -6,7 +6,7 @@ from typing import Any
 import coal
 import numpy as np
 
-from robots.collision.bodies import TOUCH_M, exact_body, piece_points, transform
+from robots.collision.geometry import TOUCH_M, exact_body, piece_points, transform
 from robots.joints import FloatArray
 
 # A closed surface goes around a point inside it once, around one in a hollow of it not at all.

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from robots.inverse.tasks import misses
 from robots.joints import FloatArray, Joints, joints_of
+from robots.kinematic_tree import chain_to, position_factors, tool_frame, tree_of
 from robots.model import joint_motion
 from robots.schema import JointType, RobotDescription
-from robots.tree import chain_to, position_factors, tool_frame, tree_of
 
 
 @dataclass(frozen=True, eq=False)

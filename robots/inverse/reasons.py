@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from robots.inverse.chain import Chain, placement_misses
-from robots.inverse.search import Found, descend, starts
+from robots.inverse.numeric import Found, descend, starts
 from robots.inverse.tasks import TOLERANCE_M, Task
 from robots.joints import FloatArray, violations
 from robots.schema import JointType

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from robots.errors import PoseError
 from robots.inverse.chain import Chain, build_chain, placement_misses
 from robots.inverse.closed_form import EXACT, ClosedForm, candidates, closed_form, turned, windows
+from robots.inverse.numeric import Found, clipped, descend, starts
 from robots.inverse.reasons import beyond_reach, reason_for_none, solutions_beyond
-from robots.inverse.search import Found, clipped, descend, starts
 from robots.inverse.tasks import Task, tool_pose
 from robots.joints import FloatArray, as_positions
 from robots.schema import RobotDescription

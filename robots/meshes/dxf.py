@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from robots.errors import MeshError
-from robots.meshes.claims import content
+from robots.meshes.declared_size import content
 from robots.meshes.mesh import Color, FloatArray, IndexArray, Material, Mesh, Part, Wire, welded
 from robots.meshes.normals import creased
 from robots.meshes.polygons import Effort, ears

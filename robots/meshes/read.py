@@ -9,8 +9,8 @@ from typing import Any
 from robots.errors import MeshError
 from robots.meshes.dxf import read_dxf
 from robots.meshes.mesh import Mesh
-from robots.meshes.rewritten import plain_text
 from robots.meshes.step import read_step
+from robots.meshes.text_repair import plain_text
 from robots.meshes.three_ds.read import read_3ds
 from robots.meshes.trimesh_formats import read_trimesh
 from robots.meshes.vrml.read import read_vrml

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from robots.errors import MeshError
-from robots.meshes.claims import content
+from robots.meshes.declared_size import content
 from robots.meshes.mesh import Mesh, transformed_mesh
 from robots.meshes.trimesh_formats import read_trimesh
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from robots.errors import MeshError
-from robots.meshes.claims import Claims, claims_of
+from robots.meshes.declared_size import Claims, claims_of
 from robots.meshes.mesh import (
     Color,
     FloatArray,

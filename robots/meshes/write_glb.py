@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.meshes.claims import OWN_MARK
+from robots.meshes.declared_size import OWN_MARK
 from robots.meshes.mesh import Color, FloatArray, Material, Mesh, Part, Wire
 
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942

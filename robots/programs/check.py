@@ -16,7 +16,7 @@ from robots.joints import FloatArray, Joints, as_positions, violations
 from robots.motion import HOMING_REST_S, HOMING_SPEED, straight_motion
 from robots.programs.path import PathSamples
 from robots.programs.plan import plan_program
-from robots.programs.runs import Runs
+from robots.programs.segments import Looker, Stretch
 from robots.programs.steps import (
     INTERPOLATION,
     CheckResult,
@@ -26,8 +26,8 @@ from robots.programs.steps import (
     Violation,
     ViolationKind,
 )
-from robots.programs.stretches import Looker, Stretch
 from robots.programs.text import parse_program
+from robots.programs.violations import Runs
 
 # Timings of different motions: what a repeat comes to again is not timed again.
 _MOST_KEPT = 1_000

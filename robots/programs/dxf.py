@@ -16,7 +16,7 @@ import numpy as np
 
 from robots.errors import MeshError
 from robots.joints import FloatArray
-from robots.meshes.claims import content
+from robots.meshes.declared_size import content
 from robots.meshes.dxf import UNITS_M, open_drawing
 from robots.poses import rpy_rotation
 from robots.programs.text import MOST_BYTES, MOST_LINES, pose_of

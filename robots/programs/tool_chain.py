@@ -10,9 +10,9 @@ import numpy as np
 from robots.collision import Arm
 from robots.collision.path import SAMPLE_M
 from robots.joints import FloatArray, JointType
+from robots.kinematic_tree import Tree, TreeLink, chain_to, position_factors, tool_frame, tree_of
 from robots.poses import axis_rotation
 from robots.singularity import reach_of
-from robots.tree import Tree, TreeLink, chain_to, position_factors, tool_frame, tree_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,10 +3,10 @@
 from collections import Counter
 from collections.abc import Iterator
 
-from robots.checks import JointFacts, Problem, common_problems, enumerated, limit_problems
+from robots.description_checks import JointFacts, Problem, common_problems, enumerated, limit_problems
 from robots.joints import joints_of
+from robots.kinematic_tree import TreeJoint, tree_of
 from robots.schema import TOOL_FRAME, JointSettings, Pose, UrdfDescription, nearest
-from robots.tree import TreeJoint, tree_of
 from robots.units import position_factor
 
 

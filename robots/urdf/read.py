@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 
 from robots.errors import DescriptionError
+from robots.kinematic_tree import BASE, Mimic, Tree, TreeJoint, TreeLink
 from robots.poses import FloatArray, axis_rotation
 from robots.schema import JointType
-from robots.tree import BASE, Mimic, Tree, TreeJoint, TreeLink
 from robots.urdf.files import Resolve
 from robots.urdf.shapes import Shapes
 from robots.urdf.values import WrongElement, numbers, origin, said

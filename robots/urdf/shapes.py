@@ -5,11 +5,11 @@ from math import cos, pi
 
 import numpy as np
 
+from robots.kinematic_tree import Shape
 from robots.meshes.mesh import Material, Mesh, Part
 from robots.meshes.normals import creased
 from robots.meshes.solids import Solid, ball, box, turned
 from robots.poses import FloatArray
-from robots.tree import Shape
 from robots.urdf.files import Resolve
 from robots.urdf.values import WrongElement, numbers, origin
 

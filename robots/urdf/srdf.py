@@ -7,7 +7,7 @@ import xml.etree.ElementTree as Xml
 from pathlib import Path
 
 from robots.errors import DescriptionError
-from robots.tree import Tree
+from robots.kinematic_tree import Tree
 from robots.urdf.values import WrongElement, numbers
 
 _MOST_BYTES = 4_000_000

@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from robots.joints import joints_of
+from robots.kinematic_tree import BASE, Tree, TreeJoint, TreeLink, named_frames, tree_of
 from robots.poses import FloatArray, inverse, rotation_rpy
 from robots.schema import JointType, RobotDescription
-from robots.tree import BASE, Tree, TreeJoint, TreeLink, named_frames, tree_of
 
 
 def glb_beside(link: str) -> str:

@@ -119,9 +119,9 @@ def audit_verify(
     as_json: Json = False,
 ) -> None:
     """Whether an audit log is whole and unchanged, older parts beside it and all."""
-    from services.command_line import audit
+    from services.command_line.audit import commands
 
-    audit.verify(file, head, recording, as_json)
+    commands.verify(file, head, recording, as_json)
 
 
 @audit_app.command("list")
@@ -137,9 +137,9 @@ def audit_list(
     as_json: Json = False,
 ) -> None:
     """What was asked of robots, by whom, and what became of it."""
-    from services.command_line import audit
+    from services.command_line.audit import commands
 
-    audit.list_(
+    commands.list_(
         robot,
         connect,
         operator=operator,

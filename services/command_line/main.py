@@ -14,18 +14,19 @@ import typer
 from typer.main import get_command
 
 from robomesh.endpoints import DEFAULT_ROUTER
-from services.command_line import attach, running
-from services.command_line.accounts_app import accounts_app
-from services.command_line.alarms_app import alarms_app
-from services.command_line.attaching import offer_keys
-from services.command_line.descriptions import mesh_app, robot_app
+from services.command_line import bridges
+from services.command_line.accounts.app import accounts_app
+from services.command_line.alarms.app import alarms_app
+from services.command_line.connection_options import offer_keys
 from services.command_line.kept import audit_app, recordings_app
-from services.command_line.keys import keys_app
-from services.command_line.keys_folder import KeysFolder, keys_folder
+from services.command_line.keys.app import keys_app
+from services.command_line.keys.folder import KeysFolder, keys_folder
 from services.command_line.options import Connect, Height, Json, Robot, Width
 from services.command_line.output import show_directions
-from services.command_line.programs import program_app
+from services.command_line.program.app import program_app
 from services.command_line.reading_limits import limit
+from services.command_line.robot_and_mesh import mesh_app, robot_app
+from services.command_line.site import app as site_commands
 
 app = typer.Typer(
     name="robomesh",
@@ -47,8 +48,8 @@ for name, part in (
 ):
     app.add_typer(part, name=name)
 
-running.add(app)
-attach.add(app)
+site_commands.add(app)
+bridges.add(app)
 
 # ------------------------------------------------------------- what is there
 
@@ -60,7 +61,7 @@ def list_(
     watch: Annotated[bool, typer.Option("--watch", help="Again and again, until Ctrl-C.")] = False,
 ) -> None:
     """Sites, robots, services, who watches, who controls, how old, how far away."""
-    from services.command_line import listing
+    from services.command_line.live import listing
 
     listing.run(connect, as_json, watch)
 
@@ -73,7 +74,7 @@ def monitor(
     count: Annotated[int | None, typer.Option(metavar="N", help="End after N states.")] = None,
 ) -> None:
     """Watch a robot in the terminal."""
-    from services.command_line import monitor as command
+    from services.command_line.live import monitor as command
 
     command.run(robot, connect, as_json, count)
 
@@ -98,7 +99,7 @@ def send(
     Only who moves a robot can hold it and resume: what one send moves, another cannot hold. Ctrl-C there
     ends it, and so does stop from anywhere, which needs no control.
     """
-    from services.command_line import send as command
+    from services.command_line.live import send as command
 
     command.run(robot, words, connect, operator, as_json)
 
@@ -117,7 +118,7 @@ def fault(
     as_json: Json = False,
 ) -> None:
     """Let a simulated controller misbehave: freeze, flood, jump, ..."""
-    from services.command_line import fault as command
+    from services.command_line.live import fault as command
 
     command.run(robot, name, off, connect, as_json)
 
@@ -132,7 +133,7 @@ def snapshot(
     connect: Connect = DEFAULT_ROUTER,
 ) -> None:
     """Save a rendered picture of a robot."""
-    from services.command_line import snapshot as command
+    from services.command_line.live import snapshot as command
 
     command.run(robot, view, out, (width, height), connect)
 
@@ -150,7 +151,7 @@ def video(
     as_json: Json = False,
 ) -> None:
     """Save rendered video of a robot, playable while it is written."""
-    from services.command_line import video as command
+    from services.command_line.live import video as command
 
     command.run(robot, view, out, command.Wanted(seconds, width, height, fps), connect, as_json)
 
@@ -180,7 +181,7 @@ def alive(
     connect: Connect = DEFAULT_ROUTER,
 ) -> int:
     """Whether a service answers now: exit status 0 or 1, for health checks."""
-    from services.command_line import alive as command
+    from services.command_line.live import alive as command
 
     return command.run(service, connect)
 
@@ -198,11 +199,11 @@ def doctor(
 ) -> int | None:
     """What is missing on this machine, and how to mend it."""
     if security:
-        from services.command_line import security as check
-        from services.command_line.attaching import addresses
+        from services.command_line.connection_options import addresses
+        from services.command_line.doctor import security as check
 
         return check.run(keys_folder(folder, quiet=as_json), addresses(routers), as_json)
-    from services.command_line import doctor as command
+    from services.command_line.doctor import machine as command
 
     command.run(as_json)
     return None
@@ -218,9 +219,9 @@ def fk(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI units: always so here.")] = True,
 ) -> None:
     """Forward kinematics: {"joints": [..]} a line in, {"tool", "links"} a line out."""
-    from services.command_line import robots
+    from services.command_line.robot import commands
 
-    robots.forward(robot, requests)
+    commands.forward(robot, requests)
 
 
 @app.command(context_settings={"ignore_unknown_options": True})
@@ -240,7 +241,7 @@ def ik(
     as_json: Json = False,
 ) -> None:
     """Inverse kinematics: joint positions; JSON: {"pose", "task", "near", "all", "seed"} a line in."""
-    from services.command_line import inverse
+    from services.command_line.robot import inverse
 
     inverse.inverse(robot, pose, task, all_, as_json)
 

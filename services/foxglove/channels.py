@@ -12,9 +12,9 @@ from robomesh.schemas.robomesh_pb2 import Description
 from robomesh.session import Session
 from robomesh.topics import topic
 from robots.urdf.viewers import together
-from services.foxglove.lanes import Lane, Told
+from services.foxglove.channel_subscriptions import Lane, Told
 from services.foxglove.messages import TEXT_SCHEMA, log_of, protobuf_schema, text_message
-from services.viewed import meshes_of, viewed
+from services.viewer_robots import meshes_of, viewed
 
 log = logging.getLogger(__name__)
 

@@ -6,18 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from robomesh import reason_codes as codes
-from robomesh.answering import Request
 from robomesh.errors import RefusedError
 from robomesh.quotas import Quota
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.server import Request
 from robomesh.session import Session
 from robomesh.worker import Worker, WorkerError
 from robots.errors import RobotError
 from robots.joints import FloatArray
 from robots.model import RobotModel
-from services.kinematics.place import Place
-from services.kinematics.questions import CheckQuestion, InverseQuestion, Question
+from services.kinematics.cell_state import Place
 from services.kinematics.states import forward_answer
+from services.kinematics.worker_messages import CheckQuestion, InverseQuestion, Question
 
 _INVERSE_S = 5.0
 _CHECK_S = 30.0

@@ -17,9 +17,9 @@ from robots.model import build_model
 from robots.singularity import reach_of
 from robots.urdf.write import to_urdf
 from services.kinematics.answers import Workers, answer_about
-from services.kinematics.describe import FixtureMesh, add_surroundings, describe, fixture_meshes
-from services.kinematics.follow import Followed, follow
-from services.kinematics.place import Place
+from services.kinematics.cell_state import Place
+from services.kinematics.descriptions import FixtureMesh, add_surroundings, describe, fixture_meshes
+from services.kinematics.publisher import Followed, follow
 from services.kinematics.settings import RobotSettings, Settings
 
 log = logging.getLogger(__name__)

@@ -11,7 +11,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robots.joints import FloatArray, Joints, constraint_values
 from robots.model import RobotModel, frame_placements, link_placements, manipulability, tool_jacobian
 from robots.singularity import singularity_margin
-from services.kinematics.place import Near
+from services.kinematics.cell_state import Near
 
 
 def positions_by_name(joints: Joints, states: JointStates) -> FloatArray | None:

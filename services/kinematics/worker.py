@@ -13,7 +13,7 @@ from robots.description import load
 from robots.inverse import InverseSolver, build_solver
 from services.kinematics.check import check_answer
 from services.kinematics.inverse import inverse_answer
-from services.kinematics.questions import InverseQuestion, Question
+from services.kinematics.worker_messages import InverseQuestion, Question
 
 
 def begin(cells: tuple[CellDescription, ...]) -> Callable[[Question], bytes]:

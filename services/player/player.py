@@ -12,16 +12,16 @@ from pathlib import Path
 from mcap_files.errors import RecordingsError
 from mcap_files.folder import find_file
 from robomesh import reason_codes as codes
-from robomesh.answering import Request
 from robomesh.errors import RefusedError
 from robomesh.keys import WHOLE_SITE
 from robomesh.presence import OPERATOR
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.server import Request
 from robomesh.session import Session
 from services.player.clock import Clock
 from services.player.errors import ReplayError
+from services.player.recording_source import Tape
 from services.player.replay import Replay
-from services.player.tape import Tape
 
 log = logging.getLogger(__name__)
 

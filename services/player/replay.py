@@ -10,16 +10,16 @@ from dataclasses import dataclass
 from mcap_files.errors import RecordingsError
 from robomesh import reason_codes as codes
 from robomesh import topics
-from robomesh.answering import Answerer, Handler, Request
 from robomesh.errors import BusError, RefusedError
 from robomesh.keys import robot_key
 from robomesh.publisher import Publisher
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.server import Answerer, Handler, Request
 from robomesh.session import Session
 from robomesh.topics import History
 from services.player.clock import Clock
 from services.player.errors import ReplayError
-from services.player.tape import Played, Scene, Tape
+from services.player.recording_source import Played, Scene, Tape
 
 log = logging.getLogger(__name__)
 

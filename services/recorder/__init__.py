@@ -1,6 +1,6 @@
 """Captures of what a robot publishes, as MCAP files that explain themselves."""
 
-from services.recorder.explain import without_secrets
+from services.recorder.attachments import without_secrets
 from services.recorder.recorder import serve
 from services.recorder.settings import Settings, Split, flight_of, marks_of
 

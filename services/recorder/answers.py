@@ -10,10 +10,10 @@ from typing import Any
 from google.protobuf.message import Message
 from google.protobuf.timestamp_pb2 import Timestamp
 
+from mcap_files.channel_names import SUFFIX
 from mcap_files.errors import RecordingError
 from mcap_files.files import describe_file, describe_unreadable
 from mcap_files.folder import find_file
-from mcap_files.names import SUFFIX
 from mcap_files.reading import RecordingFile
 from mcap_files.series import MOST_POINTS, POINTS, SeriesReader, known_values
 from mcap_files.video import is_key_frame

@@ -12,7 +12,7 @@ from pathlib import Path
 
 log = logging.getLogger(__name__)
 
-_MODULE = "mcap_files.finish"
+_MODULE = "mcap_files.reindex"
 # Then its process ends.
 _IDLE_S = 10.0
 _ERRNO = re.compile(r"^\[Errno \d+\] ")

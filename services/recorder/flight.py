@@ -13,18 +13,18 @@ from math import inf
 from pathlib import Path
 
 from mcap_files.capture import Capture, is_being_written
+from mcap_files.channel_names import SUFFIX
 from mcap_files.errors import CaptureError
-from mcap_files.names import SUFFIX
 from mcap_files.recover import State, state_of
 from robomesh import reason_codes as codes
 from robomesh.errors import MessageError, RefusedError
 from robomesh.messages import decode
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.topics import Topic
+from services.recorder.captures import Files, check_name
 from services.recorder.disk import words
+from services.recorder.file_writer import STATES, Part
 from services.recorder.finishing import Finisher, Job
-from services.recorder.part import STATES, Part
-from services.recorder.robot import Files, check_name
 from services.recorder.settings import MIB, Flight
 
 log = logging.getLogger(__name__)

@@ -10,26 +10,26 @@ from functools import partial
 from pathlib import Path
 
 from mcap_files.capture import Capture
+from mcap_files.channel_names import INDEXING, SUFFIX
 from mcap_files.errors import RecordingsError
-from mcap_files.names import INDEXING, SUFFIX
 from mcap_files.recover import State
 from robomesh import reason_codes as codes
-from robomesh.answering import Request
 from robomesh.errors import MessageError, RefusedError
 from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.server import Request
 from robomesh.session import Session
+from services.recorder.attachments import Explainer, for_viewers, picture
+from services.recorder.captures import Files, RobotRecorder
 from services.recorder.disk import Disk, words
-from services.recorder.explain import Explainer, for_viewers, picture
+from services.recorder.events import Notices, disk_notices
+from services.recorder.file_writer import Part
 from services.recorder.finishing import Finisher, Job
 from services.recorder.flight import FlightRecorder
-from services.recorder.intake import Intake
-from services.recorder.leftover import left_state, own
-from services.recorder.notices import Notices, disk_notices
-from services.recorder.part import Part
-from services.recorder.robot import Files, RobotRecorder
+from services.recorder.orphans import left_state, own
 from services.recorder.serving import Serving
 from services.recorder.settings import Settings
+from services.recorder.subscriptions import Intake
 
 log = logging.getLogger(__name__)
 

@@ -20,7 +20,7 @@ from robots.urdf.viewers import WORLD, Viewed, together
 from services.ros2.meshes import Meshes
 from services.ros2.settings import Settings
 from services.ros2.wire import Node, Topic, message
-from services.viewed import viewed
+from services.viewer_robots import viewed
 
 log = logging.getLogger(__name__)
 

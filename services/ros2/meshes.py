@@ -9,7 +9,7 @@ from robomesh.errors import BusError
 from robomesh.keys import robot_key
 from robomesh.schemas.robomesh_pb2 import Description
 from robomesh.session import Session
-from services.viewed import meshes_of
+from services.viewer_robots import meshes_of
 
 log = logging.getLogger(__name__)
 

@@ -2,7 +2,7 @@
 
 import asyncio
 
-from robomesh.guest import be_present
+from robomesh.linked_site import be_present
 from robomesh.session import Session
 from services.ros2.bridge import Bridge
 from services.ros2.settings import Settings

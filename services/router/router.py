@@ -18,16 +18,16 @@ from typing import Any
 
 import zenoh
 
+from robomesh.certificate_identity import read_identity
 from robomesh.endpoints import Link, Tls, first_line, router_config, router_values
 from robomesh.errors import BusError
-from robomesh.identity import read_identity
 from robomesh.schemas.robomesh_pb2 import Event
 from robomesh.session import SessionSettings
 from services.errors import ListenError, ServiceError
-from services.listen import check_reach, reachable, split_address
-from services.router.shown import imposters, to_other_sites, without_rights
-from services.router.telling import Telling
-from services.router.turn import neighbours, our_turn
+from services.router.peer_audit import imposters, to_other_sites, without_rights
+from services.router.rolling_restart import neighbours, our_turn
+from services.router.status import Telling
+from services.site_file.listen_address import check_reach, reachable, split_address
 
 log = logging.getLogger(__name__)
 

@@ -5,10 +5,10 @@ import time
 from dataclasses import dataclass
 
 from robomesh import reason_codes as codes
-from robomesh.answering import Request
 from robomesh.errors import RefusedError
 from robomesh.health import Served, present
 from robomesh.schemas.robomesh_pb2 import FaultAnswer, FaultRequest
+from robomesh.server import Request
 from robomesh.session import SessionSettings, open_session
 from robomesh.topics import Role
 from services.simulator.errors import SimulatorError

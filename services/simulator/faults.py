@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from protocol_gateway.core.records import AbsolutePositions, Command, Error, Record, Status, Velocities
 from services.simulator.errors import SimulatorError
 from services.simulator.fault_table import COPIES, FAULTS, LEAP
-from services.simulator.orders import FAULT, LOCAL, asks_to_stop
+from services.simulator.unit_execution import FAULT, LOCAL, asks_to_stop
 
 _TEXT = "drive of axis 1 overheated (simulated)"
 

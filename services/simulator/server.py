@@ -13,7 +13,7 @@ from services.simulator import faults
 from services.simulator.controller import Controller
 from services.simulator.fault_table import FAULTS
 from services.simulator.faults import Faults
-from services.simulator.orders import MALFORMED, asks_to_stop
+from services.simulator.unit_execution import MALFORMED, asks_to_stop
 
 logger = logging.getLogger(__name__)
 

@@ -10,13 +10,13 @@ from dataclasses import dataclass, field
 from robots.description import load
 from robots.joints import joints_of
 from services.errors import ListenError
-from services.listen import check_reach, split_address
 from services.simulator.controller import Controller
 from services.simulator.demo import demo_tour
 from services.simulator.errors import SimulatorError
 from services.simulator.fault_requests import Mesh, answer_requests
 from services.simulator.faults import Faults
 from services.simulator.server import Server
+from services.site_file.listen_address import check_reach, split_address
 
 logger = logging.getLogger(__name__)
 

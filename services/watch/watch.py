@@ -8,21 +8,21 @@ from collections.abc import Coroutine, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from robomesh.answering import Request
 from robomesh.clock import read_clock
 from robomesh.errors import MessageError, NoAnswerError, RefusedError
 from robomesh.ignored import PUBLICATION
 from robomesh.keys import REPLAY, ROOT, WHOLE_SITE, check_name
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.server import Request
 from robomesh.session import Session
 from robomesh.subscription import Subscription
 from robomesh.texts import one_line
 from robomesh.topics import check_operator
+from services.watch.alarm_registry import Book
 from services.watch.alarms import AlarmError
-from services.watch.book import Book
 from services.watch.conditions import Condition, Judge, robot_conditions
+from services.watch.consistency import SETTLED_S, Expected, mesh_conditions
 from services.watch.mesh import Mesh
-from services.watch.quarrels import SETTLED_S, Expected, mesh_conditions
 
 log = logging.getLogger(__name__)
 

@@ -18,7 +18,7 @@ from robomesh.keys import WHOLE_SITE
 from robomesh.schemas.robomesh_pb2 import Event
 from robomesh.session import Session, SessionSettings, open_session
 from robots.cells import Fixture
-from services.console import console
+from services.console import app
 from services.kinematics import kinematics
 from services.simulator import simulator
 from services.simulator.fault_requests import Mesh
@@ -69,7 +69,7 @@ class Plant:
     audit: Path
     fixtures: tuple[Fixture, ...] = ()
     robots: tuple[str, ...] = ("arm", "pt600")
-    console: dict = field(default_factory=dict)
+    app: dict = field(default_factory=dict)
     rate_hz: float = 25.0
     address: str = ""
     endpoint: str = field(default_factory=lambda: f"tcp/127.0.0.1:{free_port()}")
@@ -160,9 +160,9 @@ class Plant:
                                 ),
                             ),
                         ),
-                        console.serve(
+                        app.serve(
                             for_console,
-                            console.Settings(site="hall", listen="127.0.0.1:0", **self.console),
+                            app.Settings(site="hall", listen="127.0.0.1:0", **self.console),
                             on_ready=ready.set_result,
                         ),
                     )

@@ -19,15 +19,15 @@ if __name__ == "__main__":
 import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from robomesh.answering import Request
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.server import Request
 from robomesh.session import Session, SessionSettings, open_session
 from robots.description import load
 from robots.glb import link_meshes
 from robots.joints import Joints
 from robots.model import build_model
 from robots.urdf.write import to_urdf
-from services.kinematics.describe import describe
+from services.kinematics.descriptions import describe
 
 State = schema.ControllerState
 BEAT_S = 0.2

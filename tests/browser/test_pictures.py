@@ -11,8 +11,8 @@ from playwright.sync_api import expect
 
 from robots.cells import Fixture
 from robots.schema import Pose
-from services.site_fixtures import Fixture as FixtureRow
-from services.site_fixtures import fixture_shape, fixture_to_site
+from services.site_file.fixtures import Fixture as FixtureRow
+from services.site_file.fixtures import fixture_shape, fixture_to_site
 from tests.browser.crowd import crowd
 from tests.browser.rendering import rendering
 from tests.browser.robot_page import take

@@ -7,7 +7,7 @@ from playwright.sync_api import expect
 
 from robomesh.schemas.robomesh_pb2 import AuditQuery
 from services.console.accounts import sessions
-from services.console.accounts.desk import change_account
+from services.console.accounts.auth_service import change_account
 from tests.browser.conftest import NO_WEBGL, Plant, run_plant
 from tests.browser.robot_page import ARM, button, serious
 from tests.services.certificates import self_signed

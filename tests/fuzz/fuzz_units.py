@@ -27,7 +27,7 @@ from protocol_gateway.drivers.driver import JointsReceived
 from protocol_gateway.drivers.unit import UnitDriver
 from protocol_gateway.journal import Journal
 from protocol_gateway.legacy.requests import asks_for_more, asks_to_stop, requests_of
-from protocol_gateway.link.dating import Dating, Received
+from protocol_gateway.link.timestamping import Dating, Received
 from protocol_gateway.telemetry import Telemetry
 from robots.description import load
 from robots.joints import joints_of

@@ -15,9 +15,9 @@ import numpy as np
 from robots.cells import CellDescription, CellRobot, Fixture
 from robots.collision import Cell, allowed_positions, build_cell, outside_nearest, own_contacts
 from robots.joints import FloatArray
+from robots.kinematic_tree import Shape
 from robots.meshes.mesh import Material, Mesh, Part
 from robots.meshes.solids import ball, box
-from robots.tree import Shape
 from robots.views import reach
 
 Pairs = set[tuple[str, str]]

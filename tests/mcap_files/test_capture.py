@@ -7,13 +7,13 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
-from mcap_files import indexed
+from mcap_files import indexed_writer
 from mcap_files.capture import Capture
 from mcap_files.errors import CaptureError
 from mcap_files.files import describe_file
-from mcap_files.finish import index, rewrite
 from mcap_files.layout import layout_of
 from mcap_files.recover import State, is_ours, mend, recover, state_of
+from mcap_files.reindex import index, rewrite
 from robomesh.header import Header
 from robomesh.topics import topic
 from tests.recordings import write_recording
@@ -102,7 +102,7 @@ def test_an_original_is_kept_where_the_new_file_is_not_the_same(tmp_path, monkey
     path = tmp_path / "a.mcap"
     write(path, range(100))
     before = path.read_bytes()
-    compressor = indexed.zstandard.ZstdCompressor
+    compressor = indexed_writer.zstandard.ZstdCompressor
 
     class Forgetful:
         def __init__(self, **settings):
@@ -111,7 +111,7 @@ def test_an_original_is_kept_where_the_new_file_is_not_the_same(tmp_path, monkey
         def compress(self, data):
             return self._right.compress(data[:-1] + b"!")
 
-    monkeypatch.setattr(indexed.zstandard, "ZstdCompressor", Forgetful)
+    monkeypatch.setattr(indexed_writer.zstandard, "ZstdCompressor", Forgetful)
     with pytest.raises(CaptureError, match=r"cannot be read|not the same"):
         index(path)
     assert path.read_bytes() == before

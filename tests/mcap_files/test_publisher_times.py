@@ -8,13 +8,13 @@ import pytest
 from mcap.writer import Writer
 from mcap_protobuf.schema import register_schema
 
+from mcap_files.publisher_time import PublisherTimes
 from mcap_files.reading import RecordedMessage, RecordingFile
 from mcap_files.series import SeriesReader
-from mcap_files.times import PublisherTimes
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.recordings.export import Wanted
 from services.command_line.recordings.export import run as export
-from services.player.tape import Tape
+from services.player.recording_source import Tape
 from tests.recordings import START_NS, joints
 
 JOINTS, KINEMATICS = "robomesh/site/arm/joints", "robomesh/site/arm/kinematics"

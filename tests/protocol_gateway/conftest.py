@@ -4,8 +4,8 @@ import time
 
 import pytest
 
-from protocol_gateway.authority.rules import Now
-from protocol_gateway.control import control, stops
+from protocol_gateway.authority.lease_rules import Now
+from protocol_gateway.control import control, stop_handler
 
 
 class Clock:
@@ -22,6 +22,6 @@ class Clock:
 def clock(monkeypatch):
     """In place of both of control's clocks; the lease's alarm and the disk go by their own."""
     it = Clock()
-    for module in (control, stops):
+    for module in (control, stop_handler):
         monkeypatch.setattr(module, "both_clocks", lambda: it.now)
     return it

@@ -3,11 +3,11 @@
 from contextlib import asynccontextmanager
 
 from protocol_gateway.audit.log import AuditLog, read_entries
-from protocol_gateway.authority.obstacles import Controller
-from protocol_gateway.authority.rules import Authority
+from protocol_gateway.authority.lease_rules import Authority
+from protocol_gateway.authority.preconditions import Controller
+from protocol_gateway.control.audit_trail import Ledger
 from protocol_gateway.control.control import Control
-from protocol_gateway.control.ledger import Ledger
-from protocol_gateway.control.stops import Guarded
+from protocol_gateway.control.stop_handler import Guarded
 from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
 from protocol_gateway.drivers.unit import UnitDriver
 from protocol_gateway.errors import LinkDownError

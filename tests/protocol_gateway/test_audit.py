@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome, read_entries, verify
-from protocol_gateway.audit.restart import remembered
+from protocol_gateway.audit.persisted_state import remembered
 from protocol_gateway.errors import AuditError
 from tests.conftest import run
 

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from protocol_gateway.audit.entry import audit_entry, link_of, parse_line
 from protocol_gateway.audit.files import older_parts, read_entries, verify
-from protocol_gateway.audit.find import Query, find
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome
-from protocol_gateway.audit.restart import UNKNOWN
+from protocol_gateway.audit.persisted_state import UNKNOWN
+from protocol_gateway.audit.search import Query, find
 from protocol_gateway.errors import AuditError
 from tests.conftest import run
 from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until

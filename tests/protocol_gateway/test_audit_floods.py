@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol_gateway.audit.floods import IN_FULL, MOST_KINDS, Floods
+from protocol_gateway.audit.flood_counter import IN_FULL, MOST_KINDS, Floods
 from protocol_gateway.audit.log import Entry, Outcome
-from protocol_gateway.audit.restart import remembered
+from protocol_gateway.audit.persisted_state import remembered
 
 
 def entry(operator="li", request="HOME", outcome=Outcome.REFUSED, text="no", **values):

@@ -14,10 +14,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from protocol_gateway.audit.files import older_parts, part_name
-from protocol_gateway.audit.find import Query, find, matches, query_of
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome, read_entries, verify
-from protocol_gateway.audit.restart import remembered
-from protocol_gateway.authority.rules import Stop
+from protocol_gateway.audit.persisted_state import remembered
+from protocol_gateway.audit.search import Query, find, matches, query_of
+from protocol_gateway.authority.lease_rules import Stop
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run

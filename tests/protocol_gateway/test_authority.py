@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from protocol_gateway.authority.admission import admit, delay, remember
-from protocol_gateway.authority.holders_motion import command_sent, observe, refused
-from protocol_gateway.authority.rules import (
+from protocol_gateway.authority.lease_rules import (
     Answer,
     Authority,
     Now,
@@ -19,6 +18,7 @@ from protocol_gateway.authority.rules import (
     stop,
     stop_sent,
 )
+from protocol_gateway.authority.motion_owner import command_sent, observe, refused
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 

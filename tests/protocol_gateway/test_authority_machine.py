@@ -5,8 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from protocol_gateway.authority.admission import admit, remember
-from protocol_gateway.authority.holders_motion import command_sent, observe, refused, reported
-from protocol_gateway.authority.rules import (
+from protocol_gateway.authority.lease_rules import (
     MOTION_COMMANDS,
     Answer,
     Authority,
@@ -18,6 +17,7 @@ from protocol_gateway.authority.rules import (
     request_lease,
     stop,
 )
+from protocol_gateway.authority.motion_owner import command_sent, observe, refused, reported
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 

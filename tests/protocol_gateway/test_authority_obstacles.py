@@ -5,7 +5,7 @@ from math import radians
 
 import pytest
 
-from protocol_gateway.authority.obstacles import Controller, controller_command, obstacle
+from protocol_gateway.authority.preconditions import Controller, controller_command, obstacle
 from protocol_gateway.drivers.driver import Activity, Mode, MoveAbsolute, Speed, StatusReceived, Trace
 from protocol_gateway.link.link import LinkState, LinkStatus
 from protocol_gateway.motion import PositionWatch, has_arrived, is_moving, motion_may_be_held

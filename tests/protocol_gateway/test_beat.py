@@ -2,7 +2,7 @@
 
 import pytest
 
-from protocol_gateway.beat import Beat
+from protocol_gateway.watchdog import Beat
 
 
 def seen(*told_at):

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from protocol_gateway.checking.checker import MOST_PROCESSES, Checker, checkers_of
-from protocol_gateway.checking.questions import Checked, CheckMotion
 from protocol_gateway.checking.worker import begin
+from protocol_gateway.checking.worker_messages import Checked, CheckMotion
 from protocol_gateway.errors import CheckError
 from robomesh import reason_codes as codes
 from robots.cells import CellDescription, CellRobot, Fixture
+from robots.kinematic_tree import Shape
 from robots.meshes.mesh import Material, Mesh, Part
-from robots.tree import Shape
 from tests.conftest import run
 from tests.robots.boxes import bar_arm, block, placed
 

@@ -15,22 +15,20 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robots.cells import CellDescription, CellRobot, Fixture
 from robots.poses import pose_matrix
 from robots.schema import Pose, Units
-from services import site_fixtures
+from services.site_file import fixtures
 from services.watch.rules import RULES
 from tests.conftest import run
 from tests.protocol_gateway.hall import STATE, A, C, gateway, kept_control, refusal, simulator, until
 from tests.robots.boxes import bar_arm
 
 # Beside the arm, which at home reaches out along x: waist at +90 degrees is in it.
-POST = site_fixtures.Fixture(
-    cell="a", name="post", box=(200.0, 200.0, 800.0), pose={"xyz": (0.0, 500.0, 400.0)}
-)
+POST = fixtures.Fixture(cell="a", name="post", box=(200.0, 200.0, 800.0), pose={"xyz": (0.0, 500.0, 400.0)})
 AWAY, INTO_POST = [radians(-60), 0, 0, 0, 0], [radians(90), 0, 0, 0, 0]
 
 
 def fixture(each):
-    shape = site_fixtures.fixture_shape(each)
-    return Fixture(each.name, (shape,), site_fixtures.fixture_to_site(each))
+    shape = fixtures.fixture_shape(each)
+    return Fixture(each.name, (shape,), fixtures.fixture_to_site(each))
 
 
 def place_of(x_mm=0.0, turn_deg=0.0):

@@ -7,7 +7,7 @@ from math import radians
 
 import pytest
 
-from protocol_gateway.checking.cell_mates import CellMates
+from protocol_gateway.checking.cell_occupancy import CellMates
 from protocol_gateway.checking.policy import Policy
 from protocol_gateway.control.checks import Checks
 from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived

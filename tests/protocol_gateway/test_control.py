@@ -5,7 +5,7 @@ from math import radians
 
 import pytest
 
-from protocol_gateway.authority.rules import Authority
+from protocol_gateway.authority.lease_rules import Authority
 from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError

@@ -10,7 +10,7 @@ from protocol_gateway.drivers.driver import (
     StatusReceived,
     UnknownReceived,
 )
-from protocol_gateway.link.dating import Dating, Received
+from protocol_gateway.link.timestamping import Dating, Received
 
 MS = 1_000_000
 

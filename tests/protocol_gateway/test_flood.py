@@ -8,8 +8,8 @@ import time
 import pytest
 
 from protocol_gateway.drivers.driver import Activity, JointsReceived, Mode, Refused, StatusReceived
-from protocol_gateway.link.dating import Received
 from protocol_gateway.link.flood import Flood, HandOver
+from protocol_gateway.link.timestamping import Received
 from robomesh.keys import robot_key
 from tests.conftest import run
 from tests.protocol_gateway.bare import bare_controller, repeated

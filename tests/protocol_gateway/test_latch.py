@@ -13,8 +13,8 @@ import pytest
 
 from protocol_gateway.audit.latch import RESERVED, SLOT_BYTES, LatchFile
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome, read_entries
-from protocol_gateway.audit.restart import LATCH_UNKNOWN
-from protocol_gateway.authority.rules import Stop
+from protocol_gateway.audit.persisted_state import LATCH_UNKNOWN
+from protocol_gateway.authority.lease_rules import Stop
 from protocol_gateway.errors import AuditError
 from robomesh import reason_codes as codes
 from tests.conftest import run

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from protocol_gateway.core.stream import UnitStream
-from protocol_gateway.serving.budget import Budget, Limits
+from protocol_gateway.serving.rate_limit import Budget, Limits
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.protocol_gateway.hall import STATE, until
 from tests.protocol_gateway.old_program import ME, Program, hall, in_loop, legacy, program

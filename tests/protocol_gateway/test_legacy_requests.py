@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol_gateway.authority.obstacles import Controller
-from protocol_gateway.authority.rules import Authority, Stop
+from protocol_gateway.authority.lease_rules import Authority, Stop
+from protocol_gateway.authority.preconditions import Controller
 from protocol_gateway.core.records import Error, read_records, write_unit
 from protocol_gateway.core.stream import Unit, UnitStream
 from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived

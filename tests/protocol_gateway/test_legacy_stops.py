@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 
-from protocol_gateway.serving.budget import Limits
+from protocol_gateway.serving.rate_limit import Limits
 from tests.protocol_gateway.hall import STATE, until
 from tests.protocol_gateway.old_program import ME, Program, hall, in_loop, legacy, program
 

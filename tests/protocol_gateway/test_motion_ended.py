@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from protocol_gateway.audit.log import GATEWAY
-from protocol_gateway.authority.holders_motion import command_sent, observe, reported
-from protocol_gateway.authority.rules import Authority, Now, end_lease, request_lease
+from protocol_gateway.authority.lease_rules import Authority, Now, end_lease, request_lease
+from protocol_gateway.authority.motion_owner import command_sent, observe, reported
 from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest

@@ -12,12 +12,12 @@ import pytest
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from protocol_gateway.checking.checker import Checker
-from protocol_gateway.control.waits import date
+from protocol_gateway.control.deadlines import date
 from protocol_gateway.errors import CheckError
 from robomesh import reason_codes as codes
-from robomesh.answering import Request
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.server import Request
 from tests.conftest import run
 from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, simulator, until
 from tests.protocol_gateway.test_checked_motion import POST, alone, checked, standing

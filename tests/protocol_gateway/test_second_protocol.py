@@ -26,7 +26,7 @@ from protocol_gateway.drivers.driver import (
 from protocol_gateway.drivers.registry import DRIVERS
 from protocol_gateway.errors import CommandError
 from services.errors import SiteFileError
-from services.site import load
+from services.site_file.site import load
 from tests.conftest import run
 from tests.protocol_gateway.hall import STATE, A, C, gateway, refusal, until
 

@@ -7,7 +7,7 @@ import pytest
 import zenoh
 
 from protocol_gateway.audit.log import Outcome, read_entries
-from protocol_gateway.audit.restart import remembered
+from protocol_gateway.audit.persisted_state import remembered
 from robomesh.errors import NoAnswerError, RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run

@@ -15,11 +15,11 @@ import numpy as np
 if __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[2])
 
+from renderer.appearance import frame_placements, placements_at
 from renderer.cache import cache_folder
 from renderer.cameras import fitted
-from renderer.look import frame_placements, placements_at
 from renderer.overlay import Overlay, Row, _write_badge, write_over
-from renderer.staging import Placed, scene_of
+from renderer.scene_assembly import Placed, scene_of
 from renderer.views import camera_from, camera_of
 from robomesh.schemas.robomesh_pb2 import Vector3, View
 from tests.renderer.stage import cell, drawing_of, posed, robot
@@ -154,7 +154,7 @@ def main() -> None:
         for name, make in STORED.items():
             write(PICTURES / f"{name}.png", make(folder))
         return
-    write(ROOT / "services" / "console" / "stale.jpg", stale())
+    write(ROOT / "services" / "console" / "http" / "stale.jpg", stale())
     write(ROOT / "docs" / "rendered-arm.png", free(folder, size=DOCS, shading="full", near=True))
     write(ROOT / "docs" / "rendered-cell.png", legend(program(folder, size=DOCS), "free"))
 

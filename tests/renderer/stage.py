@@ -5,18 +5,18 @@ from pathlib import Path
 
 import numpy as np
 
+from renderer.appearance import Look, look_of, mesh_name
 from renderer.cache import prepared_once
 from renderer.drawing import Drawing
-from renderer.look import Look, look_of, mesh_name
 from renderer.mesh import Mesh
 from renderer.opengl import open_context
 from robots.cells import CellDescription, CellRobot
 from robots.description import load
 from robots.glb import link_meshes
 from robots.urdf.write import to_urdf
-from services import site as site_file
-from services.kinematics.describe import add_surroundings, describe, fixture_meshes
-from services.site_cells import cells_of
+from services.kinematics.descriptions import add_surroundings, describe, fixture_meshes
+from services.site_file import site as site_file
+from services.site_file.cells import cells_of
 
 
 @cache

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 
-from renderer.composing import Known, composed
-from renderer.look import look_of
-from renderer.requested import Shot, standing
+from renderer.appearance import look_of
+from renderer.composition import Known, composed
+from renderer.requested_views import Shot, standing
+from renderer.robot_state import Ages, RobotState, is_stale, touching_now
 from renderer.scene import Finish
-from renderer.state import Ages, RobotState, is_stale, touching_now
 from robomesh.schemas.robomesh_pb2 import KinematicState, ViewRequest
 from tests.renderer.test_look import described
 

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
+from renderer.appearance import home_placements, look_of
 from renderer.cameras import pixels
 from renderer.chain import placements, reach, read_chain
 from renderer.errors import ChainError, UnknownViewError
-from renderer.look import home_placements, look_of
 from renderer.views import camera_of
 from robomesh.schemas.robomesh_pb2 import Description, Vector3, View
 from robots.description import load
 from robots.model import build_model, frame_placements, link_placements
 from robots.urdf.write import to_urdf
-from services.kinematics.describe import describe
+from services.kinematics.descriptions import describe
 
 SIZE = (640, 360)
 ROBOTS = ("pt500", "pt600", "puma560")

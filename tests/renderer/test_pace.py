@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from renderer.pace import Pace, next_due, next_of
+from renderer.frame_scheduler import Pace, next_due, next_of
 
 
 @dataclass

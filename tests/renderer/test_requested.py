@@ -4,9 +4,9 @@ import math
 
 import pytest
 
+from renderer.appearance import look_of
 from renderer.errors import RendererError
-from renderer.look import look_of
-from renderer.requested import far, requested
+from renderer.requested_views import far, requested
 from robomesh.schemas.robomesh_pb2 import Vector3, View, ViewRequest
 from tests.renderer.test_look import described
 

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import pytest
 
 from renderer.errors import NoRoomError, ViewRequestError
-from renderer.requested import Shot
-from renderer.room import Room
+from renderer.requested_views import Shot
 from renderer.service import Settings
+from renderer.view_budget import Room
 from robomesh.errors import QuotaError
 
 

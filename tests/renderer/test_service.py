@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from renderer import finishing, pace, robots, service, stream
+from renderer import frame_scheduler, post_processing, robots, service, stream
 from renderer.encoder import H264Encoder
 from renderer.errors import NoEncoderError, RendererError
 from renderer.service import Settings
@@ -18,8 +18,8 @@ from robomesh.errors import NoAnswerError, RefusedError
 from robomesh.schemas.robomesh_pb2 import ControllerState, Event, KeyFrameRequest, VideoFrames
 from robomesh.session import open_session
 from robots.cells import Fixture
-from services.site_fixtures import Fixture as FixtureRow
-from services.site_fixtures import fixture_shape
+from services.site_file.fixtures import Fixture as FixtureRow
+from services.site_file.fixtures import fixture_shape
 from tests.cells import arm_alone
 from tests.conftest import last_value, run
 from tests.renderer.hall import HOME, SIZE, amber, frames, hall, joints, moving, orange, picture
@@ -107,7 +107,7 @@ def test_a_stream_whose_encoder_fails_comes_back(mesh, tmp_path, monkeypatch):
     async def main():
         async with hall(mesh, tmp_path) as (robot, monitor), moving(robot):
             await picture(monitor)
-            monkeypatch.setattr(finishing, "open_encoder", open_failing)
+            monkeypatch.setattr(post_processing, "open_encoder", open_failing)
             video = monitor.subscribe("robomesh/hall/arm/video/front", newest=100, history=False)
             messages = await frames(video, 12)
             assert len(opened) == 2
@@ -274,8 +274,8 @@ def test_a_machine_that_cannot_keep_up_draws_without_anti_aliasing_and_says_so_o
             return super().draw(*args, coarse=coarse, **options)
 
     monkeypatch.setattr(service, "Studio", Slow)
-    monkeypatch.setattr(pace, "_TOLD_AFTER_S", 0.8)
-    monkeypatch.setattr(pace, "_COARSE_AFTER_S", 0.3)
+    monkeypatch.setattr(frame_scheduler, "_TOLD_AFTER_S", 0.8)
+    monkeypatch.setattr(frame_scheduler, "_COARSE_AFTER_S", 0.3)
 
     async def main():
         async with hall(mesh, tmp_path) as (robot, monitor), moving(robot):

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from renderer.cameras import Camera, pixels
+from renderer.clearance_line import RED, Span, draw_span, same_span, span_of
 from renderer.overlay import AMBER, FAINT
-from renderer.span import RED, Span, draw_span, same_span, span_of
-from renderer.state import Ages, RobotState, span_now
+from renderer.robot_state import Ages, RobotState, span_now
 from robomesh.schemas.robomesh_pb2 import Clearance, Description, KinematicState, Vector3
 
 DESCRIPTION = Description(warning_distance=0.05, stop_distance=0.01)

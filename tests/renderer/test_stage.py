@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from renderer.appearance import look_of, placements_at
 from renderer.cameras import Camera, site_to_clip
-from renderer.look import look_of, placements_at
 from renderer.mesh import prepared
 from renderer.obstruction import contains, hides
 from renderer.occlusion import open_sky
 from renderer.ribbons import ribbons
 from renderer.scene import Finish, Line, square_m
-from renderer.staging import Placed, scene_of
+from renderer.scene_assembly import Placed, scene_of
 from tests.renderer.bodies import ball, cube
 from tests.renderer.test_look import described
 

@@ -6,8 +6,8 @@ import pytest
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from renderer.look import look_of
-from renderer.state import Ages, RobotState, age_s, overlay_of
+from renderer.appearance import look_of
+from renderer.robot_state import Ages, RobotState, age_s, overlay_of
 from robomesh.schemas.robomesh_pb2 import ControllerState
 from tests.renderer.test_look import described
 

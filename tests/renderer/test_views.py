@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from renderer.appearance import frame_placements, look_of, placements_at
 from renderer.cameras import pixels
 from renderer.errors import CameraError, UnknownViewError
-from renderer.look import frame_placements, look_of, placements_at
 from renderer.views import camera_from, camera_of, view_names
 from robomesh.schemas.robomesh_pb2 import Vector3, View
 from tests.renderer.test_look import described

@@ -4,11 +4,11 @@ import asyncio
 
 import zenoh
 
-from robomesh.answering import Request
 from robomesh.endpoints import client_config
 from robomesh.header import Header, pack
 from robomesh.last_values import last_values
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.server import Request
 from robomesh.session import open_session
 from tests.conftest import last_value, run
 from tests.robomesh.test_session import joints, until

@@ -6,8 +6,8 @@ import time
 import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
+from robomesh.delay import Lateness
 from robomesh.header import Header
-from robomesh.lateness import Lateness
 from robomesh.session import open_session
 from tests.conftest import run
 

@@ -6,7 +6,7 @@ import time
 import pytest
 import zenoh
 
-from robomesh.asking import ask_all
+from robomesh.client import ask_all
 from robomesh.endpoints import client_config
 from robomesh.errors import RefusedError
 from robomesh.messages import TEXT

@@ -6,12 +6,12 @@ import time
 
 import pytest
 
-from robomesh.answering import Request
-from robomesh.asking import ask_all
+from robomesh.client import ask_all
 from robomesh.errors import BusyError
-from robomesh.intake import RateLimit, begin_now
 from robomesh.messages import PROTOBUF
+from robomesh.request_queue import RateLimit, begin_now
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.server import Request
 from robomesh.session import open_session
 from tests.conftest import run
 from tests.protocol_gateway.hall import until

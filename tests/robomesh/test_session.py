@@ -12,11 +12,11 @@ import zenoh
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from robomesh import subscription as subscription_module
-from robomesh.answering import Request
 from robomesh.endpoints import client_config, router_config
 from robomesh.errors import NoAnswerError, RefusedError, SessionError
 from robomesh.header import pack
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.server import Request
 from robomesh.session import SessionSettings, open_session
 from tests.conftest import free_port, put_unheard, run
 

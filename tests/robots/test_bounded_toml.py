@@ -14,7 +14,7 @@ from robots.bounded_toml import MOST_CHARACTERS, MOST_DEPTH, parse_toml, read_to
 from robots.description import from_values, load, parse
 from robots.errors import DescriptionError
 from services.errors import SiteFileError
-from services.site import load as load_site
+from services.site_file.site import load as load_site
 
 DEEP = {
     "a dotted key": ".".join(["a"] * 20_000) + " = 1\n",

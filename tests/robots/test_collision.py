@@ -20,8 +20,8 @@ from robots.collision import (
     unshaped,
 )
 from robots.errors import JointCountError, MeshError
+from robots.kinematic_tree import Shape
 from robots.poses import rpy_rotation
-from robots.tree import Shape
 from tests.robots.boxes import bar_arm, block, bracket, cell_of, globe, placed, two_cheeks
 
 STRETCHED = np.zeros(2)

@@ -17,7 +17,7 @@ from robots.collision import (
     outside_nearest,
     own_contacts,
 )
-from robots.collision.nearest import arm_obstacles
+from robots.collision.distance import arm_obstacles
 from robots.collision.path import SAMPLE_M, placements_along, sampled_path, travelled
 from robots.joints import FloatArray
 from tests.robots.arms import TELESCOPE

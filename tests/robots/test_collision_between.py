@@ -7,9 +7,9 @@ import pytest
 
 from robots.cells import CellDescription, CellRobot
 from robots.collision import Cell, allowed_positions, build_cell, near_along, outside_nearest
-from robots.collision.nearest import Gauge
+from robots.collision.distance import Gauge
 from robots.collision.path import placements_along
-from robots.collision.sweeps import passed_along, sweeps_of
+from robots.collision.swept_volumes import passed_along, sweeps_of
 from robots.programs.check import check_plan
 from robots.programs.steps import CheckResult, Step, StepKind, ViolationKind
 from tests.robots.boxes import bar_arm, block, cell_of, placed, two_cheeks

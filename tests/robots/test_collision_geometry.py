@@ -7,11 +7,11 @@ import pytest
 
 from robots.cells import CellDescription, CellRobot
 from robots.collision import build_cell, outside_nearest
-from robots.collision.bodies import hull_body
+from robots.collision.geometry import hull_body
 from robots.description import load
 from robots.glb import link_mesh
 from robots.joints import FloatArray
-from robots.tree import tree_of
+from robots.kinematic_tree import tree_of
 from services.command_line.main import run
 from tests.robots.boxes import block, placed
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robots.checks import Problem
 from robots.description import from_values
+from robots.description_checks import Problem
 from robots.schema import DhDescription, UrdfDescription
 
 JOINT: dict[str, Any] = {

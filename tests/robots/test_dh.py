@@ -7,15 +7,15 @@ import pinocchio as pin
 import pytest
 
 from robots.description import from_values, library_names, load
-from robots.dh import DhForm, dh_form
 from robots.errors import DescriptionError
+from robots.kinematic_tree import tree_of
 from robots.model import build_model, frame_placements, link_placements, tool_placement
 from robots.poses import rpy_rotation
-from robots.save import write_description
+from robots.save_description import write_description
 from robots.schema import DhDescription, Pose, UrdfDescription
 from robots.summary import dh_summary
-from robots.tree import tree_of
 from robots.urdf.write import to_urdf
+from robots.urdf_to_dh import DhForm, dh_form
 from robots.views import views_of
 
 

@@ -9,7 +9,6 @@ import pytest
 from robots.cells import CellDescription, CellRobot
 from robots.collision import allowed_positions, build_cell, own_contacts
 from robots.description import EXAMPLES, from_values, known_names, library_names, load
-from robots.dh import dh_form
 from robots.errors import DescriptionError
 from robots.example_robots import example_folder
 from robots.glb import link_meshes
@@ -17,6 +16,7 @@ from robots.joints import violations
 from robots.model import RobotModel, build_model, link_placements, tool_placement
 from robots.schema import UrdfDescription
 from robots.urdf.write import to_urdf
+from robots.urdf_to_dh import dh_form
 
 FOLDER = example_folder()
 installed = pytest.mark.skipif(FOLDER is None, reason="the extra example-robots is not installed")

@@ -14,9 +14,9 @@ import pytest
 from robots.description import load, parse
 from robots.errors import MeshError
 from robots.glb import _cached_glb, cache_folder, link_meshes
+from robots.kinematic_tree import Shape
 from robots.meshes.mesh import Material, Mesh, Part, bounds
 from robots.meshes.read import read_mesh
-from robots.tree import Shape
 
 BOX = """#VRML V2.0 utf8
 Shape { appearance Appearance { material DEF %s Material { diffuseColor 1 0 0 transparency 0.5 } }

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.meshes.guess import file_to_link, guess
 from robots.meshes.mesh import Material, Mesh, Part
 from robots.meshes.normals import creased
 from robots.meshes.read import read_mesh
 from robots.meshes.solids import box
+from robots.meshes.unit_guess import file_to_link, guess
 from robots.meshes.write_glb import glb_of
 
 ODD = "odd for a robot's link"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from robots.collision import allowed_positions
-from robots.collision.pairs import plan_of
+from robots.collision.link_pairs import plan_of
 from robots.collision.verdicts import Kind
 from robots.description import load
 from robots.joints import joints_of

@@ -12,18 +12,18 @@ import pytest
 
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.cells import CellDescription, CellRobot
-from robots.collision import build_cell, near_along, own_contacts, own_nearest, pending, study
+from robots.collision import build_cell, near_along, own_contacts, own_nearest, pair_study, pending
 from robots.collision.cell import Cell
-from robots.collision.pairs import plan_of
+from robots.collision.link_pairs import plan_of
 from robots.collision.surfaces import turns_around
 from robots.collision.verdicts import Kind
 from robots.description import load
 from robots.importing import imported
 from robots.meshes.solids import ball
-from robots.save import write_folder
+from robots.save_description import write_folder
 from services.command_line.main import run
-from services.kinematics.questions import CheckQuestion
 from services.kinematics.worker import begin
+from services.kinematics.worker_messages import CheckQuestion
 
 REAL = Path(__file__).parents[3] / "shared" / "testdata" / "urdf" / "abb_irb2400_support"
 # Studies run in processes of their own.
@@ -133,15 +133,15 @@ def test_links_apart_at_home_stay_hulls_where_their_meshes_touch_as_often(tmp_pa
 def test_meshes_too_large_to_check_and_a_study_that_failed_leave_hulls(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(study, "_failed", {})
+    monkeypatch.setattr(pair_study, "_failed", {})
     model = hollow(tmp_path, base=BESIDE)
     with monkeypatch.context() as broken:
-        broken.setattr(study.sys, "executable", "/bin/false")
+        broken.setattr(pair_study.sys, "executable", "/bin/false")
         cell = cell_of(model)
     assert cell.arms["arm"].plan.elsewhere == cell.arms["arm"].plan.refined == ()
     assert touching(cell, 0.0, 0.21) == [("arm/base", "arm/hand")]
-    monkeypatch.setattr(study, "MOST_TRIANGLES", 30)
-    monkeypatch.setattr("robots.collision.pairs.studied", lambda case, *, wait: study.study(case))
+    monkeypatch.setattr(pair_study, "MOST_TRIANGLES", 30)
+    monkeypatch.setattr("robots.collision.link_pairs.studied", lambda case, *, wait: pair_study.study(case))
     ((links, text),) = plan_of(load(model)).elsewhere
     assert links == ("base", "hand")
     assert "hulls are checked, for the exact meshes have over" in text
@@ -160,7 +160,7 @@ def test_a_study_is_made_once_for_the_same_content(
     def refused(*_: object, **__: object) -> None:
         raise AssertionError("another process was started")
 
-    monkeypatch.setattr(study.subprocess, "Popen", refused)
+    monkeypatch.setattr(pair_study.subprocess, "Popen", refused)
     assert touching(cell_of(other / model.name), 0.0, 0.0) == []
     assert [*own_cache.rglob("*.json")] == [kept]
 
@@ -183,8 +183,8 @@ def test_a_damaged_result_of_a_study_is_replaced(tmp_path: Path, own_cache: Path
 def test_threads_that_ask_for_the_same_study_share_it(
     own_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(study, "_failed", {})
-    monkeypatch.setattr(study, "_running", {})
+    monkeypatch.setattr(pair_study, "_failed", {})
+    monkeypatch.setattr(pair_study, "_running", {})
     started, waiting, ended = [], threading.Semaphore(0), threading.Event()
 
     class Failing:
@@ -195,18 +195,18 @@ def test_threads_that_ask_for_the_same_study_share_it(
             waiting.release()
             assert ended.wait(60.0)
 
-    monkeypatch.setattr(study.subprocess, "Popen", Failing)
+    monkeypatch.setattr(pair_study.subprocess, "Popen", Failing)
     none = np.empty((0, 3, 3))
-    case = study.Case(((0, 1),), (none, none), (none, none), np.eye(4)[None, None], (np.empty(0, int),))
+    case = pair_study.Case(((0, 1),), (none, none), (none, none), np.eye(4)[None, None], (np.empty(0, int),))
     with ThreadPoolExecutor(2) as threads:
-        asked = [threads.submit(study.studied, case) for _ in range(2)]
+        asked = [threads.submit(pair_study.studied, case) for _ in range(2)]
         for _ in asked:
             assert waiting.acquire(timeout=60.0)
         ended.set()
         for each in asked:
-            assert each.result() == (study.Found(Kind.NOT_STUDIED),)
+            assert each.result() == (pair_study.Found(Kind.NOT_STUDIED),)
     assert len(started) == 1
-    ((failures, _),) = study._failed.values()
+    ((failures, _),) = pair_study._failed.values()
     assert failures == 1
 
 
@@ -222,33 +222,33 @@ def test_a_cell_is_pending_until_the_study_ends(tmp_path: Path) -> None:
 def test_a_study_that_fails_leaves_hulls_and_is_tried_again(
     tmp_path: Path, own_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(study, "_failed", {})
+    monkeypatch.setattr(pair_study, "_failed", {})
     model = hollow(tmp_path)
     with monkeypatch.context() as broken:
-        broken.setattr(study.sys, "executable", "/bin/false")
+        broken.setattr(pair_study.sys, "executable", "/bin/false")
         cell = cell_of(model)
     assert touching(cell, 0.0, 0.0) == [("arm/base", "arm/hand")]
     ((_, text),) = cell.arms["arm"].plan.refined
     assert "hulls are checked" in text
     assert [*own_cache.rglob("*.json")] == []
-    ((path, (failures, _)),) = study._failed.items()
+    ((path, (failures, _)),) = pair_study._failed.items()
     assert failures == 1
     # Not at once, ...
     assert pending(cell_of(model, wait=False)) == ("arm",)
-    assert study._running == {}
-    study._failed[path] = (study._TRIES, study._failed[path][1])
+    assert pair_study._running == {}
+    pair_study._failed[path] = (pair_study._TRIES, pair_study._failed[path][1])
     unready = cell_of(model, wait=False)
     assert (pending(unready), touching(unready, 0.0, 0.0)) == ((), [("arm/base", "arm/hand")])
     # ... but later.
-    study._failed[path] = (failures, 0.0)
+    pair_study._failed[path] = (failures, 0.0)
     assert touching(cell_of(model), 0.0, 0.0) == []
-    assert study._failed == {}
+    assert pair_study._failed == {}
 
 
 def test_the_services_check_answers_while_a_study_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(study, "_running", {})
+    monkeypatch.setattr(pair_study, "_running", {})
     answer = begin((CellDescription((CellRobot("arm", hollow(tmp_path), np.eye(4)),)),))
     home = CheckQuestion("arm", schema.CheckRequest(program="home").SerializeToString(), np.zeros(2), {})
     text = "links whose hulls touch are not studied yet; until then they are checked as hulls"
@@ -264,12 +264,12 @@ def test_the_services_check_answers_while_a_study_goes_on(
             raise AssertionError("somebody waited for the study")
 
     with monkeypatch.context() as patch:
-        patch.setattr(study.subprocess, "Popen", Endless)
+        patch.setattr(pair_study.subprocess, "Popen", Endless)
         for _ in range(2):
             unready = schema.CheckAnswer.FromString(answer(home))
             assert text in unready.notes
             assert not unready.ok
-    study._running.clear()
+    pair_study._running.clear()
     cell_of(tmp_path / "hollow.urdf")
     ready = schema.CheckAnswer.FromString(answer(home))
     assert text not in ready.notes

@@ -8,9 +8,9 @@ import pytest
 
 from robots.description import load
 from robots.errors import DescriptionError
+from robots.kinematic_tree import Shape, end_link
 from robots.meshes.mesh import Mesh, bounds
 from robots.model import build_model, frame_placements, link_placements, tool_jacobian
-from robots.tree import Shape, end_link
 from robots.urdf.files import files_of
 from robots.urdf.read import UrdfRobot, read_urdf
 

@@ -13,11 +13,18 @@ from pathlib import Path
 import pytest
 
 from robots.description import LIBRARY, load
+from robots.description_text import description_text
 from robots.errors import DescriptionError, RobotExistsError, SaveError
 from robots.glb import link_mesh, link_meshes
-from robots.save import Saved, read_robot, refused_path, revision_of, write_description, zip_description
-from robots.save_text import description_text
-from robots.tree import tree_of
+from robots.kinematic_tree import tree_of
+from robots.save_description import (
+    Saved,
+    read_robot,
+    refused_path,
+    revision_of,
+    write_description,
+    zip_description,
+)
 
 PT500 = (LIBRARY / "pt500" / "robot.toml").read_text(encoding="utf-8")
 

@@ -8,11 +8,11 @@ import pinocchio
 import pytest
 
 from robots.description import library_names, load, parse
-from robots.dh import dh_form
 from robots.model import build_model, link_placements, tool_placement
 from robots.schema import UrdfDescription
 from robots.urdf.read import read_urdf
 from robots.urdf.write import to_urdf
+from robots.urdf_to_dh import dh_form
 
 
 @pytest.mark.parametrize("robot", library_names())

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from robots.errors import MeshError
+from robots.kinematic_tree import BASE
 from robots.meshes.mesh import Mesh, bounds
 from robots.meshes.vrml.read import read_vrml
 from robots.schema import JointType
-from robots.tree import BASE
 from robots.vrml_robot import VrmlRobot, read_vrml_robot
 
 PROTOS = """

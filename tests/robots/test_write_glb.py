@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from renderer.glb import read_glb
-from robots.meshes.lighten import lightened
 from robots.meshes.mesh import Material, Mesh, Part, Wire, bounds
 from robots.meshes.normals import creased
 from robots.meshes.read import read_mesh
+from robots.meshes.simplify import lightened
 from robots.meshes.solids import ball, box
 from robots.meshes.write_glb import glb_of
 

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from robomesh.session import SessionSettings, open_session
-from services.console.console import Settings, serve
+from services.console.app import Settings, serve
 from services.console.define.settings import DefineSettings
-from services.site import Define, Robot, Site
+from services.site_file.site import Define, Robot, Site
 
 
 @dataclass

@@ -10,7 +10,7 @@ from argon2 import PasswordHasher
 from websockets.asyncio.client import connect
 
 from services.console.accounts import passwords
-from services.console.accounts.desk import change_account
+from services.console.accounts.auth_service import change_account
 from services.console.accounts.file import AccountRole
 from tests.services.test_console import Page, console, get
 

@@ -6,11 +6,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from services import site
 from services.command_line import main as command_line
 from services.console.accounts import passwords
-from services.console.accounts.attempts import Attempts, SignInLimits
-from services.console.accounts.desk import change_account
+from services.console.accounts.auth_service import change_account
 from services.console.accounts.file import Account, AccountRole, read_accounts
 from services.console.accounts.passwords import check_password, hash_password, verify
 from services.console.accounts.sessions import (
@@ -21,8 +19,10 @@ from services.console.accounts.sessions import (
     MOST_OF_ACCOUNT,
     Sessions,
 )
+from services.console.accounts.sign_in_attempts import Attempts, SignInLimits
 from services.console.errors import AccountsError
 from services.errors import SiteFileError
+from services.site_file import site
 from tests.services.signing_in import PASSWORD, cheap_hasher, hashed
 
 AT = datetime(2026, 11, 21, 8, 0, tzinfo=UTC)

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from robomesh.keys import parse_key
 from robomesh.schemas.robomesh_pb2 import Alarm as Message
 from robomesh.schemas.robomesh_pb2 import Event
-from services.watch import kept
+from services.watch import alarm_store
 from services.watch.alarms import LONGEST_SHELF_S, Alarm, AlarmError, Alarms
-from services.watch.intake import Intake
+from services.watch.subscriptions import Intake
 
 UNACKNOWLEDGED, ACKNOWLEDGED = Message.UNACKNOWLEDGED, Message.ACKNOWLEDGED
 RETURNED, SHELVED = Message.RETURNED, Message.SHELVED
@@ -241,8 +241,8 @@ def test_alarms_survive_in_their_file_as_they_were(tmp_path):
     alarms = Alarms()
     alarms.come(alarm(values=(("joint", "Hüfte"),)), 5.0)
     alarms.acknowledge(["arm:link"], "li", 6.0)
-    kept.save(path, alarms.held.values(), {"arm/events": 12345})
-    assert kept.load(path) == (alarms.held, {"arm/events": 12345})
+    alarm_store.save(path, alarms.held.values(), {"arm/events": 12345})
+    assert alarm_store.load(path) == (alarms.held, {"arm/events": 12345})
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[]", '{"alarms": [{}], "told_ns": {}}', '{"alarms": 3}', "\x00"])
@@ -250,7 +250,7 @@ def test_a_file_that_is_none_of_alarms_is_named(tmp_path, text):
     path = tmp_path / "site.json"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ValueError, match=r"site\.json: not a file of alarms"):
-        kept.load(path)
+        alarm_store.load(path)
 
 
 @pytest.mark.parametrize(
@@ -272,12 +272,12 @@ def test_a_file_that_is_none_of_alarms_is_named(tmp_path, text):
 )
 def test_a_file_of_alarms_with_a_value_that_cannot_be_is_named(tmp_path, name, value):
     path = tmp_path / "site.json"
-    kept.save(path, [alarm()], {})
+    alarm_store.save(path, [alarm()], {})
     values = json.loads(path.read_text(encoding="utf-8"))
     values["alarms"][0][name] = value
     path.write_text(json.dumps(values), encoding="utf-8")
     with pytest.raises(ValueError, match=r"site\.json: not a file of alarms"):
-        kept.load(path)
+        alarm_store.load(path)
 
 
 def test_a_clock_that_is_set_back_keeps_no_alarm_standing_for_longer():

@@ -12,7 +12,7 @@ from robomesh.presence import MONITOR
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import SessionSettings, open_session
 from robomesh.topics import Role
-from services.keys import Folder, deeds
+from services.pki import Folder, authority
 from services.ros2 import Settings as Ros2Settings
 from services.ros2 import serve as serve_ros2
 from services.router.router import read_access
@@ -26,9 +26,9 @@ from tests.services.test_foxglove import ARM, bridge, joints
 def secured(tmp_path_factory):
     """The keys of a site that runs, and its router."""
     folder = Folder(tmp_path_factory.mktemp("site") / "keys")
-    deeds.prepare(folder, "hall", robots=["arm"], border="open", routers=[])
-    deeds.issue(folder, "mo", Role.MONITOR)
-    deeds.issue(folder, "li", Role.OPERATOR)
+    authority.prepare(folder, "hall", robots=["arm"], border="open", routers=[])
+    authority.issue(folder, "mo", Role.MONITOR)
+    authority.issue(folder, "li", Role.OPERATOR)
     endpoint = f"tls/127.0.0.1:{free_port()}"
     with zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access))):
         yield folder, endpoint

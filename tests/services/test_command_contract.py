@@ -141,9 +141,9 @@ def test_entry_leaves_ctrl_c_to_the_command_that_runs(monkeypatch: pytest.Monkey
 
 
 def test_doctor_tells_a_running_site_from_another_program(router: str) -> None:
-    from services.command_line import doctor
+    from services.command_line.doctor import machine
 
-    assert doctor._is_router(int(router.rpartition(":")[2]))
+    assert machine._is_router(int(router.rpartition(":")[2]))
     with socket.create_server(("127.0.0.1", 0)) as other:
-        assert not doctor._is_console(other.getsockname()[1])
-    assert not doctor._is_router(free_port())
+        assert not machine._is_console(other.getsockname()[1])
+    assert not machine._is_router(free_port())

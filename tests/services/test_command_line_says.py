@@ -7,9 +7,9 @@ import threading
 
 import pytest
 
-from services.command_line.up import _console_url
-from services.site import Site
-from services.site_console import Console
+from services.command_line.site.up import _console_url
+from services.site_file.console import Console
+from services.site_file.site import Site
 
 ROBOMESH = (sys.executable, "-m", "services.command_line.main")
 
@@ -45,7 +45,7 @@ def test_a_command_ends_quietly_when_its_reader_has_gone(arguments, lines):
 @pytest.mark.slow
 def test_a_site_goes_on_when_nobody_takes_its_log():
     program = (
-        "from services.command_line import up\n"
+        "from services.command_line.site import up\n"
         "up._say_lines_as_they_are()\n"
         "for number in range(3000): up._write(f'{number:<200}')\n"
         "print('goes on', flush=True)\n"

@@ -16,9 +16,9 @@ from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
 from robomesh.subscription import Subscription
-from services.console import feeds
-from services.console.console import Settings, serve
+from services.console.app import Settings, serve
 from services.console.errors import PageNotBuiltError
+from services.console.websocket import shared_subscriptions
 from services.errors import ListenError
 from tests.conftest import put_unheard, run
 
@@ -401,7 +401,7 @@ def test_beyond_loopback_every_page_is_told(mesh, page):
 
 
 def test_a_value_whose_answer_was_lost_is_asked_for_again(mesh, page, monkeypatch):
-    monkeypatch.setattr(feeds, "_ASK_AGAIN_S", 0.1)
+    monkeypatch.setattr(shared_subscriptions, "_ASK_AGAIN_S", 0.1)
     ask, lost = Subscription._ask, []
 
     def lose_the_first(subscription, key_expr):

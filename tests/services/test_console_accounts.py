@@ -7,9 +7,9 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from robomesh.schemas import robomesh_pb2 as schema
-from services.console.accounts.desk import change_account
+from services.console.accounts.auth_middleware import SIGNED_OUT
+from services.console.accounts.auth_service import change_account
 from services.console.accounts.file import AccountRole
-from services.console.accounts.gate import SIGNED_OUT
 from tests.conftest import run
 from tests.services.signing_in import PASSWORD, Client, guarded
 from tests.services.test_console import console, page

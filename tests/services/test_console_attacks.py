@@ -11,9 +11,10 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
 from robomesh.schemas.robomesh_pb2 import FromPage
-from services.console import line, meshes, recordings, server
-from services.console.connection import Connection
-from services.console.listener import Listener
+from services.console.http import meshes, recordings, uvicorn_server
+from services.console.http.listener import Listener
+from services.console.http.request_timeout import Connection
+from services.console.websocket import websocket_transport
 from tests.conftest import run
 from tests.services.signing_in import Client, guarded
 from tests.services.test_console import console, get, page
@@ -381,8 +382,8 @@ async def endlessly(writer, data):
 def test_a_page_whose_frames_never_end_is_cut_off_before_it_takes_memory(
     mesh, page, monkeypatch, begin, again
 ):
-    monkeypatch.setattr(line, "_MOST_HELD", 1 << 20)
-    monkeypatch.setattr(server, "_PING_EACH_S", 300.0)  # it is not that it answers none
+    monkeypatch.setattr(websocket_transport, "_MOST_HELD", 1 << 20)
+    monkeypatch.setattr(uvicorn_server, "_PING_EACH_S", 300.0)  # it is not that it answers none
 
     async def main():
         async with console(mesh, page) as (address, _), page_of_bytes(address) as writer:
@@ -395,8 +396,8 @@ def test_a_page_whose_frames_never_end_is_cut_off_before_it_takes_memory(
 
 
 def test_a_page_that_reads_nothing_any_more_is_gone_once_it_answers_no_ping(mesh, page, monkeypatch):
-    monkeypatch.setattr(server, "_PING_EACH_S", 0.2)
-    monkeypatch.setattr(server, "_PONG_WITHIN_S", 0.5)
+    monkeypatch.setattr(uvicorn_server, "_PING_EACH_S", 0.2)
+    monkeypatch.setattr(uvicorn_server, "_PONG_WITHIN_S", 0.5)
     watch = FromPage(watch=FromPage.Watch(key="robomesh/s/r/joints")).SerializeToString()
     large = JointStates()
     large.joints.add(name="x" * 100_000)

@@ -3,10 +3,10 @@
 import pytest
 
 from robomesh.errors import RefusedError
-from services.console.browser import check_ask
 from services.console.errors import WatchError
-from services.console.feeds import check_expression
-from services.console.guard import refused_host, refused_origin
+from services.console.http.guard import refused_host, refused_origin
+from services.console.websocket.page_connection import check_ask
+from services.console.websocket.shared_subscriptions import check_expression
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from robomesh import topics
 from robomesh.header import Header
 from robomesh.subscription import Sample
-from services.console.lanes import is_key_frame, lane_for, thinned
+from services.console.websocket.send_queues import is_key_frame, lane_for, thinned
 
 KEY = b"\0\0\0\1\x67\x42\xc0\x1f\0\0\0\1\x68\xce\0\0\0\1\x65\x88"
 DELTA = b"\0\0\0\1\x41\x9a\x01"

@@ -4,8 +4,8 @@ import pytest
 from starlette.requests import Request
 
 from robomesh.errors import BusyError, NoAnswerError, QuotaError, RefusedError
-from services.console import meshes
-from services.console.meshes import MeshCache, mesh_response
+from services.console.http import meshes
+from services.console.http.meshes import MeshCache, mesh_response
 from tests.conftest import run
 
 

@@ -2,7 +2,7 @@
 
 import asyncio
 
-from robomesh.asking import ask_all
+from robomesh.client import ask_all
 from robomesh.errors import RefusedError
 from robomesh.schemas.robomesh_pb2 import LeaseAnswer, LeaseRequest, ReplayState
 from tests.conftest import run

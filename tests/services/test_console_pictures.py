@@ -16,10 +16,10 @@ from robomesh.errors import QuotaError, RefusedError
 from robomesh.header import Header
 from robomesh.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
 from robomesh.subscription import Sample
-from services.console import pictures
-from services.console.lanes import NewestLane
-from services.console.streamed import Streamed
-from services.console.wire import Moment
+from services.console.http import pictures
+from services.console.http.streaming import Streamed
+from services.console.websocket.framing import Moment
+from services.console.websocket.send_queues import NewestLane
 from tests.conftest import run
 from tests.services.test_console import console, get, page  # noqa: F401
 
@@ -247,7 +247,7 @@ def test_what_cannot_be_shown_is_said_in_words(mesh, page, path, status, words):
 
 
 def test_without_a_renderer_the_answer_says_so(mesh, page, monkeypatch):  # noqa: F811
-    monkeypatch.setattr("services.console.views.TIMEOUT_S", 0.3)
+    monkeypatch.setattr("services.console.requested_views.TIMEOUT_S", 0.3)
 
     async def main():
         async with console(mesh, page) as (address, _):

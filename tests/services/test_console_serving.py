@@ -9,9 +9,9 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from robomesh.header import Header
 from robomesh.schemas.robomesh_pb2 import FromPage, ToPage
 from robomesh.subscription import Sample
-from services.console.browser import Browser
-from services.console.turns import Turns
-from services.console.wire import Moment, frame, moments, state_frame
+from services.console.websocket.framing import Moment, frame, moments, state_frame
+from services.console.websocket.page_connection import Browser
+from services.console.websocket.write_scheduler import Turns
 from tests.conftest import run
 
 KEY, VIDEO = "robomesh/s/r/joints", "robomesh/s/r/video/top"
@@ -88,7 +88,9 @@ class Socket:
 
 
 def test_who_keeps_step_gets_all_in_one_write_and_who_does_not_the_newest_until_it_does(monkeypatch):
-    monkeypatch.setattr("services.console.wire._SAME_AGE_S", 60.0)  # a busy machine's turn may be long
+    monkeypatch.setattr(
+        "services.console.websocket.framing._SAME_AGE_S", 60.0
+    )  # a busy machine's turn may be long
 
     async def main():
         feeds, lines = Feeds(), [Line(), Line(), Line()]
@@ -161,7 +163,7 @@ def test_the_same_bytes_are_sent_to_all_for_a_moment_then_the_age_is_told_anew(m
     first = moment.frames()
     assert moment.frames() is first or time.monotonic() - moment._at > 0.005
     later = time.monotonic() + 1.0
-    monkeypatch.setattr("services.console.wire.time", SimpleNamespace(monotonic=lambda: later))
+    monkeypatch.setattr("services.console.websocket.framing.time", SimpleNamespace(monotonic=lambda: later))
     ages = [ToPage.FromString(each[2:]).sample.age_s for each in (first, moment.frames())]
     assert ages[0] >= 2.0
     assert 0.9 < ages[1] - ages[0] < 31.0

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 from robomesh.schemas.robomesh_pb2 import FromPage, ToPage
 from robomesh.session import open_session
-from services.console.browser import Browser
-from services.console.feeds import Feeds
-from services.console.views import Views
+from services.console.requested_views import Views
+from services.console.websocket.page_connection import Browser
+from services.console.websocket.shared_subscriptions import Feeds
 from tests.conftest import run
 from tests.services.test_console import browse, console, page
 
@@ -42,8 +42,8 @@ class Deaf:
 
 
 def test_a_page_that_asks_and_never_reads_is_cut_off(mesh, monkeypatch):
-    monkeypatch.setattr("services.console.browser._MOST_UNREAD", 20_000)
-    monkeypatch.setattr("services.console.browser._CLOSED_WITHIN_S", 0.05)
+    monkeypatch.setattr("services.console.websocket.page_connection._MOST_UNREAD", 20_000)
+    monkeypatch.setattr("services.console.websocket.page_connection._CLOSED_WITHIN_S", 0.05)
 
     async def main():
         async with open_session(mesh) as session:

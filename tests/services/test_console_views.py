@@ -11,10 +11,10 @@ from robomesh.header import Header
 from robomesh.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
 from robomesh.session import open_session
 from robomesh.subscription import Sample
-from services.console import lanes, stepped
-from services.console.stepped import SteppedVideo
-from services.console.views import LOWEST_STEP, Views, less
-from services.console.wire import Moment
+from services.console.requested_views import LOWEST_STEP, Views, less
+from services.console.websocket import adaptive_video, send_queues
+from services.console.websocket.adaptive_video import SteppedVideo
+from services.console.websocket.framing import Moment
 from tests.conftest import run
 
 KEY = "robomesh/s/r/video/top"
@@ -84,7 +84,7 @@ class Steps:
 class Clock:
     def __init__(self, monkeypatch):
         self.now = 100.0
-        for module in (stepped, lanes):
+        for module in (adaptive_video, send_queues):
             monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now))
 
 
@@ -193,7 +193,7 @@ def test_who_cannot_be_given_less_is_not_asked_about_with_every_picture(monkeypa
 
 def test_who_takes_all_again_is_given_more_later_and_less_soon_after_too_much(monkeypatch):
     async def main():
-        monkeypatch.setattr(stepped, "_MIND_EACH_S", 0.0)
+        monkeypatch.setattr(adaptive_video, "_MIND_EACH_S", 0.0)
         clock, feeds = Clock(monkeypatch), Feeds()
         video = watch(feeds)
 

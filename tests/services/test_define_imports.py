@@ -12,7 +12,7 @@ import zenoh
 
 from robomesh.endpoints import router_config
 from robomesh.session import SessionSettings
-from robots.collision.pairs import plan_of
+from robots.collision.link_pairs import plan_of
 from robots.collision.verdicts import IGNORED
 from robots.description import load
 from robots.urdf.write import to_urdf

@@ -15,14 +15,14 @@ from starlette.requests import Request
 from robomesh.endpoints import router_config
 from robomesh.session import SessionSettings
 from robots.description import LIBRARY, load
-from robots.save import read_robot, write_folder
-from services.command_line import roles
+from robots.save_description import read_robot, write_folder
+from services.command_line.site import services
 from services.console.define import routes, store
 from services.console.define.errors import RefusedRequest
 from services.console.define.routes import Define
 from services.console.define.settings import DefineSettings
-from services.site import Define as DefinePart
-from services.site import Site
+from services.site_file.site import Define as DefinePart
+from services.site_file.site import Site
 from tests.conftest import free_port, run
 from tests.services.defining import defining
 from tests.site import wait_until
@@ -379,8 +379,8 @@ def test_without_a_supervisor_the_lines_for_the_site_file_are_told(mesh, tmp_pat
 
 def test_a_running_robot_of_the_pages_reads_its_own_folder_only(tmp_path, monkeypatch):
     begun = []
-    monkeypatch.setattr(roles.service, "run", lambda serve, settings, **_: begun.append(settings))
-    monkeypatch.setattr(roles.service, "log_to_stderr", lambda: None)
+    monkeypatch.setattr(services.service, "run", lambda serve, settings, **_: begun.append(settings))
+    monkeypatch.setattr(services.service, "log_to_stderr", lambda: None)
     robots = tmp_path / "robots"
     for folder in (robots / "mine", tmp_path / "own"):
         folder.mkdir(parents=True)
@@ -395,8 +395,8 @@ def test_a_running_robot_of_the_pages_reads_its_own_folder_only(tmp_path, monkey
     (robots / "started.toml").write_text(
         'site = "s"\n[[robot]]\nname = "mine"\nmodel = "mine/pt500/robot.toml"\ncontroller = "simulated"\n'
     )
-    roles.kinematics(tmp_path / "site.toml", "tcp/127.0.0.1:1", "")
-    roles.kinematics(tmp_path / "site.toml", "tcp/127.0.0.1:1", "mine")
+    services.kinematics(tmp_path / "site.toml", "tcp/127.0.0.1:1", "")
+    services.kinematics(tmp_path / "site.toml", "tcp/127.0.0.1:1", "mine")
     found = {
         each.name: each.confined
         for settings in begun

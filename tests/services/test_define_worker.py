@@ -17,7 +17,7 @@ from robots.urdf.write import to_urdf
 from services.console.accounts.sessions import SignedIn
 from services.console.define import routes, store
 from services.console.define.errors import RefusedRequest
-from services.console.define.workshop import Limits, Worker, Workers, Workshop
+from services.console.define.worker_pool import Limits, Worker, Workers, Workshop
 from tests.conftest import run
 from tests.robots.test_step import step_box
 from tests.services.defining import defining

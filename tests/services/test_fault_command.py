@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from robomesh.schemas import robomesh_pb2 as schema
-from services.command_line.monitor import link_words
+from services.command_line.live.monitor import link_words
 from services.simulator.fault_requests import Mesh
 from services.simulator.fault_table import FAULTS
 from services.simulator.simulator import Settings, serve

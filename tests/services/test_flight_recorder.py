@@ -12,7 +12,7 @@ from mcap_protobuf.decoder import DecoderFactory
 
 from mcap_files.capture import Capture
 from mcap_files.files import describe_file
-from mcap_files.finish import rewrite
+from mcap_files.reindex import rewrite
 from robomesh.errors import RefusedError
 from robomesh.header import Header
 from robomesh.schemas import robomesh_pb2 as schema

@@ -10,8 +10,8 @@ import trustme
 import websockets
 
 from services.errors import ListenError
-from services.foxglove import door
-from services.foxglove.door import Door, welcome
+from services.foxglove import listener
+from services.foxglove.listener import Door, welcome
 from services.foxglove.settings import ORIGINS
 from tests.conftest import run
 from tests.services.foxglove_client import attached
@@ -132,8 +132,8 @@ def test_a_page_that_says_nonsense_of_itself_is_sent_away_like_any_other():
 
 
 def test_who_says_nothing_keeps_out_himself_alone_and_for_as_long_as_he_stays(monkeypatch):
-    monkeypatch.setattr(door, "_MOST_CLIENTS", 2)
-    monkeypatch.setattr(door, "_MOST_OF_ONE", 4)
+    monkeypatch.setattr(listener, "_MOST_CLIENTS", 2)
+    monkeypatch.setattr(listener, "_MOST_OF_ONE", 4)
 
     async def main():
         async with open_door() as knock:
@@ -153,8 +153,8 @@ def test_who_says_nothing_keeps_out_himself_alone_and_for_as_long_as_he_stays(mo
 
 
 def test_places_of_those_who_went_are_free_again(monkeypatch):
-    monkeypatch.setattr(door, "_MOST_CLIENTS", 1)
-    monkeypatch.setattr(door, "_MOST_OF_ONE", 2)
+    monkeypatch.setattr(listener, "_MOST_CLIENTS", 1)
+    monkeypatch.setattr(listener, "_MOST_OF_ONE", 2)
 
     async def main():
         async with open_door() as knock:

@@ -12,16 +12,17 @@ import pytest
 import zenoh
 
 from robomesh.access import NOBODYS_ROBOT
+from robomesh.certificate_identity import read_identity
 from robomesh.endpoints import router_config
-from robomesh.identity import read_identity
 from robomesh.topics import Role
 from robots.description import library_names
-from services.command_line import main, up
-from services.keys import Folder, deeds
-from services.keys.errors import KeysError
+from services.command_line import main
+from services.command_line.site import up
+from services.pki import Folder, authority
+from services.pki.errors import KeysError
 from services.router.router import read_access
-from services.site import load
-from services.started import may_start
+from services.site_file.site import load
+from services.site_file.started_robots import may_start
 from tests.conftest import free_port
 from tests.site import ONE_ARM, robomesh, running_site, site_file
 
@@ -156,12 +157,12 @@ def test_where_no_names_can_be_written_ahead_the_robots_that_were_started_run_on
     started = tmp_path / "robots" / "started.toml"
     started.parent.mkdir()
     started.write_text('site = "hall"' + ONE_ARM.replace('"arm"', '"mine"'))
-    deeds.entitle(folder, ["mine"])
+    authority.entitle(folder, ["mine"])
 
     def full(*_):
         raise KeysError(f"{folder.principals}: cannot be written: no space left on device")
 
-    monkeypatch.setattr(deeds, "save", full)
+    monkeypatch.setattr(authority, "save", full)
     following = up._Started(load(site), site, load(site).listened[0])
     assert [key[0] for key in following.wanted()] == ["mine"]
     assert "no space left on device; the robots that were started run" in caplog.text
@@ -245,7 +246,7 @@ def test_keys_are_found_where_a_site_file_says_or_beside_or_around_ones_own_and_
     tmp_path, monkeypatch, capsys
 ):
     for name in ("keys", "other", "third"):
-        deeds.prepare(Folder(tmp_path / name), name, robots=[], border="open", routers=[])
+        authority.prepare(Folder(tmp_path / name), name, robots=[], border="open", routers=[])
     work = tmp_path / "work"
     work.mkdir()
     monkeypatch.chdir(work)
@@ -304,7 +305,7 @@ def test_without_the_authoritys_key_nothing_is_issued_and_rules_are_still_writte
     assert keys("issue", "mo", "--role", "monitor") == 2
     assert "the authority's key signs; bring it back for this" in capsys.readouterr().err
     assert keys("revoke", "li") == 0
-    assert deeds.principals_of(folder).find("li").revoked is not None
+    assert authority.principals_of(folder).find("li").revoked is not None
 
 
 def test_a_list_that_somebody_spoiled_is_told_with_its_file_and_key(site, capsys):
@@ -329,11 +330,11 @@ def test_a_time_without_its_zone_is_told_too(site, capsys):
 def test_an_init_that_was_killed_before_it_wrote_the_list_is_made_good_by_the_next(site):
     keys("init", str(site))
     folder = Folder(site.parent / "keys")
-    whole = deeds.principals_of(folder)
+    whole = authority.principals_of(folder)
     folder.principals.unlink()
     folder.access.unlink()
     assert keys("init", str(site)) == 0
-    again = deeds.principals_of(folder)
+    again = authority.principals_of(folder)
     assert [each.name for each in again.entries] == [each.name for each in whole.entries]
     known = json.dumps(read_access(folder.access)["access_control"]["subjects"])
     assert all(each.name in known and each.serial for each in again.entries)
@@ -348,7 +349,7 @@ def test_a_revoked_name_is_given_to_nobody_while_a_certificate_of_it_is_good(mad
     for role in ("operator", "monitor"):
         assert keys("issue", "wang", "--role", role) == 2
         assert "would be let in again; issue wang-2 in its place" in (error := capsys.readouterr().err)
-    listed = deeds.principals_of(Folder(made / "keys")).find("wang")
+    listed = authority.principals_of(Folder(made / "keys")).find("wang")
     assert listed.good_until - listed.expires > timedelta(days=88)
     assert f"is good until {listed.good_until:%Y-%m-%d %H:%M} UTC" in error
     assert keys("renew", "wang") == 2
@@ -357,35 +358,35 @@ def test_a_revoked_name_is_given_to_nobody_while_a_certificate_of_it_is_good(mad
 
 def test_a_revoked_name_is_free_when_its_certificates_have_expired(made):
     folder = Folder(made / "keys")
-    deeds.issue(folder, "zhou", Role.OPERATOR, lives=timedelta(seconds=-60))
-    deeds.revoke(folder, "zhou")
-    assert deeds.issue(folder, "zhou", Role.MONITOR).revoked is None
+    authority.issue(folder, "zhou", Role.OPERATOR, lives=timedelta(seconds=-60))
+    authority.revoke(folder, "zhou")
+    assert authority.issue(folder, "zhou", Role.MONITOR).revoked is None
 
 
 def test_a_revoked_guest_comes_back_neither_by_a_new_file_nor_by_one_that_its_site_gives(tmp_path):
     here, there = Folder(tmp_path / "here"), Folder(tmp_path / "there")
     for folder in (here, there):
-        deeds.prepare(folder, folder.path.name, robots=[], border="open", routers=[])
-    deeds.issue_guest(here, "there")
-    deeds.issue_guest(there, "here")
-    deeds.revoke(here, "router.there")
+        authority.prepare(folder, folder.path.name, robots=[], border="open", routers=[])
+    authority.issue_guest(here, "there")
+    authority.issue_guest(there, "here")
+    authority.revoke(here, "router.there")
     with pytest.raises(KeysError, match="a new authority alone keeps the old one out"):
-        deeds.issue_guest(here, "there")
+        authority.issue_guest(here, "there")
     with pytest.raises(KeysError, match="would be let in again"):
-        deeds.accept(here, there.guest("here").read_bytes())
+        authority.accept(here, there.guest("here").read_bytes())
     assert "router.there" not in here.access.read_text()
 
 
 def test_deeds_at_the_same_time_lose_nothing_of_each_other(made):
     folder = Folder(made / "keys")
-    deeds.issue(folder, "thief", Role.OPERATOR)
+    authority.issue(folder, "thief", Role.OPERATOR)
     several = [f"p{number}" for number in range(12)]
     with ThreadPoolExecutor(4) as pool:
-        done = [pool.submit(deeds.issue, folder, name, Role.MONITOR) for name in several]
-        done.append(pool.submit(deeds.revoke, folder, "thief"))
+        done = [pool.submit(authority.issue, folder, name, Role.MONITOR) for name in several]
+        done.append(pool.submit(authority.revoke, folder, "thief"))
         for each in done:
             each.result()
-    principals, rules = deeds.principals_of(folder), folder.access.read_text()
+    principals, rules = authority.principals_of(folder), folder.access.read_text()
     assert all(principals.find(name) and f'"{name}.hall"' in rules for name in several)
     assert "thief.hall" not in rules
 
@@ -461,7 +462,7 @@ def test_doctor_tries_every_certificate_and_finds_what_a_router_does_otherwise(s
 @pytest.mark.processes
 def test_a_site_with_keys_runs_over_tls(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    deeds.prepare(Folder(tmp_path / "keys"), "test", robots=[], border="open", routers=[])
+    authority.prepare(Folder(tmp_path / "keys"), "test", robots=[], border="open", routers=[])
     assert keys("issue", "mo", "--role", "monitor") == 0
     with running_site(tmp_path, robots="", more='[keys]\nfolder = "keys"\n') as site:
         router = site.router.replace("tcp/", "tls/")

@@ -17,9 +17,9 @@ from robots.collision import build_cell, outside_clearance, own_nearest
 from robots.model import tool_placement
 from services import kinematics
 from services.kinematics import answers
-from services.kinematics.place import Place
-from services.site_fixtures import Fixture as FixtureRow
-from services.site_fixtures import fixture_shape
+from services.kinematics.cell_state import Place
+from services.site_file.fixtures import Fixture as FixtureRow
+from services.site_file.fixtures import fixture_shape
 from tests.conftest import last_value, run
 from tests.site import alive
 

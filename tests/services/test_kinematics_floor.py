@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from renderer.look import floor_of
+from renderer.appearance import floor_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.cells import CellDescription, CellRobot, Floor
 from robots.collision import build_cell
-from services.kinematics.describe import add_surroundings
+from services.kinematics.descriptions import add_surroundings
 from services.kinematics.floor import floor_event
 from services.watch.rules import RULES
 from tests.robots.boxes import placed

@@ -7,8 +7,10 @@ import pytest
 from robomesh.keys import PresenceKey
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
-from services.command_line import alarms, find, listing, listing_words
-from services.command_line.alarm_lists import gone_sites, lists
+from services.command_line import discovery
+from services.command_line.alarms import commands
+from services.command_line.alarms.lists import gone_sites, lists
+from services.command_line.live import listing, listing_text
 from tests.conftest import run
 
 Alarm = schema.Alarm
@@ -37,10 +39,10 @@ def test_a_site_that_is_gone_stays_in_the_list_with_the_time_that_a_watch_tells_
     rows = {row["site"]: row for row in listing._sites(ALIVE, [SHANGHAI, WUHAN])}
     assert rows.keys() == {"beijing", "shanghai", "wuhan"}
     assert rows["beijing"]["gone_since"] == 9e8
-    assert listing_words._site(rows["beijing"]).startswith("beijing — gone since 1998-07-")
+    assert listing_text._site(rows["beijing"]).startswith("beijing — gone since 1998-07-")
     assert rows["shanghai"]["gone_since"] is None
     # What is unacknowledged is said, and not only how much of it.
-    assert "-:site.gone:beijing: site beijing is gone" in listing_words._site(rows["shanghai"])
+    assert "-:site.gone:beijing: site beijing is gone" in listing_text._site(rows["shanghai"])
 
 
 def test_a_site_that_is_back_is_not_gone():
@@ -56,8 +58,10 @@ def test_who_asks_for_a_robot_of_a_site_that_is_gone_is_told_so(mesh):
             watch.declare_publisher("shanghai", "-", "alarms").put(SHANGHAI)
             while not await lists(monitor):
                 await asyncio.sleep(0.02)
-            with pytest.raises(find.NoSuchRobotError, match=r"no robot 'beijing/pt500-1'.*; gone.*beijing"):
-                await find.find(monitor, "beijing/pt500-1")
+            with pytest.raises(
+                discovery.NoSuchRobotError, match=r"no robot 'beijing/pt500-1'.*; gone.*beijing"
+            ):
+                await discovery.find(monitor, "beijing/pt500-1")
 
     run(main())
 
@@ -67,22 +71,22 @@ def test_who_asks_for_a_robot_of_a_site_that_is_gone_is_told_so(mesh):
     ["arm:link", "shanghai/arm:link", "link.down", "gateway · link.down", "arm:link.down"],
 )
 def test_an_alarm_is_known_by_its_id_and_by_what_the_page_calls_it(name):
-    assert alarms._by_site([name], [SHANGHAI]) == {"shanghai": ["arm:link"]}
+    assert commands._by_site([name], [SHANGHAI]) == {"shanghai": ["arm:link"]}
 
 
 def test_a_name_that_several_alarms_have_is_refused_with_theirs():
     both = schema.AlarmList(site="shanghai", alarms=[alarm(), alarm("arm-2:link", robot="arm-2")])
-    with pytest.raises(alarms.NoSuchAlarmError, match=r"shanghai/arm:link, shanghai/arm-2:link"):
-        alarms._by_site(["link.down"], [both])
-    with pytest.raises(alarms.NoSuchAlarmError, match=r"there are: arm:link \(gateway · link\.down\)"):
-        alarms._by_site(["nothing"], [both])
+    with pytest.raises(commands.NoSuchAlarmError, match=r"shanghai/arm:link, shanghai/arm-2:link"):
+        commands._by_site(["link.down"], [both])
+    with pytest.raises(commands.NoSuchAlarmError, match=r"there are: arm:link \(gateway · link\.down\)"):
+        commands._by_site(["nothing"], [both])
 
 
 def test_an_alarms_name_is_never_broken_and_its_text_takes_the_whole_width(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "80")
     text = "word " * 30
     told = alarm(f"-:{LONG}", "service.silent", text=text, advice="Look at it.", count=3, by="li")
-    alarms._print([schema.AlarmList(site="a-site-with-a-name-that-is-long", alarms=[told])])
+    commands._print([schema.AlarmList(site="a-site-with-a-name-that-is-long", alarms=[told])])
     lines = capsys.readouterr().out.splitlines()
     assert f"  a-site-with-a-name-that-is-long/-:{LONG}" in lines
     assert lines[0].startswith("HIGH  unacknowledged  2001-09-")

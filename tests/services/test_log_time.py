@@ -9,8 +9,8 @@ from mcap_files.capture import Capture
 from robomesh.header import Header, pack
 from robomesh.session import open_session
 from robomesh.wall_clock import WallClock
-from services.recorder import intake
-from services.recorder import robot as recorder_robot
+from services.recorder import captures as recorder_robot
+from services.recorder import subscriptions
 from tests.conftest import run
 from tests.services.recording import put_states, recording_site, trace_off, trace_on, until, until_indexed
 
@@ -37,7 +37,7 @@ def test_what_comes_while_the_recorder_is_busy_came_after_it_was_published(mesh)
     async def main():
         async with open_session(mesh) as own, open_session(mesh) as other:
             taking, sink, wall_clock = (
-                intake.Intake(own.zenoh_session, "site", own.ignored),
+                subscriptions.Intake(own.zenoh_session, "site", own.ignored),
                 Slow(),
                 WallClock(),
             )

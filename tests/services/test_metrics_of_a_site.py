@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from services import site as site_file
-from services.command_line.metering import following_with_metrics, with_metrics
-from services.command_line.up import programs
+from services.command_line.site.metrics_ports import following_with_metrics, with_metrics
+from services.command_line.site.up import programs
 from services.errors import ListenError
+from services.site_file import site as site_file
 from services.supervisor import Program
 from tests.site import robomesh
 

@@ -10,7 +10,7 @@ from robomesh.schemas.robomesh_pb2 import (
     KinematicState,
     ProgramState,
 )
-from services.command_line.monitor_words import (
+from services.command_line.live.monitor_text import (
     check_words,
     clearance_record,
     near_words,

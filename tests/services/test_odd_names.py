@@ -26,9 +26,9 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import SessionSettings, open_session
 from robomesh.topics import REQUESTS, TOPICS, Role
 from services import foxglove, kinematics, player, recorder, ros2, watch
-from services.command_line.listing import _Around, _collect
-from services.console import console
-from services.keys import Folder, deeds
+from services.command_line.live.listing import _Around, _collect
+from services.console import app
+from services.pki import Folder, authority
 from services.recorder.settings import Settings as RecorderSettings
 from services.router.router import read_access
 from tests.cells import arm_alone
@@ -51,7 +51,7 @@ class Site:
     services: dict
     plain: zenoh.Session
     observer: object
-    console: str = ""
+    app: str = ""
     foxglove: asyncio.Task | None = None
 
     def call(self, coroutine):
@@ -128,8 +128,8 @@ async def services_of(folder: Path, mesh_of, site: Site):
         page.mkdir()
         (page / "index.html").write_text("<!doctype html><title>page</title>")
         listening = asyncio.get_running_loop().create_future()
-        its_settings = console.Settings(site=SITE, listen="127.0.0.1:0", page=page)
-        await begin("console", console.serve, its_settings, on_ready=listening.set_result)
+        its_settings = app.Settings(site=SITE, listen="127.0.0.1:0", page=page)
+        await begin("console", app.serve, its_settings, on_ready=listening.set_result)
         site.console = (await asyncio.wait_for(listening, WITHIN_S)).removeprefix("http://")
         # The bridge to Foxglove is a program of a person's: it has a monitor's certificate.
         session = await stack.enter_async_context(open_session(mesh_of("foxglove")))
@@ -147,9 +147,9 @@ def site(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("site")
     if request.param == "with keys":
         keys = Folder(folder / "keys")
-        deeds.prepare(keys, SITE, robots=["arm"], border="open", routers=[])
-        deeds.issue(keys, "li", Role.OPERATOR)
-        deeds.issue(keys, "mo", Role.MONITOR)
+        authority.prepare(keys, SITE, robots=["arm"], border="open", routers=[])
+        authority.issue(keys, "li", Role.OPERATOR)
+        authority.issue(keys, "mo", Role.MONITOR)
         endpoint = f"tls/127.0.0.1:{free_port()}"
         router = zenoh.open(router_config((endpoint,), (), keys.tls_of("router"), read_access(keys.access)))
         files = {"observer": keys.person("mo"), "foxglove": keys.person("mo"), "plain": keys.person("li")}

@@ -5,11 +5,11 @@ import pytest
 from robomesh.clock import Reading
 from robomesh.keys import PresenceKey
 from robomesh.schemas.robomesh_pb2 import ControllerState, ServiceHealth
-from services import site as site_file
 from services.errors import SiteFileError
+from services.site_file import site as site_file
 from services.watch.conditions import Condition, Judge, robot_conditions
+from services.watch.consistency import Expected, mesh_conditions
 from services.watch.mesh import Mesh
-from services.watch.quarrels import Expected, mesh_conditions
 
 # 2026-11-22 12:00 UTC.
 EPOCH = 1795348800.0

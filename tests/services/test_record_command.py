@@ -5,9 +5,9 @@ import os
 import signal
 from contextlib import asynccontextmanager
 
-from services.command_line.find import Robot
+from services.command_line.discovery import Robot
+from services.command_line.live.send import joined
 from services.command_line.recordings.record import _record
-from services.command_line.send import joined
 from tests.conftest import run
 from tests.services.recording import put_states, recording_site, trace_off
 from tests.services.test_recorder import fill_disk_under

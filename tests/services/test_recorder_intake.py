@@ -12,9 +12,9 @@ from robomesh.header import Header, pack
 from robomesh.schemas.robomesh_pb2 import Event, EventList, RecordingQuery
 from robomesh.session import open_session
 from robomesh.topics import TOPICS, topic
-from services.recorder import intake
+from services.recorder import subscriptions
 from services.recorder.disk import Taken
-from services.recorder.part import Part
+from services.recorder.file_writer import Part
 from services.recorder.settings import Flight
 from tests.conftest import run
 from tests.recordings import KEY_PICTURE, PICTURE, START_NS
@@ -46,7 +46,7 @@ def test_who_takes_a_robots_joints_is_given_no_video_and_misses_none_of_it(mesh)
             def put(key, number, data=b""):
                 other.zenoh_session.put(key, data, attachment=pack(Header(7, number, number)))
 
-            taking = intake.Intake(own.zenoh_session, "site", own.ignored)
+            taking = subscriptions.Intake(own.zenoh_session, "site", own.ignored)
             states, all_of_it, later = Sink(), Sink(), Sink()
             try:
                 with taking.lock:
@@ -111,7 +111,7 @@ def test_a_list_with_a_time_that_is_none_is_left_out_and_what_follows_is_taken(m
                 query.reply(EVENTS, list_of, attachment=pack(Header(7, 1, 0)))
 
             queryable = other.zenoh_session.declare_queryable(EVENTS, tell)
-            taking, sink = intake.Intake(own.zenoh_session, "site", own.ignored), Sink()
+            taking, sink = subscriptions.Intake(own.zenoh_session, "site", own.ignored), Sink()
             try:
                 with taking.lock:
                     taking.robot("arm").attach(sink, frozenset({"events"}))
@@ -134,7 +134,7 @@ def test_a_sink_that_fails_at_a_message_ends_no_other_robots_recording(mesh, cap
 
     async def main():
         async with open_session(mesh) as own, open_session(mesh) as other:
-            taking, sink = intake.Intake(own.zenoh_session, "site", own.ignored), Sink()
+            taking, sink = subscriptions.Intake(own.zenoh_session, "site", own.ignored), Sink()
             try:
                 with taking.lock:
                     taking.robot("bad").attach(Failing(), frozenset({"joints"}))
@@ -155,7 +155,7 @@ def test_a_sink_that_fails_at_a_message_ends_no_other_robots_recording(mesh, cap
 
 
 def test_no_ring_is_larger_than_its_topic_needs():
-    rings = {row.name: intake._ring(row) for row in TOPICS.values() if row.recorded}
+    rings = {row.name: subscriptions._ring(row) for row in TOPICS.values() if row.recorded}
     assert rings["joints"] == 2000
     assert rings["audit"] == 512
     # Of a robot, without video: what a recorder of a hundred robots has room for.
@@ -164,11 +164,11 @@ def test_no_ring_is_larger_than_its_topic_needs():
 
 
 def test_a_long_time_between_key_frames_is_kept_whole_or_not_at_all(monkeypatch):
-    kept = intake._Kept()
+    kept = subscriptions._Kept()
     for number in range(1000):
         kept.add((Header(7, number, 0), PICTURE, 0))
     assert len(kept.entries) == 1000
-    monkeypatch.setattr(intake, "_MOST_KEPT_BYTES", 1000)
+    monkeypatch.setattr(subscriptions, "_MOST_KEPT_BYTES", 1000)
     kept.add((Header(7, 1000, 0), PICTURE, 0))
     kept.add((Header(7, 1001, 0), PICTURE, 0))
     assert kept.entries == [], "what begins in its middle cannot be decoded"
@@ -201,7 +201,7 @@ def test_an_event_is_recorded_though_its_publishers_clock_is_behind_and_a_list_t
                 query.reply(EVENTS, list_of, attachment=pack(Header(7, 2, 0)))
 
             queryable = other.zenoh_session.declare_queryable(EVENTS, tell)
-            taking, sink = intake.Intake(own.zenoh_session, "site", own.ignored), Sink()
+            taking, sink = subscriptions.Intake(own.zenoh_session, "site", own.ignored), Sink()
             try:
                 with taking.lock:
                     robot = taking.robot("arm")
@@ -236,7 +236,7 @@ def test_of_a_list_that_tells_what_came_before_the_first_event_all_is_recorded(m
                     EVENTS, EventList(events=events).SerializeToString(), attachment=pack(Header(7, 7, 0))
                 )
 
-            taking, sink = intake.Intake(own.zenoh_session, "site", own.ignored), Sink()
+            taking, sink = subscriptions.Intake(own.zenoh_session, "site", own.ignored), Sink()
             try:
                 with taking.lock:
                     robot = taking.robot("arm")

@@ -20,7 +20,7 @@ from robots.glb import link_meshes
 from robots.urdf.write import to_urdf
 from services.command_line.main import run
 from services.command_line.recordings.output import whole_file
-from services.kinematics.describe import describe
+from services.kinematics.descriptions import describe
 from services.recorder.serving import Serving
 from tests.conftest import run as run_async
 from tests.recordings import START_NS, Written, joints, write_recording

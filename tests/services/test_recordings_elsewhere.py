@@ -16,7 +16,7 @@ from renderer.encoder import H264Encoder
 from robomesh.endpoints import router_config
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import SessionSettings
-from services.recorder.explain import without_secrets
+from services.recorder.attachments import without_secrets
 from tests.conftest import free_port, run
 from tests.services.recording import put_states, recording_site, trace_off, trace_on, until, until_indexed
 

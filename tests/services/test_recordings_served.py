@@ -19,7 +19,7 @@ from robomesh.errors import BrokenAnswerError, BusyError, QuotaError, RefusedErr
 from robomesh.quotas import DEFAULT_QUOTAS, Quotas
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
-from services.console.recordings import Recordings
+from services.console.http.recordings import Recordings
 from services.recorder.answers import Answers
 from services.recorder.serving import Serving
 from tests.conftest import run
@@ -263,7 +263,7 @@ def test_values_as_csv_equal_the_files_numbers(http, folder, monkeypatch):
             if number == 10:
                 file.put("kinematics", state, number / 100)
             file.put("joints", joints(waist=number / 7), number / 100)
-    monkeypatch.setattr("services.console.recordings._ROWS", 7)  # many answers
+    monkeypatch.setattr("services.console.http.recordings._ROWS", 7)  # many answers
     answer = http.get("/recordings/site/tool.mcap/values.csv")
     header, *rows = csv.reader(io.StringIO(answer.text))
     assert header[:5] == ["time", "received", "sequence", "t [s]", "waist [rad]"]
@@ -281,7 +281,7 @@ def test_values_of_a_clock_that_stood_still_are_all_there_and_nonsense_is_left_o
             file.put("joints", joints(waist=number), 0.5)
             file.put("joints", joints(waist=number), 0.5)
             file.put("joints", nonsense, 0.5)
-    monkeypatch.setattr("services.console.recordings._ROWS", 7)
+    monkeypatch.setattr("services.console.http.recordings._ROWS", 7)
     answer = http.get("/recordings/site/still.mcap/values.csv")
     _, *rows = csv.reader(io.StringIO(answer.text))
     # A row a state: equal times and values make no two states one.

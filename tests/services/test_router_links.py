@@ -10,9 +10,9 @@ import zenoh
 from robomesh.endpoints import Link, bundle, client_config, router_config
 from robomesh.keys import robot_key
 from robomesh.topics import Role
-from services.keys import certificates, deeds
+from services.pki import authority, certificates
+from services.router.rolling_restart import neighbours, our_turn
 from services.router.router import read_access
-from services.router.turn import neighbours, our_turn
 from tests.conftest import free_port, run
 from tests.services.test_router_rules import attached, names, prepared, routing, settings_of, until
 
@@ -27,8 +27,8 @@ async def linked_sites(tmp_path, border="open", sites=()):
     """Folders and endpoints of two sites; the second links to the first as its guest."""
     here, at_here = prepared(tmp_path, "here", border)
     there, at_there = prepared(tmp_path, "there")
-    deeds.issue_guest(here, "there")
-    assert deeds.accept(there, here.guest("there").read_bytes(), sites=sites) == "here"
+    authority.issue_guest(here, "there")
+    assert authority.accept(there, here.guest("there").read_bytes(), sites=sites) == "here"
     link = Link(endpoint=at_here, tls=there.tls_of_link("here"), site="here")
     return (here, at_here), (there, at_there), link
 
@@ -36,7 +36,7 @@ async def linked_sites(tmp_path, border="open", sites=()):
 def test_two_sites_meet_and_each_speaks_for_itself_alone(tmp_path):
     async def main():
         (here, at_here), (there, at_there), link = await linked_sites(tmp_path)
-        deeds.issue(there, "li", Role.OPERATOR)
+        authority.issue(there, "li", Role.OPERATOR)
         async with (
             routing(settings_of(here, at_here), settings_of(there, at_there, link)),
             attached(at_here, here.service("gateway")) as ours,
@@ -101,8 +101,8 @@ def test_a_slow_border_lets_thinned_joints_and_the_far_view_out_and_nothing_that
 def test_a_hub_brings_everybody_but_us(tmp_path):
     async def main():
         (here, at_here), (hub, at_hub), _ = await linked_sites(tmp_path)
-        deeds.issue_guest(hub, "here")
-        deeds.accept(here, hub.guest("here").read_bytes(), sites=("*",))
+        authority.issue_guest(hub, "here")
+        authority.accept(here, hub.guest("here").read_bytes(), sites=("*",))
         link = Link(endpoint=at_hub, tls=here.tls_of_link("there"), site="there")
         async with routing(settings_of(hub, at_hub), settings_of(here, at_here, link)):
             heard = set()
@@ -135,13 +135,13 @@ def test_a_neighbour_that_shows_one_of_our_own_names_is_cut_off_and_our_own_rout
     async def main():
         (here, at_here), (there, at_there), link = await linked_sites(tmp_path)
         # The other site's authority signs what it likes.
-        authority = certificates.read_authority(here.authority_key.read_bytes(), here.authority.read_bytes())
+        other = certificates.read_authority(here.authority_key.read_bytes(), here.authority.read_bytes())
         made = certificates.issue(
-            authority, name, "router", now=deeds.now(), lives=timedelta(days=1), serves=True
+            other, name, "router", now=authority.now(), lives=timedelta(days=1), serves=True
         )
         forged = here.service("forged")
         forged.write_bytes(made.key + made.certificate + here.authority.read_bytes())
-        deeds.issue(there, "router-2", Role.ROUTER)
+        authority.issue(there, "router-2", Role.ROUTER)
         second = f"tls/127.0.0.1:{free_port()}"
         own = bundle(there.service("router-2"))
         with (
@@ -170,7 +170,7 @@ def test_a_neighbour_that_shows_one_of_our_own_names_is_cut_off_and_our_own_rout
 
 def test_of_two_routers_of_a_site_the_second_waits_until_the_first_serves_again(tmp_path):
     folder, first = prepared(tmp_path)
-    deeds.issue(folder, "router-2", Role.ROUTER)
+    authority.issue(folder, "router-2", Role.ROUTER)
     second = f"tls/127.0.0.1:{free_port()}"
     tls = {first: folder.tls_of("router"), second: bundle(folder.service("router-2"))}
     configs = {

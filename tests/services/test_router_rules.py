@@ -14,7 +14,7 @@ from robomesh.keys import robot_key
 from robomesh.session import CERTIFICATE, SessionSettings, open_session
 from robomesh.topics import Role
 from services import router as service
-from services.keys import Folder, certificates, deeds, renewals
+from services.pki import Folder, authority, certificates, renewals
 from services.router.router import AccessError, read_access
 from tests.conftest import free_port, run
 
@@ -26,13 +26,13 @@ SITE = "here"
 def prepared(path, site=SITE, border="open"):
     folder = Folder(path / site / "keys")
     endpoint = f"tls/127.0.0.1:{free_port()}"
-    deeds.prepare(folder, site, robots=["arm"], border=border, routers=[endpoint])
+    authority.prepare(folder, site, robots=["arm"], border=border, routers=[endpoint])
     return folder, endpoint
 
 
 def settings_of(folder, endpoint, *links):
     return service.Settings(
-        site=deeds.principals_of(folder).site,
+        site=authority.principals_of(folder).site,
         listen=(endpoint,),
         connect=links,
         tls=folder.tls_of("router"),
@@ -78,20 +78,20 @@ async def names(session):
 
 def test_who_is_revoked_is_cut_off_while_the_router_runs_and_who_is_issued_a_certificate_comes_in(tmp_path):
     folder, endpoint = prepared(tmp_path)
-    deeds.issue(folder, "li", Role.OPERATOR)
+    authority.issue(folder, "li", Role.OPERATOR)
 
     async def main():
         async with routing(settings_of(folder, endpoint)), attached(endpoint, folder.person("li")) as li:
             await until(lambda: there(li, (SITE, "router")))
             async with attached(endpoint, folder.service("watch")) as watch:
                 events = watch.subscribe("robomesh/*/-/events/*", newest=100)
-                deeds.revoke(folder, "li")
+                authority.revoke(folder, "li")
                 async for event in events:
                     if "router.without_rights" in str(event.message()):
                         assert "li.here is attached, and has no right here" in str(event.message())
                         break
             await until(lambda: nobody(li))
-            deeds.issue(folder, "mo", Role.MONITOR)
+            authority.issue(folder, "mo", Role.MONITOR)
             async with attached(endpoint, folder.person("mo")) as mo:
                 await until(lambda: there(mo, (SITE, "router")))
                 assert await nobody(li)
@@ -107,7 +107,7 @@ def test_who_is_revoked_is_cut_off_while_the_router_runs_and_who_is_issued_a_cer
 
 def test_broken_rules_are_not_taken_and_the_router_goes_on(tmp_path, caplog):
     folder, endpoint = prepared(tmp_path)
-    deeds.issue(folder, "mo", Role.MONITOR)
+    authority.issue(folder, "mo", Role.MONITOR)
     good = folder.access.read_text()
 
     async def refused():
@@ -162,7 +162,7 @@ def test_what_are_no_rules_at_all_is_told_so(tmp_path, text):
 
 def test_an_expired_certificate_is_refused_by_its_holder_in_words_and_by_the_router(tmp_path):
     folder, endpoint = prepared(tmp_path)
-    deeds.issue(folder, "old", Role.MONITOR, lives=timedelta(seconds=-60))
+    authority.issue(folder, "old", Role.MONITOR, lives=timedelta(seconds=-60))
     # As made elsewhere: nobody at this end sees its date.
     text = folder.person("old").read_text()
     unsaid = tmp_path / "unsaid.pem"
@@ -182,7 +182,7 @@ def test_an_expired_certificate_is_refused_by_its_holder_in_words_and_by_the_rou
 
 def test_a_link_ends_with_its_certificate_and_comes_back_with_the_renewed_one(tmp_path):
     folder, endpoint = prepared(tmp_path)
-    deeds.issue(folder, "mo", Role.MONITOR, lives=timedelta(seconds=3))
+    authority.issue(folder, "mo", Role.MONITOR, lives=timedelta(seconds=3))
     with zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access))):
 
         async def main():
@@ -204,7 +204,7 @@ def test_a_link_ends_with_its_certificate_and_comes_back_with_the_renewed_one(tm
 def test_another_authoritys_certificate_and_none_at_all_open_no_session(tmp_path):
     folder, endpoint = prepared(tmp_path)
     stranger, _ = prepared(tmp_path, "elsewhere")
-    deeds.issue(stranger, "mo", Role.MONITOR)
+    authority.issue(stranger, "mo", Role.MONITOR)
     # It trusts the right router, and shows a certificate that the router does not know.
     forged = stranger.person("mo").read_text().rpartition("-----BEGIN")[0] + folder.authority.read_text()
     (tmp_path / "forged.pem").write_text(forged)
@@ -228,7 +228,7 @@ def test_another_authoritys_certificate_and_none_at_all_open_no_session(tmp_path
 
 def test_no_certificate_but_a_routers_passes_for_a_router(tmp_path):
     folder, endpoint = prepared(tmp_path)
-    deeds.issue(folder, "li", Role.OPERATOR)
+    authority.issue(folder, "li", Role.OPERATOR)
     imposter = router_config((endpoint,), (), bundle(folder.person("li")))
     with zenoh.open(imposter):
 
@@ -243,7 +243,7 @@ def test_no_certificate_but_a_routers_passes_for_a_router(tmp_path):
 def test_what_a_certificate_may_not_do_is_said_in_words_before_anybody_is_asked(tmp_path):
     folder, endpoint = prepared(tmp_path)
     for name, role in (("li", Role.OPERATOR), ("mo", Role.MONITOR)):
-        deeds.issue(folder, name, role)
+        authority.issue(folder, name, role)
     with zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access))):
 
         async def main():
@@ -288,7 +288,7 @@ def test_the_configuration_for_zenohd_is_what_our_router_runs_with(tmp_path):
 
 def test_a_certificate_shows_whose_it_is_and_who_signed_it(tmp_path):
     folder, _ = prepared(tmp_path)
-    entry = deeds.issue(folder, "li", Role.OPERATOR)
+    entry = authority.issue(folder, "li", Role.OPERATOR)
     shown = certificates.show(folder.person("li").read_bytes())
     assert (shown.name, shown.role, shown.authority) == ("li.here", "operator", "here")
     assert entry.expires == shown.expires
@@ -298,10 +298,12 @@ def test_a_router_outlives_keys_that_are_gone_or_half_copied_and_takes_them_when
     tmp_path, caplog
 ):
     folder, endpoint = prepared(tmp_path)
-    deeds.issue(folder, "mo", Role.MONITOR)
+    authority.issue(folder, "mo", Role.MONITOR)
     bundle_of_router = folder.service("router")
     good = bundle_of_router.read_bytes()
-    other = deeds.issued(folder, deeds.principals_of(folder), deeds.principals_of(folder).find("router"))
+    other = authority.issued(
+        folder, authority.principals_of(folder), authority.principals_of(folder).find("router")
+    )
     assert other.find("router").serial
     other_key = bundle_of_router.read_bytes()
     bundle_of_router.write_bytes(good)
@@ -336,7 +338,7 @@ def test_a_router_outlives_keys_that_are_gone_or_half_copied_and_takes_them_when
 def test_rules_that_zenoh_refuses_are_not_said_to_be_followed(tmp_path, caplog):
     caplog.set_level("INFO")
     folder, endpoint = prepared(tmp_path)
-    deeds.issue(folder, "mo", Role.MONITOR)
+    authority.issue(folder, "mo", Role.MONITOR)
     rules = json.loads("\n".join(folder.access.read_text().splitlines()[1:]))
     rules["access_control"]["policies"][0]["rules"] = ["no such rule"]
 
@@ -358,14 +360,14 @@ def test_rules_that_zenoh_refuses_are_not_said_to_be_followed(tmp_path, caplog):
 
 def test_a_renewed_certificate_is_told_without_a_restart(tmp_path):
     folder, endpoint = prepared(tmp_path)
-    deeds.issue(folder, "mo", Role.MONITOR, lives=timedelta(hours=1))
+    authority.issue(folder, "mo", Role.MONITOR, lives=timedelta(hours=1))
     with zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access))):
 
         async def main():
             async with attached(endpoint, folder.person("mo")) as mo:
                 (left,) = (each.read for each in mo.measures if each.name == CERTIFICATE)
                 assert 3500 < left() <= 3600
-                deeds.issue(folder, "mo", Role.MONITOR, lives=timedelta(hours=2))
+                authority.issue(folder, "mo", Role.MONITOR, lives=timedelta(hours=2))
                 assert 7100 < left() <= 7200
                 folder.person("mo").unlink()
                 assert 3500 < left() <= 3600

@@ -13,7 +13,7 @@ from robomesh.endpoints import Tls, bundle, client_config, router_config
 from robomesh.errors import KeyNameError
 from robomesh.keys import parse_presence_key
 from robomesh.topics import PEOPLE, REQUESTS, SERVICES, TOPICS, Role
-from services.keys import Folder, deeds
+from services.pki import Folder, authority
 from services.router.router import read_access
 from tests.conftest import free_port
 from tests.site import wait_until
@@ -71,15 +71,15 @@ def one_link(endpoint: str, tls: Tls) -> zenoh.Config:
 def mesh(tmp_path_factory):
     """A router, everybody attached to it, and the witness, who answers every request of the table."""
     folder = Folder(tmp_path_factory.mktemp("site") / "keys")
-    deeds.prepare(folder, SITE, robots=[OWN_ROBOT], border="open", routers=[], started=[STARTED_ROBOT])
+    authority.prepare(folder, SITE, robots=[OWN_ROBOT], border="open", routers=[], started=[STARTED_ROBOT])
     for name, role in people().items():
         if role in PEOPLE:
-            deeds.issue(folder, name, role)
-    deeds.issue(folder, WITNESS, Role.ROUTER)
-    deeds.issue(folder, "gone", Role.OPERATOR)
-    deeds.revoke(folder, "gone")
-    deeds.issue_guest(folder, OTHER_SITE)
-    deeds.issue_guest(folder, HUB, sites=["*"])
+            authority.issue(folder, name, role)
+    authority.issue(folder, WITNESS, Role.ROUTER)
+    authority.issue(folder, "gone", Role.OPERATOR)
+    authority.revoke(folder, "gone")
+    authority.issue_guest(folder, OTHER_SITE)
+    authority.issue_guest(folder, HUB, sites=["*"])
     endpoint = f"tls/127.0.0.1:{free_port()}"
     opened = [zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access)))]
 

@@ -8,14 +8,14 @@ import pytest
 import zenoh
 
 from protocol_gateway import gateway
-from protocol_gateway.audit.find import Query, find
 from protocol_gateway.audit.log import Outcome
+from protocol_gateway.audit.search import Query, find
 from robomesh.endpoints import bundle, router_config
 from robomesh.lease import control
 from robomesh.session import SessionSettings, open_session
 from robomesh.topics import Role
-from services.command_line import security
-from services.keys import Folder, deeds
+from services.command_line.doctor import security
+from services.pki import Folder, authority
 from services.router.router import read_access
 from tests.conftest import free_port, run
 
@@ -26,9 +26,9 @@ SITE, ARM = "hall", "robomesh/hall/arm"
 def folder(tmp_path):
     """The keys of a site with one robot, an operator and a monitor."""
     folder = Folder(tmp_path / "keys")
-    deeds.prepare(folder, SITE, robots=["arm"], border="open", routers=[], started=["lab"])
-    deeds.issue(folder, "li", Role.OPERATOR)
-    deeds.issue(folder, "mo", Role.MONITOR)
+    authority.prepare(folder, SITE, robots=["arm"], border="open", routers=[], started=["lab"])
+    authority.issue(folder, "li", Role.OPERATOR)
+    authority.issue(folder, "mo", Role.MONITOR)
     return folder
 
 

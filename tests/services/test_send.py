@@ -4,12 +4,13 @@ import asyncio
 import signal
 
 from robomesh import reason_codes as codes
-from robomesh.asking import ask_all
+from robomesh.client import ask_all
 from robomesh.errors import RefusedError
 from robomesh.lease import control
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
-from services.command_line import find, send
+from services.command_line import discovery
+from services.command_line.live import send
 from tests.conftest import run
 from tests.protocol_gateway.hall import A, until
 
@@ -94,7 +95,7 @@ class Gateway(Owner):
 def sent(li):
     """What `robomesh send hall/arm run` says of a program, in a task of its own."""
     request = schema.CommandRequest(command=schema.CommandRequest.RUN_PROGRAM, program="home")
-    robot = find.Robot("hall", "arm")
+    robot = discovery.Robot("hall", "arm")
 
     async def main():
         async with control(li, *robot, "li") as own:
@@ -147,7 +148,7 @@ def test_a_gateway_that_began_anew_is_told_with_what_to_do_and_warnings_come_bef
 def test_what_to_do_about_a_refusal_is_told_as_a_command_to_type():
     def said(reason, text=""):
         error = RefusedError(reason, text=text)
-        return send.in_words_of_the_command_line(error, find.Robot("hall", "arm"))
+        return send.in_words_of_the_command_line(error, discovery.Robot("hall", "arm"))
 
     assert said(codes.STOP_LATCHED(id=3, by="li", reason="with another lease")) == (
         "stop 3 is latched (li: with another lease): see to it, then `robomesh send hall/arm reset`"

@@ -11,11 +11,11 @@ from robots.cells import CellDescription, Floor
 from robots.collision import build_cell, distances, outside_clearance, unshaped
 from robots.glb import link_mesh
 from robots.meshes.mesh import bounds
-from services import site
 from services.errors import SiteFileError
-from services.site_cells import cells_of
-from services.site_fixtures import Fixture, fixture_shape
-from services.started import read_started
+from services.site_file import site
+from services.site_file.cells import cells_of
+from services.site_file.fixtures import Fixture, fixture_shape
+from services.site_file.started_robots import read_started
 from tests.robots.boxes import bar_arm
 
 ROBOT = '[[robot]]\nname = "arm"\nmodel = "pt600"\n'

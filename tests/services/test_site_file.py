@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from services import site
 from services.errors import ListenError, SiteFileError
-from services.listen import check_reach, split_address
-from services.site_router import OF_OTHERS, RoutedSite, read_routed
-from services.started import read_started, robot_to_start, write_started
+from services.site_file import site
+from services.site_file.listen_address import check_reach, split_address
+from services.site_file.router import OF_OTHERS, RoutedSite, read_routed
+from services.site_file.started_robots import read_started, robot_to_start, write_started
 
 ROBOT = '[[robot]]\nname = "arm"\nmodel = "pt600"\n'
 

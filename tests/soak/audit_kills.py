@@ -27,7 +27,7 @@ from pathlib import Path
 import zenoh
 
 from protocol_gateway.audit.log import read_entries, verify
-from protocol_gateway.audit.restart import remembered
+from protocol_gateway.audit.persisted_state import remembered
 from robomesh.endpoints import router_config
 from robomesh.errors import NoAnswerError, RefusedError
 from robomesh.schemas import robomesh_pb2 as schema

@@ -19,10 +19,10 @@ import zenoh
 from google.protobuf import json_format
 
 from robomesh import messages
-from robomesh.answering import Request
 from robomesh.endpoints import bundle
 from robomesh.errors import BusError, NoAnswerError
 from robomesh.messages import PROTOBUF
+from robomesh.server import Request
 from robomesh.session import Session, SessionSettings, open_session
 from robomesh.subscription import Subscription
 from robomesh.topics import request

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mcap_files.reading import RecordingFile
-from services.command_line import find
+from services.command_line import discovery
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.fetch import here
 from services.command_line.recordings.output import whole_file
@@ -52,7 +52,7 @@ def run(source: str, out: Path, wanted: Wanted, router: str, as_json: bool) -> N
         with whole_file(out) as partial:
             words, values = _write(file, span, partial, kind, wanted)
     if as_json:
-        find.print_json({"file": str(out), "bytes": out.stat().st_size, **values})
+        discovery.print_json({"file": str(out), "bytes": out.stat().st_size, **values})
     else:
         print(f"{out}: {words}, {out.stat().st_size / 1e6:.2f} MB")
 

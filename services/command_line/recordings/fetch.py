@@ -13,7 +13,7 @@ from robomesh.errors import NoAnswerError, QuotaError
 from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
-from services.command_line import find
+from services.command_line import discovery
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.listing import attached_for, found
 from services.command_line.recordings.output import progress
@@ -32,7 +32,7 @@ def run(what: str, out: Path, router: str, as_json: bool) -> None:
     """
     done = _run(what, out, router)
     if as_json:
-        find.print_json({"file": str(done.file), "bytes": done.total, "resumed_at": done.begun})
+        discovery.print_json({"file": str(done.file), "bytes": done.total, "resumed_at": done.begun})
     else:
         begun = f", from byte {done.begun} on" if done.begun else ""
         print(f"{done.file}: {done.total / 1e6:.2f} MB{begun}")
@@ -60,7 +60,7 @@ class _Fetched(NamedTuple):
 
 def _run(what: str, out: Path, router: str) -> _Fetched:
     try:
-        return find.run(_fetch(what, out, router, into=out.is_dir()))
+        return discovery.run(_fetch(what, out, router, into=out.is_dir()))
     except OSError as error:
         raise ExportError(f"{out}: cannot be written: {error.strerror or error}") from None
 

@@ -12,7 +12,7 @@ from robomesh.errors import BusError, SessionError
 from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
-from services.command_line import find
+from services.command_line import discovery
 from services.command_line.recordings.errors import ExportError
 
 _TIMEOUT_S = 10.0
@@ -22,10 +22,10 @@ def list_all(router: str, as_json: bool) -> None:
     """Print every recording of every site."""
 
     async def main() -> list[Listed]:
-        async with find.attached(router) as session:
+        async with discovery.attached(router) as session:
             return await listed(session)
 
-    recordings = find.run(main())
+    recordings = discovery.run(main())
     for site, recording in recordings:
         # Where it is, also of a file that says nothing of itself.
         recording.site = recording.site or site
@@ -124,7 +124,7 @@ async def attached_for(what: str, router: str) -> AsyncIterator[Session]:
         ExportError: If there is no mesh either.
     """
     try:
-        async with find.attached(router) as session:
+        async with discovery.attached(router) as session:
             yield session
     except SessionError as error:
         raise ExportError(f"{what}: no such file here, and no site to ask: {error}") from None
@@ -141,7 +141,7 @@ def info(what: str, router: str, as_json: bool) -> None:
             assert isinstance(answer, schema.Recording)
             return answer
 
-    show(_described(Path(what)) if Path(what).is_file() else find.run(ask()), as_json)
+    show(_described(Path(what)) if Path(what).is_file() else discovery.run(ask()), as_json)
 
 
 def _described(file: Path) -> schema.Recording:
@@ -158,7 +158,7 @@ def show(recording: schema.Recording, as_json: bool) -> None:
     """Print one recording, a line and what is in it."""
     values = _values(recording)
     if as_json:
-        find.print_json(values)
+        discovery.print_json(values)
         return
     state = _state(recording)
     part = f" part {recording.part}" if recording.part else ""

@@ -13,7 +13,7 @@ from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.presence import OPERATOR, session_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
-from services.command_line import find
+from services.command_line import discovery
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.listing import attached_for, found
 from services.command_line.recordings.output import progress
@@ -25,7 +25,7 @@ _SILENT_S = 5.0
 
 def run(what: str, asked: schema.PlayRequest, router: str) -> None:
     """Play a file of this machine, or a recording of a site by its name, and tell how far it is."""
-    find.run(_play(what, Path(what) if Path(what).is_file() else None, asked, router))
+    discovery.run(_play(what, Path(what) if Path(what).is_file() else None, asked, router))
 
 
 async def _play(what: str, path: Path | None, asked: schema.PlayRequest, router: str) -> None:

@@ -16,7 +16,7 @@ from robomesh.keys import robot_key
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 from robomesh.subscription import Subscription
-from services.command_line import find
+from services.command_line import discovery
 from services.command_line.recordings.listing import show, summary
 
 _Request = schema.RecorderRequest
@@ -39,7 +39,7 @@ def record(robot: str, name: str, views: Sequence[str], router: str, as_json: bo
     Args:
         views: Whose video is recorded too; "-": none; empty: as the site file says.
     """
-    done = find.run(_record(robot, name, views, router))
+    done = discovery.run(_record(robot, name, views, router))
     if as_json:
         show(done.recording, as_json)
     else:
@@ -50,8 +50,8 @@ def record(robot: str, name: str, views: Sequence[str], router: str, as_json: bo
 
 
 async def _record(text: str, name: str, views: Sequence[str], router: str) -> _Done:
-    async with find.attached(router) as session, _interrupted() as interrupted:
-        robot = await find.find(session, text)
+    async with discovery.attached(router) as session, _interrupted() as interrupted:
+        robot = await discovery.find(session, text)
         key = robot_key(*robot, "recorder/request")
         asked = _Request(action=_Request.TRACE_ON, name=name, views=views)
         begun = await session.ask(key, asked, timeout_s=5.0)
@@ -73,7 +73,9 @@ async def _record(text: str, name: str, views: Sequence[str], router: str) -> _D
         return await ending
 
 
-async def _ended(session: Session, robot: find.Robot, states: Subscription, begun: schema.Recording) -> _Done:
+async def _ended(
+    session: Session, robot: discovery.Robot, states: Subscription, begun: schema.Recording
+) -> _Done:
     """Wait until it ends without us."""
     newest = begun
     while True:

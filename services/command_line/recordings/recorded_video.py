@@ -4,8 +4,8 @@ from pathlib import Path
 
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
+from mcap_files.publisher_time import PublisherTimes
 from mcap_files.reading import RecordingFile
-from mcap_files.times import PublisherTimes
 from mcap_files.video import is_key_frame
 from renderer.mp4 import FragmentedMp4
 from services.command_line.recordings.errors import ExportError

@@ -5,7 +5,7 @@ from pathlib import Path
 from mcap_files import recover as files
 from mcap_files.capture import is_being_written
 from mcap_files.files import describe_file
-from services.command_line import find
+from services.command_line import discovery
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.output import progress
 
@@ -31,7 +31,7 @@ def run(file: Path, as_json: bool) -> None:
             raise ExportError(f"{file}: not recovered, and as it was: {error.strerror or error}") from None
         words, messages, cut, damaged = "recovered", found.messages, found.cut, found.damaged
     if as_json:
-        find.print_json(
+        discovery.print_json(
             {
                 "file": str(file),
                 "messages": messages,

@@ -8,17 +8,17 @@ from pathlib import Path
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from mcap_files.errors import RecordingError
+from mcap_files.publisher_time import PublisherTimes
 from mcap_files.reading import RecordedMessage, RecordingFile
-from mcap_files.times import PublisherTimes
+from renderer.appearance import look_of, mesh_name, placements_at
 from renderer.cache import cache_folder, stored_glb
-from renderer.composing import Known, composed
+from renderer.clearance_line import draw_span
+from renderer.composition import Known, composed
 from renderer.encoder import open_encoder
-from renderer.look import look_of, mesh_name, placements_at
 from renderer.mp4 import FragmentedMp4
 from renderer.overlay import write_over
-from renderer.requested import Shot
-from renderer.span import draw_span
-from renderer.state import Ages, RobotState
+from renderer.requested_views import Shot
+from renderer.robot_state import Ages, RobotState
 from renderer.studio import Studio
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.recordings.errors import ExportError

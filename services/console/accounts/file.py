@@ -25,8 +25,8 @@ from typing import Any
 from robomesh import keys
 from robomesh.errors import KeyNameError
 from robots.bounded_toml import read_toml
+from services.atomic_write import write_whole
 from services.console.errors import AccountsError
-from services.whole_file import write_whole
 
 _LONGEST_NAME = 32
 MOST_ACCOUNTS = 1000

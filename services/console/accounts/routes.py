@@ -13,12 +13,12 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
-from services.console.accounts.desk import Desk, SignInError
+from services.console.accounts.auth_service import Desk, SignInError
 from services.console.accounts.file import AccountRole, role_of
 from services.console.accounts.rights import operator_name
 from services.console.accounts.sessions import SignedIn
-from services.console.answered import Handler, answered
 from services.console.errors import AccountsError, SignInBusyError
+from services.console.http.error_responses import Handler, answered
 
 Json = dict[str, Any]
 

@@ -5,8 +5,8 @@ Whoever sends many tries at once delays, and displaces, the own ones alone. No I
 
 from typing import Generic, TypeVar
 
-from services.console.asker_queue import AskerQueue
 from services.console.errors import SignInBusyError
+from services.console.fair_queue import AskerQueue
 
 Job = TypeVar("Job")
 

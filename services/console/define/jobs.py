@@ -11,20 +11,20 @@ from typing import Any
 
 import numpy as np
 
-from robots.checks import named_files
-from robots.collision.pairs import plan_of
+from robots.collision.link_pairs import plan_of
 from robots.description import DESCRIPTION_FILE, Problem, RobotDescription, from_values, robot_name
+from robots.description_checks import named_files
+from robots.description_text import as_saved
 from robots.errors import DescriptionError, MeshError
 from robots.importing import as_rows
-from robots.inspect_meshes import mesh_findings
 from robots.joints import joints_of
-from robots.meshes.guess import guess
+from robots.mesh_inspection import mesh_findings
 from robots.meshes.mesh import Mesh
 from robots.meshes.read import read_mesh
+from robots.meshes.unit_guess import guess
 from robots.meshes.write_glb import glb_of
 from robots.model import RobotModel, build_model, link_placements, tool_placement
-from robots.save import read_robot, refused_path
-from robots.save_text import as_saved
+from robots.save_description import read_robot, refused_path
 from robots.schema import UrdfDescription
 from robots.summary import mesh_summary
 from robots.units import position_factor

@@ -19,14 +19,14 @@ from starlette.routing import Mount, Route
 
 from robots.description import library_names
 from robots.errors import RobotError, RobotExistsError
-from robots.save import read_robot, refused_path, revision_of, write_description, zip_description
+from robots.save_description import read_robot, refused_path, revision_of, write_description, zip_description
 from services.console.accounts.sessions import SignedIn
-from services.console.answered import Handler, answered
-from services.console.define import saved, store
+from services.console.define import saved_robots, store
 from services.console.define.errors import RefusedRequest
 from services.console.define.settings import DefineSettings
 from services.console.define.start import start, started_names, stop
-from services.console.define.workshop import Workshop
+from services.console.define.worker_pool import Workshop
+from services.console.http.error_responses import Handler, answered
 
 log = logging.getLogger(__name__)
 
@@ -81,7 +81,7 @@ class Define:
         """What can be opened, and where robots are saved."""
         site = self.settings.site
         running = frozenset(started_names(site)) | {robot.name for robot in site.robot}
-        rows = await asyncio.to_thread(lambda: list(saved.listing(site, running)))
+        rows = await asyncio.to_thread(lambda: list(saved_robots.listing(site, running)))
         for row in rows:
             if row["joints"] is None:
                 row["joints"] = await self._joint_count(row["name"], _asker(request))
@@ -120,7 +120,7 @@ class Define:
         return JSONResponse(opened | {"revision": revision})
 
     def _folder(self, name: str) -> Path:
-        folder = saved.robot_folder(self.settings.site, name)
+        folder = saved_robots.robot_folder(self.settings.site, name)
         if folder is None:
             raise RefusedRequest(404, f"there is no robot {name!r} here")
         return folder

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from robots.glb import cache_folder
-from services.console.define.workshop import Limits
-from services.site import Site
+from services.console.define.worker_pool import Limits
+from services.site_file.site import Site
 
 
 def _store_folder() -> Path:

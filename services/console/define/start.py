@@ -2,8 +2,8 @@
 
 from services.console.define.errors import RefusedRequest
 from services.errors import SiteFileError
-from services.site import Robot, Site
-from services.started import read_started, robot_to_start, write_started
+from services.site_file.site import Robot, Site
+from services.site_file.started_robots import read_started, robot_to_start, write_started
 
 
 def started_names(site: Site) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from collections.abc import AsyncIterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from robots.save import refused_path
+from robots.save_description import refused_path
 from services.console.define.errors import RefusedRequest
 
 MOST_BYTES = 2 * 1024**3

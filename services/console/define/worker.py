@@ -1,6 +1,6 @@
 """The process that reads other people's files for the console: a request a line in, an answer a line out.
 
-It may hang, grow or die over any of them: `services.console.define.workshop` ends it and starts another.
+It may hang, grow or die over any of them: `services.console.define.worker_pool` ends it and starts another.
 
     {"job": "mesh", "folder": ..., "request": {...}}
     {"done": {...}}   or   {"refused": "words"}
@@ -33,7 +33,7 @@ def main() -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
     from services.console.define import jobs
-    from services.console.define.confine import confine
+    from services.console.define.sandbox import confine
     from services.console.define.store import Store
 
     store = Store(folder)

@@ -1,4 +1,4 @@
-// How late a sample comes to this page: the same rule as in `robomesh/lateness.py`, for the page's own line.
+// How late a sample comes to this page: the same rule as in `robomesh/delay.py`, for the page's own line.
 
 interface Least {
   publisher: bigint;

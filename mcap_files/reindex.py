@@ -1,0 +1,303 @@
+"""A closed recording, or several in a row, written again: 1 MiB zstd chunks, an index, checked, renamed.
+
+`python -m mcap_files.reindex` is a process of its own beside a recorder, which never waits for it. It takes
+jobs, `{"target": "...", "sources": ["..."], "about": {...}}` a line, tells how far it is, a number from 0
+to 1 a line, and then `done` or `failed` and why.
+"""
+
+import contextlib
+import json
+import os
+import queue
+import sys
+import threading
+import zlib
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import IO, Any
+
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.records import Attachment, Channel, Metadata, Schema, Statistics
+
+from mcap_files import records
+from mcap_files.capture import is_being_written
+from mcap_files.channel_names import INDEXING, LOST
+from mcap_files.errors import CaptureError
+from mcap_files.indexed_writer import Copied, IndexedWriter
+
+_STEP_BYTES = 8 << 20
+# What a kill or a power cut leaves unreadable at a file's end; more is damage.
+_MOST_TAIL_BYTES = 4 << 20
+Progress = Callable[[float], None]
+
+
+def index(path: Path, progress: Progress = lambda _: None) -> None:
+    """Write a closed file again, quick to read; it stays as it is when anything differs.
+
+    Raises:
+        CaptureError: If the new one is not the same.
+        OSError: If the disk refuses.
+    """
+    rewrite([path], path, progress=progress)
+
+
+def rewrite(
+    sources: Sequence[Path],
+    target: Path,
+    *,
+    about: Mapping[str, str] | None = None,
+    progress: Progress = lambda _: None,
+) -> Copied:
+    """Write what sources hold into one file, check it, and only then give it the target's name.
+
+    A target that is one of the sources stays as it was until then.
+
+    Args:
+        about: What the metadata `robomesh` says more, or otherwise, than that of the first source.
+
+    Raises:
+        CaptureError: If the new one does not hold what the sources do, none of them is a recording, or one
+            is damaged otherwise than by its writer's end or within a chunk, or still being written.
+        OSError: If the disk refuses.
+    """
+    for source in sources:
+        if is_being_written(source):
+            raise CaptureError(f"{source.name}: it is being recorded now: end that first")
+    new = target.with_suffix(INDEXING)
+    total = sum(source.stat().st_size for source in sources) or 1
+    done = 0
+
+    def tell(size: int) -> None:
+        nonlocal done
+        done += size
+        progress(min(done / total, 1.0) * 0.8)  # the rest is the check
+
+    try:
+        with new.open("wb") as stream:
+            writer = IndexedWriter(stream, about or {})
+            for source in sources:
+                _copy(source, writer, tell)
+            if not writer.copied.messages and not writer.about:
+                raise CaptureError(f"{sources[0].name}: no recording that can be read")
+            writer.finish()
+            stream.flush()
+            os.fsync(stream.fileno())
+        _check(new, writer)
+        progress(1.0)
+        new.replace(target)
+        folder = os.open(target.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+    finally:
+        with contextlib.suppress(FileNotFoundError):
+            new.unlink()
+    return writer.copied
+
+
+class _Source:
+    """A file that is copied: its numbers of schemas and channels become the new file's."""
+
+    def __init__(self, writer: IndexedWriter) -> None:
+        self._writer = writer
+        self._schemas: dict[int, tuple[int, Schema]] = {}
+        self._channels: dict[int, int] = {}
+        self._gaps = _Gaps()
+        self._told_lost = False
+        # Messages by this file's channels, those left out too.
+        self.counts: Counter[int] = Counter()
+
+    def take(self, opcode: int, body: bytes) -> None:
+        """Copy a record."""
+        match opcode:
+            case Opcode.MESSAGE:
+                self._message(body)
+            case Opcode.SCHEMA:
+                schema = Schema.read(records.stream_of(body))
+                self._schemas[schema.id] = (self._writer.schema(schema), schema)
+            case Opcode.CHANNEL:
+                channel = Channel.read(records.stream_of(body))
+                schema_id, of = self._schemas.get(channel.schema_id, (0, None))
+                self._channels[channel.id] = self._writer.channel(channel, schema_id, of)
+            case Opcode.ATTACHMENT:
+                self._writer.attachment(Attachment.read(records.stream_of(body)))
+            case Opcode.METADATA:
+                metadata = Metadata.read(records.stream_of(body))
+                self._told_lost = self._told_lost or metadata.name == LOST
+                self._writer.metadata(metadata)
+            case Opcode.CHUNK:
+                try:
+                    unpacked = records.unpack_chunk(body)
+                except records.DAMAGE:
+                    self._writer.copied.damaged += 1
+                    return
+                for each in records.walk_chunk(unpacked):
+                    self.take(*each)
+
+    def end(self) -> None:
+        """A writer that was killed could not tell what it had missed: the numbers do."""
+        if not self._told_lost and self._writer.about:
+            self._writer.lost.update(self._gaps.by_topic(self._writer.topic))
+
+    def _message(self, body: bytes) -> None:
+        channel, sequence, log_time, publish_time = records.MESSAGE.unpack_from(body)
+        if channel not in self._channels:
+            raise ValueError(f"what its channel {channel} is, is not there")
+        number = self._channels[channel]
+        self.counts[channel] += 1
+        mark = (sequence, publish_time)
+        if number not in self._gaps.last and self._writer.newest.get(number) == mark:
+            return  # what a robot is stands at the beginning of each source
+        self._gaps.take(number, *mark)
+        self._writer.newest[number] = mark
+        if number != channel:
+            body = number.to_bytes(2, "little") + body[2:]
+        self._writer.message(number, log_time, body)
+
+
+class _Gaps:
+    """Publications that are missing between those that are there, by channel."""
+
+    def __init__(self) -> None:
+        self.last: dict[int, tuple[int, int]] = {}
+        self._missing: Counter[int] = Counter()
+
+    def take(self, channel: int, sequence: int, publish_time: int) -> None:
+        before, when = self.last.get(channel, (sequence - 1, 0))
+        if sequence <= before and publish_time <= when:
+            self._missing[channel] -= 1  # it came late
+            return
+        if sequence > before:
+            self._missing[channel] += sequence - before - 1
+        self.last[channel] = (sequence, publish_time)
+
+    def by_topic(self, topic: Callable[[int], str]) -> dict[str, int]:
+        return {topic(channel): number for channel, number in self._missing.items() if number > 0}
+
+
+def _copy(path: Path, writer: IndexedWriter, tell: Callable[[int], None]) -> None:
+    """Copy a source.
+
+    Raises:
+        CaptureError: If more of it would be missing than what its writer's end cut off, or a damaged chunk.
+    """
+    source, last_told, end, whole = _Source(writer), 0, 0, False
+    size = path.stat().st_size
+    with path.open("rb") as stream:
+        told = _told(stream)
+        stream.seek(0)
+        try:
+            for opcode, body, after in records.walk(stream) if size >= len(records.MAGIC) else ():
+                whole = opcode == Opcode.DATA_END
+                source.take(opcode, body)
+                end = after
+                if end - last_told >= _STEP_BYTES:
+                    tell(end - last_told)
+                    last_told = end
+        except records.DAMAGE as error:
+            words = f"damaged near byte {end}" if end else "no recording that can be read"
+            raise CaptureError(f"{path.name}: {words}: {error}") from None
+        if not whole and not _is_tail(stream, end, size):
+            raise CaptureError(f"{path.name}: damaged near byte {end}, {size - end} bytes before its end")
+    if told is not None and (not whole or dict(source.counts) != dict(told.channel_message_counts)):
+        raise CaptureError(
+            f"{path.name}: {source.counts.total()} of the {told.message_count} messages it tells can be read"
+        )
+    source.end()
+    writer.copied.cut += not whole
+    tell(size - last_told)
+
+
+def _told(stream: IO[bytes]) -> Statistics | None:
+    """What a file that was closed tells of itself; None: it was not."""
+    try:
+        summary = make_reader(stream).get_summary()
+    except records.DAMAGE:
+        return None
+    return None if summary is None else summary.statistics
+
+
+def _is_tail(stream: IO[bytes], begin: int, size: int) -> bool:
+    """Whether what cannot be read from there on is what a writer leaves that was killed."""
+    if size - begin <= _MOST_TAIL_BYTES:
+        return True
+    stream.seek(begin)
+    head = stream.read(records.RECORD.size)
+    opcode, length = records.RECORD.unpack(head)
+    if opcode in (Opcode.CHUNK, Opcode.ATTACHMENT):
+        return begin + len(head) + int(length) > size and length <= records.MOST_RECORD_BYTES
+    while head:
+        if head.count(0) != len(head):
+            return False
+        head = stream.read(_STEP_BYTES)
+    return True  # a system that lost its power had made room, and written nothing into it
+
+
+def _check(path: Path, writer: IndexedWriter) -> None:
+    """Read the new file from the disk, every byte of it.
+
+    Raises:
+        CaptureError: If it does not hold what was copied.
+    """
+    found = Copied()
+    with path.open("rb") as stream:
+        try:
+            for opcode, body, _ in records.walk(stream):
+                if opcode == Opcode.CHUNK:
+                    for inner, each in records.walk_chunk(records.unpack_chunk(body)):
+                        if inner == Opcode.MESSAGE:
+                            found.messages[int.from_bytes(each[:2], "little")] += 1
+                            found.crc = zlib.crc32(each, found.crc)
+                elif opcode == Opcode.ATTACHMENT:
+                    attachment = Attachment.read(records.stream_of(body))
+                    found.attachments[attachment.name] = zlib.crc32(attachment.data)
+            stream.seek(0)
+            summary = make_reader(stream).get_summary()
+        except records.DAMAGE as error:
+            raise CaptureError(f"{path}: cannot be read as it was written: {error}") from None
+    expected = writer.copied
+    counts = None if summary is None or summary.statistics is None else summary.statistics
+    if (
+        (found.messages, found.crc, found.attachments)
+        != (expected.messages, expected.crc, expected.attachments)
+        or counts is None
+        or counts.channel_message_counts != dict(expected.messages)
+    ):
+        raise CaptureError(f"{path}: not the same as what it was written from; that was kept")
+
+
+def main() -> None:
+    """Do the jobs that a recorder gives, one after the other; it ends with the recorder."""
+    jobs: queue.SimpleQueue[str] = queue.SimpleQueue()
+
+    def read() -> None:
+        for line in sys.stdin:
+            jobs.put(line)
+        os._exit(0)  # what is being written is thrown away at the next start
+
+    threading.Thread(target=read, daemon=True).start()
+    os.nice(10)
+    while True:
+        print(_do(json.loads(jobs.get())), flush=True)
+
+
+def _do(job: dict[str, Any]) -> str:
+    """The last line of a job."""
+    sources = [Path(each) for each in job["sources"]]
+    try:
+        rewrite(
+            sources,
+            Path(job["target"]),
+            about=job.get("about"),
+            progress=lambda part: print(f"{part:.3f}", flush=True),
+        )
+    except (CaptureError, OSError) as error:
+        return f"failed {error}"
+    return "done"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,119 @@
+"""The end of a log as a start finds it, and whether what must be remembered is there for certain.
+
+    torn last line                    cut off: its gateway was killed as it wrote, nobody was told it is there
+    ... that may be a STOP or RESET   a stop may be lost
+    any other damage                  a stop may be lost
+
+Who may have lost a stop latches one (`AuditLog`), and goes on in a new file: the damaged one becomes an
+older part, as it is, and the next start does not find the same damage again.
+"""
+
+import contextlib
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+from protocol_gateway.audit.entry import NOTHING_BEFORE, link_of, parse_line
+from protocol_gateway.audit.files import first_number, lines_of, older_parts
+from protocol_gateway.audit.persisted_state import (
+    NOTHING,
+    Memory,
+    begins_file,
+    concerns,
+    concerns_stop,
+    follow,
+)
+from protocol_gateway.errors import AuditError
+
+# Quotes within texts are escaped, so no text looks like this.
+_REQUEST = re.compile(rb'"request":"[A-Z_]+"')
+
+
+@dataclass(frozen=True, kw_only=True)
+class End:
+    """Where a log's live file ends; `first`: number of its first entry, `length`: bytes."""
+
+    first: int = 1
+    number: int = 0
+    hash: str = NOTHING_BEFORE
+    length: int = 0
+    memory: Memory = NOTHING
+
+
+class Start(NamedTuple):
+    """What a start finds.
+
+    Attributes:
+        mended: What is wrong, in words.
+        in_doubt: A stop may be lost with it.
+        damaged: More is wrong than a torn last line.
+    """
+
+    end: End
+    mended: str
+    in_doubt: bool
+    damaged: bool
+
+
+class _Scan(NamedTuple):
+    end: End
+    torn: bytes
+    damage: str
+
+
+def find_end(live: Path) -> Start:
+    """The end of the live file; where that is damaged, older parts tell the last number."""
+    end, torn, damage = _scan(live)
+    parts = older_parts(live)
+    if parts and not end.length:
+        damage = "its live file is empty or was missing, but older parts are there"
+    elif parts and first_number(parts[-1]) >= end.first:
+        damage = damage or f"its live file does not go on from {parts[-1].name}"
+    if parts and damage:
+        end = _behind(end, parts[-1])
+    mended = damage
+    if torn:
+        mended = f"a torn last line was cut off after entry {end.number}{damage and ', and '}{damage}"
+    unknown = bool(torn) and (_REQUEST.search(torn) is None or concerns_stop(torn))
+    return Start(end, mended, bool(damage) or unknown, bool(damage))
+
+
+def _behind(end: End, newest: Path) -> End:
+    """The end of a damaged live file, put behind the newest part: numbers never go back."""
+    before, named = _scan(newest).end, first_number(newest)
+    last_stop_id = max(end.memory.last_stop_id, before.memory.last_stop_id)
+    return replace(
+        end,
+        first=max(end.first, named + 1) if end.length else named,
+        number=max(end.number, before.number, named),
+        hash=end.hash if end.length else before.hash,
+        memory=replace(end.memory, last_stop_id=last_stop_id),
+    )
+
+
+def _scan(path: Path) -> _Scan:
+    """The end of a file, the torn line after it, and what else is wrong with it in words."""
+    first, number, last, length, memory = 1, 0, NOTHING_BEFORE, 0, NOTHING
+    torn, damage = b"", ""
+    with path.open("rb") as file:
+        for line in lines_of(file):
+            if not line.endswith(b"\n"):
+                torn = line
+                break
+            link = link_of(line)
+            if not length and link is not None and link.whole and begins_file(line):
+                first, number, last = link.number, link.number - 1, link.previous
+            number += 1
+            length = file.tell()
+            if link is None:
+                damage = damage or f"entry {number} cannot be read"
+                continue
+            if (link.number, link.previous, link.whole) != (number, last, True):
+                damage = damage or f"the chain is broken at entry {number}"
+                number = max(number, link.number) if link.whole else number
+            last = link.hash
+            if concerns(line):
+                with contextlib.suppress(AuditError):
+                    memory = follow(memory, parse_line(line))
+    return _Scan(End(first=first, number=number, hash=last, length=length, memory=memory), torn, damage)

@@ -1,0 +1,163 @@
+"""Looking for entries in a robot's audit log, for people and for the request `audit/find`."""
+
+import asyncio
+import json
+import re
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from protocol_gateway.audit.entry import Entry, Outcome, audit_entry, parse_line
+from protocol_gateway.audit.files import lines_of, open_files
+from protocol_gateway.errors import AuditError
+from protocol_gateway.foreign_text import one_line
+from robomesh import reason_codes as codes
+from robomesh.errors import RefusedError
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.server import Request
+
+MOST = 10_000
+MOST_UNLESS_ASKED = 1000
+# Who asks more than so many questions at once is not listened to: each may read the whole log.
+_MOST_SEARCHES = 8
+
+_TIME = re.compile(rb'"time_ns":(\d{1,19}),"values":')
+# A gentle search lets go of the interpreter now and then.
+_LINES_AT_ONCE = 200
+_PAUSE_S = 0.0005
+
+
+@dataclass(frozen=True, kw_only=True)
+class Query:
+    """What is looked for; what is empty or None matches everything.
+
+    Attributes:
+        since_ns: Asked then or later, ns since the Unix epoch; `until_ns`: then or before.
+        most: The newest so many.
+    """
+
+    operator: str = ""
+    request: str = ""
+    outcome: Outcome | None = None
+    since_ns: int | None = None
+    until_ns: int | None = None
+    most: int = MOST_UNLESS_ASKED
+
+
+def matches(entry: Entry, query: Query) -> bool:
+    """Whether an entry is among what is looked for."""
+    return (
+        query.operator in ("", entry.operator)
+        and query.request in ("", entry.request)
+        and query.outcome in (None, entry.outcome)
+        and (query.since_ns is None or entry.time_ns >= query.since_ns)
+        and (query.until_ns is None or entry.time_ns <= query.until_ns)
+    )
+
+
+def find(live: Path, query: Query, *, gently: bool = False) -> list[Entry]:
+    """The newest entries of a log, with its older parts, that match; oldest first.
+
+    Args:
+        gently: In a thread beside robots, which must not wait for it.
+
+    Raises:
+        OSError: If the log cannot be read.
+    """
+    may_match = _filter(query)
+    found: deque[bytes] = deque()
+    for file in open_files(live, newest_first=True):
+        here: deque[bytes] = deque(maxlen=query.most - len(found))
+        for number, line in enumerate(lines_of(file)):
+            if may_match(line):
+                here.append(line)
+            if gently and number % _LINES_AT_ONCE == 0:
+                time.sleep(_PAUSE_S)
+        found.extendleft(reversed(here))
+        if len(found) >= query.most:
+            break
+    entries = []
+    for line in found:
+        try:
+            entry = parse_line(line)
+        except AuditError:
+            continue  # somebody changed that line: `verify` tells
+        if matches(entry, query):
+            entries.append(entry)
+    return entries
+
+
+def _filter(query: Query) -> Callable[[bytes], bool]:
+    """Tells lines that cannot match, without parsing them."""
+    words = {"operator": query.operator, "request": query.request, "outcome": query.outcome or ""}
+    needles = [
+        f'"{name}":{json.dumps(word, ensure_ascii=False)}'.encode(errors="backslashreplace")
+        for name, word in words.items()
+        if word
+    ]
+    since_ns, until_ns = query.since_ns, query.until_ns
+
+    def may_match(line: bytes) -> bool:
+        if not all(needle in line for needle in needles):
+            return False
+        told = _TIME.search(line)
+        if told is None:
+            return False
+        time_ns = int(told[1])
+        return (since_ns is None or time_ns >= since_ns) and (until_ns is None or time_ns <= until_ns)
+
+    return may_match
+
+
+class Searches:
+    """Answers `audit/find` from a robot's log: one search after the other, none on the event loop."""
+
+    def __init__(self, live: Path) -> None:
+        self._live = live
+        self._one_at_a_time = asyncio.Lock()
+        self._asked = 0
+
+    async def answer(self, request: Request) -> schema.AuditList:
+        """The entries that match.
+
+        Raises:
+            RefusedError: If too much is asked at once, or the log cannot be read.
+        """
+        assert isinstance(request.message, schema.AuditQuery)
+        query = query_of(request.message)
+        if self._asked >= _MOST_SEARCHES:
+            raise RefusedError(codes.AUDIT_SEARCHES(count=_MOST_SEARCHES))
+        self._asked += 1
+        try:
+            async with self._one_at_a_time:
+                return await asyncio.to_thread(self._list, query)
+        except OSError as error:
+            raise RefusedError(codes.AUDIT_UNREADABLE(file=self._live.name, detail=error.strerror)) from None
+        finally:
+            self._asked -= 1
+
+    def _list(self, query: Query) -> schema.AuditList:
+        return schema.AuditList(
+            entries=[audit_entry(entry) for entry in find(self._live, query, gently=True)]
+        )
+
+
+def query_of(message: schema.AuditQuery) -> Query:
+    """A query from its message.
+
+    Raises:
+        RefusedError: Naming what cannot be meant.
+    """
+    if message.most > MOST:
+        raise RefusedError(codes.AUDIT_TOO_MANY(count=message.most, most=MOST))
+    outcomes = schema.AuditEntry.Outcome
+    return Query(
+        operator=one_line(message.operator),
+        request=one_line(message.request),
+        outcome=Outcome(outcomes.Name(message.outcome)) if message.HasField("outcome") else None,
+        since_ns=message.since.ToNanoseconds() if message.HasField("since") else None,
+        until_ns=message.until.ToNanoseconds() if message.HasField("until") else None,
+        most=message.most or MOST_UNLESS_ASKED,
+    )

@@ -1,0 +1,194 @@
+"""Why a command cannot go to a controller as it is now: its state, the joints' limits. No I/O.
+
+    command                     link  mode  stopped, fault  positions  homed  limits
+    --------------------------  ----  ----  --------------  ---------  -----  ------
+    HOLD                        x
+    RESET TRACE_ON TRACE_OFF    x     x
+    SPEED                       x     x                                       1-100 %
+    HOME                        x     x     x               not gone
+    RESUME                      x     x     x, idle         x          x, or on hold
+    RUN_PROGRAM                 x     x     x               x
+    MOVE_ABSOLUTE MOVE_RELATIVE x     x     x               x          x      x
+
+HOLD only ever makes a robot slower, so a mode that nobody knows does not forbid it.
+"""
+
+from dataclasses import dataclass, replace
+
+from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, not_sent
+from protocol_gateway.drivers.driver import (
+    Activity,
+    ControllerCommand,
+    Hold,
+    Home,
+    Mode,
+    MoveAbsolute,
+    MoveRelative,
+    Reset,
+    Resume,
+    Speed,
+    StatusReceived,
+    Trace,
+)
+from protocol_gateway.link.link import LinkState, LinkStatus
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
+from robomesh.schemas.robomesh_pb2 import CommandRequest
+from robots.joints import Joints, violations
+
+_C = CommandRequest.Command
+_MOVES = frozenset({_C.MOVE_ABSOLUTE, _C.MOVE_RELATIVE})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Controller:
+    """What is known of a controller now.
+
+    Attributes:
+        positions: Where its joints are [rad] or [m]; None: not told, or not any more.
+        positions_gone: That they are not received any more; None: they are, or never were.
+        read_only: Why nothing is ever sent to it; None: commands may be sent to it.
+        accept_unknown: What it never tells and the site file says to do without: "mode", "homed".
+    """
+
+    link: LinkStatus
+    status: StatusReceived
+    fault: str = ""
+    positions: tuple[float, ...] | None = None
+    positions_gone: Reason | None = None
+    read_only: Reason | None = None
+    accept_unknown: frozenset[str] = frozenset()
+
+
+def obstacle(request: CommandRequest, controller: Controller, joints: Joints) -> Answer | None:
+    """Why the command cannot be sent: what, why and what next; None: it can."""
+    found = (
+        _link_obstacle(controller)
+        or _mode_obstacle(request, controller)
+        or _state_obstacle(request, controller)
+        or _value_obstacle(request, controller, joints)
+    )
+    return None if found is None else not_sent(found)
+
+
+def _link_obstacle(controller: Controller) -> Reason | None:
+    if controller.read_only is not None:
+        return codes.ROBOT_READ_ONLY(controller.read_only)
+    match controller.link.state:
+        case LinkState.DOWN:
+            return codes.LINK_DOWN(controller.link.reason)
+        case LinkState.SILENT:
+            return codes.LINK_SILENT(controller.link.reason)
+        case LinkState.UP:
+            return None
+
+
+def _mode_obstacle(request: CommandRequest, controller: Controller) -> Reason | None:
+    match controller.status.mode:
+        case Mode.LOCAL:
+            return codes.CONTROLLER_LOCAL()
+        case None if request.command != _C.HOLD and "mode" not in controller.accept_unknown:
+            return codes.CONTROLLER_MODE_UNKNOWN()
+    return None
+
+
+def _state_obstacle(request: CommandRequest, controller: Controller) -> Reason | None:
+    if request.command not in MOTION_COMMANDS:
+        return None
+    status = controller.status
+    if status.activity is Activity.STOPPED:
+        return codes.CONTROLLER_STOPPED()
+    if status.activity is Activity.FAULT:
+        return codes.CONTROLLER_FAULT(fault=controller.fault or "it does not say which")
+    if status.activity is Activity.HOLDING and request.command != _C.RESUME:
+        return codes.CONTROLLER_HOLDING()
+    if controller.positions_gone is not None:
+        return codes.POSITIONS_UNKNOWN(controller.positions_gone)
+    # Many an arm cannot tell where it is before it is homed; one that could and cannot any more is not moved.
+    if controller.positions is None and request.command != _C.HOME:
+        return codes.POSITIONS_NONE()
+    if request.command == _C.RESUME and status.activity is Activity.IDLE:
+        return codes.CONTROLLER_NOT_HOLDING()
+    # A program may begin with homing; each of its steps is judged when its turn comes.
+    if request.command in (_C.HOME, _C.RUN_PROGRAM) or status.homed:
+        return None
+    # What is on hold was judged when it began; it may be the way home.
+    if request.command == _C.RESUME and status.activity is Activity.HOLDING:
+        return None
+    if status.homed is False:
+        return codes.ROBOT_NOT_HOMED()
+    return None if "homed" in controller.accept_unknown else codes.ROBOT_HOMED_UNKNOWN()
+
+
+def _value_obstacle(request: CommandRequest, controller: Controller, joints: Joints) -> Reason | None:
+    if request.command == _C.SPEED:
+        if not request.HasField("speed_percent"):
+            return codes.SPEED_MISSING()
+        if not 1.0 <= request.speed_percent <= 100.0:
+            return codes.SPEED_OUTSIDE(value=request.speed_percent)
+    if request.command not in _MOVES:
+        return None
+    count = len(request.joint_positions)
+    if count != len(joints):
+        return codes.JOINT_COUNT(count=count, joints=len(joints), names=", ".join(joints.names))
+    # Limits and constraints are linear: all of a straight path in joint space is within them when its end is.
+    target = target_of(request, controller, joints)
+    found = violations(joints, target) if target is not None else ()
+    return codes.JOINTS_OUTSIDE(*found) if found else None
+
+
+def target_of(request: CommandRequest, controller: Controller, joints: Joints) -> tuple[float, ...] | None:
+    """Where a command takes the joints [rad] or [m]; None: nowhere, or it is not known."""
+    match request.command:
+        case _C.HOME:
+            return tuple(joints.home.tolist())
+        case _C.MOVE_ABSOLUTE:
+            return tuple(request.joint_positions)
+        case _C.MOVE_RELATIVE if controller.positions is not None:
+            pairs = zip(controller.positions, request.joint_positions, strict=True)
+            return tuple(start + offset for start, offset in pairs)
+    return None
+
+
+def after(request: CommandRequest, controller: Controller, joints: Joints) -> Controller:
+    """The controller as a command will leave it: so it is for the next one of the same unit."""
+    status = controller.status
+    match request.command:
+        case _C.HOME:
+            status = replace(status, homed=True)
+        case _C.RESET:
+            status = replace(status, activity=None)  # not stopped, and nothing is on hold
+        case _C.HOLD:
+            status = replace(status, activity=Activity.HOLDING)
+        case _C.RESUME:
+            status = replace(status, activity=Activity.MOVING)
+    target = target_of(request, controller, joints)
+    return replace(controller, status=status, positions=controller.positions if target is None else target)
+
+
+def controller_command(request: CommandRequest) -> ControllerCommand:
+    """A command as the driver takes it.
+
+    Raises:
+        ValueError: If it is none that a driver knows.
+    """
+    match request.command:
+        case _C.HOME:
+            return Home()
+        case _C.HOLD:
+            return Hold()
+        case _C.RESUME:
+            return Resume()
+        case _C.RESET:
+            return Reset()
+        case _C.TRACE_ON:
+            return Trace(on=True)
+        case _C.TRACE_OFF:
+            return Trace(on=False)
+        case _C.SPEED:
+            return Speed(percent=request.speed_percent)
+        case _C.MOVE_ABSOLUTE:
+            return MoveAbsolute(positions=tuple(request.joint_positions))
+        case _C.MOVE_RELATIVE:
+            return MoveRelative(offsets=tuple(request.joint_positions))
+    raise ValueError(f"{_C.Name(request.command)} is not a controller's command")

@@ -1,0 +1,159 @@
+"""What Control writes into the audit log: before a thing is done, or after it, but never instead of it."""
+
+import asyncio
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from hashlib import sha256
+
+from protocol_gateway.audit.flood_counter import STOP, Floods
+from protocol_gateway.audit.log import AuditLog, Entry, Outcome
+from protocol_gateway.authority.admission import LONGEST_WAIT_S
+from protocol_gateway.authority.lease_rules import Answer
+from protocol_gateway.errors import AuditError
+from protocol_gateway.foreign_text import LONGEST_SENTENCE, one_line
+from protocol_gateway.journal import Journal
+from robomesh import reason_codes as codes
+from robomesh.reasons import Reason
+from robomesh.schemas.robomesh_pb2 import CommandRequest, Event, LeaseRequest
+
+
+class Ledger:
+    """Entries of one robot. What cannot be written is said in an event, and stops nothing but motion."""
+
+    def __init__(self, audit: AuditLog, journal: Journal) -> None:
+        self._audit = audit
+        self._journal = journal
+        self._floods = Floods()
+        self._failing = False
+
+    async def before(self, *entries: Entry) -> None:
+        """Write down what is about to be done, all or nothing; it is on disk when this returns.
+
+        Raises:
+            AuditError: If it is not, or not within a second; then it must not be done.
+        """
+        if any(entry.request == "RESET" for entry in entries):
+            # A start reads which stop is latched in the order of the entries.
+            self._write_counts(STOP)
+        late = AuditError(codes.AUDIT_SLOW(seconds=LONGEST_WAIT_S))
+        if self._audit.stuck_s > LONGEST_WAIT_S:
+            self._not_done(entries, late, Outcome.REFUSED)
+            raise late
+        try:
+            async with asyncio.timeout(LONGEST_WAIT_S):
+                await asyncio.gather(*map(self._audit.append, entries))
+        except AuditError as error:
+            self._not_done(entries, error, Outcome.REFUSED)
+            raise
+        except TimeoutError:
+            # The entry will be on disk yet, so what became of it has to stand behind it.
+            self._not_done(entries, late, Outcome.FAILED)
+            raise late from None
+
+    def after_later(self, entry: Entry) -> None:
+        """Write down what has happened, without waiting for the disk; a flood of it is counted."""
+        if self._floods.admits(entry, time.monotonic()):
+            self._note(entry)
+
+    def look(self) -> None:
+        """Write what was counted, and what the disk refused before; to be called each second."""
+        self._write_counts()
+        self._audit.pay()
+        latch = self._audit.latch
+        latch.retry()
+        if latch.problem is not None:
+            if not self._failing:
+                self._say_failed(AuditError(latch.problem))
+        elif self._failing and not self._audit.problem and self._audit.stuck_s < LONGEST_WAIT_S:
+            self._failing = False
+            self._journal.say(Event.Severity.INFO, "audit.mended", "the audit log is written again")
+
+    async def settle(self) -> None:
+        """Wait until all that was begun is written, or could not be."""
+        self._write_counts()
+        await self._audit.settle()
+
+    def _write_counts(self, request: str = "") -> None:
+        for entry in self._floods.counts(time.monotonic(), request=request):
+            self._note(entry)
+
+    def _note(self, entry: Entry) -> None:
+        self._audit.note(entry).add_done_callback(self._noted)
+
+    def _noted(self, told: asyncio.Future[Entry]) -> None:
+        error = None if told.cancelled() else told.exception()
+        if error is not None:
+            self._say_failed(error)
+
+    def _not_done(self, entries: Sequence[Entry], error: AuditError, outcome: Outcome) -> None:
+        for entry in entries:
+            reason = codes.NOT_DONE(error.reason)
+            self.after_later(replace(entry, outcome=outcome, text=reason.text, reason=reason))
+        self._say_failed(error)
+
+    def _say_failed(self, error: BaseException) -> None:
+        self._failing = True
+        text = f"{error}: the robot is not moved while that is so; stop still works"
+        self._journal.say(Event.Severity.ERROR, "audit.failed", text)
+
+
+def entry_of(
+    request: str,
+    *,
+    operator: str,
+    source: str,
+    outcome: Outcome,
+    text: str,
+    why: Reason | None = None,
+    **values: object,
+) -> Entry:
+    """An entry dated now; values that are empty are left out, and long ones cut."""
+    return Entry(
+        time_ns=time.time_ns(),
+        operator=operator,
+        source=source,
+        request=request,
+        outcome=outcome,
+        text=text,
+        reason=why,
+        values={
+            name: one_line(str(value), LONGEST_SENTENCE)
+            for name, value in values.items()
+            if value not in ("", 0)
+        },
+    )
+
+
+def lease_entry(
+    request: LeaseRequest, outcome: Outcome, answer: Answer, *, operator: str, source: str
+) -> Entry:
+    """The entry of a lease request."""
+    return entry_of(
+        LeaseRequest.Action.Name(request.action),
+        operator=operator,
+        source=source,
+        outcome=outcome,
+        text=answer.text,
+        why=answer.reason,
+        ttl_s=request.ttl_s,
+        to=request.to,
+        reason=request.reason,
+    )
+
+
+def command_entry(request: CommandRequest, *, operator: str, source: str) -> Entry:
+    """The entry of a command that is accepted."""
+    return entry_of(
+        CommandRequest.Command.Name(request.command),
+        operator=operator,
+        source=source,
+        outcome=Outcome.ACCEPTED,
+        text="",
+        id=str(request.id),
+        joint_positions=" ".join(f"{value:.6g}" for value in request.joint_positions),
+        speed_percent=f"{request.speed_percent:g}" if request.HasField("speed_percent") else "",
+        stop_id=request.stop_id,
+        program_name=request.program_name,
+        program_sha256=sha256(request.program.encode()).hexdigest() if request.program else "",
+    )

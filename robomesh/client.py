@@ -1,0 +1,207 @@
+"""Asking: a question to a request's owner with a time-out, its answer or why it was refused."""
+
+import asyncio
+import math
+import secrets
+from contextlib import suppress
+from dataclasses import dataclass
+
+import zenoh
+from google.protobuf.message import Message
+
+from robomesh import keys, pieces, topics
+from robomesh.endpoints import ON_THE_SECOND_LINK, first_line, settle
+from robomesh.errors import (
+    BrokenAnswerError,
+    BusError,
+    BusyError,
+    MessageError,
+    NoAnswerError,
+    QuotaError,
+    RefusedError,
+)
+from robomesh.messages import PROTOBUF, TEXT, decode
+from robomesh.reasons import Reason, pairs_of, reason_of
+from robomesh.server import AGAIN_S, BUSY, CODES, MARK_BYTES, OLD_AGAIN_S, WITHIN
+
+_AGAIN_S = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """One owner's answer to a request that may have many owners."""
+
+    key: str
+    message: Message | None
+    error: str | None
+
+
+async def ask_all(
+    session: zenoh.Session,
+    key: str,
+    payload: bytes,
+    *,
+    timeout_s: float,
+    silent_s: float | None = None,
+) -> list[tuple[str, bytes | None, RefusedError | BrokenAnswerError | None]]:
+    """Every owner's (key, answer bytes, error); exactly one of the two is there.
+
+    Args:
+        timeout_s: How long owners may take to answer [s].
+        silent_s: How long nothing more of a long answer may come [s]; None: as long.
+    """
+    loop = asyncio.get_running_loop()
+    row = topics.request(keys.parse_expression(key).topic)
+    if row.priority in ON_THE_SECOND_LINK:
+        # In a thread, which keeps no order: never before a command.
+        await asyncio.to_thread(settle, session, row.priority)
+    priorities = (row.priority, ON_THE_SECOND_LINK[0]) if row.both_links else (row.priority,)
+    mark = secrets.token_bytes(MARK_BYTES) if row.both_links else None
+    asked = [loop.create_future() for _ in priorities]
+    for priority, done in zip(priorities, asked, strict=True):
+        try:
+            _get(session, key, payload, priority, mark, timeout_s, done)
+        except zenoh.ZError as error:
+            raise NoAnswerError(f"{key} could not be asked: {first_line(error)}") from None
+    answers: _Answers = []
+    for done in asyncio.as_completed(asked):
+        answers = max(answers, await done, key=len)
+        if answers:
+            break
+    silent_s = timeout_s if silent_s is None else silent_s
+    found: list[tuple[str, bytes | None, RefusedError | BrokenAnswerError | None]] = []
+    for owner, answer, refused in answers:
+        if not isinstance(answer, pieces.First):
+            found.append((owner, answer, refused))
+            continue
+        try:
+            whole = await pieces.whole(session, answer, _zenoh(row.priority), timeout_s=silent_s)
+            found.append((owner, whole, None))
+        except BrokenAnswerError as error:
+            found.append((owner, None, error))
+    return found
+
+
+_Answers = list[tuple[str, bytes | pieces.First | None, RefusedError | None]]
+
+
+def _get(
+    session: zenoh.Session,
+    key: str,
+    payload: bytes,
+    priority: topics.Priority,
+    mark: bytes | None,
+    timeout_s: float,
+    done: asyncio.Future[_Answers],
+) -> None:
+    """Ask, and hand every owner's answer over when the last is there, or the time is over."""
+    loop = done.get_loop()
+    answers: _Answers = []
+
+    def on_reply(reply: zenoh.Reply) -> None:
+        if reply.ok is not None:
+            # Zenoh sees to it that it is a key that was asked.
+            if not keys.has_wildcard(str(reply.ok.key_expr)):
+                answer = pieces.first_of(reply.ok) or reply.ok.payload.to_bytes()
+                answers.append((str(reply.ok.key_expr), answer, None))
+        elif reply.err is not None and (encoding := str(reply.err.encoding)).startswith(TEXT):
+            answers.append((key, None, _refused(reply.err.payload.to_bytes(), encoding)))
+
+    def finish() -> None:
+        if not done.done():
+            done.set_result(answers)
+
+    def on_end() -> None:
+        if not loop.is_closed():
+            loop.call_soon_threadsafe(finish)
+
+    session.get(
+        f"{pieces.selector(key)};{WITHIN}={timeout_s:.3f};{CODES}",
+        zenoh.handlers.Callback(on_reply, on_end),
+        payload=payload,
+        encoding=PROTOBUF,
+        attachment=mark,
+        # Else one who calls himself complete would be asked in the owner's place.
+        target=zenoh.QueryTarget.ALL,
+        consolidation=zenoh.ConsolidationMode.NONE,
+        # The default, BLOCK, would stall joint states on a full link.
+        congestion_control=zenoh.CongestionControl.DROP,
+        priority=_zenoh(priority),
+        timeout=timeout_s,
+    )
+
+
+def _zenoh(priority: topics.Priority) -> zenoh.Priority:
+    found: zenoh.Priority = getattr(zenoh.Priority, priority.value)
+    return found
+
+
+def _refused(words: bytes, encoding: str) -> RefusedError:
+    """Return an owner's refusal; without a code it is an older owner's, or a stranger's."""
+    text = words.decode(errors="replace")
+    parameters = pairs_of(encoding.partition(";")[2])
+    reason: Reason | str = reason_of(parameters, text) or text
+    if BUSY in parameters:
+        return BusyError(reason, text=text)
+    for name in (AGAIN_S, OLD_AGAIN_S):
+        with suppress(ValueError):
+            again_s = float(parameters.get(name, ""))
+            if math.isfinite(again_s):
+                return QuotaError(reason, again_s=max(again_s, _AGAIN_S))
+    return RefusedError(reason, text=text)
+
+
+async def ask_bytes(session: zenoh.Session, key: str, payload: bytes, *, timeout_s: float) -> bytes:
+    """The one answer to a request, as bytes.
+
+    An owner who is busy or starting, or has forgotten a long answer before it was taken, is asked again, and
+    so is one whose quota gives something in time. A long answer that has begun may take longer.
+
+    Raises:
+        RefusedError: With the owner's words.
+        BusyError: If the owner had no place for it, until the end.
+        QuotaError: If the quota gives nothing before the end.
+        NoAnswerError: If nobody answered in time.
+        BrokenAnswerError: If nothing more of a long answer came for the whole of that time.
+    """
+    loop = asyncio.get_running_loop()
+    deadline = loop.time() + timeout_s
+    again: BusyError | QuotaError | BrokenAnswerError | None = None
+    while (left_s := deadline - loop.time()) > 0:
+        # Zenoh answers at once that there is no owner. One that was busy before is not said to be missing.
+        again_s = _AGAIN_S
+        for _, answer, error in await ask_all(session, key, payload, timeout_s=left_s, silent_s=timeout_s):
+            if isinstance(error, BusyError | BrokenAnswerError):
+                again = error
+            elif isinstance(error, QuotaError) and error.again_s < deadline - loop.time():
+                again, again_s = error, error.again_s
+            elif error is not None:
+                raise error
+            elif answer is not None:
+                return answer
+        await asyncio.sleep(min(again_s, left_s))
+    if again is not None:
+        raise again
+    raise NoAnswerError(f"nobody answered {key} within {timeout_s:g} s: is its service running?")
+
+
+def answer_of(owner: str, answer: bytes | None, refused: BusError | None) -> Answer:
+    """One of many owners' answers; of one whose bytes are none, what is wrong with them."""
+    if answer is None:
+        return Answer(owner, None, None if refused is None else str(refused))
+    try:
+        return Answer(owner, decode_answer(owner, answer), None)
+    except BusError as error:  # another's nonsense must not hide what the others say
+        return Answer(owner, None, str(error))
+
+
+def decode_answer(key: str, payload: bytes) -> Message:
+    """An answer by the request table.
+
+    Raises:
+        MessageError: If the bytes are not that message.
+    """
+    schema = topics.request(keys.parse_expression(key).topic).answer
+    if schema is None:
+        raise MessageError(f"{key} answers with plain bytes")
+    return decode(schema, payload)

@@ -1,0 +1,45 @@
+"""The presence of a program that belongs to no site: at the one it was told, or the first it sees."""
+
+import asyncio
+
+from robomesh.health import Served, present
+from robomesh.keys import WHOLE_SITE
+from robomesh.metrics import serve_metrics
+from robomesh.presence import MONITOR
+from robomesh.session import Session
+from robomesh.topic_schema import PEOPLE
+
+
+async def be_present(
+    session: Session, service: str, *, site: str = "", metrics: tuple[str, int] | None = None
+) -> None:
+    """Be there for everybody, until cancelled.
+
+    Args:
+        site: Empty: the first that is seen.
+        metrics: Host and port at which Prometheus may ask; None: nowhere.
+
+    Raises:
+        SessionError: If the metrics cannot be served where they should be.
+    """
+    at = site or await _first_site(session)
+    if session.principal is not None and session.principal.role in PEOPLE:
+        # People watch; health is a service's.
+        session.declare_presence(at, WHOLE_SITE, MONITOR)
+        if metrics is not None:
+            serve_metrics(session, *metrics, {"service": service, "site": at, "id": session.identity})
+        await asyncio.Event().wait()
+    served = Served(service=service, present_for=((at, WHOLE_SITE),), metrics=metrics)
+    async with present(session, served):
+        await asyncio.Event().wait()
+
+
+async def _first_site(session: Session) -> str:
+    watch = session.watch_presence()
+    try:
+        async for who, alive in watch:
+            if alive:
+                return who.site
+    finally:
+        watch.close()
+    raise asyncio.CancelledError  # the session ends

@@ -1,0 +1,230 @@
+"""How near an arm is to itself and to what stands around it, in one position."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import coal
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.cells import FLOOR
+from robots.collision.cell import Arm, Cell
+from robots.collision.floor import heights_above
+from robots.collision.geometry import TOUCH_M, Body, transform
+from robots.collision.obstacles import Obstacles, boxes_of, joined, least_distances
+from robots.collision.self_collision import nearest_pair, touching_pairs
+from robots.joints import FloatArray
+from robots.model import link_placements
+
+
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """Two that are near each other.
+
+    Attributes:
+        pair: Each "<robot>/<link>", "<fixture>" or FLOOR.
+        distance_m: 0 where they touch.
+        points: (3,) on each, in the site's frame [m]: where they touch, or are nearest.
+    """
+
+    pair: tuple[str, str]
+    distance_m: float
+    points: tuple[FloatArray, FloatArray]
+
+
+class Gauge:
+    """Measures two bodies; keeps coal's workspace."""
+
+    def __init__(self) -> None:
+        self._request = coal.DistanceRequest()
+        self._result = coal.DistanceResult()
+
+    def distance(self, one: Body, one_at: Any, other: Body, other_at: Any) -> float:
+        """How far apart two bodies are [m]; 0 where they touch.
+
+        Args:
+            one_at, other_at: Their placements as coal has them.
+        """
+        self._result.clear()
+        found = coal.distance(one.geometry, one_at, other.geometry, other_at, self._request, self._result)
+        return 0.0 if found <= TOUCH_M else float(found)
+
+    def bound(self, one: Body, one_at: Any, other: Body, other_at: Any) -> float:
+        """As `distance`, or less where hulls about two meshes are apart: it is 0 only where they touch."""
+        if one.hull is not None and other.hull is not None:
+            self._result.clear()
+            found = coal.distance(one.hull, one_at, other.hull, other_at, self._request, self._result)
+            if found > TOUCH_M:
+                return float(found)
+        return self.distance(one, one_at, other, other_at)
+
+    def points(self, one: Body, one_at: Any, other: Body, other_at: Any) -> tuple[FloatArray, FloatArray]:
+        """Where the two bodies of the last `distance` are nearest, or touch: (3,) on each [m]."""
+        found = self._result
+        if found.min_distance <= TOUCH_M:
+            # Of meshes that touch, a distance tells no point.
+            contact = coal.CollisionResult()
+            request = coal.CollisionRequest(coal.CONTACT, 1)
+            if coal.collide(one.geometry, one_at, other.geometry, other_at, request, contact):
+                found = contact.getContact(0)
+        return np.array(found.getNearestPoint1()), np.array(found.getNearestPoint2())
+
+    def nearest(self, some: Obstacles, one: int, others: Obstacles, other: int) -> Nearest:
+        """Two bodies by their numbers, measured."""
+        bodies = some.bodies[one], others.bodies[other]
+        places = transform(some.placements[one]), transform(others.placements[other])
+        distance = self.distance(bodies[0], places[0], bodies[1], places[1])
+        points = self.points(bodies[0], places[0], bodies[1], places[1])
+        return Nearest((some.names[one], others.names[other]), distance, points)
+
+
+def one_a_pair(found: Iterable[Nearest]) -> tuple[Nearest, ...]:
+    """The nearest of each pair, nearest first."""
+    pairs: dict[tuple[str, str], Nearest] = {}
+    for each in sorted(found, key=lambda each: each.distance_m):
+        pairs.setdefault(each.pair, each)
+    return tuple(pairs.values())
+
+
+def arm_obstacles(arm: Arm, positions: FloatArray) -> Obstacles:
+    """The bodies of an arm in their places.
+
+    Raises:
+        JointCountError: If there is not one value a joint.
+    """
+    placements = arm.base_to_site @ link_placements(arm.model, positions)
+    return Obstacles(arm.names, arm.bodies, placements[arm.links], arm.moving)
+
+
+def checked(cell: Cell, at: Obstacles, around: Obstacles) -> NDArray[np.bool_]:
+    """Which bodies are checked against which: (a, b)."""
+    moves: NDArray[np.bool_] = at.moving[:, None] | around.moving
+    if cell.ignored:
+        moves &= [[(one, other) not in cell.ignored for other in around.names] for one in at.names]
+    return moves
+
+
+def own_contacts(cell: Cell, robot: str, positions: FloatArray) -> tuple[Nearest, ...]:
+    """Links of an arm that touch each other; neighbours and ignored pairs are left out.
+
+    Args:
+        positions: (n,) joint positions [rad] or [m].
+
+    Raises:
+        JointCountError: If there is not one value a joint.
+    """
+    arm = cell.arms[robot]
+    touching = touching_pairs(arm.own, arm.model, positions)
+    return one_a_pair(_own(arm, number, 0.0, points) for number, points in touching.items())
+
+
+def own_nearest(cell: Cell, robot: str, positions: FloatArray) -> Nearest | None:
+    """The two links of an arm that are nearest each other, of those that are checked; None: there are none.
+
+    Args:
+        positions: (n,) joint positions [rad] or [m].
+
+    Raises:
+        JointCountError: If there is not one value a joint.
+    """
+    arm = cell.arms[robot]
+    found = nearest_pair(arm.own, arm.model, positions)
+    if found is None:
+        return None
+    if found[1] <= TOUCH_M and (touching := own_contacts(cell, robot, positions)):
+        return touching[0]  # of meshes that touch, a distance tells no point
+    return _own(arm, *found)
+
+
+def _own(arm: Arm, number: int, distance_m: float, points: tuple[FloatArray, FloatArray]) -> Nearest:
+    one, other = arm.own.pairs[number]
+    rotation, origin = arm.base_to_site[:3, :3], arm.base_to_site[:3, 3]
+    in_site = rotation @ points[0] + origin, rotation @ points[1] + origin
+    return Nearest((arm.names[one], arm.names[other]), distance_m, in_site)
+
+
+def outside_nearest(
+    cell: Cell,
+    robot: str,
+    positions: FloatArray,
+    others: Mapping[str, FloatArray],
+    *,
+    within_m: float | None = None,
+) -> tuple[Nearest, ...]:
+    """What an arm is near to: fixtures, and links of other robots; one a pair, nearest first.
+
+    The floor is among them where it has a warning distance.
+
+    What does not move is not checked against what does not move either: base links and fixtures.
+
+    Args:
+        positions: (n,) joint positions [rad] or [m].
+        others: Positions of each other robot of the cell that counts; the rest are left out.
+        within_m: Pairs that are farther apart are left out: they cost nothing.
+
+    Raises:
+        JointCountError: If there is not one value a joint.
+    """
+    at, around, least = _surveyed(cell, robot, positions, others)
+    gauge = Gauge()
+    reach = np.inf if within_m is None else within_m
+    pairs = np.argwhere((least <= reach) & np.isfinite(least)).tolist()
+    met = [gauge.nearest(at, one, around, other) for one, other in pairs]
+    found = one_a_pair([*met, *_above_floor(cell, robot, at)])
+    return tuple(each for each in found if each.distance_m <= reach)
+
+
+def outside_clearance(
+    cell: Cell, robot: str, positions: FloatArray, others: Mapping[str, FloatArray]
+) -> Nearest | None:
+    """The nearest pair of `outside_nearest`, sooner than all of them; None: nothing is around.
+
+    Raises:
+        JointCountError: If there is not one value a joint.
+    """
+    at, around, least = _surveyed(cell, robot, positions, others)
+    gauge = Gauge()
+    found = min(_above_floor(cell, robot, at), key=lambda each: each.distance_m, default=None)
+    for number in least.argsort(axis=None).tolist():
+        one, other = divmod(number, len(around))
+        if least[one, other] >= (np.inf if found is None else found.distance_m):
+            break
+        measured = gauge.nearest(at, one, around, other)
+        if found is None or measured.distance_m < found.distance_m:
+            found = measured
+    return found
+
+
+def _above_floor(cell: Cell, robot: str, at: Obstacles) -> list[Nearest]:
+    """How far the moving bodies of an arm are above the floor; nothing without a warning distance to it."""
+    if cell.floor is None or cell.floor.warning_m <= 0.0:
+        return []
+    found = heights_above(cell.floor, cell.arms[robot], at.placements[None])
+    below = found.points[0].copy()
+    below[:, 2] = cell.floor.height_m
+    return [
+        Nearest((at.names[body], FLOOR), max(float(height), 0.0), (point, foot))
+        for body, height, point, foot in zip(
+            found.bodies.tolist(), found.heights[0], found.points[0], below, strict=True
+        )
+    ]
+
+
+def _surveyed(
+    cell: Cell, robot: str, positions: FloatArray, others: Mapping[str, FloatArray]
+) -> tuple[Obstacles, Obstacles, FloatArray]:
+    """An arm, what is around it, and their least distances (a, b): infinite for what is not checked."""
+    at = arm_obstacles(cell.arms[robot], positions)
+    around = joined(
+        [
+            cell.fixtures,
+            *(arm_obstacles(cell.arms[name], there) for name, there in others.items() if name != robot),
+        ]
+    )
+    if not len(at) or not len(around):
+        return at, around, np.full((len(at), len(around)), np.inf)
+    boxes = boxes_of(around.bodies, around.placements)
+    least = least_distances(cell.arms[robot].balls, at.placements[None], boxes)[0]
+    least[~checked(cell, at, around)] = np.inf
+    return at, around, least

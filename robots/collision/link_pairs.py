@@ -1,0 +1,250 @@
+"""Which pairs of an arm's own links are checked, how, and why the others are not."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache, lru_cache
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from robots.collision.geometry import Body, exact_body, hull_bodies, hull_body, surface, wider
+from robots.collision.pair_study import (
+    FEWEST_FALSE,
+    MEMORY_LIMIT,
+    MOST_TRIANGLES,
+    SURVEYED,
+    TIME_LIMIT_S,
+    Case,
+    Found,
+    studied,
+)
+from robots.collision.sampling import SAMPLES, allowed_positions
+from robots.collision.self_collision import OwnPairs, Pairs, own_pairs, touching_pairs
+from robots.collision.verdicts import ELSEWHERE, EXACT, IGNORED, Kind, Verdict
+from robots.description import load
+from robots.joints import FloatArray
+from robots.kinematic_tree import Tree, TreeLink, are_neighbours, tree_of
+from robots.model import RobotModel, build_model, link_placements
+from robots.schema import RobotDescription, UrdfDescription
+
+Bodies = tuple[tuple[int, Body], ...]
+Links = tuple[str, str]
+# What the texts of verdicts name.
+_VALUES: dict[Kind, dict[str, str | int]] = {
+    Kind.ALWAYS: {"positions": SAMPLES},
+    Kind.NOT_STUDIED: {"seconds": round(TIME_LIMIT_S), "gigabytes": MEMORY_LIMIT >> 30},
+    Kind.TOO_LARGE: {"triangles": MOST_TRIANGLES},
+}
+
+
+@dataclass(frozen=True, eq=False)
+class PairPlan:
+    """How an arm is checked against itself.
+
+    Attributes:
+        bodies: Hulls, each with the number of its link; the box of one that is checked as what is drawn
+            holds that, too.
+        pairs: Numbers of two bodies, and what is checked of them.
+        verdicts: Of every two links with a shape.
+        pending: The study of pairs whose hulls touch goes on; until it ends they are checked as hulls.
+    """
+
+    bodies: Bodies
+    pairs: Pairs
+    verdicts: tuple[Verdict, ...]
+    pending: bool = False
+
+    @property
+    def ignored(self) -> tuple[tuple[Links, str], ...]:
+        """Pairs that are not checked, and the reason."""
+        return tuple((each.links, each.text) for each in self.verdicts if each.kind in IGNORED)
+
+    @property
+    def refined(self) -> tuple[tuple[Links, str], ...]:
+        """Pairs that touch at home as hulls, and as what they are checked."""
+        others = IGNORED | {Kind.APART} | ELSEWHERE
+        return tuple((each.links, each.text) for each in self.verdicts if each.kind not in others)
+
+    @property
+    def elsewhere(self) -> tuple[tuple[Links, str], ...]:
+        """Pairs that are apart at home and often touch elsewhere as hulls, and as what they are checked."""
+        return tuple((each.links, each.text) for each in self.verdicts if each.kind in ELSEWHERE)
+
+
+def ignored_pairs(description: RobotDescription, tree: Tree) -> dict[frozenset[str], Verdict]:
+    """Pairs of links with a shape that are ignored without a study."""
+    found: dict[frozenset[str], Verdict] = {}
+    if isinstance(description, UrdfDescription):
+        for links, file in description.robot.ignored:
+            found[frozenset(links)] = Verdict(links, Kind.SRDF, {"file": file})
+    for links in description.collision.ignore:
+        found[frozenset(links)] = Verdict(links, Kind.DESCRIPTION)
+    for one, other in combinations([link for link in tree.links if link.checked], 2):
+        if are_neighbours(tree, one.joint, other.joint):
+            links = one.name, other.name
+            found[frozenset(links)] = Verdict(links, Kind.ADJACENT)
+    return found
+
+
+def plan_pairs(model: str | Path, confined: bool, *, wait: bool) -> PairPlan:
+    """Decide how an arm is checked against itself.
+
+    Args:
+        model, confined: As `robots.description.load` takes them.
+        wait: Else a study that takes time goes on elsewhere, and the plan is pending.
+
+    Raises:
+        MeshError: If a mesh cannot be read.
+    """
+    return _planned(_start(model, confined), wait=wait)
+
+
+def plan_of(description: RobotDescription) -> PairPlan:
+    """Decide how an arm is checked against itself, and wait for the study.
+
+    Raises:
+        MeshError: If a mesh cannot be read.
+    """
+    return _planned(_begun(description), wait=True)
+
+
+def _planned(start: "_Start", *, wait: bool) -> PairPlan:
+    if start.case is None:
+        return start.plan
+    found = studied(start.case, wait=wait)
+    if found is None:
+        return replace(start.plan, pending=True)
+    if found not in start.refined:
+        start.refined[found] = _refined(start, found)
+    return start.refined[found]
+
+
+@dataclass(frozen=True, eq=False)
+class _Start:
+    """What is known without a study.
+
+    Attributes:
+        plan: With hulls alone.
+        numbers: Which of its pairs are studied.
+        case: A study of those; None: there is none.
+        refined: The plan with what a study found: a plant has many arms of one kind.
+    """
+
+    plan: PairPlan
+    numbers: tuple[int, ...] = ()
+    case: Case | None = None
+    refined: dict[tuple[Found, ...], PairPlan] = field(default_factory=dict)
+
+
+@lru_cache(maxsize=8)
+def _start(model: str | Path, confined: bool) -> _Start:
+    return _begun(load(model, confined=confined))
+
+
+def _begun(description: RobotDescription) -> _Start:
+    tree, built = tree_of(description), build_model(description)
+    bodies = tuple(
+        (number, body) for number, link in enumerate(tree.links) for body in hull_bodies(link.checked)
+    )
+    ignored = ignored_pairs(description, tree)
+    pairs, verdicts = [], []
+    for one, other in combinations(range(len(bodies)), 2):
+        links = tree.links[bodies[one][0]].name, tree.links[bodies[other][0]].name
+        verdict = ignored.get(frozenset(links))
+        verdicts.append(replace(verdict, links=links) if verdict else Verdict(links, Kind.APART))
+        if verdict is None:
+            pairs.append((one, other, (bodies[one][1], bodies[other][1])))
+    plan = PairPlan(bodies, tuple(pairs), tuple(verdicts))
+    positions = allowed_positions(built.joints, SURVEYED)
+    touching = _touching(own_pairs(tree, bodies, pairs), built, positions)
+    if not touching:
+        return _Start(plan)
+    case = _case(
+        [tree.links[number] for number, _ in bodies],
+        built,
+        [(pairs[number][:2], samples) for number, samples in touching.items()],
+        positions,
+    )
+    return _Start(plan, tuple(touching), case)
+
+
+def _touching(own: OwnPairs, model: RobotModel, positions: FloatArray) -> dict[int, list[int]]:
+    """Numbers of the pairs whose hulls touch at home or often, and of the positions in which they do.
+
+    Args:
+        positions: (m, n) joint positions [rad] or [m], home first.
+    """
+    found: dict[int, list[int]] = {}
+    for sample, each in enumerate(positions):
+        for number in touching_pairs(own, model, each):
+            found.setdefault(number, []).append(sample)
+    return {
+        number: samples
+        for number, samples in found.items()
+        if samples[0] == 0 or len(samples) >= FEWEST_FALSE
+    }
+
+
+def _case(
+    links: Sequence[TreeLink],
+    model: RobotModel,
+    pairs: Sequence[tuple[tuple[int, int], Sequence[int]]],
+    positions: FloatArray,
+) -> Case:
+    """A study of pairs of links.
+
+    Args:
+        pairs: Numbers of two of the links, and of the positions in which their hulls touch.
+        positions: (m, n) joint positions [rad] or [m], home first.
+    """
+    used = sorted({number for pair, _ in pairs for number in pair})
+    frames = [model.link_names.index(links[number].name) for number in used]
+    at_home = {number for pair, samples in pairs if samples[0] == 0 for number in pair}
+    first = 0
+    if at_home:
+        many = allowed_positions(model.joints, SAMPLES)
+        first, positions = len(many), np.concatenate([many, positions])
+    return Case(
+        tuple((used.index(one), used.index(other)) for (one, other), _ in pairs),
+        tuple(surface(links[number].checked) for number in used),
+        # Only pairs that touch at home may be checked as what is drawn.
+        tuple(surface(links[number].shapes if number in at_home else ()) for number in used),
+        np.stack([link_placements(model, each)[frames] for each in positions]),
+        tuple(np.array([] if samples[0] == 0 else samples, np.int64) + first for _, samples in pairs),
+    )
+
+
+def _refined(start: _Start, found: tuple[Found, ...]) -> PairPlan:
+    """The plan with what a study found."""
+    assert start.case is not None
+    case, bodies, verdicts, pairs = start.case, list(start.plan.bodies), [], []
+
+    @cache
+    def exact(number: int, drawn: bool) -> Body:
+        triangles = (case.drawn if drawn else case.checked)[number]
+        return replace(exact_body(triangles), hull=hull_body(triangles.reshape(-1, 3)).geometry)
+
+    results = dict(zip(start.numbers, found, strict=True))
+    studied_pairs = dict(zip(start.numbers, start.case.pairs, strict=True))
+    checked = iter(enumerate(start.plan.pairs))
+    for verdict in start.plan.verdicts:
+        if verdict.kind in IGNORED:
+            verdicts.append(verdict)
+            continue
+        number, (one, other, measured) = next(checked)
+        kind, share = results.get(number, Found(Kind.APART))
+        values = _VALUES.get(kind, {})
+        if kind in ELSEWHERE:
+            values = {"percent": round(100 * share), **values}
+        verdicts.append(replace(verdict, kind=kind, values=values))
+        if kind is Kind.ALWAYS:
+            continue
+        if kind in EXACT:
+            first, second = studied_pairs[number]
+            measured = exact(first, kind is Kind.VISUAL_MESHES), exact(second, kind is Kind.VISUAL_MESHES)
+            if kind is Kind.VISUAL_MESHES:
+                for body, mesh in zip((one, other), measured, strict=True):
+                    bodies[body] = bodies[body][0], wider(bodies[body][1], mesh.corners)
+        pairs.append((one, other, measured))
+    return PairPlan(tuple(bodies), tuple(pairs), tuple(verdicts))

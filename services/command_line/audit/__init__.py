@@ -1,0 +1,1 @@
+"""`robomesh audit`."""

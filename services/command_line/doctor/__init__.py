@@ -1,0 +1,1 @@
+"""`robomesh doctor`: this machine, and with `--security` the rights of every role on the mesh."""

@@ -1,0 +1,235 @@
+"""`robomesh doctor --security`: every role against every key, tried on the live mesh.
+
+It is tried on keys of a robot that does not exist, of its replay, by a wildcard that means it, and of
+another site; publishing and deleting on the site's real robots too. No service takes any of it: what is
+published has no header, and answers are empty. `security_probes` tries leases, commands and tokens of real
+robots. Where no harmless probe exists (presence of services, which everybody would see; stops, other
+requests, reading and answering on real robots), the file of rules is compared with what principals.toml
+gives, and nothing is tried. What should be comes from the table.
+"""
+
+import json
+import time
+from collections.abc import Iterable
+from contextlib import ExitStack
+from functools import partial
+from itertools import chain, product
+
+import zenoh
+
+from robomesh.access import NOBODYS_ROBOT, Act, Principal
+from robomesh.keys import has_wildcard
+from robomesh.topics import Role, Topic
+from services.command_line.doctor.security_probes import probe
+from services.command_line.doctor.security_rules import wrong_rules
+from services.command_line.doctor.security_sessions import (
+    Person,
+    Trial,
+    open_as,
+    settle,
+    wait_until,
+    who_answers,
+    with_files,
+)
+from services.command_line.doctor.security_table import ROBOTS, ROWS, names, should, tried, tried_on_real
+from services.pki import Folder, authority
+from services.pki.errors import KeysError
+
+_QUIET_S = 0.3
+_WORDS: dict[Act, str] = {
+    "put": "publish",
+    "delete": "delete",
+    "declare_subscriber": "read",
+    "declare_queryable": "answer",
+    "query": "ask",
+    "liveliness_token": "be present as",
+}
+
+
+def run(keys: Folder, connect: tuple[str, ...], as_json: bool) -> int:
+    """Print the matrix; 1: something differs from the table.
+
+    Raises:
+        KeysError: If there are no keys, or no router takes them.
+    """
+    principals = authority.principals_of(keys)
+    routers = connect or principals.routers
+    if not routers:
+        raise KeysError(f"{keys.principals} names no routers: --connect tls/HOST:PORT says where they are")
+    with ExitStack() as opened:
+        people = [
+            Person(entry, opened.enter_context(open_as(routers, file)))
+            for entry, file in with_files(keys, principals)
+        ]
+        robots = sorted({robot for each in principals.entries for robot in each.robots or ()})
+        trials = _trials(people, principals.site, robots)
+        witness = next((each for each in people if each.principal.role is Role.ROUTER), None)
+        if witness is None:
+            raise KeysError(
+                "the router's own certificate is needed to see what goes through: keys/router.pem"
+            )
+        done = _try(people, witness, principals.site, trials)
+        probed = probe(people, witness, principals.site, robots)
+        trials |= probed.trials
+        done |= probed.done
+    rules = wrong_rules(keys, principals)
+    roles = {person.principal.name: person.principal for person in people}
+    allowed = {trial for trial in trials if should(roles[trial.who], trial.act, trial.key)}
+    wrong = sorted(done ^ allowed, key=lambda trial: (trial.who, trial.act, trial.key))
+    if as_json:
+        for trial in sorted(done | allowed, key=lambda trial: (trial.who, trial.act, trial.key)):
+            row = {"who": trial.who, "act": _WORDS[trial.act], "key": trial.key}
+            print(json.dumps(row | {"should": trial in allowed, "does": trial in done}))
+        for problem in rules:
+            print(json.dumps({"rules": problem}))
+        for robot in probed.left_out:
+            print(json.dumps({"not_running": robot}))
+        return 1 if wrong or rules else 0
+    _print([*roles.values()], principals.site, done)
+    for trial in wrong:
+        does, should_ = ("can", "should not") if trial in done else ("cannot", "should")
+        print(f"WRONG: {trial.who} {does} {_WORDS[trial.act]} {trial.key}, and {should_}")
+    for problem in rules:
+        print(f"WRONG: {keys.access}: {problem}")
+    print(
+        f"{len(trials)} acts of {len(people)} certificates tried: "
+        + (f"{len(wrong)} wrong" if wrong else "all as the table says")
+    )
+    absent = sorted({role.value for role in Role} - {each.role.value for each in roles.values()})
+    if absent:
+        print(f"not tried, without a certificate here: {', '.join(absent)}")
+    if probed.left_out:
+        print(
+            f"leases, commands and tokens not tried, without a running gateway: {', '.join(probed.left_out)}"
+        )
+    print(
+        "not tried, compared in the rules only: presence of services; of real robots what is read and "
+        "answered, stops, and requests other than leases and commands: "
+        + (f"{len(rules)} wrong" if rules else "the rules are what principals.toml gives")
+    )
+    return 1 if wrong or rules else 0
+
+
+# -------------------------------------------------------------- what is tried
+
+
+def _trials(people: list[Person], site: str, robots: Iterable[str]) -> set[Trial]:
+    trials = set()
+    real = tuple(f"{site}/{robot}" for robot in robots)
+    for who, row in product((person.principal for person in people), ROWS):
+        for robot in ROBOTS:
+            for name, act in product(names(row, who), tried(row, robot)):
+                trials.add(Trial(who.name, act, f"robomesh/{site}/{robot}/{name}"))
+        for where in (*real, f"{site}x/{NOBODYS_ROBOT}"):
+            for name, act in product(names(row, who), tried_on_real(row)):
+                trials.add(Trial(who.name, act, f"robomesh/{where}/{name}"))
+    return trials
+
+
+def _try(people: list[Person], witness: Person, site: str, trials: set[Trial]) -> set[Trial]:
+    """What went through."""
+    keys = {act: sorted({trial.key for trial in trials if trial.act == act}) for act in _WORDS}
+    by_name = {each.principal.name: each for each in people}
+    done: set[Trial] = set()
+
+    def of(person: Person, act: Act) -> list[str]:
+        return sorted(
+            trial.key for trial in trials if trial.who == person.principal.name and trial.act == act
+        )
+
+    # Published: the witness hears it, with the name of who did.
+    def hear(sample: zenoh.Sample) -> None:
+        # A real robot's own messages have a header there, which is no text.
+        mark = sample.attachment.to_bytes() if sample.attachment is not None else b""
+        if (name := mark.decode(errors="replace")) in by_name:
+            act: Act = "delete" if sample.kind == zenoh.SampleKind.DELETE else "put"
+            done.add(Trial(name, act, str(sample.key_expr)))
+
+    with ExitStack() as declared:
+        # Whole keys: who listens to all of a robot makes its cameras draw.
+        for key in {*keys["put"], *keys["delete"]}:
+            declared.enter_context(witness.session.declare_subscriber(key, hear))
+        settle(witness, site)
+        for person in people:
+            for key in of(person, "put"):
+                person.session.put(key, b"", attachment=person.principal.name)
+            for key in of(person, "delete"):
+                person.session.delete(key, attachment=person.principal.name)
+            settle(person, site)
+        time.sleep(_QUIET_S)
+    done -= {trial for trial in done if trial not in trials}
+    # Read: the witness publishes everything once.
+    with ExitStack() as declared:
+        for person in people:
+
+            def note(sample: zenoh.Sample, person: Person = person) -> None:
+                if sample.attachment is not None and sample.attachment.to_bytes() == b"witness":
+                    person.heard.add(str(sample.key_expr))
+
+            for key in of(person, "declare_subscriber"):
+                declared.enter_context(person.session.declare_subscriber(key, note))
+            settle(person, site)
+        for key in keys["declare_subscriber"]:
+            witness.session.put(key, b"", attachment="witness")
+        for person in people:
+            wanted = set(of(person, "declare_subscriber"))
+            wait_until(partial(wanted.issubset, person.heard))
+            done |= {Trial(person.principal.name, "declare_subscriber", key) for key in person.heard}
+    # Answered: the witness asks. By a wildcard alone: a session with both would answer as either.
+    answered = keys["declare_queryable"]
+    for vague in (False, True):
+        with ExitStack() as declared:
+            for person in people:
+                for key in of(person, "declare_queryable"):
+                    if has_wildcard(key) is vague:
+                        declared.enter_context(_answering(person, key))
+                settle(person, site)
+            asked = who_answers(witness, (key for key in answered if not has_wildcard(key)))
+            done |= {Trial(name, "declare_queryable", key) for name, key in chain(*asked.values())}
+    # Asked: the witness answers.
+    with ExitStack() as declared:
+        for key in keys["query"]:
+            declared.enter_context(_answering(witness, key))
+        settle(witness, site)
+        for person in people:
+            asked = who_answers(person, of(person, "query"))
+            done |= {Trial(person.principal.name, "query", key) for key, by in asked.items() if by}
+    return done & trials
+
+
+def _answering(person: Person, key: str) -> zenoh.Queryable[None]:
+    def reply(query: zenoh.Query) -> None:
+        with query:
+            query.reply(str(query.key_expr), b"", attachment=f"{person.principal.name} {key}")
+
+    return person.session.declare_queryable(key, reply)
+
+
+# ------------------------------------------------------------------- printed
+
+
+def _print(people: list[Principal], site: str, done: set[Trial]) -> None:
+    """A row a topic or request, a column a certificate: what each can do."""
+    heads = [each.name.rpartition(".")[0] for each in people]
+    width = max(len(row.name) for row in ROWS) + 2
+    columns = [max(len(name), 2) + 1 for name in heads]
+    print("p: publishes, r: reads, o: answers as its owner, a: asks\n")
+    print(" " * width + "".join(f"{name:<{size}}" for name, size in zip(heads, columns, strict=True)))
+    for row in ROWS:
+        letters: dict[Act, str] = (
+            {"put": "p", "declare_subscriber": "r"}
+            if isinstance(row, Topic)
+            else {"declare_queryable": "o", "query": "a"}
+        )
+        cells = []
+        for who in people:
+            keys = {f"robomesh/{site}/{robot}/{topic}" for robot in ROBOTS for topic in names(row, who)}
+            cells.append(
+                "".join(
+                    letter if any(Trial(who.name, act, key) in done for key in keys) else "-"
+                    for act, letter in letters.items()
+                )
+            )
+        line = "".join(f"{cell:<{size}}" for cell, size in zip(cells, columns, strict=True))
+        print(f"{row.name:<{width}}{line}")
+    print()

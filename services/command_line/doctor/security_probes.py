@@ -1,0 +1,121 @@
+"""Probes of a running site: what a gateway or a router answers, and harms nothing if it gets through.
+
+- `lease/request/NAME` of a real robot: RENEW with a secret that no lease has. The gateway refuses it.
+- `command/NAME` of a real robot: COMMAND_UNSPECIFIED without a lease. The gateway refuses it unjudged.
+- `alive/operator/NAME.doctor-probe-...` of a real robot: a token of a session that holds no lease and has
+  opened no replay. It is withdrawn at once; then gateway and player look for what that session held: nothing.
+- `@/**`: the router's own state is read, nothing is written.
+
+A gateway writes each request that reaches it into its audit log, as refused. No probe is a stop, takes
+control, moves anything or publishes. A robot whose gateway does not answer is left out: there a token would
+show a robot that is not running, and a request without an answer says nothing about the rules.
+"""
+
+import time
+from collections.abc import Iterable
+from contextlib import ExitStack
+from functools import partial
+from typing import NamedTuple
+
+import zenoh
+
+from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
+from services.command_line.doctor.security_sessions import (
+    TIMEOUT_S,
+    Person,
+    Trial,
+    ask_all,
+    settle,
+    wait_until,
+)
+from services.command_line.doctor.security_table import ROUTERS_OWN, names_of_operators, should
+
+_RENEW = LeaseRequest(action=LeaseRequest.RENEW, lease="doctor --security", reason="doctor --security")
+_REQUESTS = {
+    "lease/request": _RENEW.SerializeToString(),
+    "command": CommandRequest(command=CommandRequest.COMMAND_UNSPECIFIED).SerializeToString(),
+}
+_QUIET_S = 0.3
+
+
+class Probed(NamedTuple):
+    """What was tried on the running site, what went through, and the robots without a gateway."""
+
+    trials: set[Trial]
+    done: set[Trial]
+    left_out: list[str]
+
+
+def probe(people: list[Person], witness: Person, site: str, robots: Iterable[str]) -> Probed:
+    """Try requests and tokens on real robots, in each one's own and in every operator's name, and `@/**`.
+
+    Args:
+        witness: The router's certificate: it may ask everything, and sees every token.
+    """
+    robots = list(robots)
+    running = _running(witness, site, robots)
+    tried = [person for person in people if person is not witness]
+    operators = names_of_operators([person.principal for person in people])
+    trials = {Trial(person.principal.name, "query", ROUTERS_OWN) for person in tried}
+    for person in tried:
+        who = person.principal.name
+        for base in (f"robomesh/{site}/{robot}" for robot in running):
+            for name in {who, *operators}:
+                trials |= {Trial(who, "query", f"{base}/{request}/{name}") for request in _REQUESTS}
+                session = f"{name}.doctor-probe-{who.replace('.', '-')}"
+                trials.add(Trial(who, "liveliness_token", f"{base}/alive/operator/{session}"))
+    done = _ask(tried, trials) | _be_present(tried, witness, site, trials)
+    return Probed(trials, done, [robot for robot in robots if robot not in running])
+
+
+def _running(witness: Person, site: str, robots: Iterable[str]) -> list[str]:
+    """Robots whose gateway answers."""
+    name = witness.principal.name
+    keys = {f"robomesh/{site}/{robot}/lease/request/{name}": robot for robot in robots}
+    answered: set[str] = set()
+    payload = _REQUESTS["lease/request"]
+    ask_all(witness, dict.fromkeys(keys, payload), lambda key, _: answered.add(key))
+    return [robot for key, robot in keys.items() if key in answered]
+
+
+def _ask(people: list[Person], trials: set[Trial]) -> set[Trial]:
+    """Requests that were answered: a gateway answers in words what it refuses, a router nothing."""
+    done: set[Trial] = set()
+    for person in people:
+        who = person.principal.name
+        keys = sorted(trial.key for trial in trials if trial.who == who and trial.act == "query")
+        questions = {key: _payload(key) for key in keys}
+
+        def note(key: str, reply: zenoh.Reply, who: str = who) -> None:
+            done.add(Trial(who, "query", key))
+
+        ask_all(person, questions, note, of=zenoh.Locality.REMOTE)
+    return done
+
+
+def _payload(key: str) -> bytes | None:
+    return next((payload for request, payload in _REQUESTS.items() if f"/{request}/" in key), None)
+
+
+def _be_present(people: list[Person], witness: Person, site: str, trials: set[Trial]) -> set[Trial]:
+    """Tokens that the witness sees."""
+    tokens = {trial.key: trial for trial in trials if trial.act == "liveliness_token"}
+    roles = {person.principal.name: person.principal for person in people}
+    expected = {each for each in tokens.values() if should(roles[each.who], each.act, each.key)}
+    done: set[Trial] = set()
+
+    def see(sample: zenoh.Sample) -> None:
+        if (trial := tokens.get(str(sample.key_expr))) is not None:
+            done.add(trial)
+
+    everywhere = f"robomesh/{site}/*/alive/operator/*"
+    with witness.session.liveliness().declare_subscriber(everywhere, see), ExitStack() as declared:
+        settle(witness, site)
+        for person in people:
+            for key in sorted(key for key, trial in tokens.items() if trial.who == person.principal.name):
+                declared.callback(person.session.liveliness().declare_token(key).undeclare)
+            settle(person, site)
+        settle(witness, site)
+        wait_until(partial(expected.issubset, done), TIMEOUT_S)
+        time.sleep(_QUIET_S)
+    return done

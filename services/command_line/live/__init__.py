@@ -1,0 +1,1 @@
+"""Commands that attach to a running mesh: list, monitor, send, fault, snapshot, video, alive."""

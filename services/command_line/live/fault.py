@@ -1,0 +1,27 @@
+"""`robomesh fault`: a simulated controller misbehaves on request, and behaves again."""
+
+from robomesh.keys import robot_key
+from robomesh.schemas.robomesh_pb2 import FaultAnswer, FaultRequest
+from services.command_line import discovery
+from services.simulator.fault_table import FAULTS
+
+
+def run(robot: str, name: str, off: bool, router: str, as_json: bool) -> None:
+    """Begin or end a fault; without a name, say which there are."""
+    answer = discovery.run(_ask(robot, FaultRequest(fault=name, off=off), router))
+    if as_json:
+        discovery.print_json({"active": list(answer.active), "known": list(answer.known)})
+    elif name:
+        print(f"faults now: {', '.join(answer.active) or 'none'}")
+    else:
+        for known in answer.known:
+            mark = "*" if known in answer.active else " "
+            print(f"{mark} {known:<8} {FAULTS[known].what if known in FAULTS else ''}".rstrip())
+
+
+async def _ask(name: str, request: FaultRequest, router: str) -> FaultAnswer:
+    async with discovery.attached(router) as session:
+        robot = await discovery.find(session, name)
+        answer = await session.ask(robot_key(*robot, "simulator/fault"), request)
+    assert isinstance(answer, FaultAnswer)
+    return answer

@@ -1,0 +1,308 @@
+"""`robomesh monitor`: a robot in the terminal, live: a table with bars, or a line of JSON a state."""
+
+import asyncio
+import contextlib
+import math
+import sys
+import time
+from collections.abc import AsyncIterator, Iterable
+from contextlib import asynccontextmanager
+from datetime import datetime
+from typing import TYPE_CHECKING, Any
+
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+
+from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.presence import MONITOR
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
+from robomesh.subscription import Sample, Subscription
+from robomesh.topics import topic
+from services.command_line import discovery
+from services.command_line.live.monitor_text import (
+    OLD,
+    Words,
+    alarm_words,
+    check_words,
+    clearance_record,
+    is_replay,
+    near_words,
+    program_record,
+    program_words,
+    replay_record,
+    replay_words,
+)
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+_State = schema.ControllerState
+_ROTARY = schema.Description.Joint.ROTARY
+_REDRAW_HZ = 10
+_BAR_CELLS, _LEAST_BAR_CELLS, _BESIDE_BAR_CELLS = 40, 5, 42
+# What a line of JSON tells beside the joints.
+_BESIDE = ("controller", "lease", "kinematics", "program")
+# Of a replay: what its controller and holder were when it was recorded is not so now.
+_BESIDE_REPLAY = ("replay", "kinematics", "program")
+_FIRST_S = 1.0
+
+
+def run(robot: str, router: str, as_json: bool, count: int | None) -> None:
+    """Watch until Ctrl-C, or for `count` states."""
+    with contextlib.suppress(KeyboardInterrupt):
+        # A pipe has no screen to draw on.
+        lines = as_json or not sys.stdout.isatty()
+        discovery.run(_json(robot, router, count) if lines else _live(robot, router, count))
+
+
+async def _json(name: str, router: str, count: int | None) -> None:
+    async with discovery.attached(router) as session:
+        robot = await discovery.find(session, name)
+        session.declare_presence(robot.site, WHOLE_SITE, MONITOR)
+        states = session.subscribe(robot_key(*robot, "joints"), newest=1000)
+        newest = _Newest(session, robot, _BESIDE_REPLAY if is_replay(robot.name) else _BESIDE)
+        async with newest.followed():
+            await newest.first()
+            printed = 0
+            async for sample in states:
+                discovery.print_json(_record(sample, states) | newest.record())
+                printed += 1
+                if printed == count:
+                    return
+
+
+def _record(sample: Sample, states: Subscription) -> dict[str, Any]:
+    message = sample.message()
+    assert isinstance(message, JointStates)
+    return {
+        "key": sample.key,
+        "sequence": sample.header.sequence,
+        "time": datetime.fromtimestamp(sample.header.source_time_ns * 1e-9).astimezone().isoformat(),
+        "live": sample.live and not is_replay(sample.parsed.robot),
+        "lost": states.lost(sample.key),
+        "joints": {joint.name: joint.position for joint in message.joints},
+    }
+
+
+async def _live(name: str, router: str, count: int | None) -> None:
+    from rich.live import Live
+
+    async with discovery.attached(router) as session:
+        robot = await discovery.find(session, name)
+        # Everybody sees who watches.
+        session.declare_presence(robot.site, WHOLE_SITE, MONITOR)
+        beside = _BESIDE_REPLAY if is_replay(robot.name) else _BESIDE
+        newest = _Newest(session, robot, {"joints", "description", "controller", *beside})
+        # A screen of its own, drawn whole: nothing is left over when the window changes its size.
+        live = Live(screen=True, auto_refresh=False)
+        width = live.console.width
+        try:
+            with live:
+                async with newest.followed():
+                    while count is None or newest.states < count:
+                        width = live.console.width
+                        live.update(newest.picture(width), refresh=True)
+                        await asyncio.sleep(1 / _REDRAW_HZ)
+        finally:
+            live.console.print(newest.picture(width))
+
+
+class _Newest:
+    """The newest value of each topic that is shown."""
+
+    def __init__(self, session: Session, robot: discovery.Robot, names: Iterable[str]) -> None:
+        self.robot = robot
+        self.replayed = is_replay(robot.name)
+        self.states = 0
+        self.subscriptions = {name: session.subscribe(robot_key(*robot, name)) for name in names}
+        self._alarms = session.subscribe(robot_key(robot.site, WHOLE_SITE, "alarms"))
+        self._values: dict[str, Any] = {}
+
+    @asynccontextmanager
+    async def followed(self) -> AsyncIterator[None]:
+        """What comes is taken as long as the block lasts."""
+        followed = (*self.subscriptions.values(), self._alarms)
+        followers = [asyncio.create_task(self._follow(each)) for each in followed]
+        try:
+            yield
+        finally:
+            for follower in followers:
+                follower.cancel()
+
+    async def first(self) -> None:
+        """Wait for a value of each topic; but not for a service that is not there."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(_FIRST_S):
+                while len(self._values) < len(self.subscriptions):
+                    await asyncio.sleep(0.02)
+
+    def record(self) -> dict[str, Any]:
+        """What is known beside the joints; null: nobody says so now."""
+        lease, kinematics, program = (
+            None if name not in self.subscriptions or self._stale(name) else self._values.get(name)
+            for name in ("lease", "kinematics", "program")
+        )
+        return {
+            "replay": replay_record(self._values.get("replay")) if self.replayed else None,
+            "control": None if lease is None else lease.holder,
+            "clearance": clearance_record(kinematics, str(self.robot)),
+            "program": program_record(program),
+        }
+
+    async def _follow(self, subscription: Subscription) -> None:
+        async for sample in subscription:
+            self._values[subscription.topic.name] = sample.message()
+            self.states += subscription.topic.name == "joints"
+
+    def age_s(self, name: str) -> float | None:
+        """Age of a topic [s]: since its last number, plus what the gateway says of the controller."""
+        own = self.subscriptions[name].age_s(robot_key(*self.robot, name))
+        if own is None or name != "joints":
+            return own
+        state = self._values.get("controller")
+        told = state.last_unit_age_s if state is not None and state.link != _State.UP else 0.0
+        return max(own, told)
+
+    def picture(self, width: int) -> "Group":
+        """As it is now.
+
+        Args:
+            width: Of the terminal, in characters.
+        """
+        from rich.console import Group
+        from rich.text import Text
+
+        age, stale = self.age_s("joints"), self._stale("joints")
+        head = Text(str(self.robot), style="bold")
+        head.append("   ")
+        if stale:
+            words = "no live data yet" if age is None else f"STALE {age:.0f} s"
+            head.append(f" {words} ", style="black on yellow")
+        elif not self.replayed:
+            head.append("live", style="green")
+        if self.replayed:
+            head.append(f"   {replay_words(self._values.get('replay'))}", style="magenta")
+            return Group(head, self._table(stale, width), *self._around(), *self._alarmed(), self._foot())
+        state, lease = self._values.get("controller"), self._values.get("lease")
+        if state is not None:
+            head.append(f"   link {_word(_State.Link, state.link)}")
+            head.append(
+                f"   {_word(_State.Activity, state.activity)}   mode {_word(_State.Mode, state.mode)}"
+                f"   homed {_word(_State.Known, state.homed)}",
+                style="" if state.link == _State.UP else "dim strike",
+            )
+            if state.HasField("stop"):
+                head.append(f"   STOP REQUESTED by {state.stop.by}", style="bold red")
+        if lease is not None:
+            head.append(f"   control: {lease.holder or 'nobody'}")
+        return Group(head, self._table(stale, width), *self._around(), *self._alarmed(), self._foot())
+
+    def _table(self, stale: bool, width: int) -> Any:
+        from rich import box
+        from rich.table import Table
+
+        # Name, position and limits come first; what is left is the bar's.
+        cells = min(max(width - _BESIDE_BAR_CELLS, 0), _BAR_CELLS)
+        table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+        for column, justify in (("joint", "left"), ("position", "right"), ("", "left"), ("limits", "left")):
+            table.add_column(column, justify=justify, no_wrap=True)  # type: ignore[arg-type]
+        description, states = self._values.get("description"), self._values.get("joints")
+        limits = {joint.name: joint for joint in description.joints} if description is not None else {}
+        for joint in states.joints if states is not None else ():
+            row = limits.get(joint.name)
+            if row is None:
+                table.add_row(joint.name, f"{joint.position:.4f}", "", "", style=OLD if stale else None)
+                continue
+            factor, unit = (180 / math.pi, "°") if row.type == _ROTARY else (1000.0, " mm")
+            table.add_row(
+                joint.name,
+                f"{joint.position * factor:.2f}{unit}",
+                _bar(joint.position, row.lower, row.upper, cells),
+                f"{row.lower * factor:.0f} .. {row.upper * factor:.0f}{unit}",
+                style=OLD if stale else None,
+            )
+        return table
+
+    def _around(self) -> list[Any]:
+        """A line on what is near, and one on what is checked and what runs."""
+        from rich.text import Text
+
+        state, kinematics, program = (
+            self._values.get(name) for name in ("controller", "kinematics", "program")
+        )
+        near = (
+            []
+            if kinematics is None
+            else near_words(kinematics, self._values.get("description"), str(self.robot))
+        )
+        if self._stale("kinematics"):
+            near = [(words, OLD) for words, _ in near]
+        runs: list[Words | None] = []
+        if state is not None and not self.replayed:
+            runs.append(check_words(state))
+        ran = None if program is None else program_words(program, stale=self._stale("program"))
+        # It ran when this was recorded.
+        runs.append((f"then: {ran[0]}", OLD) if ran is not None and self.replayed else ran)
+        lines = [near, [words for words in runs if words is not None]]
+        return [Text("   ").join(Text(*each) for each in line) for line in lines if line]
+
+    def _alarmed(self) -> list[Any]:
+        """A line for each alarm of the robot and its site that nobody has put aside; the first few."""
+        from rich.text import Text
+
+        listed = self._values.get("alarms")
+        told = alarm_words(listed.alarms if listed is not None else (), self.robot.name)
+        return [Text(*each) for each in told]
+
+    def _stale(self, name: str) -> bool:
+        age = self.age_s(name)
+        return age is None or age > (topic(name).stale_after_s or math.inf)
+
+    def _foot(self) -> Any:
+        from rich.text import Text
+
+        kinematics, state = self._values.get("kinematics"), self._values.get("controller")
+        joints = self.subscriptions["joints"]
+        key = robot_key(*self.robot, "joints")
+        told = []
+        if kinematics is not None:
+            x, y, z = (kinematics.tool_to_base[index] * 1000 for index in (3, 7, 11))
+            told.append(f"tool {x:.1f} {y:.1f} {z:.1f} mm")
+        if state is not None and not self.replayed:
+            told.append(f"controller: {link_words(state)}")
+        own = f"missed here: {joints.lost(key)}   {time.strftime('%H:%M:%S')}   Ctrl-C ends"
+        return Text("\n".join(["   ".join(told), own] if told else [own]), style="dim")
+
+
+def link_words(state: schema.ControllerState) -> str:
+    """How well the controller's link does, briefly: only what is known of it, and what is wrong."""
+    health, counters = state.health, state.counters
+    words = [f"{state.rate_hz:.0f} units/s"] if state.HasField("rate_hz") else []
+    for name in ("jitter", "network_round_trip", "answer"):
+        if health.HasField(f"{name}_s"):
+            seconds: float = getattr(health, f"{name}_s")
+            words.append(f"{name.replace('_', ' ')} {1000 * seconds:.1f} ms")
+    if state.HasField("last_unit_age_s") and state.link != _State.UP:
+        words.append(f"{state.last_unit_age_s:.1f} s old")
+    for count, what in (
+        (counters.units_lost, "lost"),
+        (counters.units_malformed, "malformed"),
+        (counters.units_skipped, "skipped"),
+    ):
+        if count:
+            words.append(f"{count} {what}")
+    return ", ".join([*words, *(["FLOODING"] if health.flooding else [])])
+
+
+def _bar(position: float, lower: float, upper: float, cells: int) -> str:
+    """Where in its range; nothing where there is no room for it."""
+    if cells < _LEAST_BAR_CELLS:
+        return ""
+    span = upper - lower
+    share = (position - lower) / span if span > 0 else 0.5
+    cell = min(max(round(share * (cells - 1)), 0), cells - 1)
+    return "─" * cell + "●" + "─" * (cells - 1 - cell)
+
+
+def _word(enum: Any, value: int) -> str:
+    return str(enum.Name(value)).rsplit("_", 1)[-1].lower()

@@ -1,0 +1,190 @@
+"""`robomesh send`: one command to a robot, under a lease that lives as long as its motion."""
+
+import asyncio
+import sys
+from math import radians
+from pathlib import Path
+
+import typer
+
+from robomesh import reason_codes as codes
+from robomesh.errors import RefusedError
+from robomesh.keys import check_chunk, robot_key
+from robomesh.lease import control
+from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.session import Session
+from services.command_line import discovery
+from services.command_line.live.command_progress import (
+    Interrupted,
+    answered,
+    interrupt,
+    stop,
+    until_done,
+    warning_of,
+)
+from services.errors import ServiceError
+
+_Command = schema.CommandRequest
+_LATEST_NS = 3_000_000_000
+_MOTIONS = (_Command.HOME, _Command.MOVE_ABSOLUTE, _Command.MOVE_RELATIVE, _Command.RESUME)
+_WORDS = {
+    ("home",): _Command.HOME,
+    ("hold",): _Command.HOLD,
+    ("resume",): _Command.RESUME,
+    ("reset",): _Command.RESET,
+    ("trace", "on"): _Command.TRACE_ON,
+    ("trace", "off"): _Command.TRACE_OFF,
+}
+_USAGE = "home, stop, hold, resume, reset, trace on, trace off, speed N, move Q... (degrees, mm), or run FILE"
+# The gateway plans and checks a whole program before it begins.
+_PROGRAM_S = 60.0
+_RECORDER_S = 0.5
+
+
+class WordsError(ServiceError):
+    """Words that are no command."""
+
+
+def run(robot: str, words: list[str], router: str, operator: str, as_json: bool) -> None:
+    """Send; exit status 1 when it is refused."""
+    if words != ["stop"]:
+        _parse(words, None)  # before anything is asked of anybody
+    accepted, text = discovery.run(_send(robot, words, router, check_chunk(operator or discovery.own_name())))
+    if as_json:
+        discovery.print_json({"accepted": accepted, "text": text})
+    else:
+        print(text)
+    if not accepted:
+        raise typer.Exit(1)
+
+
+async def _send(name: str, words: list[str], router: str, operator: str) -> tuple[bool, str]:
+    async with discovery.attached(router) as session:
+        robot = await discovery.find(session, name)
+        if words == ["stop"]:
+            return await stop(session, robot, operator, "robomesh send stop")
+        description = await session.last(robot_key(*robot, "description"))
+        known = description if isinstance(description, schema.Description) else None
+        if known is None and words[0] == "move":
+            return (
+                False,
+                f"nobody tells what {robot} is, so degrees and mm mean nothing: start its kinematics",
+            )
+        request = _parse(words, known)
+        try:
+            async with control(session, *robot, operator) as own:
+                request.lease = own.lease
+                request.id = 1
+                # By the gateway's clock: what is held up on the way must not move an arm later.
+                runs = request.command == _Command.RUN_PROGRAM
+                waits_ns = round(_PROGRAM_S * 1e9) if runs else _LATEST_NS
+                request.not_after.FromNanoseconds(own.now_ns + waits_ns)
+                if request.command == _Command.RESET:
+                    request.stop_id = await _latched_stop(session, robot)
+                accepted, text = await _to_its_end(session, robot, operator, request, own.renewing)
+                if accepted and request.command == _Command.TRACE_ON:
+                    text += await joined(session, robot)
+        except RefusedError as error:
+            accepted, text = False, in_words_of_the_command_line(error, robot)
+        return accepted, text
+
+
+async def _to_its_end(
+    session: Session,
+    robot: discovery.Robot,
+    operator: str,
+    request: schema.CommandRequest,
+    renewing: asyncio.Task[str],
+) -> tuple[bool, str]:
+    """Send a command, and stay until what it began has ended; Ctrl-C stops the robot, at any time."""
+    runs = request.command == _Command.RUN_PROGRAM
+    with interrupt() as interrupted:
+        try:
+            key = robot_key(*robot, f"command/{operator}")
+            timeout_s = _PROGRAM_S if runs else 2.0
+            answer = await answered(session, key, request, interrupted, timeout_s=timeout_s)
+            if not answer.accepted or not (runs or request.command in _MOTIONS):
+                return answer.accepted, answer.text
+            warning = warning_of(answer)
+            if warning:
+                print(f"mind: {warning}", file=sys.stderr, flush=True)
+            done, text = await until_done(session, robot, operator, renewing, interrupted, runs=runs)
+            return done, f"{text}; mind: {warning}" if warning else text
+        except Interrupted:
+            _, said = await stop(session, robot, operator, "Ctrl-C in robomesh send")
+            return False, f"interrupted: {said}"
+
+
+async def joined(session: Session, robot: discovery.Robot) -> str:
+    """Into whose recording a trace goes that began while one ran: it gets none of its own."""
+    last = await session.last(robot_key(*robot, "recording"), timeout_s=_RECORDER_S)
+    if isinstance(last, schema.Recording) and last.open and last.started_by == "request":
+        return f"; recorded in {last.name!r}, which is being recorded already"
+    return ""
+
+
+def in_words_of_the_command_line(error: RefusedError, robot: discovery.Robot) -> str:
+    """Return a refusal's sentence with what to do next as a command to type."""
+    text, reason = str(error), error.reason
+    if reason.code in (codes.STOP_LATCHED.name, codes.STOP_OTHER.name):
+        advice = f"send RESET with stop_id {reason.values.get('id')}"
+        text = text.replace(advice, f"`robomesh send {robot} reset`")
+    if reason.code == codes.LEASE_OTHER.name:
+        text = (
+            f"{text.rstrip('.')}. Only that window or program can hold what it moves; "
+            f"Ctrl-C there, or `robomesh send {robot} stop`, ends it"
+        )
+    return text
+
+
+async def _latched_stop(session: Session, robot: discovery.Robot) -> int:
+    """The stop that a RESET is to name; 0 where none is latched, and the controller itself is stopped."""
+    state = await session.last(robot_key(*robot, "controller"))
+    return state.stop.id if isinstance(state, schema.ControllerState) else 0
+
+
+def _parse(words: list[str], description: schema.Description | None) -> schema.CommandRequest:
+    """The request that the words mean; joint positions in SI only once the robot is known.
+
+    Raises:
+        WordsError: If they mean none.
+    """
+    command = _WORDS.get(tuple(words))
+    if command is not None:
+        return _Command(command=command)
+    match words:
+        case ["speed", percent]:
+            return _Command(command=_Command.SPEED, speed_percent=_number(percent))
+        case ["run", file]:
+            return _Command(
+                command=_Command.RUN_PROGRAM, program=_program(Path(file)), program_name=Path(file).stem
+            )
+        case ["move", *values] if values:
+            positions = [_number(value) for value in values]
+            if description is not None:
+                if len(positions) != len(description.joints):
+                    names = ", ".join(joint.name for joint in description.joints)
+                    raise WordsError(
+                        f"move takes {len(description.joints)} positions ({names}), not {len(positions)}"
+                    )
+                positions = [
+                    radians(value) if joint.type == schema.Description.Joint.ROTARY else value / 1000.0
+                    for value, joint in zip(positions, description.joints, strict=True)
+                ]
+            return _Command(command=_Command.MOVE_ABSOLUTE, joint_positions=positions)
+    raise WordsError(f"{' '.join(words)!r} is no command: {_USAGE}")
+
+
+def _program(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
+        raise WordsError(f"{path}: cannot be read: {reason}") from None
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise WordsError(f"{text!r} is no number: {_USAGE}") from None

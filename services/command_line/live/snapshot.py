@@ -1,0 +1,58 @@
+"""`robomesh snapshot`: a rendered picture in a file."""
+
+from pathlib import Path
+
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+
+from services.command_line import discovery
+from services.command_line.live.views import view_of
+from services.errors import ServiceError
+
+# A robot of many parts, first drawn on a busy machine, takes a while.
+_TIMEOUT_S = 15.0
+
+
+class NoPictureError(ServiceError):
+    """There is no picture, or no file for it."""
+
+
+def run(robot: str, view: str, out: Path, size: tuple[int, int], router: str) -> None:
+    """Save the picture; PNG, JPEG or whatever else the file's name says.
+
+    Args:
+        size: Width and height [px]; 0: the renderer's own.
+    """
+    picture = discovery.run(_picture(robot, view, size, router))
+    if out.suffix.lower() in (".jpg", ".jpeg"):
+        data = picture
+    else:
+        import cv2
+        import numpy as np
+
+        image = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
+        if image is None:
+            raise NoPictureError(f"what came for {view!r} is no picture")
+        try:
+            done, encoded = cv2.imencode(out.suffix or ".png", image)
+        except cv2.error:
+            done = False
+        if not done:
+            raise NoPictureError(f"{out}: no picture format {out.suffix!r}; .png and .jpg are right")
+        data = encoded.tobytes()
+    try:
+        out.write_bytes(data)
+    except OSError as error:
+        raise NoPictureError(f"{out}: cannot be written: {error.strerror}") from None
+    print(out)
+
+
+async def _picture(name: str, view: str, size: tuple[int, int], router: str) -> bytes:
+    async with discovery.attached(router) as session:
+        robot = await discovery.find(session, name)
+        keys = await view_of(session, robot, view, width=size[0], height=size[1])
+        message = await session.last(keys.image, timeout_s=_TIMEOUT_S)
+        if not isinstance(message, CompressedImage):
+            raise NoPictureError(
+                f"no picture of {robot} from {view!r} came within {_TIMEOUT_S:g} s: the renderer's log tells"
+            )
+        return bytes(message.data)

@@ -1,0 +1,262 @@
+"""What `robomesh program` does: programs read, checked, planned, drawn, made from drawings."""
+
+import sys
+from collections.abc import Iterable, Sequence
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import typer
+
+from robots.cells import CellDescription, CellRobot
+from robots.collision import Cell, build_cell
+from robots.description import load
+from robots.errors import ProgramError
+from robots.inverse import build_solver
+from robots.joints import FloatArray, Joints
+from robots.programs.check import check_program
+from robots.programs.plan import plan_program
+from robots.programs.steps import CheckResult, Step, Violation, ViolationKind
+from robots.programs.text import MOST_BYTES, joint_scales, parse_program
+from robots.programs.write import number, steps_text
+from services.command_line.discovery import print_json
+from services.errors import ServiceError
+from services.site_file import site as site_file
+from services.site_file.cells import cells_of
+
+
+class ProgramFileError(ServiceError):
+    """A program, or what is asked of it, that cannot be used."""
+
+
+def check(
+    file: str, robot: str, site: Path | None, start: str, exact: bool, plot: Path | None, as_json: bool
+) -> None:
+    """Print what a check finds; exit status 1 when it finds anything."""
+    text = _text(file)
+    cell, name = _cell(robot, site, exact=exact)
+    joints = cell.arms[name].joints
+    others = {other: arm.joints.home for other, arm in cell.arms.items() if other != name}
+    result = check_program(text, cell, name, _start(start, joints), others=others)
+    notes = list(result.notes)
+    if others:
+        notes.append(f"at home, for this check: {', '.join(others)}")
+    if plot is not None:
+        from robots.programs.plot import plot_check
+
+        plot_check(result, joints, plot, title=f"{Path(file).name} on {name}")
+    if as_json:
+        print_json(_result_json(result, notes))
+    else:
+        _print_result(file, result, notes)
+    if not result.ok:
+        raise typer.Exit(1)
+
+
+def plan(file: str, robot: str, site: Path | None, start: str, as_json: bool) -> None:
+    """Print a program's steps, as a program of joint moves or as JSON; exit status 1 when it breaks off."""
+    cell, name = _cell(robot, site, exact=False)
+    arm = cell.arms[name]
+    try:
+        program = parse_program(_text(file), arm.joints)
+    except ProgramError as error:
+        for line, text in error.problems:
+            print(f"{file}: line {line}: {text}", file=sys.stderr)
+        raise typer.Exit(1) from None
+    found = plan_program(program, arm, build_solver(arm.description), _start(start, arm.joints))
+    if as_json:
+        print_json({"ok": not found.violations, "steps": [_step_json(step) for step in found.steps]})
+    else:
+        print(steps_text(found.steps, arm.joints), end="")
+    for violation in found.violations:
+        print(f"{file}: line {violation.line}: {violation.text}", file=sys.stderr)
+    if found.violations:
+        raise typer.Exit(1)
+
+
+def from_dxf(
+    file: Path,
+    layer: str,
+    handle: str,
+    frame: str,
+    tool: str,
+    approach: float,
+    tolerance: float,
+    unit: float,
+    out: Path | None,
+    force: bool,
+) -> None:
+    """Write a drawing's curves as a program."""
+    from robots.programs.dxf import DxfPath, program_from_dxf
+
+    asked = DxfPath(
+        layer=layer,
+        handle=handle,
+        frame=tuple(_numbers("--frame", frame, "x y z roll pitch yaw")),
+        tool=tuple(_numbers("--tool", tool, "roll pitch yaw")),
+        approach_mm=_between("--approach", approach, 0.0, 10_000.0),
+        tolerance_mm=_between("--tolerance", tolerance, 0.001, 100.0),
+        unit_mm=_between("--unit", unit, 0.0, 1e6),
+    )
+    text = program_from_dxf(file, asked)
+    if out is None:
+        print(text, end="")
+        return
+    try:
+        with out.open("w" if force else "x", encoding="utf-8") as opened:
+            opened.write(text)
+    except FileExistsError:
+        raise ProgramFileError(f"{out}: is there already; --force writes over it") from None
+    except OSError as error:
+        raise ProgramFileError(f"{out}: cannot be written: {error.strerror}") from None
+    print(out)
+
+
+# ------------------------------------------------------------------------- what is given
+
+
+def _text(file: str) -> str:
+    try:
+        if file == "-":
+            data = sys.stdin.buffer.read(MOST_BYTES + 1)
+        else:
+            with Path(file).open("rb") as opened:
+                data = opened.read(MOST_BYTES + 1)
+        if len(data) > MOST_BYTES:
+            raise ProgramFileError(f"{file}: has more than {MOST_BYTES} bytes, which is no teach program")
+        return data.decode("utf-8")
+    except OSError as error:
+        raise ProgramFileError(f"{file}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise ProgramFileError(f"{file}: is not UTF-8 text: byte {error.start}") from None
+
+
+def _cell(robot: str, site: Path | None, *, exact: bool) -> tuple[Cell, str]:
+    """The cell to check in, and the robot's name there."""
+    if site is None:
+        name = load(robot).name
+        description = CellDescription(robots=(CellRobot(name=name, model=robot, base_to_site=np.eye(4)),))
+        return build_cell(description, exact=exact), name
+    cells = cells_of(site_file.load(site))
+    if robot not in cells:
+        there = ", ".join(cells) or "none"
+        raise ProgramFileError(f"--robot {robot}: {site} has no such robot; there are {there}")
+    return build_cell(cells[robot], exact=exact), robot
+
+
+def _start(text: str, joints: Joints) -> FloatArray:
+    """(n,) [rad] or [m]."""
+    if not text:
+        return joints.home.copy()
+    return np.array(_numbers("--start", text, " ".join(joints.names))) * joint_scales(joints)
+
+
+def _numbers(option: str, text: str, names: str) -> list[float]:
+    words = text.replace(",", " ").split()
+    try:
+        found = [float(word) for word in words]
+    except ValueError:
+        found = []
+    count = len(names.split())
+    if len(found) != count or not all(isfinite(each) and abs(each) <= 1e5 for each in found):
+        raise ProgramFileError(
+            f"{option} {text!r}: {count} number{'s' if count > 1 else ''} from -100000 to 100000 "
+            f"are right ({names})"
+        )
+    return found
+
+
+def _between(option: str, value: float, lowest: float, highest: float) -> float:
+    if not lowest <= value <= highest:
+        raise ProgramFileError(f"{option} {value:g}: from {lowest:g} to {highest:g} mm is right")
+    return value
+
+
+# ------------------------------------------------------------------------ what is printed
+
+
+def _result_json(result: CheckResult, notes: list[str]) -> dict[str, Any]:
+    return {
+        "ok": result.ok,
+        "duration_s": result.duration_s,
+        "violations": [_violation_json(each) for each in result.violations],
+        "interpolation": result.interpolation,
+        "notes": notes,
+        "alone": result.alone,
+    }
+
+
+def _violation_json(violation: Violation) -> dict[str, Any]:
+    return {
+        "line": violation.line,
+        "time_s": violation.time_s,
+        "until_s": violation.until_s,
+        "kind": str(violation.kind),
+        "pair": list(violation.pair),
+        "points": violation.points.tolist(),
+        "distance_m": violation.distance_m,
+        "text": violation.text,
+        "refuses": violation.refuses,
+    }
+
+
+def _step_json(step: Step) -> dict[str, Any]:
+    told: dict[str, Any] = {"line": step.line, "kind": str(step.kind)}
+    if step.target is not None:
+        told["joints"] = step.target.tolist()
+    for key in ("percent", "seconds", "on"):
+        if (value := getattr(step, key)) is not None:
+            told[key] = value
+    return told
+
+
+def _print_result(file: str, result: CheckResult, notes: list[str]) -> None:
+    errors = [each for each in result.violations if each.kind is ViolationKind.PROGRAM]
+    for each in errors:
+        print(f"{file}: line {each.line}: {each.text}")
+    for group in _groups(each for each in result.violations if each.kind is not ViolationKind.PROGRAM):
+        print(f"{file}: {_group_text(group)}")
+    for note in notes:
+        print(f"note: {note}")
+    if errors:
+        print(f"{file}: {len(errors)} error{'' if len(errors) == 1 else 's'} in the text")
+        return
+    count = len(result.violations)
+    fine = "nothing wrong, but only the arm itself was checked" if result.alone else "nothing wrong"
+    found = f"{count} violation{'' if count == 1 else 's'}" if count else fine
+    print(f"{file}: {number(round(result.duration_s, 2))} s, {found}")
+    print(f"assumed of the controller: {result.interpolation}")
+
+
+def _groups(violations: Iterable[Violation]) -> list[list[Violation]]:
+    """Violations of one kind and pair on neighbouring lines: one cause."""
+    groups: list[list[Violation]] = []
+    newest: dict[tuple[Any, ...], list[Violation]] = {}
+    for each in violations:
+        # Where no two things are concerned, only the words tell what of.
+        key = (each.kind, each.pair or each.text, each.refuses)
+        group = newest.get(key)
+        if group is None or abs(each.line - group[-1].line) > 1:
+            groups.append(group := [])
+            newest[key] = group
+        group.append(each)
+    return groups
+
+
+def _group_text(group: Sequence[Violation]) -> str:
+    """Where, when, and the worst of it."""
+    lowest, highest = min(each.line for each in group), max(each.line for each in group)
+    begin, until = group[0].time_s, max(each.until_s for each in group)
+    where = f"lines {lowest} to {highest}" if highest > lowest else f"line {lowest}"
+    when = f"{begin:.2f} to {until:.2f} s" if until > begin else f"{begin:.2f} s"
+    worst = min(group, key=lambda each: 0.0 if each.distance_m is None else each.distance_m)
+    often = (
+        f" ({len(group)} times{', this is the nearest' if worst.distance_m else ''})"
+        if len(group) > 1
+        else ""
+    )
+    warning = "" if worst.refuses else " (a warning)"
+    # What is wrong at the start says so itself.
+    placed = f"{where}, {when}: " if highest else ""
+    return f"{placed}{worst.kind}: {worst.text}{often}{warning}"

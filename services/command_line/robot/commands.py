@@ -1,0 +1,221 @@
+"""`robomesh robot`, `fk`: what a robot is, asked on the command line."""
+
+import json
+import sys
+from collections.abc import Iterator
+from math import degrees, isfinite
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from robots.description import load
+from robots.errors import DescriptionError, RobotError
+from services.command_line.discovery import print_json
+from services.errors import ServiceError
+
+
+class RequestError(ServiceError):
+    """A request line that cannot be answered."""
+
+
+def check(robot: str, as_json: bool) -> None:
+    """Print every problem of a description and its meshes; exit status 1 when there is one."""
+    from robots.mesh_inspection import mesh_findings
+
+    name = robot
+    problems: list[dict[str, Any]] = []
+    warnings: list[dict[str, Any]] = []
+    report: dict[str, Any] = {}
+    try:
+        description = load(robot)
+        name = description.name
+        found, odd = mesh_findings(description)
+        problems += [{"file": each.file, "path": [], "text": each.text} for each in found]
+        warnings = [{"file": each.file, "text": each.text} for each in odd]
+        if not problems:
+            from robots.collision.report import collision_report
+
+            report = collision_report(robot)
+    except DescriptionError as error:
+        if not Path(error.source).is_file():
+            raise  # nothing was checked
+        problems = [
+            {"file": error.source, "path": list(path), "text": text}
+            for path, text in zip(error.paths, error.problems, strict=True)
+        ]
+    if as_json:
+        print_json({"ok": not problems, "problems": problems, "warnings": warnings, **report})
+    else:
+        for problem in problems:
+            print(f"{problem['file']}: {problem['text']}")
+        for warning in warnings:
+            print(f"{warning['file']}: warning: {warning['text']}")
+        for link, way in report.get("stands_out", {}).items():
+            print(f"{name}: {link}: its visual geometry stands out of what is checked by {way * 1000:.1f} mm")
+        for each in report.get("not_checked", []):
+            print(f"{name}: {' and '.join(each['links'])} are not checked: {each['reason']}")
+        for each in report.get("touch_at_home", []):
+            print(f"{name}: {' and '.join(each['links'])} touch at home as hulls: {each['reason']}")
+        for each in report.get("touch_elsewhere", []):
+            print(f"{name}: {' and '.join(each['links'])} are apart at home; {each['reason']}")
+        if not problems:
+            print(f"{name}: a right description")
+    if problems:
+        raise typer.Exit(1)
+
+
+def show(robot: str, as_json: bool, png: Path | None) -> None:
+    """Print a robot's D-H table, limits and derived values; draw its four views."""
+    from robots.model import build_model, tool_placement
+    from robots.summary import description_summary
+
+    description = load(robot)
+    model = build_model(description)
+    tool = tool_placement(model, model.joints.home)
+    summary = {**description_summary(description), "tool_at_home": tool.tolist()}
+    if png is not None:
+        from services.command_line.robot.drawing import draw_four_views
+
+        draw_four_views(description, png)
+    if as_json:
+        print_json(summary)
+        return
+    _print_summary(summary, tool[:3, 3].tolist())
+    if png is not None:
+        print(png)
+
+
+def _print_summary(summary: dict[str, Any], tool: list[float]) -> None:
+    joints = summary["joints"]
+    print(
+        f"{summary['title'] or summary['name']}: {len(joints)} joints, "
+        f"reach {summary['reach_m'] * 1000:.0f} mm"
+    )
+    if summary["provenance"]:
+        print(summary["provenance"])
+    wide = max(len(joint["name"]) for joint in joints)
+    if summary["dh"] is not None:
+        print(f"  {'D-H rows':<{wide}} {'a mm':>10} {'alpha °':>10} {'d mm':>10} {'theta °':>10}  link")
+        for row in summary["dh"]["rows"]:
+            variable = "theta" if row["type"] == "rotary" else "d"
+            cells = {
+                "a": row["a"] * 1000,
+                "alpha": degrees(row["alpha"]),
+                "d": row["d"] * 1000,
+                "theta": degrees(row["theta"]),
+            }
+            # The star: what the joint adds to.
+            text = " ".join(
+                f"{_cell(value)}{'*' if key == variable else ' '}" for key, value in cells.items()
+            )
+            print(f"  {row['joint']:<{wide}} {text}  {row['link']}")
+        start = summary["dh"]["start"]
+        if any(start["xyz"] + start["rpy"]):
+            xyz = ", ".join(f"{1000 * value:.6g}" for value in start["xyz"])
+            rpy = ", ".join(f"{degrees(angle):.6g}" for angle in start["rpy"])
+            print(f"  the first row begins at xyz [{xyz}] mm, rpy [{rpy}]° in the base frame")
+        for note in summary["dh"]["notes"]:
+            print(f"  note: {note}")
+    print(f"  {'joints':<{wide}} {'type':<10} {'limits':>20} {'home':>9}  most: speed, /s, /s")
+    for joint in joints:
+        factor, unit = (degrees(1.0), "°") if joint["type"] == "rotary" else (1000.0, " mm")
+        limits = f"{joint['lower'] * factor:.1f} .. {joint['upper'] * factor:.1f}{unit}"
+        rates = [joint[key] * factor for key in ("max_speed", "max_acceleration", "max_jerk")]
+        print(
+            f"  {joint['name']:<{wide}} {joint['type']:<10} {limits:>20} {joint['home'] * factor:8.1f}{unit}"
+            f"  {', '.join(f'{rate:.0f}' for rate in rates)}{unit}"
+        )
+    for frame in summary["frames"]:
+        place = [1000 * row[3] for row in frame["frame_to_link"][:3]]
+        print(f"  {frame['name']} on {frame['link']} at {' '.join(f'{x:.1f}' for x in place)} mm")
+    print(f"  tool at home: {' '.join(f'{1000 * x:.1f}' for x in tool)} mm")
+
+
+def _cell(value: float) -> str:
+    return f"{round(value, 3) + 0.0:9.3f}"
+
+
+def export(robot: str, folder: Path) -> None:
+    """Write URDF and GLB meshes into a folder."""
+    from robots.glb import collision_meshes, link_meshes
+    from robots.urdf.write import collision_beside, glb_beside, to_urdf
+
+    description = load(robot)
+    urdf = folder / f"{description.name}.urdf"
+    others = [path for path in folder.glob("*.urdf") if path != urdf]
+    if others or (not urdf.exists() and (folder / "meshes").exists()):
+        there = others[0].name if others else "meshes"
+        raise RequestError(
+            f"{folder}: holds another robot ({there}); its meshes would be lost: name a new folder"
+        )
+    files = {glb_beside(link): glb for link, glb in link_meshes(description).items()}
+    files |= {collision_beside(link): glb for link, glb in collision_meshes(description).items()}
+    try:
+        (folder / "meshes").mkdir(parents=True, exist_ok=True)
+        for path, glb in files.items():
+            (folder / path).write_bytes(glb)
+        urdf.write_text(to_urdf(description, collision_uri=collision_beside), encoding="utf-8")
+    except OSError as error:
+        raise RequestError(f"{folder}: cannot be written: {error.strerror}") from None
+    print(urdf)
+
+
+def import_(source: str, folder: Path, packages: list[Path], as_dh: bool) -> None:
+    """Write a robot from elsewhere as robot.toml and meshes: the whole folder, or nothing."""
+    from robots.importing import imported
+    from robots.save_description import write_folder
+
+    robot = imported(source, packages=packages, as_dh=as_dh)
+    for note in robot.notes:
+        print(f"note: {note}", file=sys.stderr)
+    for name in robot.missing:
+        print(f"missing: {name}: that shape is left out", file=sys.stderr)
+    print(write_folder(robot.values, robot.files, folder.absolute()).path)
+    if robot.missing:
+        raise typer.Exit(1)
+
+
+def forward(robot: str, requests: str) -> None:
+    """Answer each request line with a line: JSON, SI, in the base frame."""
+    from robots.model import build_model, link_placements, tool_placement
+
+    if requests != "-":
+        raise RequestError(f"{requests!r}: '-' is right, and one JSON request a line on standard input")
+    model = build_model(load(robot))
+    failed = False
+    for line in request_lines():
+        try:
+            positions = _joint_positions(line)
+            placements = link_placements(model, positions)
+            links = {name: placements[index].tolist() for index, name in enumerate(model.link_names)}
+            print_json({"tool": tool_placement(model, positions).tolist(), "links": links})
+        except (RobotError, RequestError) as error:
+            failed = True
+            print_json({"error": str(error)})
+    if failed:
+        raise typer.Exit(1)
+
+
+def request_lines() -> Iterator[str]:
+    """Standard input's lines, but for empty ones; what is no UTF-8 is no reason to answer none behind it."""
+    for line in sys.stdin.buffer:
+        if text := line.decode(errors="replace").strip():
+            yield text
+
+
+def _joint_positions(line: str) -> list[float]:
+    try:
+        positions = json.loads(line, parse_constant=_refuse)["joints"]
+        found = [float(position) for position in positions]
+        if not all(map(isfinite, found)):
+            raise ValueError
+        return found
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
+        raise RequestError(
+            f'{line[:200]!r} is no request; {{"joints": [0.1, 0.2]}} is right, in rad and m'
+        ) from None
+
+
+def _refuse(constant: str) -> float:
+    raise ValueError(constant)

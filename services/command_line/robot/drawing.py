@@ -1,0 +1,84 @@
+"""A robot's four views in one picture, drawn off screen."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.errors import RobotError
+from robots.schema import RobotDescription
+
+_VIEWS = ("front", "left", "top", "free")
+_SIZE = (720, 540)
+_MARGIN = 1.3
+
+
+class PictureError(RobotError):
+    """A picture that cannot be written."""
+
+
+def draw_four_views(description: RobotDescription, out: Path) -> None:
+    """Front, left, top and free, two by two, all joints at home.
+
+    Raises:
+        RobotError: If a mesh cannot be read, or the picture not written.
+        RendererError: If there is no OpenGL.
+    """
+    from renderer.appearance import home_placements, look_of, mesh_name
+    from renderer.cache import cache_folder, prepared_once
+    from renderer.cameras import fitted
+    from renderer.drawing import Drawing
+    from renderer.opengl import open_context
+    from renderer.overlay import Overlay, write_over
+    from renderer.scene_assembly import Placed, scene_of
+    from renderer.views import camera_of
+    from robots.glb import link_meshes
+    from robots.urdf.write import to_urdf
+    from services.kinematics.descriptions import describe
+
+    drawing = Drawing(open_context(), _SIZE)
+    try:
+        meshes = link_meshes(description)
+        message = describe(
+            description,
+            urdf=to_urdf(description),
+            meshes=meshes,
+            base_to_site=np.eye(4),
+            cell="",
+            simulated=False,
+        )
+        aspect = _SIZE[0] / _SIZE[1]
+        look = look_of(message)
+        for link in message.links:
+            if link.mesh and not drawing.has(mesh_name(link)):
+                glb = prepared_once(meshes[link.name], color=link.color, folder=cache_folder())
+                drawing.add(mesh_name(link), glb)
+        scene = scene_of(Placed(look, home_placements(look)))
+        pictures = []
+        corners = drawing.corners(scene)
+        for view in _VIEWS:
+            camera = camera_of(look, view, aspect=aspect)
+            if corners is not None:
+                # A site's views leave room for every pose; here it is this one that is looked at.
+                camera = fitted(camera, aspect, corners, margin=_MARGIN)
+            picture = drawing.draw(scene, camera).copy()
+            write_over(picture, Overlay(message.title, view, time="", state="", rows=()))
+            pictures.append(picture)
+    finally:
+        drawing.close()
+    _write(np.vstack([np.hstack(pictures[:2]), np.hstack(pictures[2:])]), out)
+
+
+def _write(picture: NDArray[np.uint8], out: Path) -> None:
+    import cv2
+
+    try:
+        done, encoded = cv2.imencode(out.suffix or ".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
+    except cv2.error:
+        done = False
+    if not done:
+        raise PictureError(f"{out}: no picture format {out.suffix!r}; .png and .jpg are right")
+    try:
+        out.write_bytes(encoded.tobytes())
+    except OSError as error:
+        raise PictureError(f"{out}: cannot be written: {error.strerror}") from None

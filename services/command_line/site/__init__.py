@@ -1,0 +1,1 @@
+"""`robomesh up`, and the commands that run one service of a site."""

@@ -1,0 +1,67 @@
+"""`robomesh router`: reads no more of the site file than it needs, for its restart has to be quick."""
+
+import logging
+from pathlib import Path
+
+from robomesh import service
+from services import router as role
+from services.pki import Folder
+from services.site_file.listen_address import check_reach, split_address
+from services.site_file.router import RoutedSite, read_routed
+from services.supervisor import wait_for_turn
+
+logger = logging.getLogger(__name__)
+
+
+def run(path: Path | None, config_out: Path | None = None, metrics: str = "") -> None:
+    """Run the router of the site."""
+    service.log_to_stderr()
+    wait_for_turn()
+    # zenohd may be started in another folder.
+    site = _read(path if path is None or config_out is None else path.absolute())
+    settings = _settings(site, metrics_address(site, metrics))
+    if config_out is not None:
+        print(role.write_config(settings, config_out))
+        return
+    service.run_until_signalled(role.serve(settings, ready=print))
+
+
+def _read(path: Path | None) -> RoutedSite:
+    if path is None:
+        return RoutedSite(site="demo")
+    site = read_routed(path)
+    if site is None:
+        from services.site_file.site import load  # half of a router's start, for words that are seldom needed
+
+        site = load(path)
+    return site
+
+
+def _settings(site: RoutedSite, metrics: tuple[str, int] | None) -> role.Settings:
+    access = site.router.access
+    if access is None and site.keys.folder is not None:
+        access = Folder(site.keys.folder).access
+    return role.Settings(
+        site=site.site,
+        listen=site.listened,
+        connect=site.links,
+        tls=site.tls_of("router"),
+        access=access,
+        insecure=site.router.insecure,
+        metrics=metrics,
+        line_bps=None if site.router.line_mbit is None else site.router.line_mbit * 1e6,
+    )
+
+
+def metrics_address(site: RoutedSite, text: str) -> tuple[str, int] | None:
+    """Where Prometheus may ask; None: nowhere.
+
+    Raises:
+        ListenError: If it is no address, or beyond loopback without the site's `insecure = true`.
+    """
+    if not text:
+        return None
+    host, port = split_address(text)
+    if warning := check_reach(f"--metrics {text}", host, secured=False, insecure=site.router.insecure):
+        logger.warning("%s", warning)
+    return host, port

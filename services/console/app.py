@@ -1,0 +1,331 @@
+"""The console's server: the built page, the WebSocket behind it, the meshes it draws."""
+
+import asyncio
+import functools
+import logging
+import ssl
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddleware
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp, Scope
+from starlette.websockets import WebSocket
+
+from robomesh import keys, topics
+from robomesh.keys import PresenceKey
+from robomesh.schemas.robomesh_pb2 import Event, ToPage
+from robomesh.session import Session
+from services.console.accounts.auth_middleware import SIGNED_OUT, Gate, cookie_name
+from services.console.accounts.auth_service import Desk
+from services.console.accounts.rights import operator_name
+from services.console.accounts.routes import AccountRoutes
+from services.console.accounts.sessions import MOST_PAGES, SignedIn
+from services.console.define.routes import Define
+from services.console.define.settings import DefineSettings
+from services.console.errors import PageNotBuiltError
+from services.console.http import png
+from services.console.http.guard import Guard
+from services.console.http.listener import listening
+from services.console.http.meshes import MeshCache, mesh_response
+from services.console.http.pictures import MJPEG, Pictures
+from services.console.http.recordings import Recordings
+from services.console.http.uvicorn_server import (
+    follow_certificate,
+    serve_until_cancelled,
+    server_of,
+    tls_context,
+)
+from services.console.requested_views import Views
+from services.console.websocket.page_connection import Browser
+from services.console.websocket.shared_subscriptions import Feeds
+from services.site_file.listen_address import check_page_reach, split_address
+
+log = logging.getLogger(__name__)
+
+PAGE = Path(__file__).parent / "page"  # built from `web/`
+
+_CONNECTED_EACH_S = 0.5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Where the page is served.
+
+    Attributes:
+        site: The console's own site; the page shows every site that its router reaches.
+        listen: `HOST:PORT`; port 0 takes a free one.
+        insecure: Beyond loopback without TLS or accounts, at the site's own risk.
+        accounts: File of those who may sign in; None: whoever reaches the page may use it, where the console
+            has a certificate in the console's name alone.
+        certificate: With `key`: served over TLS (PEM).
+        hosts: Names that the console is known by, beside `localhost` and addresses.
+        page: Folder of the built page.
+        define: Of the page's Define; none: robots cannot be defined here.
+    """
+
+    site: str
+    listen: str = "127.0.0.1:8080"
+    insecure: bool = False
+    hosts: tuple[str, ...] = ()
+    accounts: Path | None = None
+    certificate: Path | None = None
+    key: Path | None = None
+    page: Path = PAGE
+    define: DefineSettings | None = None
+
+
+async def serve(
+    session: Session, settings: Settings, *, on_ready: Callable[[str], None] | None = None
+) -> None:
+    """Serves the page until it is cancelled.
+
+    Args:
+        on_ready: Told the page's address once it can be opened.
+
+    Raises:
+        ListenError: If it cannot listen there, or may not.
+        AccountsError: If nobody could sign in.
+        PageNotBuiltError: If there is no page.
+    """
+    if not (settings.page / "index.html").exists():
+        raise PageNotBuiltError(f"no page in {settings.page}: build it with `python web/build_page.py`")
+    host, port = split_address(settings.listen)
+    warning = reach_warning(settings, host)
+    if warning is not None:
+        log.warning("%s", warning)
+    tls = None
+    if settings.certificate is not None and settings.key is not None:
+        tls = tls_context(settings.certificate, settings.key)
+    with listening(host, port) as listener:
+        hub = Hub(session, settings, exposed=warning is not None, tls=tls)
+        guarded = Guard(application(hub), settings.hosts, secure=tls is not None)
+        bound_port = listener.getsockname()[1]
+        address = f"http{'s' if tls else ''}://{f'[{host}]' if ':' in host else host}:{bound_port}"
+        async with hub:
+            await serve_until_cancelled(server_of(guarded, tls), listener, address, on_ready)
+
+
+def reach_warning(settings: Settings, host: str) -> str | None:
+    """The warning that listening there deserves; None where it needs none.
+
+    Raises:
+        ListenError: If others can reach it, it has not both accounts and TLS, and nobody took the risk.
+    """
+    return check_page_reach(
+        host,
+        accounts=settings.accounts is not None,
+        tls=settings.certificate is not None,
+        insecure=settings.insecure,
+    )
+
+
+class Hub:
+    """What all browsers share: the feeds, who is alive, the meshes."""
+
+    def __init__(
+        self, session: Session, settings: Settings, *, exposed: bool, tls: ssl.SSLContext | None = None
+    ) -> None:
+        self.session = session
+        self.settings = settings
+        self.meshes = MeshCache()
+        self.feeds = Feeds(session)
+        self.views = Views(session)
+        self.pictures = Pictures(self.feeds, self.views, self.asker)
+        self._alive: set[PresenceKey] = set()
+        self._browsers: set[Browser] = set()
+        self._before = Counter[str]()  # of browsers that have gone
+        self.exposed = exposed
+        self._tls = tls
+        self.desk = None if settings.accounts is None else self._open_desk(settings.accounts)
+        self._tasks: list[asyncio.Task[None]] = []
+        self.define = None if settings.define is None else Define(settings.define)
+        session.measure("browsers", "Pages that are open", lambda: len(self._browsers))
+        for name, text in (("offered", "that came for pages"), ("sent", "that were sent to pages")):
+            session.measure(
+                f"page_samples_{name}_total", f"Samples {text}", functools.partial(self._count, name)
+            )
+
+    async def __aenter__(self) -> "Hub":
+        work = self._watch_presence(), self._watch_router(), asyncio.to_thread(png.prepare)
+        self._tasks = [asyncio.create_task(each) for each in work]
+        if self.desk is not None:
+            self._tasks.append(asyncio.create_task(self.desk.follow()))
+        certificate, key = self.settings.certificate, self.settings.key
+        if self._tls is not None and certificate is not None and key is not None:
+            self._tasks.append(asyncio.create_task(follow_certificate(self._tls, certificate, key)))
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        for task in self._tasks:
+            task.cancel()
+        self.feeds.close()
+        if self.desk is not None:
+            self.desk.close()
+        if self.define is not None:
+            await self.define.close()
+
+    async def browse(self, websocket: WebSocket) -> None:
+        """Serves one browser."""
+        who: SignedIn | None = websocket.scope.get("signed_in")
+        if who is not None and len(who.pages) >= MOST_PAGES:
+            await websocket.close(SIGNED_OUT)
+            return
+        await websocket.accept()
+        browser = Browser(
+            self.session,
+            self.feeds,
+            self.views,
+            greet=self._hello,
+            site=self.settings.site,
+            who=who,
+            own_name=self._own_name(who),
+        )
+        for each in self._alive:
+            browser.tell(_presence(each, alive=True))
+        self._browsers.add(browser)
+        try:
+            if who is None:
+                await browser.run(websocket)
+            else:
+                await _serve_signed_in(browser, who, websocket)
+        finally:
+            self._browsers.discard(browser)
+            self._before.update(offered=browser.offered, sent=browser.sent)
+
+    def _count(self, name: str) -> int:
+        now: int = sum(getattr(browser, name) for browser in tuple(self._browsers))
+        return self._before[name] + now
+
+    def _open_desk(self, accounts: Path) -> Desk:
+        events = self.session.declare_publisher(self.settings.site, keys.WHOLE_SITE, "events/console")
+
+        def tell(severity: Event.Severity, code: str, text: str, values: Mapping[str, str]) -> None:
+            event = Event(severity=severity, code=code, text=text, source="console", values=values)
+            event.timestamp.GetCurrentTime()
+            events.put(event)
+
+        return Desk(accounts, self.settings.site, tell)
+
+    def asker(self, scope: Scope) -> str:
+        """In whose name something is asked for over HTTP: the account's, else that of the whole console."""
+        return self._own_name(scope.get("signed_in")) or self.session.own_name
+
+    def _own_name(self, who: SignedIn | None) -> str:
+        """The one operator that a page asks as; empty: any, where no certificate says who is who.
+
+        The router lets a console ask in every name of its site, for its accounts: it must know whose. So
+        without accounts all its pages ask in its own, and share that name's quotas.
+        """
+        if who is not None:
+            return operator_name(who.account.name, self.settings.site)
+        return "" if self.session.principal is None else self.session.principal.name
+
+    def _hello(self, browser: Browser) -> ToPage:
+        hello = ToPage.Hello(
+            version=_version(),
+            site=self.settings.site,
+            insecure=self.exposed,
+            connected=self.session.connected,
+            session=browser.operator.id,
+            may_command=browser.who is None or browser.who.may_command,
+            operator=browser.own_name,
+        )
+        if browser.who is not None:
+            hello.account = browser.who.account.name
+        for name, row in topics.TOPICS.items():
+            if row.stale_after_s is not None:
+                hello.stale.add(topic=name, after_s=row.stale_after_s)
+        return ToPage(hello=hello)
+
+    async def _watch_presence(self) -> None:
+        async for who, alive in self.session.watch_presence():
+            (self._alive.add if alive else self._alive.discard)(who)
+            for browser in self._browsers:
+                browser.tell(_presence(who, alive=alive))
+
+    async def _watch_router(self) -> None:
+        connected = self.session.connected
+        while True:
+            await asyncio.sleep(_CONNECTED_EACH_S)
+            if self.session.connected is not connected:
+                connected = not connected
+                for browser in self._browsers:
+                    browser.greet()
+
+
+async def _serve_signed_in(browser: Browser, who: SignedIn, websocket: WebSocket) -> None:
+    """Serves a page for as long as its session lasts, and says why it ends."""
+    try:
+        with who.serving(), who.with_page(browser):
+            await browser.run(websocket)
+    except asyncio.CancelledError:
+        if not who.ended:
+            raise
+        await websocket.close(SIGNED_OUT, who.ended)
+
+
+def application(hub: Hub) -> ASGIApp:
+    """The routes: `/mesh` (WebSocket), `/mesh/<site>/<robot>/<name>`, pictures, recordings, Define,
+    `/account`, `/health`, the page; behind the gate, where there are accounts.
+    """
+    settings, secure = hub.settings, hub.settings.certificate is not None
+    cookie = cookie_name(settings.site, secure=secure)
+    account = AccountRoutes(hub.desk, site=settings.site, cookie=cookie, secure=secure, insecure=hub.exposed)
+
+    async def mesh(request: Request) -> Response:
+        return await mesh_response(request, hub.session, hub.meshes)
+
+    async def health(_: Request) -> Response:
+        return JSONResponse({"mesh": hub.session.connected}, headers={"Cache-Control": "no-store"})
+
+    routes: list[BaseRoute] = [
+        Route("/health", health, methods=["GET"]),
+        *account.routes(),
+        WebSocketRoute("/mesh", hub.browse),
+        Route("/mesh/{site}/{robot}/{name}", mesh, methods=["GET"]),
+        *hub.pictures.routes(),
+        *Recordings(hub.session, hub.asker).routes(),
+        *([] if hub.define is None else [hub.define.routes()]),
+        Mount("/", PageFiles(directory=hub.settings.page, html=True)),
+    ]
+    packed = Middleware(
+        GZipMiddleware,
+        minimum_size=1024,
+        compresslevel=5,
+        exclude_content_types=(*DEFAULT_EXCLUDED_CONTENT_TYPES, MJPEG, "application/octet-stream"),
+    )
+    app = Starlette(routes=routes, middleware=[packed])
+    return app if hub.desk is None else Gate(app, hub.desk.sessions, cookie)
+
+
+class PageFiles(StaticFiles):
+    """The built page: hashed assets for ever, the rest asked for each time."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        """A file, with how long it may be kept."""
+        response = await super().get_response(path, scope)
+        hashed = path.startswith("assets/") and response.status_code == 200
+        response.headers["Cache-Control"] = "public, max-age=31536000, immutable" if hashed else "no-store"
+        return response
+
+
+def _presence(who: PresenceKey, *, alive: bool) -> ToPage:
+    key = keys.presence_key(who.site, who.robot, who.service, who.id)
+    return ToPage(presence=ToPage.Presence(key=key, alive=alive))
+
+
+@functools.cache  # it reads the package's metadata, and every page is told
+def _version() -> str:
+    try:
+        return version("robomesh")
+    except PackageNotFoundError:
+        return "unknown"

@@ -1,0 +1,223 @@
+"""The site file's part on cells: what stands in one, and how near an arm may come to it.
+
+Degrees and millimetres in the file, SI in the shapes that come of it.
+"""
+
+import math
+import re
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, Field, StrictBool, field_validator, model_validator
+
+from robomesh import keys
+from robomesh.errors import KeyNameError
+from robots.errors import MeshError
+from robots.joints import FloatArray
+from robots.kinematic_tree import Shape, rgb
+from robots.meshes.mesh import Material, Mesh, Part
+from robots.meshes.normals import creased
+from robots.meshes.solids import ball, box, turned
+from robots.poses import pose_matrix
+from robots.schema import Pose, Positive, Units, nearest
+from services.site_file.part import Quiet
+
+_ROUND = 48
+_MILLIMETRE = 1e-3
+_SHAPES = ("box", "cylinder", "sphere", "mesh")
+Distance = Annotated[float, Field(strict=True, ge=0, le=10_000)]
+
+
+class Clearance(BaseModel):
+    """How near an arm may come to what stands around it [mm]."""
+
+    model_config = Quiet
+    warning: Distance = 50.0
+    stop: Distance = 10.0
+
+    @model_validator(mode="after")
+    def _order(self) -> "Clearance":
+        if self.stop > self.warning:
+            raise ValueError(
+                f"stop = {self.stop:g} is more than warning = {self.warning:g}: a warning comes first"
+            )
+        return self
+
+
+class Floor(BaseModel):
+    """The floor below a cell [mm]: `floor = -250.0`, or a table with distances to it.
+
+    Attributes:
+        height: In the site's frame; None: the height of the lowest base in the cell.
+        warning, stop: How near an arm may come to it; without them only contact counts.
+    """
+
+    model_config = Quiet
+    height: Annotated[float, Field(strict=True, ge=-100_000, le=100_000)] | None = None
+    warning: Distance = 0.0
+    stop: Distance = 0.0
+
+    @model_validator(mode="after")
+    def _order(self) -> "Floor":
+        if self.stop > self.warning:
+            raise ValueError(
+                f"stop = {self.stop:g} is more than warning = {self.warning:g}: a warning comes first"
+            )
+        return self
+
+
+class Fixture(BaseModel):
+    """Something that stands in a cell and does not move: one shape, its middle at the pose.
+
+    Attributes:
+        box: Lengths along its x, y and z [mm].
+        cylinder: Radius, and height along its z [mm].
+        sphere: Radius [mm].
+        mesh: A file, relative to the site file; in its own axes about the pose.
+        mesh_scale: The mesh file's unit in metres.
+        pose: In the site's frame.
+        exact: Checked as the mesh itself, not as its convex hull: slower, and lets an arm reach into it.
+        ignore: Links that may touch it, as "<robot>/<link>".
+    """
+
+    model_config = Quiet
+    cell: str
+    name: str
+    box: tuple[Positive, Positive, Positive] | None = None
+    cylinder: tuple[Positive, Positive] | None = None
+    sphere: Positive | None = None
+    mesh: Path | None = None
+    mesh_scale: Positive = 0.001
+    pose: Pose = Pose()
+    color: str | None = None
+    exact: StrictBool = False
+    ignore: tuple[str, ...] = ()
+
+    @field_validator("color")
+    @classmethod
+    def _color(cls, color: str | None) -> str | None:
+        if color is not None and not re.fullmatch("#[0-9a-fA-F]{6}", color):
+            raise ValueError('should be as in "#8a8f94"')
+        return color
+
+    @field_validator("name")
+    @classmethod
+    def _name(cls, name: str) -> str:
+        try:
+            return keys.check_name(name, "fixture")
+        except KeyNameError as error:
+            raise ValueError(str(error)) from None
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> "Fixture":
+        given = [name for name in _SHAPES if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(
+                f"{' and '.join(given) or 'no shape'} given: exactly one of {', '.join(_SHAPES)} is right"
+            )
+        return self
+
+
+def fixture_shape(fixture: Fixture) -> Shape:
+    """What a fixture looks like, in its own frame [m].
+
+    Round ones are a little too large rather than too small: their flat faces touch the true surface.
+    """
+    color = None if fixture.color is None else rgb(fixture.color)
+    if fixture.mesh is not None:
+        scale = fixture.mesh_scale
+        # Files that it refers to are read from its own folder only, as for every mesh from elsewhere.
+        folder = fixture.mesh.absolute().parent
+        return Shape(fixture.mesh, np.diag([scale, scale, scale, 1.0]), color, within=folder)
+    rounder = 1.0 / math.cos(math.pi / _ROUND)
+    if fixture.box is not None:
+        half = np.array(fixture.box) * _MILLIMETRE / 2
+        solid = box(-half, half)
+    elif fixture.cylinder is not None:
+        radius, height = np.array(fixture.cylinder) * _MILLIMETRE
+        around, half_height = float(radius) * rounder, float(height) / 2
+        profile = [(0.0, -half_height), (around, -half_height), (around, half_height), (0.0, half_height)]
+        solid = turned(profile, _ROUND)
+    else:
+        assert fixture.sphere is not None
+        solid = ball(fixture.sphere * _MILLIMETRE * rounder**2, _ROUND)
+    vertices, normals, triangles = creased(*solid, math.pi / 6)
+    return Shape(Mesh(parts=(Part("", Material(), vertices, normals, triangles),)), np.eye(4), color)
+
+
+def fixture_to_site(fixture: Fixture) -> FloatArray:
+    """(4, 4) [m]."""
+    return pose_matrix(fixture.pose, Units())
+
+
+def name_problem(fixtures: tuple[Fixture, ...], cells: dict[str, str]) -> str | None:
+    """What is wrong with fixtures' names and cells, in words; None: nothing.
+
+    Args:
+        cells: The cell of each robot, by name; empty for a robot alone.
+    """
+    taken = {name: f"robot {name}" for name in cells}
+    for fixture in fixtures:
+        # Of the whole site: a fixture's frame is <site>/<fixture>.
+        if other := taken.get(fixture.name):
+            return f"{other} and fixture {fixture.cell}/{fixture.name} have one name: each needs its own"
+        taken[fixture.name] = f"fixture {fixture.cell}/{fixture.name}"
+        if fixture.cell not in cells.values() or not fixture.cell:
+            there = ", ".join(sorted({cell for cell in cells.values() if cell}))
+            return (
+                f"fixture {fixture.name}: no robot has cell = {fixture.cell!r}: "
+                f"{f'there are {there}' if there else 'no robot of this site has a cell'}"
+            )
+        inside = [robot for robot, cell in cells.items() if cell == fixture.cell]
+        for pair in fixture.ignore:
+            robot, _, link = pair.partition("/")
+            if robot not in inside or not link:
+                return (
+                    f"fixture {fixture.name}: ignore {pair!r}: should be <robot>/<link> "
+                    f"with a robot of its cell, {', '.join(inside)}"
+                )
+    return None
+
+
+def fixture_problem(fixtures: tuple[Fixture, ...], links: dict[str, dict[str, bool]]) -> str | None:
+    """What is wrong with fixtures' meshes, and with the links that they ignore; None: nothing.
+
+    A mesh is read now, and its GLB is kept for who serves it.
+
+    Args:
+        links: Of each robot, by name.
+    """
+    from robots.glb import shapes_glb
+
+    for fixture in fixtures:
+        for robot, _, link in (pair.partition("/") for pair in fixture.ignore):
+            if link not in links[robot]:
+                hint = nearest(link, links[robot])
+                return f"fixture {fixture.name}: ignore: {robot} has no link {link!r}{hint}"
+        if fixture.mesh is not None:
+            shape = fixture_shape(fixture)
+            try:
+                shapes_glb((shape,))
+                missing = _missing_part(fixture.mesh, shape.within)
+            except MeshError as error:
+                return f"fixture {fixture.name}: mesh = {str(fixture.mesh)!r}: {error}"
+            if missing:
+                return (
+                    f"fixture {fixture.name}: mesh = {str(fixture.mesh)!r} refers to {missing!r}, "
+                    "which is not in its folder: a check would not see that part"
+                )
+    return None
+
+
+def _missing_part(mesh: Path, within: Path | None) -> str:
+    """Return a mesh file that this one refers to and that cannot be read; empty: there is none.
+
+    Only the VRML reader goes on without such a file; the others refuse the mesh.
+    """
+    from robots.meshes.read import READERS, read_mesh
+
+    if READERS.get(mesh.suffix.lower()) is not READERS[".wrl"]:
+        return ""
+    missing = read_mesh(mesh, within=within).missing
+    return next((each for each in missing if Path(each).suffix.lower() in READERS), "")

@@ -1,0 +1,392 @@
+"""The site file: what runs at a site. Every service gets its part from here, as Settings.
+
+Degrees and millimetres in the file, SI in what is read from it.
+"""
+
+import re
+import tomllib
+from collections.abc import Mapping
+from itertools import combinations, product
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    BaseModel,
+    Field,
+    StrictBool,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+
+from protocol_gateway.core.codes import code_table
+from protocol_gateway.drivers.registry import DRIVERS
+from protocol_gateway.errors import CodeTableError
+from robomesh import keys
+from robomesh.access import NOBODYS_ROBOT
+from robomesh.errors import KeyNameError
+from robots import description
+from robots.bounded_toml import read_toml
+from robots.description import Pose
+from robots.errors import DescriptionError
+from robots.kinematic_tree import BASE, bare_links, tree_of
+from robots.schema import UrdfDescription
+from services.errors import ListenError, SiteFileError
+from services.site_file.console import Console
+from services.site_file.console import beside as console_beside
+from services.site_file.fixtures import Clearance, Fixture, Floor, fixture_problem, name_problem
+from services.site_file.legacy_clients import LegacyClients
+from services.site_file.listen_address import (
+    cannot_both_listen,
+    check_page_reach,
+    check_reach,
+    same_address,
+    split_address,
+)
+from services.site_file.part import Quiet
+from services.site_file.quotas import Quotas
+from services.site_file.renderer_and_recorder import ALWAYS_RENDERED, Recorder, Renderer
+from services.site_file.router import RoutedSite, beside
+from services.site_file.validation_errors import sentence
+
+Triple = tuple[float, float, float]
+# Of a wrong site file, that are named.
+_MOST_PROBLEMS = 100
+
+
+class Robot(BaseModel):
+    """An arm and its controller."""
+
+    model_config = Quiet
+    name: str
+    model: str
+    pose: Pose = Pose()
+    cell: str = ""
+    controller: str = "simulated"
+    protocol: str = "unit"
+    codes: dict[int, str] = Field(default_factory=dict)
+    accept_unknown: tuple[Literal["mode", "homed"], ...] = ()
+    check: Literal["require", "warn", "off"] = "warn"
+    clearance: Clearance = Clearance()
+    # None: its cell has none (`floor = false`). What one robot of a cell gives counts for all of it.
+    floor: Floor | None = Floor()
+    # Whether somebody tried the stop unit on this controller; without that nothing is ever sent to it.
+    stop_proven: StrictBool | None = None
+    stale_after_s: Annotated[float, Field(gt=0.05, le=60)] = 1.0
+    demo: StrictBool = False
+    legacy_clients: LegacyClients | None = None
+
+    @field_validator("name")
+    @classmethod
+    def _name(cls, name: str) -> str:
+        if name.startswith("replay-"):
+            raise ValueError(
+                "replay-... is what recordings are played back as: call the robot something else"
+            )
+        if name == NOBODYS_ROBOT:
+            raise ValueError("rights are tried on this name: call the robot something else")
+        return _checked_name(name, "robot")
+
+    @field_validator("protocol")
+    @classmethod
+    def _protocol(cls, protocol: str) -> str:
+        if protocol not in DRIVERS:
+            raise ValueError(f"should be {' or '.join(map(repr, DRIVERS))}")
+        return protocol
+
+    @field_validator("floor", mode="before")
+    @classmethod
+    def _floor(cls, floor: Any) -> Any:
+        if floor is False:
+            return None
+        if isinstance(floor, dict | Floor):
+            return floor
+        if isinstance(floor, bool) or not isinstance(floor, int | float):
+            raise ValueError(
+                "should be its height in mm, false, or a table as { height = -250.0, warning = 50.0 }"
+            )
+        return {"height": floor}
+
+    @field_validator("codes", mode="before")
+    @classmethod
+    def _codes(cls, codes: Any) -> Any:
+        if not isinstance(codes, dict):
+            return codes
+        try:
+            # TOML's keys are text.
+            return {int(code): meaning for code, meaning in codes.items()}
+        except ValueError:
+            raise ValueError('a code is a number, as in { 2 = "ABSOLUTE.DEG" }') from None
+
+    @field_validator("codes")
+    @classmethod
+    def _table(cls, codes: dict[int, str]) -> dict[int, str]:
+        try:
+            code_table(codes)
+        except CodeTableError as error:
+            raise ValueError(str(error)) from None
+        return codes
+
+    @field_validator("controller")
+    @classmethod
+    def _controller(cls, controller: str) -> str:
+        if controller == "simulated":
+            return controller
+        scheme, _, address = controller.partition("://")
+        try:
+            _, port = split_address(address)
+        except ListenError:
+            port = 0
+        if scheme != "tcp" or not port:
+            raise ValueError("should be 'simulated' or tcp://HOST:PORT, as in tcp://10.0.0.7:5400")
+        return controller
+
+    @property
+    def simulated(self) -> bool:
+        """Whether its controller is ours, and simulated."""
+        return self.controller == "simulated"
+
+    @property
+    def can_be_stopped(self) -> bool:
+        """Whether the stop unit is proven: said so, or our own simulated controller."""
+        return self.simulated if self.stop_proven is None else self.stop_proven
+
+
+class Define(BaseModel):
+    """Where robots that were defined on the page are saved."""
+
+    model_config = Quiet
+    folder: Path = Path("robots")
+
+
+class Audit(BaseModel):
+    """Where the gateway keeps what was asked of each robot."""
+
+    model_config = Quiet
+    folder: Path = Path("audit")
+    # A file that has grown to this becomes an older part, and the log goes on in a new one.
+    rotate_mib: Annotated[float, Field(ge=0.01, le=1024)] = 16
+
+
+class Watch(BaseModel):
+    """Where the watch keeps alarms, so that a restart forgets no acknowledgement."""
+
+    model_config = Quiet
+    folder: Path = Path("watch")
+
+
+class Site(RoutedSite):
+    """A whole site."""
+
+    robot: tuple[Robot, ...] = ()
+    fixture: tuple[Fixture, ...] = ()
+    recorder: Recorder = Recorder()
+    renderer: Renderer = Renderer()
+    console: Console = Console()
+    define: Define = Define()
+    audit: Audit = Audit()
+    watch: Watch = Watch()
+    quotas: Quotas = Quotas()
+
+    @field_validator("robot")
+    @classmethod
+    def _robots(cls, robots: tuple[Robot, ...]) -> tuple[Robot, ...]:
+        names = [robot.name for robot in robots]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"two robots are named {name!r}: every robot needs a name of its own")
+        return robots
+
+    @model_validator(mode="after")
+    def _cells(self) -> "Site":
+        if problem := name_problem(self.fixture, {robot.name: robot.cell for robot in self.robot}):
+            raise ValueError(problem)
+        for robot, other in combinations(self.robot, 2):
+            both = all("floor" in each.model_fields_set for each in (robot, other))
+            if both and robot.cell and robot.cell == other.cell and robot.floor != other.floor:
+                raise ValueError(
+                    f"robots {robot.name} and {other.name} give different floors, and their cell "
+                    f"{robot.cell!r} has one: give it once"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _views(self) -> "Site":
+        rendered = (*self.renderer.views, *ALWAYS_RENDERED)
+        for view in self.recorder.views or ():
+            if view not in rendered:
+                raise ValueError(
+                    f"recorder views = {view!r}: the renderer has no such view; it has {', '.join(rendered)}"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _addresses(self) -> "Site":
+        """Every address is one thing's: two cannot listen on it, and two robots are not one controller."""
+        here = [("the router", address) for address in map(_tcp_address, self.router.listen) if address]
+        here.append(("the console", self.console.listen))
+        linked = (_tcp_address(each.rpartition("=")[2]) for each in self.router.connect)
+        there = [("another router", address) for address in linked if address]
+        for robot in self.robot:
+            if not robot.simulated:
+                there.append((f"robot {robot.name}'s controller", robot.controller.removeprefix("tcp://")))
+            if robot.legacy_clients is not None:
+                here.append((f"robot {robot.name}'s legacy_clients", robot.legacy_clients.listen))
+        tests = [
+            *((cannot_both_listen, *pair) for pair in combinations(here, 2)),
+            *((same_address, *pair) for pair in (*combinations(there, 2), *product(here, there))),
+        ]
+        for meet, (what, address), (other, another) in tests:
+            try:
+                met = meet(address, another)
+            except ListenError as error:
+                raise ValueError(str(error)) from None
+            if met:
+                raise ValueError(f"{another} is given twice, to {what} and to {other}: each needs its own")
+        return self
+
+    @property
+    def recorded_views(self) -> tuple[str, ...]:
+        """Whose video is recorded unless one asks otherwise."""
+        if self.recorder.views is not None:
+            return self.recorder.views
+        return ("free",) if "free" in self.renderer.views else self.renderer.views[:1]
+
+
+def load(path: Path | None) -> Site:
+    """The site of a file; without one the built-in site `demo`.
+
+    Paths in the file are taken from the file's own folder.
+
+    Raises:
+        SiteFileError: A line a problem: file, key, value, and what would be right.
+    """
+    if path is None:
+        return DEMO
+    try:
+        values = read_toml(path)
+        site = Site.model_validate(values)
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise SiteFileError(f"{path}: cannot be read: {reason}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise SiteFileError(f"{path}: not TOML: {error}") from None
+    except ValidationError as error:
+        found = error.errors(include_url=False)
+        sentences = [sentence(path, problem, values, Site) for problem in found[:_MOST_PROBLEMS]]
+        if len(found) > _MOST_PROBLEMS:
+            sentences.append(f"{path}: and {len(found) - _MOST_PROBLEMS} more problems")
+        raise SiteFileError("\n".join(sentences)) from None
+    site = _beside(site, path.parent)
+    # What no service could run with is told before any starts.
+    try:
+        _check_reach(site)
+    except ListenError as error:
+        raise SiteFileError(f"{path}: {error}") from None
+    links: dict[str, dict[str, bool]] = {}
+    unseen: dict[str, str] = {}
+    for robot in site.robot:
+        try:
+            described = description.load(robot.model)
+            tree = tree_of(described)
+        except DescriptionError as error:
+            raise SiteFileError(f"{path}: robot {robot.name}: model = {robot.model!r}: {error}") from None
+        links[robot.name] = {link.name: bool(link.checked) for link in tree.links}
+        missing = described.robot.unchecked if isinstance(described, UrdfDescription) else ()
+        shaped = [number for number, link in enumerate(tree.links) if link.checked]
+        moving = [tree.links[number] for number in bare_links(tree, shaped)]
+        moving = [link for link in moving if link.joint != BASE]
+        if not shaped:
+            unseen[robot.name] = f"{robot.model} has no shapes that could be checked"
+        elif missing:
+            unseen[robot.name] = f"{robot.model}: no such mesh file: {', '.join(missing)}"
+        elif moving:
+            names = ", ".join(link.name for link in moving)
+            unseen[robot.name] = f"{robot.model}: {names} moves and has no shape that could be checked"
+    if problem := _unseen_problem(site.robot, unseen) or fixture_problem(site.fixture, links):
+        raise SiteFileError(f"{path}: {problem}")
+    return site
+
+
+def _check_reach(site: Site) -> None:
+    """What others can reach is guarded, or the file takes the risk.
+
+    Raises:
+        ListenError: If not.
+    """
+    for endpoint in site.listened:
+        protocol, _, address = endpoint.partition("/")
+        host, _ = split_address(re.split("[?#]", address)[0])
+        secured = protocol in ("tls", "quic")
+        check_reach(f"the router ({endpoint})", host, secured=secured, insecure=site.router.insecure)
+    console = site.console
+    host, _ = split_address(console.listen)
+    check_page_reach(
+        host, accounts=console.accounts is not None, tls=console.tls is not None, insecure=console.insecure
+    )
+
+
+def _unseen_problem(robots: tuple[Robot, ...], unseen: Mapping[str, str]) -> str | None:
+    """Why motions of a robot that requires checks could not be checked, in words; None: they can.
+
+    Args:
+        unseen: Robots that no check covers whole, and why.
+    """
+    for robot in robots:
+        if robot.check != "require":
+            continue
+        for other in robots:
+            met = other is robot or (robot.cell and other.cell == robot.cell)
+            if met and other.name in unseen:
+                whose = "" if other is robot else f"robot {other.name} of its cell: "
+                return (
+                    f'robot {robot.name}: check = "require": {whose}{unseen[other.name]}; '
+                    '"warn" and "off" are possible'
+                )
+    return None
+
+
+def _beside(site: Site, folder: Path) -> Site:
+    robots = tuple(
+        robot.model_copy(update={"model": str(folder / robot.model)})
+        if robot.model.endswith((".toml", ".urdf")) and not Path(robot.model).is_absolute()
+        else robot
+        for robot in site.robot
+    )
+    fixtures = tuple(
+        fixture.model_copy(update={"mesh": folder / fixture.mesh}) if fixture.mesh is not None else fixture
+        for fixture in site.fixture
+    )
+    return site.model_copy(
+        update={
+            "robot": robots,
+            "fixture": fixtures,
+            "recorder": site.recorder.model_copy(update={"folder": folder / site.recorder.folder}),
+            "define": site.define.model_copy(update={"folder": folder / site.define.folder}),
+            "audit": site.audit.model_copy(update={"folder": folder / site.audit.folder}),
+            "watch": site.watch.model_copy(update={"folder": folder / site.watch.folder}),
+            "console": console_beside(site.console, folder),
+            **beside(site.router, site.keys, folder),
+        }
+    )
+
+
+def _tcp_address(endpoint: str) -> str:
+    """The HOST:PORT of one of the router's endpoints; empty: it is no TCP port."""
+    protocol, _, rest = endpoint.partition("/")
+    return re.split("[?#]", rest)[0] if protocol in ("tcp", "tls") else ""
+
+
+def _checked_name(name: str, what: str) -> str:
+    try:
+        return keys.check_name(name, what)
+    except KeyNameError as error:
+        raise ValueError(str(error)) from None
+
+
+# What runs without a file. In a checkout the folder robots/ is the program's own.
+DEMO = Site(
+    site="demo",
+    robot=(Robot(name="pt600", model="pt600", demo=True),),
+    define=Define(folder=Path("my-robots")),
+)
