@@ -200,10 +200,10 @@ def test_inverse_and_check_are_answered_by_processes_that_end_with_the_service(m
             key = "robomesh/hall/left/kinematics"
             pose = tool_placement(BUILT.arms["left"].model, HOME).ravel().tolist()
             request = schema.InverseRequest(pose=pose, task=2, near=HOME)
-            answer = await monitor.ask(f"{key}/inverse", request, timeout_s=20.0)
+            answer = await monitor.ask(f"{key}/inverse", request, timeout_s=60.0)
             assert answer.solutions[0].joint_positions == pytest.approx(HOME.tolist(), abs=1e-6)
             request = schema.CheckRequest(program="move_joints 30 90 -90 0 0\nhome\n")
-            answer = await monitor.ask(f"{key}/check/li", request, timeout_s=20.0)
+            answer = await monitor.ask(f"{key}/check/li", request, timeout_s=60.0)
             assert answer.ok, answer
             assert answer.duration_s > 1.0
             assert "right is left out: nobody knows where it is now" in answer.notes
@@ -245,7 +245,7 @@ def test_inverse_and_check_are_answered_by_processes_that_end_with_the_service(m
             return children
 
     monkeypatch.setattr(kinematics.kinematics, "Worker", keep)
-    children = run(main(), timeout_s=60.0)
+    children = run(main(), timeout_s=180.0)
     assert len(children) == 2
     assert not any(alive(pid) for pid in children)
 
