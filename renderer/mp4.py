@@ -93,11 +93,6 @@ def _unpack(packet: bytes) -> _Unpacked:
     return _Unpacked(picture, sps, pps, key_frame)
 
 
-def is_key_frame(packet: bytes) -> bool:
-    """Whether a decoder can begin with a packet (Annex B)."""
-    return any(unit[0] & 0x1F == _IDR for unit in nal_units(packet))
-
-
 def nal_units(packet: bytes) -> Iterator[bytes]:
     """The NAL units of Annex B bytes."""
     at = packet.find(b"\0\0\1")

@@ -9,7 +9,7 @@ from google.protobuf.message import DecodeError
 
 from mcap_files.publisher_time import PublisherTimes
 from mcap_files.reading import RecordedMessage, RecordingFile
-from mcap_files.video import is_key_frame
+from mcap_files.video import holds_key_frame
 from robomesh import reason_codes as codes
 from robomesh import topics
 from robomesh.errors import BusError
@@ -147,7 +147,7 @@ class Tape:
         if speed <= 1.0 or row.history is History.LAST_100:
             return True
         if row.history is History.KEY_FRAME:
-            return speed <= _EACH_PICTURE_UNTIL or is_key_frame(message.data)
+            return speed <= _EACH_PICTURE_UNTIL or holds_key_frame(message.data)
         gap_ns = 1e9 * speed / (row.rate_hz or _ON_CHANGE_HZ)
         before = self._taken.get(message.topic)
         # A little early is in time: what comes at just that rate must not lose every second one.
@@ -157,7 +157,7 @@ class Tape:
         return True
 
     def _since_key_frame(self, key: str, at_ns: int) -> list[RecordedMessage]:
-        first = self.file.newest(key, at_ns, is_key_frame)
+        first = self.file.newest(key, at_ns, holds_key_frame)
         if first is None:
             return []
         coming = self.file.messages([key], start_ns=first.received_ns, end_ns=at_ns + 1)
@@ -179,7 +179,7 @@ class Tape:
                 at_ns,
                 message.source_ns,
                 payload,
-                is_video and is_key_frame(payload),
+                is_video and holds_key_frame(payload),
             )
 
 

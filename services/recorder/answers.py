@@ -16,7 +16,7 @@ from mcap_files.files import describe_file, describe_unreadable
 from mcap_files.folder import find_file
 from mcap_files.reading import RecordingFile
 from mcap_files.series import MOST_POINTS, POINTS, SeriesReader, known_values
-from mcap_files.video import is_key_frame
+from mcap_files.video import holds_key_frame
 from robomesh.schemas import robomesh_pb2 as schema
 
 _MESSAGES, _MOST_MESSAGES, _MOST_BYTES = 1000, 10_000, 4 << 20
@@ -80,7 +80,7 @@ class Answers:
             start_ns, end_ns = _times(file, asked)
             answer = schema.RecordedMessages(schema=file.schema_name(asked.topic))
             if asked.from_key_frame and answer.schema == _VIDEO:
-                key_frame = file.newest(asked.topic, start_ns, is_key_frame)
+                key_frame = file.newest(asked.topic, start_ns, holds_key_frame)
                 start_ns = start_ns if key_frame is None else key_frame.received_ns
             taken = 0
             messages = file.messages([asked.topic], start_ns=start_ns, end_ns=end_ns + 1)

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import zenoh
 import zenoh.ext
 
-from mcap_files.video import is_key_frame
+from mcap_files.video import holds_key_frame
 from robomesh.endpoints import settle
 from robomesh.errors import MessageError
 from robomesh.header import Header, unpack
@@ -179,7 +179,7 @@ class _Tap:
 
     def _keep(self, key: str, header: Header, payload: bytes, received_ns: int) -> None:
         kept = self.kept.setdefault(key, _Kept())
-        if self._timeless or is_key_frame(payload):
+        if self._timeless or holds_key_frame(payload):
             kept.begin()
         kept.add((header, payload, received_ns))
 

@@ -14,7 +14,7 @@ from mcap_files.files import describe_file
 from mcap_files.folder import find_file
 from mcap_files.layout import layout_of
 from mcap_files.reading import RecordingFile
-from mcap_files.video import is_key_frame
+from mcap_files.video import holds_key_frame
 from tests.recordings import START_NS, write_recording
 
 JOINTS, VIDEO = "robomesh/site/arm/joints", "robomesh/site/arm/video/front"
@@ -65,12 +65,12 @@ def test_the_last_so_many_of_a_topic_come_oldest_first(file):
 
 
 def test_video_begins_at_the_key_frame_before(file):
-    key_frame = file.newest(VIDEO, at(1.3), is_key_frame)
+    key_frame = file.newest(VIDEO, at(1.3), holds_key_frame)
     assert key_frame is not None
     assert seconds([key_frame]) == [1.0]
-    assert is_key_frame(key_frame.data)
+    assert holds_key_frame(key_frame.data)
     later = file.newest(VIDEO, at(1.3))
-    assert not is_key_frame(later.data)
+    assert not holds_key_frame(later.data)
 
 
 def test_an_attachment_is_read_where_it_lies(file):

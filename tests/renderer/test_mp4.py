@@ -9,7 +9,8 @@ import pytest
 from renderer.encoder import H264Encoder
 from renderer.errors import Mp4Error
 from renderer.h264_sps import picture_size
-from renderer.mp4 import FragmentedMp4, is_key_frame
+from renderer.mp4 import FragmentedMp4
+from robomesh.h264 import is_key_frame
 
 # Not a multiple of 16: the parameter set cuts it.
 SIZE = (334, 190)

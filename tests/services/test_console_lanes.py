@@ -8,7 +8,7 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from robomesh import topics
 from robomesh.header import Header
 from robomesh.subscription import Sample
-from services.console.websocket.send_queues import is_key_frame, lane_for, thinned
+from services.console.websocket.send_queues import lane_for, thinned
 
 KEY = b"\0\0\0\1\x67\x42\xc0\x1f\0\0\0\1\x68\xce\0\0\0\1\x65\x88"
 DELTA = b"\0\0\0\1\x41\x9a\x01"
@@ -121,12 +121,3 @@ def test_who_joins_gets_the_frames_since_the_last_key_frame():
     for number, data in enumerate([KEY, DELTA, DELTA, KEY, DELTA], start=1):
         held.push(frame(number, data))
     assert [each.header.sequence for each in held.held()] == [4, 5]
-
-
-def test_a_key_frame_is_told_by_its_parameter_sets_or_its_slice():
-    assert is_key_frame(KEY)
-    assert is_key_frame(b"\0\0\1\x65\x88")
-    assert not is_key_frame(DELTA)
-    assert not is_key_frame(b"\0\0\1\x06\x05" + DELTA)
-    assert not is_key_frame(b"")
-    assert not is_key_frame(b"\0\0\1")

@@ -11,8 +11,9 @@ from typing import BinaryIO
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
 from renderer.errors import Mp4Error
-from renderer.mp4 import FragmentedMp4, is_key_frame
+from renderer.mp4 import FragmentedMp4
 from robomesh.errors import MessageError
+from robomesh.h264 import is_key_frame
 from robomesh.subscription import Subscription
 from services.command_line import discovery
 from services.command_line.live.views import view_of

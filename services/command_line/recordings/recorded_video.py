@@ -6,7 +6,7 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
 from mcap_files.publisher_time import PublisherTimes
 from mcap_files.reading import RecordingFile
-from mcap_files.video import is_key_frame
+from mcap_files.video import holds_key_frame
 from renderer.mp4 import FragmentedMp4
 from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.output import progress
@@ -21,7 +21,7 @@ def write_recorded(file: RecordingFile, span: Span, target: Path, view: str) -> 
         Mp4Error: If it is no H.264, or changes on the way.
     """
     topic = needed(file, f"video/{view}")
-    first = file.newest(topic, span.start_ns, is_key_frame)
+    first = file.newest(topic, span.start_ns, holds_key_frame)
     start_ns = span.start_ns if first is None else first.received_ns
     mp4, times = FragmentedMp4(), PublisherTimes()
     with target.open("wb") as stream, progress("video") as tell:

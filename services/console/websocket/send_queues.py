@@ -12,6 +12,7 @@ from typing import Protocol
 
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
+from robomesh.h264 import is_key_frame
 from robomesh.header import Header
 from robomesh.subscription import Sample
 from robomesh.topics import History, Topic
@@ -26,8 +27,6 @@ _SKIP_FROM = 6
 _RECENT_S, _MOST_RECENT = 0.05, 8
 # How far behind a page may draw.
 _SHOWN_S = 0.1
-
-_NAL_IDR, _NAL_SPS = 5, 7
 
 
 class Lane(Protocol):
@@ -196,16 +195,3 @@ def thinned(topic: Topic, samples: Sequence[Sample]) -> Sequence[Sample]:
 def begins_video(sample: Sample) -> bool:
     """Whether a decoder can begin with this sample: a key frame, or the frames since one."""
     return not sample.live or is_key_frame(CompressedVideo.FromString(sample.payload).data)
-
-
-def is_key_frame(data: bytes) -> bool:
-    """Whether an H.264 picture (Annex B) is a key frame: it has parameter sets or an IDR slice."""
-    at = data.find(b"\0\0\1")
-    while 0 <= at < len(data) - 3:
-        kind = data[at + 3] & 0x1F
-        if kind in (_NAL_IDR, _NAL_SPS):
-            return True
-        if kind == 1:  # a slice of another picture: nothing more can follow
-            return False
-        at = data.find(b"\0\0\1", at + 3)
-    return False
