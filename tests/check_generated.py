@@ -11,7 +11,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 SCHEMAS = ROOT / "robomesh" / "schemas"
-PACKAGE_LOCK = ROOT / "services" / "console" / "page" / "package-lock.json"
+PACKAGE_LOCK = ROOT / "web" / "package-lock.json"
 LOCK = ROOT / "requirements.lock"
 EXAMPLE_ROBOTS_LOCK = ROOT / "example-robots.lock"
 
