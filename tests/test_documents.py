@@ -1,46 +1,50 @@
-"""Documents that say what the code says."""
+"""Documents that agree with the code."""
 
+import re
 from pathlib import Path
 
-from robomesh.topics import REQUESTS, TOPICS, History
+from tests import make_topics
 
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def topic_rows() -> list[str]:
-    """The topic table of ARCHITECTURE.md, from the table that the code reads."""
-    rows = [
-        "| topic | schema | rate | priority | a `get` answers with | recorded | stale after |",
-        "|" + "---|" * 7,
-    ]
-    for row in TOPICS.values():
-        beat = f"on change, {row.heartbeat_s:g} s" if row.heartbeat_s else "as it comes"
-        rate = f"{row.rate_hz:g} Hz" if row.rate_hz else beat
-        stale = f"{row.stale_after_s:g} s" if row.stale_after_s else "never"
-        history = "nothing" if row.history is History.NONE else row.history.value
-        rows.append(
-            f"| `{row.name}` | {row.schema.DESCRIPTOR.full_name} | {rate} | {row.priority.value} "
-            f"| {history} | {'yes' if row.recorded else 'no'} | {stale} |"
-        )
-    return rows
+def test_the_reference_of_topics_is_the_topic_table():
+    assert make_topics.FILE.read_text(encoding="utf-8") == make_topics.document()
 
 
-def request_rows() -> list[str]:
-    """The request table of ARCHITECTURE.md."""
-    rows = ["| request | asked with | answered with | priority | answered by |", "|" + "---|" * 5]
-    for row in REQUESTS.values():
-        asked, answer = (s.DESCRIPTOR.name if s else "-" for s in (row.request, row.answer))
-        owners = ", ".join(sorted(role.value for role in row.owners))
-        answered = answer if row.answer else "bytes"
-        rows.append(f"| `{row.name}` | {asked} | {answered} | {row.priority.value} | {owners} |")
-    return rows
-
-
-def test_architecture_shows_the_topic_table_as_it_is():
+def test_architecture_is_short_and_names_folders_and_files_that_exist():
     text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
-    assert "\n".join(topic_rows()) in text
-    assert "\n".join(request_rows()) in text
-    assert len(text.splitlines()) < 200
+    assert len(text.splitlines()) <= 150
+    assert named_paths("ARCHITECTURE.md", text) == []
+
+
+def test_decisions_are_listed_and_name_files_that_exist():
+    folder = ROOT / "docs" / "adr"
+    index = (folder / "README.md").read_text(encoding="utf-8")
+    records = sorted(folder.glob("[0-9]*.md"))
+    assert len(records) >= 20
+    for number, record in enumerate(records, 1):
+        text = record.read_text(encoding="utf-8")
+        assert text.startswith(f"# {number:04d}: ")
+        assert [line for line in text.splitlines() if line.startswith("## ")] == [
+            "## Context",
+            "## Decision",
+            "## Consequences",
+        ]
+        assert f"({record.name})" in index
+        assert named_paths(record.name, text) == []
+
+
+def named_paths(where: str, text: str) -> list[str]:
+    """Return the paths of this repository that a document names and that do not exist."""
+    named = re.findall(r"`((?:[a-z0-9_]+/)+(?:[A-Za-z0-9_.-]+\.(?:py|ts|tsx|proto|toml|md))?)`", text)
+    linked = re.findall(r"\]\((docs/[^)#]+)\)", text)
+    known = {path.name for path in ROOT.iterdir()}
+    return [
+        f"{where}: {name}"
+        for name in named + linked
+        if name.split("/")[0] in known and not (ROOT / name).exists()
+    ]
 
 
 def test_every_example_stands_in_the_readme():
