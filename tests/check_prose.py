@@ -3,8 +3,8 @@
 Usage: check_prose.py [--list N]
 
 Measures, by kind of text, the share of docstrings that begin with a question word ("What", "Whether")
-instead of a verb or a noun phrase, and the number of idiomatic words in 1,000. Text within the limits can still be
-hard to read. `--list N` prints the N worst places.
+instead of a verb or a noun phrase, and the number of idiomatic words in 1,000. Text within the limits can
+still be hard to read. `--list N` prints the N worst places.
 """
 
 import ast
