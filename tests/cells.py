@@ -17,4 +17,6 @@ def arm_alone(
 ) -> kinematics.RobotSettings:
     """A robot of a kinematics service, in a cell of its own."""
     robot = CellRobot(name=name, model=model, base_to_site=np.eye(4), warning_m=warning_m, stop_m=stop_m)
-    return kinematics.RobotSettings(name=name, place=CellDescription((robot,), fixtures), simulated=simulated)
+    return kinematics.RobotSettings(
+        name=name, cell_description=CellDescription((robot,), fixtures), simulated=simulated
+    )

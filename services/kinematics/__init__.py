@@ -1,4 +1,4 @@
-"""What an arm is, where its parts are, what it is near to: a thin service over `robots`."""
+"""Kinematics service: robot descriptions, frames, clearances and kinematics requests, on top of `robots`."""
 
 from services.kinematics.kinematics import serve
 from services.kinematics.settings import RobotSettings, Settings

@@ -1,9 +1,9 @@
-"""Events that begin and end once, however much a value trembles about its threshold.
+"""Alarm state machine: one begin event and one end event a condition, without chattering.
 
-A condition begins when it is met, and is over when it has not been near for a while. Pure: what is near
+A condition begins when it is active, and is over when it has left its deadband for a while. Pure: conditions
 and the time go in, events come out.
 
-Source: ANSI/ISA-18.2 (an alarm asks somebody to act; deadbands and delays against chattering).
+Source: ANSI/ISA-18.2 (an alarm requires an operator's response; deadbands and delays prevent chattering).
 """
 
 from collections.abc import Iterable
@@ -16,20 +16,20 @@ OVER = ".over"
 
 @dataclass(frozen=True, kw_only=True)
 class Condition:
-    """Something that is so, or nearly: what is further away than its deadband is no condition.
+    """A condition that is active or within its deadband; callers leave out conditions beyond the deadband.
 
     Attributes:
-        key: What it is of, the same each time.
-        met: Whether it is so; else it begins nothing, and what has begun is not over.
-        code, severity, text: Of the event that it begins with.
-        over: Text of the event that it ends with.
-        values: Of both events.
-        after_s: So long it must be met to begin.
-        over_after_s: So long it must not be near to be over.
+        key: Stable identity of the condition.
+        active: True beyond the threshold; False within the deadband, where it neither begins nor ends.
+        code, severity, text: Fields of the begin event.
+        over: Text of the end event.
+        values: Values of both events.
+        after_s: Time that it must be active before it begins.
+        over_after_s: Time that it must be absent before it is over.
     """
 
     key: str
-    met: bool
+    active: bool
     code: str
     severity: Event.Severity
     text: str
@@ -40,12 +40,12 @@ class Condition:
 
 
 @dataclass
-class _Standing:
-    """A condition that was met.
+class _Tracked:
+    """A condition that was active.
 
     Attributes:
-        begins_at: When it is told [s].
-        over_at: When it is over [s]; None: it is near.
+        begins_at: Time at which its begin event is due [s].
+        over_at: Time at which it is over [s]; None while it is present.
     """
 
     condition: Condition
@@ -56,41 +56,41 @@ class _Standing:
 
 @dataclass
 class Alarms:
-    """What is so of one robot, as far as it was told."""
+    """Tracked conditions of one robot."""
 
-    _standing: dict[str, _Standing] = field(default_factory=dict)
+    _tracked: dict[str, _Tracked] = field(default_factory=dict)
 
     def judge(self, conditions: Iterable[Condition], now_s: float) -> list[Event]:
-        """The events of what has begun, and of what is over.
+        """Return the events of conditions that began or ended.
 
         Args:
-            now_s: On a clock that never goes back.
+            now_s: Time on a monotonic clock.
         """
         near = {condition.key: condition for condition in conditions}
         events = []
         for key, condition in near.items():
-            standing = self._standing.get(key)
-            if standing is None:
-                if not condition.met:
+            tracked = self._tracked.get(key)
+            if tracked is None:
+                if not condition.active:
                     continue
-                standing = self._standing[key] = _Standing(condition, now_s + condition.after_s)
-            standing.condition, standing.over_at = condition, None
-            if standing.begun:
+                tracked = self._tracked[key] = _Tracked(condition, now_s + condition.after_s)
+            tracked.condition, tracked.over_at = condition, None
+            if tracked.begun:
                 continue
-            if not condition.met:
-                del self._standing[key]
-            elif now_s >= standing.begins_at:
-                standing.begun = True
+            if not condition.active:
+                del self._tracked[key]
+            elif now_s >= tracked.begins_at:
+                tracked.begun = True
                 events.append(_event(condition, condition.severity, condition.code, condition.text))
-        for key in [key for key in self._standing if key not in near]:
-            standing = self._standing[key]
-            if standing.over_at is None:
-                standing.over_at = now_s + standing.condition.over_after_s
-            if not standing.begun or now_s >= standing.over_at:
-                del self._standing[key]
-                if standing.begun:
-                    gone = standing.condition
-                    events.append(_event(gone, Event.Severity.INFO, gone.code + OVER, gone.over))
+        for key in [key for key in self._tracked if key not in near]:
+            tracked = self._tracked[key]
+            if tracked.over_at is None:
+                tracked.over_at = now_s + tracked.condition.over_after_s
+            if not tracked.begun or now_s >= tracked.over_at:
+                del self._tracked[key]
+                if tracked.begun:
+                    ended = tracked.condition
+                    events.append(_event(ended, Event.Severity.INFO, ended.code + OVER, ended.over))
         return events
 
 

@@ -1,4 +1,4 @@
-"""Requests about one arm: its meshes, forward at once, inverse and check from processes of their own."""
+"""Request handlers of one arm: meshes and forward in-process, inverse and check in worker processes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from robomesh.worker import Worker, WorkerError
 from robots.errors import RobotError
 from robots.joints import FloatArray
 from robots.model import RobotModel
-from services.kinematics.cell_state import Place
+from services.kinematics.cell_state import CellState
 from services.kinematics.states import forward_answer
 from services.kinematics.worker_messages import CheckQuestion, InverseQuestion, Question
 
@@ -25,66 +25,70 @@ _CHECK_S = 30.0
 
 @dataclass(frozen=True)
 class Workers:
-    """Two processes, because an answer while somebody types must not wait for a program's check."""
+    """One worker process for inverse requests and one for checks.
+
+    Separate, so that the inverse requests of an operator who is typing never wait for a program's check.
+    """
 
     inverse: Worker
     check: Worker
 
     async def close(self) -> None:
-        """End both."""
+        """Stop both worker processes."""
         await self.inverse.close()
         await self.check.close()
 
 
-def answer_about(
+def answer_robot_requests(
     session: Session,
     site: str,
     robot: str,
     *,
     model: RobotModel,
     meshes: Mapping[str, bytes],
-    place: Place,
+    cell_state: CellState,
     workers: Workers,
     checks: Quota,
 ) -> None:
-    """Answer what is asked about an arm from now on.
+    """Register the request handlers of an arm.
 
     Args:
-        meshes: GLB bytes by the last part of their key.
-        place: Of its cell.
-        checks: Each asker's, of all arms together: one process answers them.
+        meshes: GLB bytes by the last chunk of their key.
+        cell_state: Positions of the arms of its cell.
+        checks: Check quota of each client, over all arms because one process serves them.
     """
 
     async def answer_mesh(request: Request) -> bytes:
         if request.chunk not in meshes:
-            have = ", ".join(meshes) or "none"
-            raise RefusedError(codes.MESH_UNKNOWN(name=request.chunk, robot=robot, meshes=have))
+            available = ", ".join(meshes) or "none"
+            raise RefusedError(codes.MESH_UNKNOWN(name=request.chunk, robot=robot, meshes=available))
         return meshes[request.chunk]
 
     async def answer_forward(request: Request) -> schema.ForwardAnswer:
-        asked = request.message
-        assert isinstance(asked, schema.ForwardRequest)
-        return forward_answer(model, _positions(model, "joint_positions", asked.joint_positions, robot))
+        message = request.message
+        assert isinstance(message, schema.ForwardRequest)
+        positions = _checked_positions(model, "joint_positions", message.joint_positions, robot)
+        return forward_answer(model, positions)
 
     async def answer_inverse(request: Request) -> schema.InverseAnswer:
-        asked = request.message
-        assert isinstance(asked, schema.InverseRequest)
-        question = InverseQuestion(robot, asked.SerializeToString())
-        return schema.InverseAnswer.FromString(await _asked(workers.inverse, question, _INVERSE_S))
+        message = request.message
+        assert isinstance(message, schema.InverseRequest)
+        question = InverseQuestion(robot, message.SerializeToString())
+        return schema.InverseAnswer.FromString(await _ask_worker(workers.inverse, question, _INVERSE_S))
 
     async def answer_check(request: Request) -> schema.CheckAnswer:
-        asked = request.message
-        assert isinstance(asked, schema.CheckRequest)
-        if asked.start:
-            start = _positions(model, "start", asked.start, robot)
-        elif (here := place.positions(robot)) is not None:
-            start = here
+        message = request.message
+        assert isinstance(message, schema.CheckRequest)
+        if message.start:
+            start = _checked_positions(model, "start", message.start, robot)
+        elif (current := cell_state.positions(robot)) is not None:
+            start = current
         else:
             raise RefusedError(codes.CHECK_START_UNKNOWN(robot=robot))
-        others, _ = place.others(robot)
-        question = CheckQuestion(robot, asked.SerializeToString(), start, others)
+        others, _ = cell_state.others(robot)
+        question = CheckQuestion(robot, message.SerializeToString(), start, others)
         with checks.one(request.asker):
-            return schema.CheckAnswer.FromString(await _asked(workers.check, question, _CHECK_S))
+            return schema.CheckAnswer.FromString(await _ask_worker(workers.check, question, _CHECK_S))
 
     session.answer(site, robot, "mesh/*", answer_mesh)
     session.answer(site, robot, "kinematics/forward", answer_forward)
@@ -92,11 +96,11 @@ def answer_about(
     session.answer(site, robot, "kinematics/check/*", answer_check)
 
 
-def _positions(model: RobotModel, field: str, given: Sequence[float], robot: str) -> FloatArray:
-    """(n,) joint positions of a request [rad] or [m].
+def _checked_positions(model: RobotModel, field: str, given: Sequence[float], robot: str) -> FloatArray:
+    """Return the (n,) joint positions of a request [rad] or [m].
 
     Raises:
-        RefusedError: If there is not one a joint.
+        RefusedError: If there is not one value for each joint.
     """
     if len(given) != len(model.joints):
         raise RefusedError(
@@ -111,11 +115,11 @@ def _positions(model: RobotModel, field: str, given: Sequence[float], robot: str
     return np.array(given)
 
 
-async def _asked(worker: Worker, question: Question, timeout_s: float) -> bytes:
-    """A worker's answer, as its bytes.
+async def _ask_worker(worker: Worker, question: Question, timeout_s: float) -> bytes:
+    """Return a worker's serialized answer.
 
     Raises:
-        RefusedError: With its reason, or what became of it.
+        RefusedError: If the request is invalid, or the worker crashed or timed out.
     """
     try:
         answer: bytes = await worker.ask(question, timeout_s=timeout_s)

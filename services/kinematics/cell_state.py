@@ -1,4 +1,4 @@
-"""Where the arms of a cell are as far as anybody knows, and how near they are to things."""
+"""Last known positions of a cell's arms, and their clearances."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -9,14 +9,14 @@ from services.kinematics.conditions import far_from
 
 
 @dataclass(frozen=True, eq=False)
-class Near:
-    """How near an arm is to things.
+class Proximity:
+    """Clearances of an arm.
 
     Attributes:
-        own: The nearest two of its links; None: it has no such pair.
-        outside: The nearest of fixtures and other robots, its own end first; None: nothing is around.
-        close: All that is within the arm's warning distance, or nearly, nearest first.
-        not_counted: Other robots that are left out: nobody knows where they are now.
+        own: The nearest pair of its links; None if no pair is checked.
+        outside: The nearest fixture or other robot, the arm's own end first; None if there is none.
+        close: All pairs within the warning distance or its deadband, nearest first.
+        not_counted: Other robots that are left out because their positions are unknown.
     """
 
     own: Nearest | None
@@ -27,43 +27,43 @@ class Near:
 
 @dataclass
 class _Arm:
-    """The newest of an arm.
+    """The newest state of an arm.
 
     Attributes:
-        told_at: When its positions came [s].
-        seen: What was near, and where everything was then.
+        received_at: Receive time of its positions [s].
+        cached: Its last clearances, and the positions that they were computed for.
     """
 
     fresh_for_s: float
     positions: FloatArray | None = None
-    told_at: float = 0.0
-    seen: tuple[tuple[object, ...], Near] | None = None
+    received_at: float = 0.0
+    cached: tuple[tuple[object, ...], Proximity] | None = None
 
 
-class Place:
-    """The newest positions of a cell's robots. One thread at a time.
+class CellState:
+    """The newest positions of a cell's robots. Not thread-safe.
 
     Args:
-        fresh_for_s: How long each robot's positions count, by name [s].
-        now_s: A clock that never goes back.
+        fresh_for_s: Time until a robot's positions are stale, by name [s].
+        now_s: Monotonic clock.
     """
 
     def __init__(self, fresh_for_s: Mapping[str, float], now_s: Callable[[], float]) -> None:
         self._arms = {name: _Arm(seconds) for name, seconds in fresh_for_s.items()}
         self._now_s = now_s
 
-    def take(self, robot: str, positions: FloatArray) -> None:
-        """An arm told where it is."""
+    def update(self, robot: str, positions: FloatArray) -> None:
+        """Store the positions that an arm reported."""
         arm = self._arms[robot]
-        arm.positions, arm.told_at = positions, self._now_s()
+        arm.positions, arm.received_at = positions, self._now_s()
 
     def positions(self, robot: str) -> FloatArray | None:
-        """Where an arm is, (n,) [rad] or [m]; None: nobody knows now."""
+        """Return an arm's positions (n,) [rad] or [m]; None if they are unknown or stale."""
         arm = self._arms[robot]
-        return arm.positions if self._now_s() - arm.told_at <= arm.fresh_for_s else None
+        return arm.positions if self._now_s() - arm.received_at <= arm.fresh_for_s else None
 
     def others(self, robot: str) -> tuple[dict[str, FloatArray], tuple[str, ...]]:
-        """Where the other arms are, and the names of those of which nobody knows."""
+        """Return the known positions of the other arms, and the names of the arms at unknown positions."""
         known, unknown = {}, []
         for name in self._arms:
             if name == robot:
@@ -74,22 +74,25 @@ class Place:
                 known[name] = positions
         return known, tuple(unknown)
 
-    def near(self, cell: Cell, robot: str, positions: FloatArray) -> Near:
-        """How near an arm is to things; looked at anew only where something has moved."""
+    def proximity(self, cell: Cell, robot: str, positions: FloatArray) -> Proximity:
+        """Return an arm's clearances; they are computed again only after a robot of the cell has moved."""
         arm = self._arms[robot]
         others, unknown = self.others(robot)
-        where = positions.tobytes(), *((name, there.tobytes()) for name, there in others.items()), unknown
-        if arm.seen is None or arm.seen[0] != where:
-            was_close = arm.seen is not None and bool(arm.seen[1].close)
+        key = positions.tobytes(), *((name, other.tobytes()) for name, other in others.items()), unknown
+        if arm.cached is None or arm.cached[0] != key:
+            was_close = arm.cached is not None and bool(arm.cached[1].close)
             outside, close = _outside(cell, robot, positions, others, was_close=was_close)
-            arm.seen = where, Near(own_nearest(cell, robot, positions), outside, close, unknown)
-        return arm.seen[1]
+            arm.cached = key, Proximity(own_nearest(cell, robot, positions), outside, close, unknown)
+        return arm.cached[1]
 
 
 def _outside(
     cell: Cell, robot: str, positions: FloatArray, others: Mapping[str, FloatArray], *, was_close: bool
 ) -> tuple[Nearest | None, tuple[Nearest, ...]]:
-    """What is nearest, and all that is close, by one survey where nothing has changed in that."""
+    """Return the nearest outside pair and all close ones.
+
+    `was_close` chooses which query runs first, so that a steady state costs one query.
+    """
     floor = [cell.floor.warning_m] if cell.floor is not None else []
     far = far_from(max([*floor, *(arm.warning_m for arm in cell.arms.values())]))
     close = outside_nearest(cell, robot, positions, others, within_m=far) if was_close else ()

@@ -1,4 +1,4 @@
-"""A program's check as an answer of the mesh: pure functions."""
+"""Answers to program-check requests: pure functions."""
 
 from collections.abc import Mapping
 
@@ -22,25 +22,25 @@ def check_answer(
     others: Mapping[str, FloatArray],
     solver: InverseSolver | None = None,
 ) -> schema.CheckAnswer:
-    """What a check of the program finds.
+    """Check the program and return the answer.
 
     Args:
-        start: (n,) where the robot begins [rad] or [m].
-        others: (k, n) straight joint path of each other robot of the cell that counts; k = 1: it stands.
-        solver: Of this arm; built unless given.
+        start: (n,) start positions of the robot [rad] or [m].
+        others: (k, n) straight joint path of each other robot of the cell that counts; k = 1 if it rests.
+        solver: Inverse solver of this arm; built unless given.
 
     Raises:
-        JointCountError: If some positions do not have one value a joint.
+        JointCountError: If an array of positions does not have one value for each joint.
     """
     result = check_program(request.program, cell, robot, start, others=others, solver=solver)
     return answer_of(result, path=request.path)
 
 
 def answer_of(result: CheckResult, *, path: bool) -> schema.CheckAnswer:
-    """A result as a message.
+    """Return a check's result as a message.
 
     Args:
-        path: Tell the sampled motion too.
+        path: Include the sampled motion.
     """
     answer = schema.CheckAnswer(
         ok=result.ok,
@@ -69,11 +69,11 @@ def answer_of(result: CheckResult, *, path: bool) -> schema.CheckAnswer:
 
 
 def _path(path: SampledPath) -> schema.CheckAnswer.Path:
-    around = np.isfinite(path.clearances).all()
+    has_clearances = np.isfinite(path.clearances).all()
     return schema.CheckAnswer.Path(
         times_s=path.times_s,
         joint_positions=path.joint_positions.ravel(),
         tool_positions=path.tool_positions.ravel(),
-        clearances=path.clearances if around else (),
+        clearances=path.clearances if has_clearances else (),
         lines=path.lines,
     )

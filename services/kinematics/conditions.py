@@ -1,6 +1,6 @@
-"""What of an arm's state is worth an event: near a limit, a singular position, a thing, itself.
+"""Alarm conditions of an arm's state: near a limit, a singular position, an obstacle or its own links.
 
-Each is met at one threshold and near until another, further one.
+Each has an activation threshold and a wider one that ends its deadband.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -12,23 +12,23 @@ from robots.collision import Nearest
 from robots.joints import FloatArray, Joints, JointType, constraint_values
 from services.kinematics.alarms import Condition
 
-# Shares of a joint's range.
+# Fractions of a joint's range.
 _LIMIT, _LIMIT_OVER = 0.02, 0.03
 _SINGULAR, _SINGULAR_OVER = 0.02, 0.03
-# An arm whose work passes a singular position again and again is one event, not one a cycle. The demo
-# of a Pt600 stays away for 20 s of its 37 s; at a tenth of its speed for two minutes.
+# Longer than a work cycle: an arm that passes a singular position in each cycle causes one event, not one a
+# cycle. The demo of a Pt600 is away for 20 s of its 37 s; at a tenth of its speed for two minutes.
 _SINGULAR_OVER_S = 300.0
-# The larger of the two further away is far enough.
+# Deadband of a distance: a factor or an addition, the larger of the two.
 _FURTHER, _FURTHER_M = 1.10, 5e-3
 _APART_M = 1e-3
-# When a site starts, its robots come one after the other.
+# The robots of a starting site do not report at the same time.
 _MISSING_AFTER_S = 2.0
 
 _S = Event.Severity
 
 
 def limit_conditions(joints: Joints, positions: FloatArray) -> Iterator[Condition]:
-    """Joints, and sums of joints, near an end of their range.
+    """Yield the joints, and sums of joints, that are near an end of their range.
 
     Args:
         positions: (n,) [rad] or [m].
@@ -45,7 +45,7 @@ def limit_conditions(joints: Joints, positions: FloatArray) -> Iterator[Conditio
         end, limit = ("lower", lower[number]) if low else ("upper", upper[number])
         yield Condition(
             key=f"limit {name}",
-            met=bool(shares[number] < _LIMIT),
+            active=bool(shares[number] < _LIMIT),
             code="kinematics.limit",
             severity=_S.WARNING,
             text=f"{name} is near the end of its range: {_text(value, kind)} of {_text(float(limit), kind)}",
@@ -55,15 +55,15 @@ def limit_conditions(joints: Joints, positions: FloatArray) -> Iterator[Conditio
 
 
 def singularity_conditions(margin: float) -> Iterator[Condition]:
-    """A singular position that is near."""
+    """Yield a condition if the arm is near a singular position."""
     if margin <= _SINGULAR_OVER:
         yield Condition(
             key="singularity",
-            met=margin < _SINGULAR,
+            active=margin < _SINGULAR,
             code="kinematics.singularity",
-            # No alarm: joint moves pass there as anywhere, and for a line the check refuses it beforehand.
+            # INFO, not an alarm: joint moves pass there without harm, and the check refuses lines there.
             severity=_S.INFO,
-            text=f"near a singular position, margin {margin:.3f}: a straight line would ask for fast joints",
+            text=f"near a singular position, margin {margin:.3f}: a straight line would need fast joints",
             over="away from singular positions again",
             values=(("margin", f"{margin:.6g}"),),
             over_after_s=_SINGULAR_OVER_S,
@@ -71,7 +71,7 @@ def singularity_conditions(margin: float) -> Iterator[Condition]:
 
 
 def own_conditions(nearest: Nearest | None) -> Iterator[Condition]:
-    """Two links of the arm that touch."""
+    """Yield a condition if two links of the arm touch."""
     if nearest is not None and nearest.distance_m <= _APART_M:
         yield _touching("own links", nearest, over="no links of the arm touch any more")
 
@@ -79,64 +79,64 @@ def own_conditions(nearest: Nearest | None) -> Iterator[Condition]:
 def outside_conditions(
     close: Sequence[Nearest], distances: Callable[[tuple[str, str]], tuple[float, float]]
 ) -> Iterator[Condition]:
-    """Fixtures and other robots that are near: to be warned of, to stop at, touched.
+    """Yield a condition for each obstacle within its warning distance, within its stop distance, or touching.
 
     Args:
-        close: Nearest first, the arm's own end first.
-        distances: To be warned of and to stop at, of a pair [m].
+        close: Pairs of the arm (first) and a fixture or other robot, nearest pair first.
+        distances: Function from a pair's names to its warning and stop distances [m].
     """
     seen = set()
     for each in close:
         one, other = each.pair
-        thing = other.partition("/")[0]
-        if thing in seen:
-            continue  # further away than the pair that was told of
-        seen.add(thing)
+        obstacle = other.partition("/")[0]
+        if obstacle in seen:
+            continue  # a nearer pair with this obstacle came first
+        seen.add(obstacle)
         for name, bound, severity in zip(
             ("warning", "stop"), distances(each.pair), (_S.WARNING, _S.ERROR), strict=True
         ):
             if each.distance_m > far_from(bound):
                 continue
             yield Condition(
-                key=f"{name} {thing}",
-                met=each.distance_m < bound,
+                key=f"{name} {obstacle}",
+                active=each.distance_m < bound,
                 code=f"kinematics.clearance.{name}",
                 severity=severity,
                 text=(
                     f"{one} is {each.distance_m * 1000:.0f} mm from {other}, "
                     f"within the {name} distance of {bound * 1000:g} mm"
                 ),
-                over=f"{thing} is out of the {name} distance of {bound * 1000:g} mm again",
+                over=f"{obstacle} is out of the {name} distance of {bound * 1000:g} mm again",
                 values=_values(each),
             )
         if each.distance_m <= _FURTHER_M:
-            yield _touching(thing, each, over=f"nothing touches {thing} any more")
+            yield _touching(obstacle, each, over=f"the arm does not touch {obstacle} any more")
 
 
 def far_from(distance_m: float) -> float:
-    """Further away than this, a thing is not near a distance any more [m]."""
+    """Return the distance that ends the deadband of a threshold [m]."""
     return max(_FURTHER * distance_m, distance_m + _FURTHER_M)
 
 
 def missing_conditions(not_counted: Sequence[str]) -> Iterator[Condition]:
-    """Robots of the cell of which nobody knows where they are now."""
+    """Yield a condition for each robot of the cell at an unknown position."""
     for robot in not_counted:
         yield Condition(
             key=f"missing {robot}",
-            met=True,
+            active=True,
             code="kinematics.not_counted",
             severity=_S.WARNING,
-            text=f"clearance leaves {robot} out: nobody knows where it is now",
+            text=f"clearance does not count {robot}: its position is unknown",
             over=f"clearance counts {robot} again",
             values=(("robot", robot),),
             after_s=_MISSING_AFTER_S,
         )
 
 
-def _touching(what: str, nearest: Nearest, *, over: str) -> Condition:
+def _touching(name: str, nearest: Nearest, *, over: str) -> Condition:
     return Condition(
-        key=f"touching {what}",
-        met=nearest.distance_m <= 0.0,
+        key=f"touching {name}",
+        active=nearest.distance_m <= 0.0,
         code="kinematics.collision",
         severity=_S.ERROR,
         text=f"{nearest.pair[0]} and {nearest.pair[1]} touch",

@@ -1,4 +1,4 @@
-"""A robot's `description` message: everything that renderer, page and monitors know of it."""
+"""A robot's `description` message: everything that renderer, page and monitors need to show it."""
 
 import hashlib
 from collections.abc import Mapping, Sequence
@@ -20,19 +20,19 @@ _TYPES = {
 
 @dataclass(frozen=True, eq=False)
 class FixtureMesh:
-    """A fixture, and its shape as GLB."""
+    """A fixture with its shape as GLB."""
 
     fixture: Fixture
     glb: bytes
 
     @property
     def name(self) -> str:
-        """In `mesh/<name>`; a link may be named as the fixture is."""
+        """Name of its `mesh/<name>`; the prefix avoids a clash with a link of the same name."""
         return f"fixture.{self.fixture.name}"
 
 
 def fixture_meshes(cell: CellDescription) -> tuple[FixtureMesh, ...]:
-    """What stands in a cell, as it is drawn.
+    """Return a cell's fixtures with their meshes.
 
     Raises:
         MeshError: If a mesh file cannot be read.
@@ -49,11 +49,11 @@ def describe(
     cell: str,
     simulated: bool,
 ) -> schema.Description:
-    """The message of a robot that stands somewhere.
+    """Return the `description` message of a robot.
 
     Args:
-        meshes: GLB bytes by link name; a link that is not in it has no shape.
-        base_to_site: (4, 4).
+        meshes: GLB bytes by link name; links without a shape are absent.
+        base_to_site: (4, 4) placement of the base in the site's frame.
     """
     message = schema.Description(
         name=description.name,
@@ -75,7 +75,7 @@ def describe(
 def add_surroundings(
     message: schema.Description, robot: CellRobot, cell: CellDescription, fixtures: Sequence[FixtureMesh]
 ) -> None:
-    """What stands around a robot, and how near it may come."""
+    """Add the fixtures, the floor and the clearance distances of a robot's cell."""
     for each in fixtures:
         color = each.fixture.color
         message.fixtures.add(
@@ -96,7 +96,7 @@ def add_surroundings(
 
 
 def _add_joints(message: schema.Description, description: RobotDescription) -> None:
-    """Joints, and the constraints between them."""
+    """Add the joints and the constraints between them."""
     joints = joints_of(description)
     for index, name in enumerate(joints.names):
         message.joints.add(

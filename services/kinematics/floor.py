@@ -1,4 +1,4 @@
-"""An arm that is below its floor at the start: listed once, with the line of the site file to write."""
+"""Event for an arm that is below its floor at the start, with the line to write in the site file."""
 
 from collections.abc import Mapping
 
@@ -12,22 +12,22 @@ from robots.joints import FloatArray
 
 
 def floor_event(cell: Cell, robot: str, poses: Mapping[str, FloatArray]) -> Event | None:
-    """An event that lists the poses in which an arm is below the floor; None: it is in none of them.
+    """Return an event that lists the poses in which an arm is below the floor, or None if there is none.
 
     Args:
-        poses: (n,) joint positions [rad] or [m], each by its words: "at home".
+        poses: (n,) joint positions [rad] or [m], by a phrase that names them: "at home".
     """
     if cell.floor is None or not poses:
         return None
     arm = cell.arms[robot]
     found = heights_above(cell.floor, arm, placements_along(arm, np.array([*poses.values()])))
-    said, lowest = [], 0.0
-    for words, heights in zip(poses, found.heights, strict=True):
+    phrases, lowest = [], 0.0
+    for phrase, heights in zip(poses, found.heights, strict=True):
         if len(heights) and heights.min() <= 0.0:
             link = arm.names[int(found.bodies[heights.argmin()])]
-            said.append(f"{words} {link} is {-heights.min() * 1000:.0f} mm below the floor")
+            phrases.append(f"{phrase} {link} is {-heights.min() * 1000:.0f} mm below the floor")
             lowest = min(lowest, float(heights.min()))
-    if not said:
+    if not phrases:
         return None
     assert cell.floor.height_m is not None
     height_m = cell.floor.height_m
@@ -35,6 +35,6 @@ def floor_event(cell: Cell, robot: str, poses: Mapping[str, FloatArray]) -> Even
         severity=Event.Severity.WARNING,
         code="kinematics.floor",
         source="kinematics",
-        text=f"{' and '.join(said)}: {floor_advice(cell.floor, height_m + lowest)}",
+        text=f"{' and '.join(phrases)}: {floor_advice(cell.floor, height_m + lowest)}",
         values={"floor_m": f"{height_m:.6g}", "lowest_m": f"{height_m + lowest:.6g}"},
     )

@@ -1,4 +1,4 @@
-"""Joint positions for a tool's pose as an answer of the mesh: a pure function."""
+"""Answers to inverse-kinematics requests: a pure function."""
 
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
@@ -13,10 +13,10 @@ _TASKS = {
 
 
 def inverse_answer(solver: InverseSolver, request: schema.InverseRequest) -> schema.InverseAnswer:
-    """The solutions, or why there is none.
+    """Return the solutions, or the reason why there is none.
 
     Raises:
-        RefusedError: If the request cannot be answered: the text says what is wrong with which field.
+        RefusedError: If a field of the request is invalid; the text names the field.
     """
     task = _TASKS.get(request.task)
     if task is None:

@@ -1,4 +1,4 @@
-"""The kinematics service: what the arms of a site are, where their parts are, and how near to things."""
+"""Kinematics service of a site: starts the cells' and robots' tasks."""
 
 import asyncio
 import gc
@@ -16,33 +16,33 @@ from robots.glb import link_meshes
 from robots.model import build_model
 from robots.singularity import reach_of
 from robots.urdf.write import to_urdf
-from services.kinematics.answers import Workers, answer_about
-from services.kinematics.cell_state import Place
+from services.kinematics.answers import Workers, answer_robot_requests
+from services.kinematics.cell_state import CellState
 from services.kinematics.descriptions import FixtureMesh, add_surroundings, describe, fixture_meshes
-from services.kinematics.publisher import Followed, follow
+from services.kinematics.publisher import FollowedArm, follow
 from services.kinematics.settings import RobotSettings, Settings
 
 log = logging.getLogger(__name__)
 
 _WORKER = "services.kinematics.worker"
-# Live states come first on a busy machine.
+# Live states have priority over requests on a busy machine.
 _NICE = 5
 
 
 async def serve(session: Session, settings: Settings) -> None:
-    """Tell what the robots are and where their parts are, until cancelled.
+    """Publish descriptions, frames and kinematic states, and answer requests, until cancelled.
 
     Raises:
-        RobotError: If a description or a mesh is wrong.
+        RobotError: If a description or a mesh is invalid.
     """
-    cells = tuple({id(robot.place): robot.place for robot in settings.robots}.values())
+    cells = tuple({id(robot.cell_description): robot.cell_description for robot in settings.robots}.values())
     workers = Workers(Worker(_WORKER, cells, nice=_NICE), Worker(_WORKER, cells, nice=_NICE))
     quotas = settings.quotas
     checks = Quota("checks", at_once=quotas.checks, a_minute=quotas.checks_a_minute)
     try:
         async with asyncio.TaskGroup() as group:
             for cell in cells:
-                robots = [robot for robot in settings.robots if robot.place is cell]
+                robots = [robot for robot in settings.robots if robot.cell_description is cell]
                 group.create_task(_serve_cell(session, settings.site, cell, robots, workers, checks))
     finally:
         gc.unfreeze()
@@ -57,15 +57,17 @@ async def _serve_cell(
     workers: Workers,
     checks: Quota,
 ) -> None:
-    place = Place({robot.name: robot.stale_after_s for robot in robots}, time.monotonic)
+    cell_state = CellState({robot.name: robot.stale_after_s for robot in robots}, time.monotonic)
     fixtures = await asyncio.to_thread(fixture_meshes, cell)
     async with asyncio.TaskGroup() as group:
-        # Hulls take their time: what a robot is, and where, does not wait for them.
+        # Building hulls takes seconds; descriptions and frames do not wait for it.
         built = group.create_task(asyncio.to_thread(build_cell, cell))
         for robot in robots:
-            group.create_task(_serve_robot(session, site, robot, place, built, fixtures, workers, checks))
+            group.create_task(
+                _serve_robot(session, site, robot, cell_state, built, fixtures, workers, checks)
+            )
         await built
-        # What lives as long as the service is no garbage to search: a fifth of a second, now and then.
+        # Hulls live as long as the service; without this each full garbage collection would take 0.2 s.
         gc.freeze()
 
 
@@ -73,23 +75,23 @@ async def _serve_robot(
     session: Session,
     site: str,
     settings: RobotSettings,
-    place: Place,
+    cell_state: CellState,
     built: asyncio.Task[Cell],
     fixtures: Sequence[FixtureMesh],
     workers: Workers,
     checks: Quota,
 ) -> None:
-    (robot,) = (each for each in settings.place.robots if each.name == settings.name)
+    (robot,) = (each for each in settings.cell_description.robots if each.name == settings.name)
     description = load(robot.model, confined=robot.confined)
     model = build_model(description)
     meshes = await asyncio.to_thread(link_meshes, description)
-    answer_about(
+    answer_robot_requests(
         session,
         site,
         robot.name,
         model=model,
         meshes=meshes | {each.name: each.glb for each in fixtures},
-        place=place,
+        cell_state=cell_state,
         workers=workers,
         checks=checks,
     )
@@ -101,11 +103,11 @@ async def _serve_robot(
         cell=settings.cell,
         simulated=settings.simulated,
     )
-    add_surroundings(message, robot, settings.place, fixtures)
+    add_surroundings(message, robot, settings.cell_description, fixtures)
     message.stale_after_s = settings.stale_after_s
     session.declare_publisher(site, robot.name, "description").put(message)
     log.info("%s/%s: %s, %d joints", site, robot.name, description.title, len(model.joints))
-    arm = Followed(
+    arm = FollowedArm(
         site=site,
         name=robot.name,
         model=model,
@@ -113,4 +115,4 @@ async def _serve_robot(
         base_to_site=robot.base_to_site,
         fixtures={each.fixture.name: each.fixture.fixture_to_site for each in fixtures},
     )
-    await follow(session, arm, place, built)
+    await follow(session, arm, cell_state, built)

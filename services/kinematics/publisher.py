@@ -1,4 +1,4 @@
-"""Joint states to `frames`, `kinematics` and `events/kinematics`, as they come; nothing when none come."""
+"""Publishers of `frames`, `kinematics` and `events/kinematics`, driven by incoming joint states only."""
 
 import asyncio
 import logging
@@ -17,7 +17,7 @@ from robots.collision import Cell, distances
 from robots.joints import FloatArray
 from robots.model import RobotModel
 from services.kinematics.alarms import Alarms, Condition
-from services.kinematics.cell_state import Near, Place
+from services.kinematics.cell_state import CellState, Proximity
 from services.kinematics.conditions import (
     limit_conditions,
     missing_conditions,
@@ -27,7 +27,7 @@ from services.kinematics.conditions import (
 )
 from services.kinematics.floor import floor_event
 from services.kinematics.states import (
-    add_near,
+    add_proximity,
     frames_message,
     kinematic_state,
     positions_by_name,
@@ -36,9 +36,9 @@ from services.kinematics.states import (
 
 log = logging.getLogger(__name__)
 
-# Older than this, the last state tells nothing of the speed.
+# Velocities are not computed from an older previous state.
 _LONGEST_DIFFERENCE_S = 0.5
-# What does not move is told so often beside what does.
+# Rate at which `frames` repeats the fixtures, which do not move.
 _FIXTURES_HZ = 1.0
 
 _LEVELS = {
@@ -49,13 +49,13 @@ _LEVELS = {
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Followed:
-    """An arm that is followed.
+class FollowedArm:
+    """An arm and the constants needed to publish its state.
 
     Attributes:
-        reach: As `robots.singularity.reach_of` has it [m].
-        base_to_site: (4, 4).
-        fixtures: (4, 4) in the site's frame of what stands in its cell, by name.
+        reach: Result of `robots.singularity.reach_of` [m].
+        base_to_site: (4, 4) placement of the base in the site's frame.
+        fixtures: (4, 4) placements of its cell's fixtures in the site's frame, by name.
     """
 
     site: str
@@ -71,25 +71,27 @@ class Followed:
         return f"{self.site}/{self.name}"
 
 
-async def follow(session: Session, arm: Followed, place: Place, built: asyncio.Task[Cell]) -> None:
-    """Tell where an arm is and how near to things, until cancelled.
+async def follow(
+    session: Session, arm: FollowedArm, cell_state: CellState, built: asyncio.Task[Cell]
+) -> None:
+    """Publish an arm's frames, kinematic state and events, until cancelled.
 
     Args:
-        place: Of its cell; told of every state that is looked at.
-        built: The cell's hulls, some time: until then nothing is told of clearance.
+        cell_state: State of its cell; receives each state that is processed.
+        built: Task that builds the cell's hulls; until it is done no clearance is published.
     """
     frames = session.declare_publisher(arm.site, arm.name, "frames")
     kinematics = session.declare_publisher(arm.site, arm.name, "kinematics")
     events = session.declare_publisher(arm.site, arm.name, "events/kinematics")
-    frames_pace, kinematics_pace = _Pace(frames.topic.rate_hz), _Pace(kinematics.topic.rate_hz)
-    fixtures_pace = _Pace(_FIXTURES_HZ)
+    frames_limit, kinematics_limit = _RateLimit(frames.topic.rate_hz), _RateLimit(kinematics.topic.rate_hz)
+    fixtures_limit = _RateLimit(_FIXTURES_HZ)
     alarms = Alarms()
     before: tuple[int, FloatArray] | None = None
-    misfit = _Misfit(arm)
-    floor_told = False
+    mismatch_log = _MismatchLog(arm)
+    floor_reported = False
     async for sample in session.subscribe(robot_key(arm.site, arm.name, "joints")):
         time_ns, dated_by = sample.header.source_time_ns, sample.header.publisher
-        frames_due, kinematics_due = frames_pace.due(time_ns), kinematics_pace.due(time_ns)
+        frames_due, kinematics_due = frames_limit.due(time_ns), kinematics_limit.due(time_ns)
         if not (frames_due or kinematics_due):
             continue
         try:
@@ -98,11 +100,11 @@ async def follow(session: Session, arm: Followed, place: Place, built: asyncio.T
             continue
         assert isinstance(message, JointStates)
         positions = positions_by_name(arm.model.joints, message)
-        misfit.say_once(None if positions is not None else message)
+        mismatch_log.update(None if positions is not None else message)
         if positions is None:
             continue
         if sample.live:
-            place.take(arm.name, positions)
+            cell_state.update(arm.name, positions)
         if frames_due:
             transforms = frames_message(
                 arm.model,
@@ -110,10 +112,10 @@ async def follow(session: Session, arm: Followed, place: Place, built: asyncio.T
                 prefix=arm.path,
                 base_to_site=arm.base_to_site,
                 timestamp=message.timestamp,
-                fixtures=arm.fixtures if fixtures_pace.due(time_ns) else {},
+                fixtures=arm.fixtures if fixtures_limit.due(time_ns) else {},
             )
             if not sample.live:
-                # Where the arm was last; published, it would look as if it came from the arm now.
+                # A last value: answer late joiners with it. Published, it would look live.
                 frames.remember(transforms, source_time_ns=time_ns)
                 continue
             frames.put(transforms, source_time_ns=time_ns, dated_by=dated_by)
@@ -123,14 +125,14 @@ async def follow(session: Session, arm: Followed, place: Place, built: asyncio.T
         if velocities is None:
             velocities = _difference(before, time_ns, positions)
         before = time_ns, positions
-        state, near = _state(arm, place, built, positions, velocities, message.timestamp)
+        state, proximity = _state(arm, cell_state, built, positions, velocities, message.timestamp)
         kinematics.put(state, source_time_ns=time_ns, dated_by=dated_by)
-        found = alarms.judge(_conditions(arm, built, positions, state, near), sample.received)
-        if built.done() and not floor_told:
-            floor_told = True
+        found = alarms.judge(_conditions(arm, built, positions, state, proximity), sample.received)
+        if built.done() and not floor_reported:
+            floor_reported = True
             poses = {"at home": arm.model.joints.home, "where it is now": positions}
-            if (listed := floor_event(built.result(), arm.name, poses)) is not None:
-                found.append(listed)
+            if (below_floor := floor_event(built.result(), arm.name, poses)) is not None:
+                found.append(below_floor)
         for event in found:
             event.timestamp.CopyFrom(message.timestamp)
             events.put(event, source_time_ns=time_ns, dated_by=dated_by)
@@ -138,59 +140,59 @@ async def follow(session: Session, arm: Followed, place: Place, built: asyncio.T
 
 
 def _state(
-    arm: Followed,
-    place: Place,
+    arm: FollowedArm,
+    cell_state: CellState,
     built: asyncio.Task[Cell],
     positions: FloatArray,
     velocities: FloatArray | None,
     timestamp: Timestamp,
-) -> tuple[schema.KinematicState, Near | None]:
-    """What `kinematics` tells, and what of it is near; None: hulls are still being built."""
+) -> tuple[schema.KinematicState, Proximity | None]:
+    """Return the `kinematics` message and the clearances; the latter are None until the hulls are built."""
     state = kinematic_state(arm.model, positions, velocities, reach=arm.reach, timestamp=timestamp)
     if not built.done():
         return state, None
-    near = place.near(built.result(), arm.name, positions)
-    add_near(state, near, site=arm.site)
-    return state, near
+    proximity = cell_state.proximity(built.result(), arm.name, positions)
+    add_proximity(state, proximity, site=arm.site)
+    return state, proximity
 
 
 def _conditions(
-    arm: Followed,
+    arm: FollowedArm,
     built: asyncio.Task[Cell],
     positions: FloatArray,
     state: schema.KinematicState,
-    near: Near | None,
+    proximity: Proximity | None,
 ) -> Iterator[Condition]:
-    """What of a state is worth an event."""
+    """Yield the alarm conditions of a state."""
     yield from limit_conditions(arm.model.joints, positions)
     yield from singularity_conditions(state.singularity_margin)
-    if near is not None:
-        yield from own_conditions(near.own)
-        yield from outside_conditions(near.close, partial(distances, built.result()))
-        yield from missing_conditions(near.not_counted)
+    if proximity is not None:
+        yield from own_conditions(proximity.own)
+        yield from outside_conditions(proximity.close, partial(distances, built.result()))
+        yield from missing_conditions(proximity.not_counted)
 
 
-class _Misfit:
-    """Says once that joint states do not fit an arm, until they do."""
+class _MismatchLog:
+    """Warning about joint states that do not match an arm, logged once until they match again."""
 
-    def __init__(self, arm: Followed) -> None:
+    def __init__(self, arm: FollowedArm) -> None:
         self._arm = arm
-        self._said = False
+        self._logged = False
 
-    def say_once(self, message: JointStates | None) -> None:
-        if message is not None and not self._said:
+    def update(self, message: JointStates | None) -> None:
+        if message is not None and not self._logged:
             log.warning(
-                "%s: joint states that do not fit its description (%s): no frames until they do",
+                "%s: joint states do not match its description (%s); frames are not published until they do",
                 self._arm.path,
                 ", ".join(joint.name for joint in message.joints),
             )
-        self._said = message is not None
+        self._logged = message is not None
 
 
 def _difference(
     before: tuple[int, FloatArray] | None, time_ns: int, positions: FloatArray
 ) -> FloatArray | None:
-    """Joint velocities from two states (n,); None: there is no state, or none young enough."""
+    """Return joint velocities (n,) from two states, or None without a recent previous state."""
     if before is None:
         return None
     seconds = (time_ns - before[0]) * 1e-9
@@ -200,11 +202,11 @@ def _difference(
     return difference
 
 
-class _Pace:
-    """Lets pass what keeps a topic within its rate, by source time."""
+class _RateLimit:
+    """Rate limit of a topic, by source time."""
 
     def __init__(self, rate_hz: float | None) -> None:
-        # A state a hair early is as good: without the tenth, 100 Hz would thin to 33 instead of 50.
+        # A tenth of tolerance for jitter: without it, 100 Hz would be thinned to 33 Hz instead of 50 Hz.
         self._interval_ns = int(0.9e9 / rate_hz) if rate_hz else 0
         self._last_ns = -self._interval_ns
 

@@ -1,4 +1,4 @@
-"""What the kinematics service is told at its start."""
+"""Settings of the kinematics service."""
 
 from dataclasses import dataclass
 
@@ -11,13 +11,13 @@ class RobotSettings:
     """A robot of the site.
 
     Attributes:
-        place: Itself, and what it is checked against; robots that share one are followed together.
-        cell: The site file's name for it; empty for a robot alone.
-        stale_after_s: Older than this, its positions tell nobody else where it is.
+        cell_description: The robot and all that it is checked against; robots with the same one share a cell.
+        cell: Name of the cell in the site file; empty for a single robot.
+        stale_after_s: Age after which the other robots' clearances ignore its positions.
     """
 
     name: str
-    place: CellDescription
+    cell_description: CellDescription
     cell: str = ""
     simulated: bool = False
     stale_after_s: float = 1.0
@@ -25,7 +25,7 @@ class RobotSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """The robots of a site, and what each asker may have of their kinematics."""
+    """Robots of a site and the quotas of each client."""
 
     site: str
     robots: tuple[RobotSettings, ...]

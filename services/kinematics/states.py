@@ -1,4 +1,4 @@
-"""Joint states to the messages of `frames` and `kinematics`: pure functions."""
+"""Conversion of joint states to `frames` and `kinematics` messages: pure functions."""
 
 from collections.abc import Iterable, Mapping
 
@@ -11,18 +11,18 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robots.joints import FloatArray, Joints, constraint_values
 from robots.model import RobotModel, frame_placements, link_placements, manipulability, tool_jacobian
 from robots.singularity import singularity_margin
-from services.kinematics.cell_state import Near
+from services.kinematics.cell_state import Proximity
 
 
 def positions_by_name(joints: Joints, states: JointStates) -> FloatArray | None:
-    """(n,) joint positions [rad] or [m] in the robot's order; None: one is missing or not finite."""
+    """Return (n,) joint positions [rad] or [m] in the robot's order; None if one is missing or not finite."""
     by_name = {joint.name: joint.position for joint in states.joints}
     positions = np.array([by_name.get(name, np.nan) for name in joints.names])
     return positions if np.isfinite(positions).all() else None
 
 
 def velocities_by_name(joints: Joints, states: JointStates) -> FloatArray | None:
-    """(n,) joint velocities [rad/s] or [m/s]; None: the controller does not tell them all."""
+    """Return (n,) joint velocities [rad/s] or [m/s]; None if the controller does not report all of them."""
     by_name = {joint.name: joint.velocity for joint in states.joints if joint.HasField("velocity")}
     velocities = np.array([by_name.get(name, np.nan) for name in joints.names])
     return velocities if np.isfinite(velocities).all() else None
@@ -37,16 +37,16 @@ def frames_message(
     timestamp: Timestamp,
     fixtures: Mapping[str, FloatArray] | None = None,
 ) -> FrameTransforms:
-    """Every link, the tool and every named frame, each placed in the site's frame.
+    """Return the placements of every link, the tool and every named frame in the site's frame.
 
     Args:
         positions: (n,) joint positions [rad] or [m].
-        prefix: `<site>/<robot>`; the site's frame is its first part.
-        base_to_site: (4, 4).
-        fixtures: What to place beside them, (4, 4) in the site's frame, by name.
+        prefix: `<site>/<robot>`; the site's frame has the name of the site.
+        base_to_site: (4, 4) placement of the base in the site's frame.
+        fixtures: (4, 4) placements in the site's frame to include, by name.
     """
     frames = dict(zip(model.link_names, link_placements(model, positions), strict=True))
-    # A URDF's link named "tool" is where the tool is: one frame.
+    # A URDF's link named "tool" shares the tool's frame.
     frames |= frame_placements(model, positions)
     placements = base_to_site @ np.array([*frames.values()])
     site = prefix.partition("/")[0]
@@ -66,9 +66,9 @@ def frames_message(
 
 
 def quaternions(rotations: FloatArray) -> FloatArray:
-    """Unit quaternions x, y, z, w of rotation matrices: (m, 3, 3) to (m, 4), w not negative.
+    """Convert rotation matrices (m, 3, 3) to unit quaternions x, y, z, w (m, 4), w not negative.
 
-    Source: Bar-Itzhack 2000: the eigenvector of the largest eigenvalue; exact at half turns too.
+    Source: Bar-Itzhack 2000: the eigenvector of the largest eigenvalue; also exact at half turns.
     """
     r = rotations
     k = np.empty((len(r), 4, 4))
@@ -95,12 +95,12 @@ def kinematic_state(
     reach: float,
     timestamp: Timestamp,
 ) -> schema.KinematicState:
-    """Tool pose and twist in the base frame, manipulability, margins to singular positions and every limit.
+    """Return tool pose and twist in the base frame, manipulability, and margins to singularities and limits.
 
     Args:
         positions: (n,) [rad] or [m].
-        velocities: (n,) [rad/s] or [m/s]; None: not known, and no twist is told.
-        reach: As `robots.singularity.reach_of` has it [m].
+        velocities: (n,) [rad/s] or [m/s]; None if unknown, then there is no twist.
+        reach: Result of `robots.singularity.reach_of` [m].
     """
     message = schema.KinematicState(
         timestamp=timestamp,
@@ -126,19 +126,19 @@ def kinematic_state(
     return message
 
 
-def add_near(message: schema.KinematicState, near: Near, *, site: str) -> None:
-    """How near the arm is to things; frame ids of their pairs begin with the site."""
-    for field, nearest in ((message.clearance, near.outside), (message.own_clearance, near.own)):
+def add_proximity(message: schema.KinematicState, proximity: Proximity, *, site: str) -> None:
+    """Add an arm's clearances; the frame ids of the pairs begin with the site."""
+    for field, nearest in ((message.clearance, proximity.outside), (message.own_clearance, proximity.own)):
         if nearest is not None:
             field.distance = nearest.distance_m
             field.first, field.second = (f"{site}/{name}" for name in nearest.pair)
             field.first_point.CopyFrom(_vector(nearest.points[0].tolist()))
             field.second_point.CopyFrom(_vector(nearest.points[1].tolist()))
-    message.not_counted.extend(near.not_counted)
+    message.not_counted.extend(proximity.not_counted)
 
 
 def forward_answer(model: RobotModel, positions: FloatArray) -> schema.ForwardAnswer:
-    """Tool, links and named frames in the base frame for joint positions (n,) [rad] or [m]."""
+    """Return tool, links and named frames in the base frame for joint positions (n,) [rad] or [m]."""
     placed = dict(zip(model.link_names, link_placements(model, positions), strict=True))
     placed |= frame_placements(model, positions)
     answer = schema.ForwardAnswer(tool_to_base=placed["tool"].ravel().tolist())

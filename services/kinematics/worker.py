@@ -1,4 +1,4 @@
-"""What takes long, in a process of its own: `python -m services.kinematics.worker`, asked by a `Worker`."""
+"""Worker process for long computations: `python -m services.kinematics.worker`, driven by a `Worker`."""
 
 from collections.abc import Callable
 from functools import cache
@@ -17,7 +17,7 @@ from services.kinematics.worker_messages import InverseQuestion, Question
 
 
 def begin(cells: tuple[CellDescription, ...]) -> Callable[[Question], bytes]:
-    """What answers for the robots of these cells; of each as much is read as is asked for."""
+    """Return the function that answers questions about the robots of these cells; it loads them on demand."""
     cell_of = {robot.name: cell for cell in cells for robot in cell.robots}
     ready: dict[tuple[CellDescription, bool], Cell] = {}
 
@@ -25,7 +25,7 @@ def begin(cells: tuple[CellDescription, ...]) -> Callable[[Question], bytes]:
         key = cell_of[robot], exact
         if key in ready:
             return ready[key]
-        # A study may take longer than an answer may: it goes on beside this process.
+        # A pair study may take longer than a request's timeout; it continues in another process.
         cell = build_cell(cell_of[robot], exact=exact, wait=False)
         if not pending(cell):
             ready[key] = cell
@@ -46,7 +46,7 @@ def begin(cells: tuple[CellDescription, ...]) -> Callable[[Question], bytes]:
             built(question.robot, request.exact),
             question.robot,
             question.start,
-            others={name: np.atleast_2d(there) for name, there in question.others.items()},
+            others={name: np.atleast_2d(positions) for name, positions in question.others.items()},
             solver=solver(question.robot),
         ).SerializeToString()
 

@@ -1,4 +1,4 @@
-"""What the service asks its worker processes; requests go as their bytes, for messages cannot be pickled."""
+"""Questions to the worker processes; requests are serialized because messages cannot be pickled."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from robots.joints import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class InverseQuestion:
-    """Joint positions of which robot, for which pose."""
+    """An inverse-kinematics request about a robot."""
 
     robot: str
     request: bytes
@@ -16,11 +16,11 @@ class InverseQuestion:
 
 @dataclass(frozen=True, eq=False)
 class CheckQuestion:
-    """How a program goes.
+    """A program-check request about a robot.
 
     Attributes:
-        start: (n,) where the robot begins [rad] or [m].
-        others: (n,) where each other robot of its cell stands.
+        start: (n,) start positions of the robot [rad] or [m].
+        others: (n,) positions of each other robot of its cell.
     """
 
     robot: str

@@ -401,7 +401,7 @@ def test_a_running_robot_of_the_pages_reads_its_own_folder_only(tmp_path, monkey
         each.name: each.confined
         for settings in begun
         for robot in settings.robots
-        for each in robot.place.robots
+        for each in robot.cell_description.robots
     }
     assert found == {"listed": True, "own": False, "known": False, "mine": True}
 

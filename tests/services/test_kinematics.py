@@ -1,4 +1,4 @@
-"""The kinematics service: frames against the D-H product, twist against differences, nothing old made new."""
+"""Kinematics service: frames against the D-H product, twist against differences, last values stay old."""
 
 import asyncio
 from contextlib import asynccontextmanager
@@ -25,7 +25,7 @@ angles = st.floats(-np.pi, np.pi)
 
 
 def dh_product(description, positions):
-    """Every link's placement by the plain product of the paper's matrices (section 3.2)."""
+    """Return every link's placement as the product of the paper's matrices (section 3.2)."""
     placement = np.eye(4)
     placements = [placement]
     for row, position in zip(description.joints, positions, strict=True):
@@ -59,7 +59,7 @@ def rotation_of(quaternion):
 
 
 @given(angles, angles, angles)
-def test_a_quaternion_turns_as_its_matrix_does(roll, pitch, yaw):
+def test_a_quaternion_is_the_rotation_of_its_matrix(roll, pitch, yaw):
     rotation = rpy_rotation(roll, pitch, yaw)
     (quaternion,) = quaternions(rotation[None])
     assert quaternion[3] >= 0
@@ -67,14 +67,14 @@ def test_a_quaternion_turns_as_its_matrix_does(roll, pitch, yaw):
 
 
 @pytest.mark.parametrize("axis", [*np.eye(3).tolist(), [0.6, 0.8, 0.0], [0.6, 0.0, -0.8]])
-def test_half_turns_are_exact_too(axis):
+def test_half_turns_are_exact(axis):
     rotation = 2 * np.outer(axis, axis) - np.eye(3)
     (quaternion,) = quaternions(rotation[None])
     assert rotation_of(quaternion) == pytest.approx(rotation, abs=1e-12)
 
 
 @pytest.mark.parametrize("name", library_names())
-def test_frames_are_the_dh_product_in_the_sites_frame(name):
+def test_frames_equal_the_dh_product_in_the_sites_frame(name):
     description = load(name)
     model = build_model(description)
     base_to_site = np.eye(4)
@@ -96,7 +96,7 @@ def test_frames_are_the_dh_product_in_the_sites_frame(name):
 
 
 @pytest.mark.parametrize("name", library_names())
-def test_the_twist_is_how_the_tool_moves(name):
+def test_the_twist_equals_the_tools_numeric_derivative(name):
     model = build_model(load(name))
     random = np.random.default_rng(3)
     positions = random.uniform(model.joints.lower, model.joints.upper)
@@ -113,16 +113,16 @@ def test_the_twist_is_how_the_tool_moves(name):
 
 
 @asynccontextmanager
-async def served(mesh):
-    """The service, and a session beside it."""
-    async with open_session(mesh) as own, open_session(mesh) as other:
+async def kinematics_service(mesh):
+    """Run the service of one arm; yield a client session."""
+    async with open_session(mesh) as own, open_session(mesh) as client:
         settings = kinematics.Settings(site="hall", robots=(arm_alone(),))
         own.declare_presence("hall", "arm", "kinematics")
         task = asyncio.create_task(kinematics.serve(own, settings))
-        while await other.last("robomesh/hall/arm/description", timeout_s=0.2) is None:
+        while await client.last("robomesh/hall/arm/description", timeout_s=0.2) is None:
             await asyncio.sleep(0.01)
         try:
-            yield other
+            yield client
         finally:
             task.cancel()
             await asyncio.gather(task, return_exceptions=True)
@@ -135,9 +135,9 @@ def states_of(positions) -> JointStates:
     return message
 
 
-def test_the_description_names_meshes_that_are_answered_as_glb(mesh):
+def test_the_description_names_meshes_that_are_served_as_glb(mesh):
     async def main():
-        async with served(mesh) as session:
+        async with kinematics_service(mesh) as session:
             description = await last_value(session, "robomesh/hall/arm/description")
             assert description.joints[0].name == "waist"
             assert description.provenance.startswith("nominal")
@@ -152,13 +152,13 @@ def test_the_description_names_meshes_that_are_answered_as_glb(mesh):
     run(main())
 
 
-def test_frames_follow_the_joints_within_their_rate_and_old_joints_make_nothing_new(mesh):
+def test_frames_keep_their_rate_and_a_last_value_publishes_none(mesh):
     async def main():
         async with open_session(mesh) as gateway:
             joints = gateway.declare_publisher("hall", "arm", "joints")
             joints.put(states_of([0.5, 0.0, 0.0, 0.0, 0.0]))
-            async with served(mesh) as session:
-                # Joined late, beside a controller that has said its last word.
+            async with kinematics_service(mesh) as session:
+                # The service joined after the controller's last message.
                 frames = session.subscribe("robomesh/hall/arm/frames", newest=1000)
                 old = await anext(frames)
                 assert not old.live
@@ -175,9 +175,9 @@ def test_frames_follow_the_joints_within_their_rate_and_old_joints_make_nothing_
     run(main())
 
 
-def test_joints_that_do_not_fit_make_no_frames(mesh):
+def test_joint_states_that_do_not_match_the_description_publish_no_frames(mesh):
     async def main():
-        async with open_session(mesh) as gateway, served(mesh) as session:
+        async with open_session(mesh) as gateway, kinematics_service(mesh) as session:
             joints = gateway.declare_publisher("hall", "arm", "joints")
             frames = session.subscribe("robomesh/hall/arm/frames", newest=10)
             while not joints.watched:

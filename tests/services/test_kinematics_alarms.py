@@ -1,4 +1,4 @@
-"""Events of where an arm is: each begins once and ends once, however a value trembles."""
+"""Alarm events of an arm's state: each begins once and ends once, also for a noisy value."""
 
 import numpy as np
 import pytest
@@ -24,8 +24,8 @@ JOINTS = joints_of(load("pt600"))
 TICK_S = 0.05
 
 
-def told(conditions_of, values, alarms=None):
-    """(tick, severity, code) of every event, a value each 50 ms."""
+def judged(conditions_of, values, alarms=None):
+    """Judge one value each 50 ms; return (tick, severity, code) of every event."""
     alarms = alarms or Alarms()
     return [
         (tick, event.severity, event.code)
@@ -35,7 +35,7 @@ def told(conditions_of, values, alarms=None):
 
 
 def elbow_at(share):
-    """The elbow so much of its range away from its upper limit."""
+    """Return the conditions of an elbow at this fraction of its range below its upper limit."""
     positions = np.zeros(len(JOINTS))
     positions[2] = JOINTS.upper[2] - share * (JOINTS.upper[2] - JOINTS.lower[2])
     return limit_conditions(JOINTS, positions)
@@ -50,11 +50,11 @@ def near_table(distance_m):
     return outside_conditions([away(distance_m)], lambda pair: (0.05, 0.01))
 
 
-TREMBLE = np.random.default_rng(5).normal(0.0, 1.0, 2000)
+NOISE = np.random.default_rng(5).normal(0.0, 1.0, 2000)
 
 
 @pytest.mark.parametrize(
-    ("conditions_of", "threshold", "tremble", "far", "code"),
+    ("conditions_of", "threshold", "noise", "far", "code"),
     [
         (elbow_at, 0.02, 0.002, 0.10, "kinematics.limit"),
         (singularity_conditions, 0.02, 0.002, 0.10, "kinematics.singularity"),
@@ -62,12 +62,12 @@ TREMBLE = np.random.default_rng(5).normal(0.0, 1.0, 2000)
         (lambda d: own_conditions(away(max(d, 0.0))), 0.0, 0.0003, 0.05, "kinematics.collision"),
     ],
 )
-def test_a_value_that_trembles_about_its_threshold_is_one_event(conditions_of, threshold, tremble, far, code):
-    at_threshold = threshold + tremble * TREMBLE
-    # A second after it went away, or five minutes where an arm passes again and again.
+def test_a_noisy_value_at_its_threshold_is_one_event(conditions_of, threshold, noise, far, code):
+    at_threshold = threshold + noise * NOISE
+    # Singular positions wait for five minutes, because an arm passes them in each cycle.
     wait_s = 300.0 if code.endswith("singularity") else 1.0
     values = [far] * 20 + at_threshold.tolist() + [far] * round((wait_s + 2) / TICK_S)
-    first, last = told(conditions_of, values)
+    first, last = judged(conditions_of, values)
     assert first[1:] in [(Event.INFO, code), (Event.WARNING, code), (Event.ERROR, code)]
     assert 20 <= first[0] < 40
     assert last[1:] == (Event.INFO, f"{code}.over")
@@ -75,7 +75,7 @@ def test_a_value_that_trembles_about_its_threshold_is_one_event(conditions_of, t
 
 
 def demonstrated(robot, *, speed, for_s, step_s):
-    """(s, positions) of the built-in motion, with its rests."""
+    """Yield (time [s], positions) of the built-in demonstration, without its pauses."""
     description = load(robot)
     joints, tour = joints_of(description), demo_tour(description)
     at, begin_s = joints.home, 0.0
@@ -88,40 +88,40 @@ def demonstrated(robot, *, speed, for_s, step_s):
         at, begin_s = target, begin_s + motion.duration + 0.4
 
 
-# The simulated controller demonstrates at 60 %, and slower where somebody asks for it.
+# The simulated controller demonstrates at 60 % by default.
 @pytest.mark.parametrize("speed", [0.6, 0.1])
-def test_an_arm_whose_work_passes_singular_positions_is_one_event(speed):
+def test_a_cycle_through_singular_positions_is_one_event(speed):
     description = load("pt600")
     model, reach, alarms = build_model(description), reach_of(description), Alarms()
     codes, margins = [], []
     for now_s, positions in demonstrated("pt600", speed=speed, for_s=600.0, step_s=0.2):
         margins.append(singularity_margin(model, positions, reach=reach))
         codes += [event.code for event in alarms.judge(singularity_conditions(margins[-1]), now_s)]
-    # It comes and goes: that is what made an event of each time.
+    # The condition itself begins and ends several times.
     assert np.count_nonzero(np.diff(np.array(margins) < 0.02)) > 8
     assert codes == ["kinematics.singularity"]
 
 
-def test_what_comes_near_again_within_a_second_is_not_over():
+def test_a_condition_that_returns_within_a_second_is_not_over():
     values = ([0.01] + [0.10] * 15) * 5 + [0.10] * 30
-    assert [code for _, _, code in told(elbow_at, values)] == ["kinematics.limit", "kinematics.limit.over"]
+    assert [code for _, _, code in judged(elbow_at, values)] == ["kinematics.limit", "kinematics.limit.over"]
 
 
-def test_between_its_thresholds_nothing_begins_and_nothing_ends():
-    assert told(elbow_at, [0.025] * 100) == []
-    assert [code for _, _, code in told(elbow_at, [0.015] + [0.025] * 100)] == ["kinematics.limit"]
+def test_a_condition_neither_begins_nor_ends_in_its_deadband():
+    assert judged(elbow_at, [0.025] * 100) == []
+    assert [code for _, _, code in judged(elbow_at, [0.015] + [0.025] * 100)] == ["kinematics.limit"]
 
 
-def test_an_approach_is_warned_of_then_an_error_then_touching():
+def test_an_approach_causes_a_warning_then_an_error_then_a_collision():
     distances = np.linspace(0.2, 0.0, 200)
-    assert [(severity, code) for _, severity, code in told(near_table, distances)] == [
+    assert [(severity, code) for _, severity, code in judged(near_table, distances)] == [
         (Event.WARNING, "kinematics.clearance.warning"),
         (Event.ERROR, "kinematics.clearance.stop"),
         (Event.ERROR, "kinematics.collision"),
     ]
 
 
-def test_one_thing_is_one_event_whichever_link_is_nearest_to_it():
+def test_an_obstacle_is_one_event_whichever_link_is_nearest():
     def conditions(tick):
         link = f"arm/{('flange', 'wrist')[tick % 2]}"
         near = [away(0.03, (link, "table")), away(0.04, (link, "post")), away(0.045, ("arm/column", "post"))]
@@ -155,12 +155,12 @@ def test_coupled_limits_count_as_joints_do(tmp_path):
     assert event.text == "shoulder + elbow is near the end of its range: 9.0° of 10.0°"
 
 
-def test_a_robot_that_is_late_at_the_start_is_not_missed_and_one_that_stays_away_is():
+def test_a_robot_that_starts_late_is_no_event_and_one_that_stays_absent_is():
     def cell(present):
         return missing_conditions([] if present else ["second"])
 
-    assert told(cell, [False] * 20 + [True] * 100) == []
-    events = told(cell, [False] * 100 + [True] * 100)
+    assert judged(cell, [False] * 20 + [True] * 100) == []
+    events = judged(cell, [False] * 100 + [True] * 100)
     assert [(severity, code) for _, severity, code in events] == [
         (Event.WARNING, "kinematics.not_counted"),
         (Event.INFO, "kinematics.not_counted.over"),

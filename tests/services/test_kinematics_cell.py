@@ -1,4 +1,4 @@
-"""Kinematics of a cell: how near arms are to things and to each other, and what of it is an event."""
+"""Kinematics of a cell: clearances of arms to fixtures and to each other, and their events."""
 
 import asyncio
 from contextlib import asynccontextmanager
@@ -17,7 +17,7 @@ from robots.collision import build_cell, outside_clearance, own_nearest
 from robots.model import tool_placement
 from services import kinematics
 from services.kinematics import answers
-from services.kinematics.cell_state import Place
+from services.kinematics.cell_state import CellState
 from services.site_file.fixtures import Fixture as FixtureRow
 from services.site_file.fixtures import fixture_shape
 from tests.conftest import last_value, run
@@ -45,11 +45,11 @@ BUILT = build_cell(CELL)
 
 
 @asynccontextmanager
-async def hall(mesh):
-    """The service of the cell, a session for its gateways and one for who asks."""
+async def cell_service(mesh):
+    """Run the service of the cell; yield a session for its gateways and one for a monitor."""
     async with open_session(mesh) as own, open_session(mesh) as gateway, open_session(mesh) as monitor:
         robots = tuple(
-            kinematics.RobotSettings(name=robot.name, place=CELL, cell="a", simulated=True)
+            kinematics.RobotSettings(name=robot.name, cell_description=CELL, cell="a", simulated=True)
             for robot in CELL.robots
         )
         task = asyncio.create_task(kinematics.serve(own, kinematics.Settings(site="hall", robots=robots)))
@@ -62,13 +62,13 @@ async def hall(mesh):
 
 
 @asynccontextmanager
-async def telling(gateway, places):
-    """Joint states at 50 Hz of where the robots are, by name; changing the dictionary moves them."""
+async def publishing(gateway, poses):
+    """Publish joint states of the robots' poses, by name, at 50 Hz; changing the dictionary moves a robot."""
 
-    async def tell():
+    async def publish():
         publishers = {}
         while True:
-            for name, positions in list(places.items()):
+            for name, positions in list(poses.items()):
                 if name not in publishers:
                     publishers[name] = gateway.declare_publisher("hall", name, "joints")
                 message = JointStates()
@@ -78,24 +78,24 @@ async def telling(gateway, places):
                 publishers[name].put(message)
             await asyncio.sleep(0.02)
 
-    task = asyncio.create_task(tell())
+    task = asyncio.create_task(publish())
     try:
-        yield places
+        yield poses
     finally:
         task.cancel()
 
 
-async def until(session, topic, right):
-    """The first live message of a topic of the left arm that is right."""
+async def until(session, topic, predicate):
+    """Return the first live message of a topic of the left arm that meets the predicate."""
     async for sample in session.subscribe(f"robomesh/hall/left/{topic}", newest=10):
-        if sample.live and right(message := sample.message()):
+        if sample.live and predicate(message := sample.message()):
             return message
     raise AssertionError("the subscription ended")
 
 
-def test_the_description_tells_what_stands_in_the_cell_with_meshes_that_are_answered(mesh):
+def test_the_description_lists_the_cells_fixtures_and_their_meshes_are_served(mesh):
     async def main():
-        async with hall(mesh) as (_, monitor):
+        async with cell_service(mesh) as (_, monitor):
             for robot in ("left", "right"):
                 description = await last_value(monitor, f"robomesh/hall/{robot}/description")
                 (fixture,) = description.fixtures
@@ -108,14 +108,14 @@ def test_the_description_tells_what_stands_in_the_cell_with_meshes_that_are_answ
     run(main())
 
 
-def test_clearance_is_live_and_counts_the_other_robot_only_while_it_tells_where_it_is(mesh):
+def test_clearance_counts_the_other_robot_only_while_it_reports_its_position(mesh):
     left = np.radians([-57.0, 90.0, -67.0, 0.0, 0.0])
     right = np.radians([69.0, 79.0, -73.0, 0.0, 0.0])
 
     async def main():
         async with (
-            hall(mesh) as (gateway, monitor),
-            telling(gateway, {"left": left, "right": right}) as places,
+            cell_service(mesh) as (gateway, monitor),
+            publishing(gateway, {"left": left, "right": right}) as poses,
         ):
             state = await until(
                 monitor, "kinematics", lambda m: m.HasField("clearance") and not m.not_counted
@@ -129,33 +129,33 @@ def test_clearance_is_live_and_counts_the_other_robot_only_while_it_tells_where_
             points = [(p.x, p.y, p.z) for p in (state.clearance.first_point, state.clearance.second_point)]
             assert np.subtract(*points) @ np.subtract(*points) == pytest.approx(expected.distance_m**2)
             own = own_nearest(BUILT, "left", left)
-            # GJK ends within its tolerance, from whatever pose was measured before.
+            # GJK's result depends on the pose measured before, within its tolerance.
             assert state.own_clearance.distance == pytest.approx(own.distance_m, abs=1e-6)
-            del places["right"]
+            del poses["right"]
             state = await until(monitor, "kinematics", lambda m: m.not_counted)
             assert list(state.not_counted) == ["right"]
             assert state.clearance.second == "hall/post"
             event = await until(monitor, "events/kinematics", lambda m: m.code == "kinematics.not_counted")
-            assert "nobody knows where it is now" in event.text
-            places["right"] = right
+            assert event.values["robot"] == "right"
+            poses["right"] = right
             await until(monitor, "kinematics", lambda m: not m.not_counted)
 
     run(main())
 
 
-def test_an_arm_that_comes_near_a_post_is_an_event_that_late_joiners_hear_of(mesh):
+def test_late_joiners_receive_the_events_of_an_arm_near_a_post(mesh):
     async def main():
         near = np.radians([-36.87, 15.0, -30.0, 0.0, 0.0])
         assert 0 < outside_clearance(BUILT, "left", near, {}).distance_m < 0.01
-        async with hall(mesh) as (gateway, monitor), telling(gateway, {"left": HOME}) as places:
+        async with cell_service(mesh) as (gateway, monitor), publishing(gateway, {"left": HOME}) as poses:
             await until(monitor, "kinematics", lambda m: m.HasField("clearance"))
-            places["left"] = near
+            poses["left"] = near
             await until(monitor, "events/kinematics", lambda m: m.code == "kinematics.clearance.stop")
-            places["left"] = HOME
+            poses["left"] = HOME
             await until(monitor, "events/kinematics", lambda m: m.code == "kinematics.clearance.stop.over")
             events = (await last_value(monitor, "robomesh/hall/left/events/kinematics")).events
-            told = [(event.severity, event.code) for event in events if "clearance" in event.code]
-            assert told == [
+            found = [(event.severity, event.code) for event in events if "clearance" in event.code]
+            assert found == [
                 (schema.Event.WARNING, "kinematics.clearance.warning"),
                 (schema.Event.ERROR, "kinematics.clearance.stop"),
                 (schema.Event.INFO, "kinematics.clearance.warning.over"),
@@ -166,28 +166,28 @@ def test_an_arm_that_comes_near_a_post_is_an_event_that_late_joiners_hear_of(mes
     run(main())
 
 
-def test_frames_place_the_fixtures_too_about_once_a_second(mesh):
+def test_frames_repeat_the_fixtures_about_once_a_second(mesh):
     async def main():
-        async with hall(mesh) as (gateway, monitor), telling(gateway, {"left": HOME}):
-            told_ns, between = [], 0
+        async with cell_service(mesh) as (gateway, monitor), publishing(gateway, {"left": HOME}):
+            fixture_times_ns, between = [], 0
             async for sample in monitor.subscribe("robomesh/hall/left/frames", newest=100):
                 frames = {each.child_frame_id: each for each in sample.message().transforms}
                 assert "hall/left/tool" in frames
                 if "hall/post" in frames:
-                    told_ns.append(sample.header.source_time_ns)
+                    fixture_times_ns.append(sample.header.source_time_ns)
                 else:
-                    between += bool(told_ns)
-                if len(told_ns) == 2:
+                    between += bool(fixture_times_ns)
+                if len(fixture_times_ns) == 2:
                     break
             assert frames["hall/post"].parent_frame_id == "hall"
             assert frames["hall/post"].translation.x == pytest.approx(0.6)
             assert between
-            assert told_ns[1] - told_ns[0] > 0.8e9
+            assert fixture_times_ns[1] - fixture_times_ns[0] > 0.8e9
 
     run(main())
 
 
-def test_inverse_and_check_are_answered_by_processes_that_end_with_the_service(mesh, monkeypatch):
+def test_inverse_and_check_run_in_processes_that_end_with_the_service(mesh, monkeypatch):
     workers = []
 
     def keep(*args, **kwargs):
@@ -195,7 +195,7 @@ def test_inverse_and_check_are_answered_by_processes_that_end_with_the_service(m
         return workers[-1]
 
     async def main():
-        async with hall(mesh) as (gateway, monitor), telling(gateway, {"left": HOME}):
+        async with cell_service(mesh) as (gateway, monitor), publishing(gateway, {"left": HOME}):
             await until(monitor, "frames", lambda m: True)
             key = "robomesh/hall/left/kinematics"
             pose = tool_placement(BUILT.arms["left"].model, HOME).ravel().tolist()
@@ -207,27 +207,27 @@ def test_inverse_and_check_are_answered_by_processes_that_end_with_the_service(m
             assert answer.ok, answer
             assert answer.duration_s > 1.0
             assert "right is left out: nobody knows where it is now" in answer.notes
-            # Two at once are one's own; these wait until a third was refused.
+            # The quota allows a client two concurrent checks; these two wait until the third was refused.
             monkeypatch.setattr(quotas, "_AGAIN_S", 60.0)
-            under_way, let_go = asyncio.Semaphore(0), asyncio.Event()
-            asked = Worker.ask
+            started, release = asyncio.Semaphore(0), asyncio.Event()
+            ask = Worker.ask
 
-            async def held(*args, **kwargs):
-                under_way.release()
-                await let_go.wait()
-                return await asked(*args, **kwargs)
+            async def blocked_ask(*args, **kwargs):
+                started.release()
+                await release.wait()
+                return await ask(*args, **kwargs)
 
             with monkeypatch.context() as patch:
-                patch.setattr(Worker, "ask", held)
+                patch.setattr(Worker, "ask", blocked_ask)
                 two = [
                     asyncio.create_task(monitor.ask(f"{key}/check/li", request, timeout_s=30.0))
                     for _ in range(2)
                 ]
                 for _ in two:
-                    await under_way.acquire()
+                    await started.acquire()
                 with pytest.raises(QuotaError, match="quota checks = 2 a name"):
                     await monitor.ask(f"{key}/check/li", request, timeout_s=20.0)
-                let_go.set()
+                release.set()
                 assert all(answer.ok for answer in await asyncio.gather(*two))
             with pytest.raises(RefusedError, match="start: 2 given, left has 5 joints"):
                 await monitor.ask(f"{key}/check/li", schema.CheckRequest(program="home", start=[0.0, 0.0]))
@@ -250,19 +250,19 @@ def test_inverse_and_check_are_answered_by_processes_that_end_with_the_service(m
     assert not any(alive(pid) for pid in children)
 
 
-def test_what_has_not_moved_is_not_looked_at_again():
+def test_clearances_are_cached_until_a_robot_moves():
     now = [0.0]
-    place = Place({"left": 1.0, "right": 2.0}, lambda: now[0])
-    assert place.positions("left") is None
-    place.take("left", HOME)
-    place.take("right", HOME)
-    near = place.near(BUILT, "left", HOME)
-    place.take("left", HOME.copy())
-    assert place.near(BUILT, "left", HOME.copy()) is near
-    place.take("right", HOME + 0.1)
-    assert place.near(BUILT, "left", HOME) is not near
+    cell_state = CellState({"left": 1.0, "right": 2.0}, lambda: now[0])
+    assert cell_state.positions("left") is None
+    cell_state.update("left", HOME)
+    cell_state.update("right", HOME)
+    near = cell_state.proximity(BUILT, "left", HOME)
+    cell_state.update("left", HOME.copy())
+    assert cell_state.proximity(BUILT, "left", HOME.copy()) is near
+    cell_state.update("right", HOME + 0.1)
+    assert cell_state.proximity(BUILT, "left", HOME) is not near
     now[0] = 1.5
-    assert place.positions("left") is None
-    assert place.others("left")[1] == ()
+    assert cell_state.positions("left") is None
+    assert cell_state.others("left")[1] == ()
     now[0] = 2.5
-    assert place.near(BUILT, "left", HOME).not_counted == ("right",)
+    assert cell_state.proximity(BUILT, "left", HOME).not_counted == ("right",)

@@ -1,4 +1,4 @@
-"""What the kinematics service tells of the floor: in a robot's description, and of arms that are below it."""
+"""Floor in the kinematics service: in a robot's description, and the event of an arm that is below it."""
 
 import numpy as np
 import pytest
@@ -18,9 +18,9 @@ ROBOT = CellRobot("arm", "pt600", placed(0.0, 0.0, 0.4))
 @pytest.mark.parametrize(
     ("floor", "height"), [(Floor(), 0.4), (Floor(0.0), 0.0), (Floor(-0.25, 0.05, 0.01), -0.25), (None, None)]
 )
-def test_a_description_tells_where_the_floor_is_and_whether_there_is_one(floor, height):
+def test_a_description_holds_the_floor_or_its_absence(floor, height):
     message = schema.Description(base_to_site=ROBOT.base_to_site.ravel().tolist())
-    assert floor_of(message) == 0.4  # an older sender's: where it stands
+    assert floor_of(message) == 0.4  # a message of an older sender: the height of the robot's base
     add_surroundings(message, ROBOT, CellDescription((ROBOT,), floor=floor), ())
     sent = schema.Description.FromString(message.SerializeToString())
     assert sent.HasField("floor")
@@ -40,7 +40,7 @@ def test_an_arm_that_is_below_the_floor_is_listed_with_the_line_to_write():
     assert "mm below the floor: if the floor is lower than 400 mm, write floor = 360.0" in event.text
     assert "floor = false" in event.text
     assert event.code in RULES
-    # With that line it is not listed any more.
+    # With that line the arm is not listed.
     for floor in (Floor(0.36), None):
         cell = build_cell(CellDescription((ROBOT,), floor=floor))
         assert floor_event(cell, "arm", {"at home": home, "where it is now": low}) is None

@@ -92,7 +92,7 @@ def kinematics(path: Path | None, connect: str, started: str, metrics: str = "")
     robots = tuple(
         role.RobotSettings(
             name=robot.name,
-            place=cells[robot.name],
+            cell_description=cells[robot.name],
             cell=robot.cell,
             simulated=robot.simulated,
             stale_after_s=robot.stale_after_s,
