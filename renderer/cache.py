@@ -3,17 +3,15 @@
 import contextlib
 import hashlib
 import os
-import tempfile
 import zipfile
-from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 
 from renderer import mesh as mesh_module
 from renderer.mesh import Mesh, prepared
+from robomesh.atomic_write import open_atomically, write_atomically
 
 # Counted up whenever a mesh is prepared differently.
 _VERSION = 4
@@ -37,7 +35,8 @@ def stored_glb(sha256: str, folder: Path) -> bytes | None:
 def store_glb(data: bytes, folder: Path) -> None:
     """Keep a mesh by its hash; a folder that cannot be written costs time later, no more."""
     with contextlib.suppress(OSError):
-        _write_whole(folder / f"{hashlib.sha256(data).hexdigest()}.glb", lambda file: file.write(data))
+        folder.mkdir(parents=True, exist_ok=True)
+        write_atomically(folder / f"{hashlib.sha256(data).hexdigest()}.glb", data, fsync=False)
 
 
 def prepared_once(glb: bytes, *, color: str, folder: Path) -> Mesh:
@@ -55,19 +54,7 @@ def prepared_once(glb: bytes, *, color: str, folder: Path) -> Mesh:
     mesh = prepared(glb, color=color)
     arrays = {name: getattr(mesh, name) for name in names}
     with contextlib.suppress(OSError):
-        _write_whole(path, lambda file: np.savez(file, **arrays))
+        folder.mkdir(parents=True, exist_ok=True)
+        with open_atomically(path, fsync=False) as new_file:
+            np.savez(new_file, **arrays)
     return mesh
-
-
-def _write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """All of it or nothing: several renderers share the folder, and a disk may be full."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
-        partial = Path(file.name)
-        try:
-            write(file.file)
-            file.flush()
-            partial.replace(path)
-        except BaseException:
-            partial.unlink()
-            raise

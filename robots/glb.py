@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from robomesh.atomic_write import write_atomically
 from robots.kinematic_tree import Shape, tree_of
 from robots.meshes.mesh import PAINT, Mesh, Part, Wire, transformed_mesh
 from robots.meshes.read import read_mesh
@@ -207,11 +208,9 @@ def _painted(part: Part, shape: Shape) -> Part:
 
 
 def _keep(path: Path, content: bytes) -> None:
-    """Write whole or not at all: another process may read it at any time."""
+    """Write atomically: another process may read the file at any time."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
-            file.write(content)
-        Path(file.name).replace(path)
+        write_atomically(path, content, fsync=False)
     except OSError as error:
         logger.warning("mesh cache %s: %s; meshes are made again at each start", path.parent, error.strerror)

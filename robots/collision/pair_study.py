@@ -26,6 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from robomesh.atomic_write import write_atomically
 from robots.collision.sampling import SAMPLES
 from robots.collision.surfaces import Surface, Touch
 from robots.collision.verdicts import Kind
@@ -264,24 +265,6 @@ def _kept(path: Path, case: Case) -> tuple[Found, ...] | None:
     return found if len(found) == len(case.pairs) else None
 
 
-def _keep(path: Path, data: bytes) -> None:
-    """Write whole or not at all, also where the machine stops.
-
-    Raises:
-        OSError: If it cannot be written.
-    """
-    with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
-        try:
-            file.write(data)
-            file.flush()
-            # Else the name may come to the disk before the content.
-            os.fsync(file.fileno())
-            Path(file.name).replace(path)
-        except OSError:
-            Path(file.name).unlink()
-            raise
-
-
 def main() -> None:
     """Study the case on standard input, unless another process just did; what is found goes to the file."""
     path = Path(sys.argv[1])
@@ -294,7 +277,7 @@ def main() -> None:
         fcntl.flock(lock, fcntl.LOCK_EX)
         case = _given(sys.stdin.buffer.read())
         if _kept(path, case) is None:
-            _keep(path, _saved(study(case)))
+            write_atomically(path, _saved(study(case)))
 
 
 if __name__ == "__main__":

@@ -17,8 +17,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from robomesh.atomic_write import write_atomically
 from robomesh.endpoints import Tls, bundle
-from services.atomic_write import write_whole
 from services.pki.errors import KeysError
 
 _FOLDER_MODE = 0o700
@@ -137,7 +137,7 @@ def write(path: Path, data: bytes) -> None:
     """
     try:
         _make(path.parent)
-        write_whole(path, data)
+        write_atomically(path, data)
     except OSError as error:
         raise KeysError(f"{path}: cannot be written: {error.strerror}") from None
 

@@ -5,6 +5,7 @@ import hashlib
 import logging
 from pathlib import Path
 
+from robomesh.atomic_write import write_atomically
 from robomesh.errors import BusError
 from robomesh.keys import robot_key
 from robomesh.schemas.robomesh_pb2 import Description
@@ -48,6 +49,4 @@ class Meshes:
 
 def _save(path: Path, data: bytes) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_suffix(".part")
-    unfinished.write_bytes(data)
-    unfinished.replace(path)
+    write_atomically(path, data, mode=0o666, fsync=False)

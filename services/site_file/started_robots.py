@@ -4,12 +4,11 @@ The console writes it, `robomesh up` follows it: each robot gets its simulator, 
 as processes of its own, now and whenever the site comes up.
 """
 
-import os
-import tempfile
 from pathlib import Path
 
 from pydantic import ValidationError
 
+from robomesh.atomic_write import write_atomically
 from robots.bounded_toml import read_toml
 from robots.description import DESCRIPTION_FILE, library_names
 from services.errors import SiteFileError
@@ -105,12 +104,4 @@ def write_started(site: Site, robots: tuple[Robot, ...]) -> None:
         own = model.relative_to(folder).as_posix() if model.is_relative_to(folder) else robot.model
         lines += ["", "[[robot]]", f'name = "{robot.name}"', f'model = "{own}"', 'controller = "simulated"']
     folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile("w", dir=folder, delete=False, encoding="utf-8") as file:
-        try:
-            file.write("\n".join([*lines, ""]))
-            file.flush()
-            os.fsync(file.fileno())
-            Path(file.name).replace(folder / STARTED_FILE)
-        except OSError:
-            Path(file.name).unlink(missing_ok=True)
-            raise
+    write_atomically(folder / STARTED_FILE, "\n".join([*lines, ""]).encode())

@@ -6,8 +6,8 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
+from robomesh.atomic_write import write_atomically
 from robomesh.schemas.robomesh_pb2 import Alarm as AlarmMessage
-from services.atomic_write import write_whole
 from services.watch.alarms import Alarm
 
 _KINDS = {each.name: each.type for each in fields(Alarm)}
@@ -42,7 +42,7 @@ def save(path: Path, alarms: Iterable[Alarm], told_ns: Mapping[str, int]) -> Non
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     values = {"alarms": [asdict(alarm) for alarm in alarms], "told_ns": dict(told_ns)}
-    write_whole(path, json.dumps(values, ensure_ascii=False, indent=1).encode())
+    write_atomically(path, json.dumps(values, ensure_ascii=False, indent=1).encode())
 
 
 def _alarm(entry: dict[str, Any]) -> Alarm:

@@ -1,14 +1,13 @@
 """`robomesh mesh`: what is in a mesh file, and the same in another format."""
 
-import os
 import sys
-import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from robomesh.atomic_write import write_atomically
 from robots.meshes.mesh import Mesh, transformed_mesh
 from robots.meshes.read import Progress, read_mesh
 from robots.meshes.three_ds.write import write_3ds
@@ -126,19 +125,9 @@ _WRITERS: Mapping[str, Callable[[Mesh, Path], dict[Path, bytes]]] = {
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Whole or not at all."""
-    made: Path | None = None
     try:
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
-            made = Path(file.name)
-            file.write(content)
-        umask = os.umask(0)
-        os.umask(umask)
-        made.chmod(0o666 & ~umask)
-        made.replace(path)
+        write_atomically(path, content, mode=0o666, fsync=False)
     except OSError as error:
-        if made is not None:
-            made.unlink(missing_ok=True)
         raise ConversionError(f"{path}: cannot be written: {error.strerror}") from None
 
 

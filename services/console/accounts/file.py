@@ -23,9 +23,9 @@ from pathlib import Path
 from typing import Any
 
 from robomesh import keys
+from robomesh.atomic_write import write_atomically
 from robomesh.errors import KeyNameError
 from robots.bounded_toml import read_toml
-from services.atomic_write import write_whole
 from services.console.errors import AccountsError
 
 _LONGEST_NAME = 32
@@ -180,7 +180,7 @@ def _write(path: Path, accounts: Accounts) -> None:
         lines += [f'hash = "{account.hash}"', f"created = {created}"]
         lines += ["disabled = true"] if account.disabled else []
     try:
-        write_whole(path, "\n".join([*lines, ""]).encode())
+        write_atomically(path, "\n".join([*lines, ""]).encode())
     except OSError as error:
         raise AccountsError(f"{path}: cannot be written: {error.strerror}") from None
 
