@@ -3,22 +3,22 @@
 import { signal } from "@preact/signals";
 import type { ComponentType } from "preact";
 import { useEffect, useRef } from "preact/hooks";
-import { mustSignIn } from "../mesh/account";
 import { AccountMenu } from "../features/account/menu";
 import { SignIn } from "../features/account/sign-in";
-import { a } from "../i18n/account";
-import { held, release } from "../mesh/control";
 import { AlarmBadge } from "../features/events/badge";
 import { Fleet } from "../features/fleet/fleet";
-import { fleetRobots } from "../mesh/known-robots";
+import { a } from "../i18n/account";
 import { timeOfDay } from "../i18n/format";
-import { hello, lostAt } from "../mesh/connection";
-import { Missing } from "../ui/robot-not-found";
-import { NoticeLine } from "../ui/parts";
-import { canBe, isReplay } from "../mesh/robot-name";
-import { defined, plain, programming, recorded, robotLink, route, walled } from "../ui/route";
-import { stop, stopNotice } from "../mesh/stop";
 import { language, switchLanguage, t } from "../i18n/texts";
+import { mustSignIn } from "../mesh/account";
+import { hello, lostAt } from "../mesh/connection";
+import { held, release } from "../mesh/control";
+import { fleetRobots } from "../mesh/known-robots";
+import { canBe, isReplay } from "../mesh/robot-name";
+import { stop, stopNotice } from "../mesh/stop";
+import { NoticeLine } from "../ui/parts";
+import { Missing } from "../ui/robot-not-found";
+import { defined, plain, programming, recorded, robotLink, route, walled } from "../ui/route";
 import { switchTheme, theme } from "../ui/theme";
 
 /** A page that is loaded when it is first shown. */
@@ -28,7 +28,11 @@ function onDemand<Props>(load: () => Promise<ComponentType<Props>>) {
   return function OnDemand(props: Props & object) {
     useEffect(() => {
       failed.value = false;
-      if (!loaded.value) load().then((page) => (loaded.value = page), () => (failed.value = true));
+      if (!loaded.value)
+        load().then(
+          (page) => (loaded.value = page),
+          () => (failed.value = true),
+        );
     }, []);
     const Page = loaded.value;
     return Page ? <Page {...props} /> : failed.value && <NotLoaded />;

@@ -1,12 +1,12 @@
 import "@preact/signals";
 import { render } from "preact";
-import { followPerson, signedOut, whoAmI } from "../mesh/account";
-import { App } from "./app";
-import { followThisTab } from "../mesh/control";
 import { isolateForeignTexts } from "../i18n/foreign-text";
-import { keepConnected } from "../mesh/connection";
 import { language } from "../i18n/texts";
+import { followPerson, signedOut, whoAmI } from "../mesh/account";
+import { keepConnected } from "../mesh/connection";
+import { followThisTab } from "../mesh/control";
 import { applyTheme } from "../ui/theme";
+import { App } from "./app";
 import "./style.css";
 
 isolateForeignTexts();

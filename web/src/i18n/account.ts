@@ -26,7 +26,10 @@ const TEXTS = {
     "Not encrypted: others on the network can read the password. Do not use one that matters elsewhere.",
     "未加密：网络上的他人可读取密码。请勿使用在别处重要的密码。",
   ],
-  insecure_signed_in: ["Insecure: what this page shows and sends is not encrypted.", "不安全：本页显示和发送的内容未加密。"],
+  insecure_signed_in: [
+    "Insecure: what this page shows and sends is not encrypted.",
+    "不安全：本页显示和发送的内容未加密。",
+  ],
 
   out_signed_out: ["You have signed out.", "您已登出。"],
   out_expired: ["Signed out: a session lasts a week at most.", "已登出：会话最长一周。"],
@@ -38,7 +41,10 @@ const TEXTS = {
   out_replaced: ["Signed out here: this browser has signed in anew.", "已登出：此浏览器已重新登录。"],
   out_too_many: ["Signed out: the account is signed in at too many places.", "已登出：该账户登录的地点过多。"],
   out_restart: ["Signed out: the console was started anew.", "已登出：控制台已重新启动。"],
-  out_nothing_live: ["What the page showed is gone, because nothing of it would be live.", "页面内容已清除，因为其中不再有实时数据。"],
+  out_nothing_live: [
+    "What the page showed is gone, because nothing of it would be live.",
+    "页面内容已清除，因为其中不再有实时数据。",
+  ],
 
   menu: ["Account: {account}, {role}", "账户：{account}，{role}"],
   role_monitor: ["monitor", "监视"],
@@ -63,10 +69,16 @@ const TEXTS = {
   cancel: ["Cancel", "取消"],
   close: ["Close", "关闭"],
 
-  refused_short: ["The password is too short: 10 characters at least, a few words are good.", "密码太短：至少 10 个字符，几个词语即可。"],
+  refused_short: [
+    "The password is too short: 10 characters at least, a few words are good.",
+    "密码太短：至少 10 个字符，几个词语即可。",
+  ],
   refused_long: ["The password is too long: 256 bytes at most.", "密码太长：最多 256 字节。"],
   refused_control: ["The password holds a control character: leave it out.", "密码含有控制字符，请去掉。"],
-  refused_repeats: ["The password repeats a few characters: a few words are good.", "密码只重复少数几个字符：请用几个词语。"],
+  refused_repeats: [
+    "The password repeats a few characters: a few words are good.",
+    "密码只重复少数几个字符：请用几个词语。",
+  ],
   refused_run: ["The password is a run of neighbours: a few words are good.", "密码是连续或相邻的字符：请用几个词语。"],
   refused_common: [
     "The password is one that is tried first: a common word or a name, and digits. A few words are good.",

@@ -8,12 +8,21 @@ const TEXTS = {
   not_loaded: ["{name} cannot be opened: {text}", "无法打开 {name}：{text}"],
 
   start_title: ["Define a robot", "定义机器人"],
-  start_words: ["Give each joint its Denavit–Hartenberg row and each link its shape; then run it here, simulated, on the mesh.", "为每个关节给出 D-H 参数，为每个连杆给出外形；随后即可在此仿真运行。"],
+  start_words: [
+    "Give each joint its Denavit–Hartenberg row and each link its shape; then run it here, simulated, on the mesh.",
+    "为每个关节给出 D-H 参数，为每个连杆给出外形；随后即可在此仿真运行。",
+  ],
   start_files: ["From link files", "从连杆文件开始"],
-  start_files_words: ["Drop them here, all at once: the first by name becomes the base, each other one a link with a joint of its own. VRML, 3DS, STL, OBJ, PLY, DAE, GLB, DXF, STEP, with the files that they refer to.", "一次拖入全部文件：按名称第一个为基座，其余各为一个连杆及其关节。支持 VRML、3DS、STL、OBJ、PLY、DAE、GLB、DXF、STEP 及其引用的文件。"],
+  start_files_words: [
+    "Drop them here, all at once: the first by name becomes the base, each other one a link with a joint of its own. VRML, 3DS, STL, OBJ, PLY, DAE, GLB, DXF, STEP, with the files that they refer to.",
+    "一次拖入全部文件：按名称第一个为基座，其余各为一个连杆及其关节。支持 VRML、3DS、STL、OBJ、PLY、DAE、GLB、DXF、STEP 及其引用的文件。",
+  ],
   choose_files: ["Choose files…", "选择文件…"],
   start_urdf: ["From a URDF or a zip", "从 URDF 或 zip 开始"],
-  start_urdf_words: ["Drop the .urdf and its mesh files (or their folder) here: a serial arm becomes D-H rows. A zip that was downloaded here opens as it was. An OpenHRP robot in VRML is chosen by the button.", "拖入 .urdf 及其网格文件（或文件夹）：串联机械臂将转换为 D-H 参数。此处下载的 zip 会按原样打开。OpenHRP 的 VRML 机器人请用按钮选择。"],
+  start_urdf_words: [
+    "Drop the .urdf and its mesh files (or their folder) here: a serial arm becomes D-H rows. A zip that was downloaded here opens as it was. An OpenHRP robot in VRML is chosen by the button.",
+    "拖入 .urdf 及其网格文件（或文件夹）：串联机械臂将转换为 D-H 参数。此处下载的 zip 会按原样打开。OpenHRP 的 VRML 机器人请用按钮选择。",
+  ],
   start_empty: ["Empty", "空白"],
   start_empty_words: ["A base and one joint; shapes can come later.", "一个基座和一个关节，外形可稍后添加。"],
   start_empty_button: ["Start empty", "从空白开始"],
@@ -63,7 +72,10 @@ const TEXTS = {
   no_changes: ["No changes", "无更改"],
   saved: ["{name} is saved in {folder}", "{name} 已保存到 {folder}"],
   exists: ["{text}. Save over it?", "{text}。是否覆盖？"],
-  exists_changed: ["{name} was changed at the site since it was opened here; that would be lost. Save over it?", "{name} 在此处打开后已被更改，覆盖将丢失这些更改。是否覆盖？"],
+  exists_changed: [
+    "{name} was changed at the site since it was opened here; that would be lost. Save over it?",
+    "{name} 在此处打开后已被更改，覆盖将丢失这些更改。是否覆盖？",
+  ],
   save_over: ["Save over it", "覆盖"],
   cancel: ["Cancel", "取消"],
   close: ["Close", "关闭"],
@@ -71,7 +83,10 @@ const TEXTS = {
   mend_first: ["Mend what is listed under Checks first.", "请先解决“检查”中的问题。"],
   started: ["{name} runs, simulated.", "{name} 正在仿真运行。"],
   watch_it: ["Watch it", "前往查看"],
-  cannot_start: ["Robots can be started where the site was brought up with robomesh up.", "仅在以 robomesh up 启动的站点可启动机器人。"],
+  cannot_start: [
+    "Robots can be started where the site was brought up with robomesh up.",
+    "仅在以 robomesh up 启动的站点可启动机器人。",
+  ],
 
   chain: ["Chain", "运动链"],
   chain_hint: ["Alt+↑ and Alt+↓ move a joint; Delete removes it.", "Alt+↑/↓ 移动关节，Delete 删除。"],
@@ -88,7 +103,10 @@ const TEXTS = {
   prismatic: ["Prismatic", "移动"],
   no_shape: ["no shape", "无外形"],
 
-  exists_running: ["{name} is running here. Saving restarts it: it stops, and whoever controls it loses control.", "{name} 正在本站运行。保存会重启它：运动停止，控制者失去控制权。"],
+  exists_running: [
+    "{name} is running here. Saving restarts it: it stops, and whoever controls it loses control.",
+    "{name} 正在本站运行。保存会重启它：运动停止，控制者失去控制权。",
+  ],
   checks: ["Checks", "检查"],
   checking: ["checking…", "检查中…"],
   no_problems: ["Nothing is wrong with it.", "没有问题。"],
@@ -97,15 +115,24 @@ const TEXTS = {
   problems: ["{count} problems", "{count} 个问题"],
 
   scene: ["3-D", "三维"],
-  scene_hint: ["Drag to turn, scroll to zoom, right drag to move; click a link to choose it; arrow keys turn.", "拖动旋转，滚轮缩放，右键平移；单击选择连杆；方向键旋转。"],
-  no_webgl: ["This browser has no WebGL: there is no 3-D view, all else works.", "此浏览器不支持 WebGL，无三维视图，其余功能正常。"],
+  scene_hint: [
+    "Drag to turn, scroll to zoom, right drag to move; click a link to choose it; arrow keys turn.",
+    "拖动旋转，滚轮缩放，右键平移；单击选择连杆；方向键旋转。",
+  ],
+  no_webgl: [
+    "This browser has no WebGL: there is no 3-D view, all else works.",
+    "此浏览器不支持 WebGL，无三维视图，其余功能正常。",
+  ],
   show_rows: ["D-H", "D-H"],
   show_shapes: ["Shapes", "外形"],
   gizmo: ["Dragging", "拖动"],
   gizmo_off: ["Select", "选择"],
   gizmo_translate: ["Move", "平移"],
   gizmo_rotate: ["Turn", "转动"],
-  gizmo_hint: ["Choose a link with a shape, or the tool, to place it. Shift: steps of 10 mm or 15°.", "选择有外形的连杆或工具以放置。按住 Shift：10 mm 或 15° 步进。"],
+  gizmo_hint: [
+    "Choose a link with a shape, or the tool, to place it. Shift: steps of 10 mm or 15°.",
+    "选择有外形的连杆或工具以放置。按住 Shift：10 mm 或 15° 步进。",
+  ],
   model_failed: ["{file}: {text}", "{file}：{text}"],
   legend_z: ["joint axis z", "关节轴 z"],
   legend_d: ["offset d", "偏距 d"],
@@ -134,7 +161,10 @@ const TEXTS = {
   name_hint: ["lower-case letters, digits, - and _", "小写字母、数字、- 和 _"],
   title: ["Title", "标题"],
   provenance: ["Provenance", "来源"],
-  provenance_hint: ["Where the dimensions come from: a data sheet, a measurement, a guess.", "尺寸来源：数据手册、测量或估计。"],
+  provenance_hint: [
+    "Where the dimensions come from: a data sheet, a measurement, a guess.",
+    "尺寸来源：数据手册、测量或估计。",
+  ],
   units: ["Units", "单位"],
   unit_length: ["Lengths", "长度"],
   unit_angle: ["Angles", "角度"],
@@ -172,20 +202,38 @@ const TEXTS = {
   tool_pose: ["Tool frame, from the last link’s", "工具坐标系（相对末端连杆）"],
   field_of: ["{field} of {name}", "{name} 的 {field}"],
 
-  frames_words: ["Sensors, mounting faces: frames on any link, published with it.", "传感器、安装面：任意连杆上的坐标系，随其发布。"],
+  frames_words: [
+    "Sensors, mounting faces: frames on any link, published with it.",
+    "传感器、安装面：任意连杆上的坐标系，随其发布。",
+  ],
   add_frame: ["Add frame", "添加坐标系"],
   on_link: ["On link", "所在连杆"],
-  constraints_words: ["Limits on a sum of joint positions: lower ≤ Σ factor × joint ≤ upper.", "关节位置之和的限制：下限 ≤ Σ 系数 × 关节 ≤ 上限。"],
+  constraints_words: [
+    "Limits on a sum of joint positions: lower ≤ Σ factor × joint ≤ upper.",
+    "关节位置之和的限制：下限 ≤ Σ 系数 × 关节 ≤ 上限。",
+  ],
   add_constraint: ["Add constraint", "添加约束"],
   factor_of: ["Factor of {joint}", "{joint} 的系数"],
   constraint_number: ["Constraint {number}", "约束 {number}"],
-  collisions_words: ["Every two links are checked against each other before each motion. Tick a pair to ignore it; a grey tick is set by a rule, as robomesh robot check lists it.", "每次运动前检查每两个连杆。勾选即忽略该连杆对；灰色勾选由规则设定，与 robomesh robot check 的列表一致。"],
-  planning: ["Working out how each pair is checked. Links whose hulls touch are studied in up to 10,000 positions, which can take three minutes.", "正在计算各连杆对的检查方式。凸包接触的连杆需分析最多 10,000 个位置，最长约三分钟。"],
+  collisions_words: [
+    "Every two links are checked against each other before each motion. Tick a pair to ignore it; a grey tick is set by a rule, as robomesh robot check lists it.",
+    "每次运动前检查每两个连杆。勾选即忽略该连杆对；灰色勾选由规则设定，与 robomesh robot check 的列表一致。",
+  ],
+  planning: [
+    "Working out how each pair is checked. Links whose hulls touch are studied in up to 10,000 positions, which can take three minutes.",
+    "正在计算各连杆对的检查方式。凸包接触的连杆需分析最多 10,000 个位置，最长约三分钟。",
+  ],
   plan_failed: ["How pairs are checked could not be worked out: {text}", "无法得出连杆对的检查方式：{text}"],
   plan_again: ["Try again", "重试"],
   plan_free: ["At home no checked pair touches.", "在零位，所检查的连杆对均不接触。"],
-  plan_touching_one: ["One checked pair touches at home: motions from there count as collisions.", "有 1 对所检查的连杆在零位接触：从零位开始的运动会被视为碰撞。"],
-  plan_touching: ["{count} checked pairs touch at home: motions from there count as collisions.", "有 {count} 对所检查的连杆在零位接触：从零位开始的运动会被视为碰撞。"],
+  plan_touching_one: [
+    "One checked pair touches at home: motions from there count as collisions.",
+    "有 1 对所检查的连杆在零位接触：从零位开始的运动会被视为碰撞。",
+  ],
+  plan_touching: [
+    "{count} checked pairs touch at home: motions from there count as collisions.",
+    "有 {count} 对所检查的连杆在零位接触：从零位开始的运动会被视为碰撞。",
+  ],
   plan_counts: ["Pairs checked: {checked}, ignored: {ignored}", "检查 {checked} 对，忽略 {ignored} 对"],
   ignore: ["Ignore", "忽略"],
   pair: ["Links", "连杆"],
@@ -197,15 +245,30 @@ const TEXTS = {
   way_visual_meshes: ["Exact visual meshes.", "精确外观网格。"],
   pair_adjacent: ["They are one joint apart.", "两者仅隔一个关节。"],
   pair_description: ["The description says so.", "由机器人描述指定。"],
-  pair_always: ["They touch in all of {positions} positions, as exact meshes too.", "在全部 {positions} 个位置都接触，精确网格也是如此。"],
+  pair_always: [
+    "They touch in all of {positions} positions, as exact meshes too.",
+    "在全部 {positions} 个位置都接触，精确网格也是如此。",
+  ],
   pair_hulls_touch: ["At home only their hulls touch.", "在零位仅凸包接触。"],
   pair_false_contacts: ["In {percent} % of positions only their hulls touch.", "在 {percent}% 的位置仅凸包接触。"],
-  pair_too_large: ["Their hulls touch in {percent} % of positions. Their exact meshes have over {triangles} triangles, too many to check.", "凸包在 {percent}% 的位置接触。精确网格超过 {triangles} 个三角形，数量过多，无法检查。"],
-  pair_touching: ["They touch at home, as exact meshes too. Correct their shapes or home, or ignore the pair.", "在零位接触，精确网格也是如此。请修正外形或零位，或忽略该连杆对。"],
+  pair_too_large: [
+    "Their hulls touch in {percent} % of positions. Their exact meshes have over {triangles} triangles, too many to check.",
+    "凸包在 {percent}% 的位置接触。精确网格超过 {triangles} 个三角形，数量过多，无法检查。",
+  ],
+  pair_touching: [
+    "They touch at home, as exact meshes too. Correct their shapes or home, or ignore the pair.",
+    "在零位接触，精确网格也是如此。请修正外形或零位，或忽略该连杆对。",
+  ],
   pair_no_surface: ["They touch at home, and one has no surface.", "在零位接触，且其中一个没有表面。"],
-  pair_not_studied: ["They touch at home. The study of their meshes failed, or took over {seconds} s or {gigabytes} GB.", "在零位接触。网格分析失败，或超过 {seconds} 秒或 {gigabytes} GB。"],
+  pair_not_studied: [
+    "They touch at home. The study of their meshes failed, or took over {seconds} s or {gigabytes} GB.",
+    "在零位接触。网格分析失败，或超过 {seconds} 秒或 {gigabytes} GB。",
+  ],
   no_pairs: ["Fewer than two links have a shape: there is nothing to check.", "有外形的连杆不足两个：无可检查。"],
-  views_words: ["Turn the 3-D view to where a camera should stand, then set it. What is not set is worked out from the arm’s reach.", "将三维视图转到相机位置后设定。未设定的视图按臂展自动计算。"],
+  views_words: [
+    "Turn the 3-D view to where a camera should stand, then set it. What is not set is worked out from the arm’s reach.",
+    "将三维视图转到相机位置后设定。未设定的视图按臂展自动计算。",
+  ],
   view_set: ["Set from the camera", "按当前视角设定"],
   view_reset: ["Back to automatic", "恢复自动"],
   view_look: ["Look", "查看"],
@@ -216,7 +279,10 @@ const TEXTS = {
   projection: ["Projection", "投影"],
   orthographic: ["parallel", "平行"],
   perspective: ["perspective", "透视"],
-  wrong_number: ["“{text}” is no number: write it as 1234.5, without commas, fractions or units; Escape takes it back", "“{text}”不是数字：请写作 1234.5，不用逗号、分数或单位；按 Esc 恢复"],
+  wrong_number: [
+    "“{text}” is no number: write it as 1234.5, without commas, fractions or units; Escape takes it back",
+    "“{text}”不是数字：请写作 1234.5，不用逗号、分数或单位；按 Esc 恢复",
+  ],
   odd_size: ["{file} is {size} large: is the file’s unit right?", "{file} 的尺寸为 {size}：文件单位正确吗？"],
 } as const;
 

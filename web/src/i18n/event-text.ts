@@ -1,11 +1,11 @@
 // Events in Chinese, by their code: a sentence with what their values tell, or the alarm that is over. In English
 // they are in their own words.
 
-import { Event_Severity as Severity } from "../gen/robomesh_pb";
 import type { Event } from "../gen/robomesh_pb";
+import { Event_Severity as Severity } from "../gen/robomesh_pb";
+import { alarmTitle } from "./alarm-words";
 import { isolated } from "./foreign-text";
 import { language, t } from "./texts";
-import { alarmTitle } from "./alarm-words";
 
 // What nobody has to act on; a code that may be an alarm's too stands here as it is when it is none.
 const CHINESE: Record<string, string> = {

@@ -13,7 +13,10 @@ export const FLEET_TEXTS = {
   sort: ["Order", "排序"],
   by_name: ["By name", "按名称"],
   by_urgency: ["Most urgent first", "最紧急优先"],
-  no_match: ["No robot matches the filter. {count} are on the mesh.", "没有机器人符合筛选条件，网络上共有 {count} 台。"],
+  no_match: [
+    "No robot matches the filter. {count} are on the mesh.",
+    "没有机器人符合筛选条件，网络上共有 {count} 台。",
+  ],
   clear: ["Clear the filter", "清除筛选"],
   robots: ["{count} robots", "{count} 台机器人"],
   robot_one: ["1 robot", "1 台机器人"],
@@ -26,7 +29,10 @@ export const FLEET_TEXTS = {
   far: ["over the slow link", "经慢速链路"],
   loading: ["Loading…", "正在加载…"],
   nothing_comes: ["Nothing comes from it: its gateway or the line to it is gone.", "没有数据：网关离线或线路中断。"],
-  far_hint: ["Another site than this console's: its picture comes over the slow link.", "不在本控制台所在站点：图像经慢速链路传输。"],
+  far_hint: [
+    "Another site than this console's: its picture comes over the slow link.",
+    "不在本控制台所在站点：图像经慢速链路传输。",
+  ],
   alarm_count: ["{count} alarms", "{count} 条报警"],
 } as const;
 

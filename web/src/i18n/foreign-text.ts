@@ -2,11 +2,12 @@
 // can change the order in which what is around it is read (CVE-2021-42574). It is done once, for every text that is
 // drawn: at each place by itself it would be forgotten at some.
 
-import { h, options } from "preact";
 import type { ComponentChildren, VNode } from "preact";
+import { h, options } from "preact";
 
 /** Control characters of direction; a text between FSI and PDI without others in it is isolated already, and stays. */
-const CONTROLS = /(\u2068[^\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]*\u2069)|[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]/g;
+const CONTROLS =
+  /(\u2068[^\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]*\u2069)|[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]/g;
 const ANY_CONTROL = /[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]/;
 /** Letters that are read from right to left: Hebrew, Arabic, Syriac, Thaana, NKo, Adlam and the others of their blocks. */
 const FROM_THE_RIGHT = /[\u0590-\u08ff\ufb1d-\ufdff\ufe70-\ufefe\u{10800}-\u{10fff}\u{1e800}-\u{1efff}]/u;

@@ -2,8 +2,8 @@
 
 import type { Timestamp } from "@bufbuild/protobuf/wkt";
 import { timestampMs } from "@bufbuild/protobuf/wkt";
-import { Description_Joint_Type } from "../gen/robomesh_pb";
 import type { Description_Joint } from "../gen/robomesh_pb";
+import { Description_Joint_Type } from "../gen/robomesh_pb";
 import { t } from "./texts";
 
 const DEGREES = 180 / Math.PI;

@@ -4,7 +4,10 @@ import { inLanguage } from "./texts";
 
 const TEXTS = {
   choose: ["Program a robot", "机器人编程"],
-  choose_words: ["Choose the robot that the program is for. Each robot's draft is kept in this browser.", "请选择要编程的机器人。每台机器人的草稿都保存在此浏览器中。"],
+  choose_words: [
+    "Choose the robot that the program is for. Each robot's draft is kept in this browser.",
+    "请选择要编程的机器人。每台机器人的草稿都保存在此浏览器中。",
+  ],
   program_of: ["Program of {robot}", "{robot} 的程序"],
   to_robot: ["Robot", "机器人"],
 
@@ -14,15 +17,27 @@ const TEXTS = {
   new_hint: ["Begins anew with an example. Undo brings the text back.", "以示例重新开始。可用撤销恢复原文。"],
   open: ["Open…", "打开…"],
   save: ["Save file", "保存文件"],
-  save_hint: ["Downloads the program. The draft itself is kept in this browser as you type.", "下载程序文件。草稿会随输入保存在此浏览器中。"],
+  save_hint: [
+    "Downloads the program. The draft itself is kept in this browser as you type.",
+    "下载程序文件。草稿会随输入保存在此浏览器中。",
+  ],
   undo: ["Undo", "撤销"],
   redo: ["Redo", "重做"],
   replaced: ["A new program. Undo brings the old text back.", "已新建程序。可用撤销恢复原文。"],
   opened: ["{name} opened. Undo brings the old text back.", "已打开 {name}。可用撤销恢复原文。"],
-  too_large: ["{name} is not opened: {size} KiB, and a program has at most 64 KiB.", "未打开 {name}：{size} KiB，程序最大 64 KiB。"],
+  too_large: [
+    "{name} is not opened: {size} KiB, and a program has at most 64 KiB.",
+    "未打开 {name}：{size} KiB，程序最大 64 KiB。",
+  ],
   no_text: ["{name} is not opened: it is no text.", "未打开 {name}：不是文本文件。"],
-  not_kept: ["This browser does not keep the draft: {text}. Save it as a file.", "此浏览器无法保存草稿：{text}。请保存为文件。"],
-  example_comment: ["Joints in degrees (mm where they slide); the check says what it does.", "关节单位为度（移动关节为 mm）；检查会说明其动作。"],
+  not_kept: [
+    "This browser does not keep the draft: {text}. Save it as a file.",
+    "此浏览器无法保存草稿：{text}。请保存为文件。",
+  ],
+  example_comment: [
+    "Joints in degrees (mm where they slide); the check says what it does.",
+    "关节单位为度（移动关节为 mm）；检查会说明其动作。",
+  ],
 
   text: ["Program text", "程序文本"],
   lines: ["{count} lines", "{count} 行"],
@@ -36,10 +51,19 @@ const TEXTS = {
   check_empty: ["Nothing to check yet: write a line, or choose New.", "尚无内容可检查：请输入一行，或选择新建。"],
   check_failed: ["Not checked: {text}", "未检查：{text}"],
   checked_at: ["from where the robot was at {time}", "以 {time} 的机器人位置为起点"],
-  moved_since: ["from where the robot was; it has moved since: check again", "以当时位置为起点；机器人已移动，请重新检查"],
+  moved_since: [
+    "from where the robot was; it has moved since: check again",
+    "以当时位置为起点；机器人已移动，请重新检查",
+  ],
   verdict_ok: ["Nothing in the way. Takes {duration}.", "无冲突，耗时 {duration}。"],
-  verdict_alone: ["Only the arm itself was checked: no floor, no fixture. Takes {duration}.", "仅检查了机器人自身：无地面、无固定物，耗时 {duration}。"],
-  verdict_warns: ["Can run, with {count} to look at. Takes {duration}.", "可以运行，有 {count} 处需注意，耗时 {duration}。"],
+  verdict_alone: [
+    "Only the arm itself was checked: no floor, no fixture. Takes {duration}.",
+    "仅检查了机器人自身：无地面、无固定物，耗时 {duration}。",
+  ],
+  verdict_warns: [
+    "Can run, with {count} to look at. Takes {duration}.",
+    "可以运行，有 {count} 处需注意，耗时 {duration}。",
+  ],
   verdict_one: ["1 violation. Takes {duration}.", "1 处违规，耗时 {duration}。"],
   verdict_many: ["{count} violations. Takes {duration}.", "{count} 处违规，耗时 {duration}。"],
   verdict_error: ["1 error in the text.", "文本中有 1 处错误。"],
@@ -62,14 +86,20 @@ const TEXTS = {
   play: ["Play", "播放"],
   pause: ["Pause", "暂停"],
   hide_ghost: ["Hide ghost", "隐藏虚影"],
-  scrub_hint: ["Drag to see the robot's ghost at a moment; nothing moves.", "拖动以查看某一时刻的虚影；机器人不会移动。"],
+  scrub_hint: [
+    "Drag to see the robot's ghost at a moment; nothing moves.",
+    "拖动以查看某一时刻的虚影；机器人不会移动。",
+  ],
   no_motion_yet: ["The motion appears here once the program is checked.", "程序检查后将在此显示运动。"],
   clearance: ["Clearance", "间距"],
   clearance_now: ["clearance {distance}", "间距 {distance}"],
 
   run: ["Run", "运行"],
   run_named: ["Run “{name}”", "运行“{name}”"],
-  run_hint: ["The gateway checks it from where the robot is, then runs it step by step.", "网关将从当前位置检查，然后逐步运行。"],
+  run_hint: [
+    "The gateway checks it from where the robot is, then runs it step by step.",
+    "网关将从当前位置检查，然后逐步运行。",
+  ],
   run_empty: ["There is no program to run.", "没有可运行的程序。"],
   run_error: ["Cannot run: line {line}: {text}", "无法运行：第 {line} 行：{text}"],
   run_running: ["A program is running.", "程序正在运行。"],
@@ -105,7 +135,10 @@ const TEXTS = {
   roll: ["roll", "滚转"],
   pitch: ["pitch", "俯仰"],
   yaw: ["yaw", "偏航"],
-  pose_keys: ["Keys: up and down by 1, Shift by 0.1, Page up and down by 10.", "键盘：上下键 1，Shift 0.1，翻页键 10。"],
+  pose_keys: [
+    "Keys: up and down by 1, Shift by 0.1, Page up and down by 10.",
+    "键盘：上下键 1，Shift 0.1，翻页键 10。",
+  ],
   points: ["Points", "点"],
   no_points: ["No points yet.", "尚无点。"],
   added: ["{name} added. Undo takes it back.", "已添加 {name}，可撤销。"],
@@ -115,8 +148,14 @@ const TEXTS = {
   delete: ["Delete", "删除"],
   delete_point: ["Delete {name}", "删除 {name}"],
   deleted: ["{name} deleted. Undo brings it back.", "已删除 {name}，可撤销。"],
-  deleted_used: ["{name} deleted; still used in line {lines}. Undo brings it back.", "已删除 {name}；第 {lines} 行仍在使用，可撤销。"],
-  name_wrong: ["“{name}” cannot be a name: lower-case letters, digits, “_” and “-”, beginning with a letter.", "“{name}”不能作为名称：仅限小写字母、数字、“_”“-”，且以字母开头。"],
+  deleted_used: [
+    "{name} deleted; still used in line {lines}. Undo brings it back.",
+    "已删除 {name}；第 {lines} 行仍在使用，可撤销。",
+  ],
+  name_wrong: [
+    "“{name}” cannot be a name: lower-case letters, digits, “_” and “-”, beginning with a letter.",
+    "“{name}”不能作为名称：仅限小写字母、数字、“_”“-”，且以字母开头。",
+  ],
   name_taken: ["There is a point “{name}” already.", "已有名为“{name}”的点。"],
   point_wrong: ["{name} has not {count} numbers, one a joint.", "{name} 没有 {count} 个数值（每关节一个）。"],
 } as const;

@@ -17,7 +17,10 @@ const TEXTS = {
   week: ["Last 7 days", "最近 7 天"],
   none: ["Nothing is recorded yet. Start a recording on a robot's page.", "尚无录制。请在机器人页面上开始录制。"],
   no_match: ["No recording matches.", "没有匹配的录制。"],
-  no_recorder: ["The recorder of {site} does not answer: its recordings cannot be listed now. Trying again.", "{site} 的录制服务无应答，暂时无法列出其录制，正在重试。"],
+  no_recorder: [
+    "The recorder of {site} does not answer: its recordings cannot be listed now. Trying again.",
+    "{site} 的录制服务无应答，暂时无法列出其录制，正在重试。",
+  ],
   list_refused: ["The recordings of {site} cannot be listed: {text}", "无法列出 {site} 的录制：{text}"],
   free: ["{size} free", "剩余 {size}"],
   free_low: ["only {size} free", "仅剩 {size}"],
@@ -26,8 +29,14 @@ const TEXTS = {
   nothing_written: ["Nothing was written.", "未写入任何内容。"],
   flight_on: ["Flight recorder on", "循环录制：开"],
   flight_off: ["Flight recorder off", "循环录制：关"],
-  flight_on_hint: ["It always keeps the last minutes, and saves them when something goes wrong.", "始终保留最近几分钟，出现问题时自动保存。"],
-  flight_off_hint: ["Nothing is kept of what nobody records. The site file turns it on.", "未录制的内容不会保留。可在站点文件中开启。"],
+  flight_on_hint: [
+    "It always keeps the last minutes, and saves them when something goes wrong.",
+    "始终保留最近几分钟，出现问题时自动保存。",
+  ],
+  flight_off_hint: [
+    "Nothing is kept of what nobody records. The site file turns it on.",
+    "未录制的内容不会保留。可在站点文件中开启。",
+  ],
   save_last: ["Save the last minutes", "保存最近几分钟"],
   save_of: ["Save the last minutes of {robot}", "保存 {robot} 的最近几分钟"],
   saving: ["Saving the last minutes of {robot}…", "正在保存 {robot} 的最近几分钟…"],
@@ -49,7 +58,10 @@ const TEXTS = {
   no_thumbnail: ["No picture of it", "无图像"],
   play: ["Play", "播放"],
   play_of: ["Play {name}", "播放 {name}"],
-  download_mcap_hint: ["Downloads the file: everything that was recorded. Foxglove, Lichtblick and Rerun open it.", "下载完整录制文件，可用 Foxglove、Lichtblick、Rerun 打开。"],
+  download_mcap_hint: [
+    "Downloads the file: everything that was recorded. Foxglove, Lichtblick and Rerun open it.",
+    "下载完整录制文件，可用 Foxglove、Lichtblick、Rerun 打开。",
+  ],
   download_csv_hint: ["Downloads joints and tool as a table.", "下载关节与工具数据表。"],
   download_of: ["Download {name} as {kind}", "下载 {name}（{kind}）"],
   compare: ["Compare", "比较"],
@@ -60,7 +72,10 @@ const TEXTS = {
 
   back: ["All recordings", "全部录制"],
   opening: ["Opening the recording…", "正在打开录制…"],
-  no_player: ["No player answers at {site}, so nothing can be played now. The file can be downloaded all the same.", "{site} 没有播放服务应答，暂时无法播放，但仍可下载文件。"],
+  no_player: [
+    "No player answers at {site}, so nothing can be played now. The file can be downloaded all the same.",
+    "{site} 没有播放服务应答，暂时无法播放，但仍可下载文件。",
+  ],
   not_opened: ["It cannot be played: {text}", "无法播放：{text}"],
   player_gone: ["The player does not answer any more. What is shown is not moving.", "播放服务已无应答，画面已停止。"],
   closed: ["The replay has ended: {text}", "回放已结束：{text}"],
@@ -78,7 +93,10 @@ const TEXTS = {
 
   no_picture_then: ["No video was recorded of this moment.", "此时刻没有录制视频。"],
   no_joints_then: ["No joints were recorded of this moment.", "此时刻没有录制关节数据。"],
-  not_decoded: ["This browser decodes recorded video over https or on localhost only.", "此浏览器仅在 https 或 localhost 下才能解码录制的视频。"],
+  not_decoded: [
+    "This browser decodes recorded video over https or on localhost only.",
+    "此浏览器仅在 https 或 localhost 下才能解码录制的视频。",
+  ],
   recorded_view: ["{view}, recorded", "{view}（录制）"],
   video: ["Video", "视频"],
   video_second: ["Video of {name}", "{name} 的视频"],
@@ -95,7 +113,10 @@ const TEXTS = {
   speed: ["Speed", "速度"],
   loop: ["Loop", "循环"],
   moment: ["Moment", "时刻"],
-  keys: ["Keys: space plays and pauses, ← → one step, Shift ← → ten, Home and End, + − speed, L loop.", "键盘：空格播放/暂停，← → 单步，Shift ← → 十步，Home/End 首尾，+ − 速度，L 循环。"],
+  keys: [
+    "Keys: space plays and pauses, ← → one step, Shift ← → ten, Home and End, + − speed, L loop.",
+    "键盘：空格播放/暂停，← → 单步，Shift ← → 十步，Home/End 首尾，+ − 速度，L 循环。",
+  ],
   position_of: ["{position} of {duration}", "{position} / {duration}"],
 
   plots: ["Plots", "曲线"],
@@ -128,8 +149,14 @@ const TEXTS = {
   attached: ["Inside the file: {names}", "文件内附：{names}"],
   export: ["Export", "导出"],
   export_mp4: ["MP4 of “{view}”", "“{view}” 的 MP4"],
-  export_mp4_live: ["Saves this view as it plays from now on, at the speed chosen above, until you end the download.", "从现在起按上方速度保存此视图的播放画面，直到结束下载。"],
-  export_line: ["MP4 drawn afresh, of the whole recording at any size, by the command line:", "用命令行重新绘制整个录制的 MP4（尺寸任选）："],
+  export_mp4_live: [
+    "Saves this view as it plays from now on, at the speed chosen above, until you end the download.",
+    "从现在起按上方速度保存此视图的播放画面，直到结束下载。",
+  ],
+  export_line: [
+    "MP4 drawn afresh, of the whole recording at any size, by the command line:",
+    "用命令行重新绘制整个录制的 MP4（尺寸任选）：",
+  ],
   copy: ["Copy", "复制"],
   copied: ["Copied", "已复制"],
 
@@ -179,5 +206,7 @@ export function recordedView(view: string): string {
 
 /** A replay's view as people read it. */
 export function viewName(view: string): string {
-  return view.startsWith(RECORDED) ? r("recorded_view", { view: viewText(view.slice(RECORDED.length)) }) : viewText(view);
+  return view.startsWith(RECORDED)
+    ? r("recorded_view", { view: viewText(view.slice(RECORDED.length)) })
+    : viewText(view);
 }

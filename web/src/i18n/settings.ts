@@ -16,7 +16,10 @@ export const SETTINGS_TEXTS = {
   router_down: ["lost", "已断开"],
   signed_in: ["Signed in", "登录"],
   signed_in_as: ["{account}, as {operator}", "{account}，操作名 {operator}"],
-  no_accounts: ["no accounts: everybody who can open this page may ask for control", "无账户：能打开本页者均可请求控制权"],
+  no_accounts: [
+    "no accounts: everybody who can open this page may ask for control",
+    "无账户：能打开本页者均可请求控制权",
+  ],
   may_command: ["may ask for control", "可请求控制权"],
   may_watch: ["may watch only", "仅可监视"],
   look: ["Look", "外观"],
@@ -51,20 +54,29 @@ export const SETTINGS_TEXTS = {
   give_or_take: ["give or take {value}", "误差 ±{value}"],
   version_differs: ["differs from this console's {version}", "与本控制台版本 {version} 不同"],
   hops: ["Where the time goes", "时间花费"],
-  hops_words: ["Of sampled publications on their way to the watch. Solid: half are faster; pale: 99 % are; the whole width: {value}.", "抽样数据到监视服务的用时。实色：50% 以内；浅色：99% 以内；全宽：{value}。"],
+  hops_words: [
+    "Of sampled publications on their way to the watch. Solid: half are faster; pale: 99 % are; the whole width: {value}.",
+    "抽样数据到监视服务的用时。实色：50% 以内；浅色：99% 以内；全宽：{value}。",
+  ],
   hop: ["{sender} → {receiver}", "{sender} → {receiver}"],
   half: ["half within", "50% 以内"],
   most: ["99 % within", "99% 以内"],
   values_count: ["{count} more values", "另 {count} 项"],
   values: ["More of {name}", "{name} 的更多信息"],
   presence: ["Who watches", "在线监视"],
-  presence_words: ["Monitors, consoles and other programs that are attached, and who is in control.", "已接入的监视器、控制台和其他程序，以及控制者。"],
+  presence_words: [
+    "Monitors, consoles and other programs that are attached, and who is in control.",
+    "已接入的监视器、控制台和其他程序，以及控制者。",
+  ],
   nobody: ["Nobody else.", "无其他人。"],
   monitor: ["monitor", "监视器"],
   console: ["console", "控制台"],
   in_control_of: ["in control of {robot}", "正在控制 {robot}"],
   certificates: ["Certificates", "证书"],
-  certificates_words: ["When each process must have a new one: the soonest first.", "各进程证书的到期时间，最早者在前。"],
+  certificates_words: [
+    "When each process must have a new one: the soonest first.",
+    "各进程证书的到期时间，最早者在前。",
+  ],
   certificate_ends: ["ends in {age}", "{age} 后到期"],
   certificate_ended: ["has ended", "已到期"],
   accounts: ["Accounts", "账户"],
@@ -76,7 +88,10 @@ export const SETTINGS_TEXTS = {
   created: ["Created", "创建"],
   disabled: ["disabled", "已停用"],
   active: ["active", "有效"],
-  accounts_words: ["Who may sign in here. A change holds at once: lesser rights end what is open.", "可登录本控制台的人员。更改立即生效，权限降低会中断已打开的会话。"],
+  accounts_words: [
+    "Who may sign in here. A change holds at once: lesser rights end what is open.",
+    "可登录本控制台的人员。更改立即生效，权限降低会中断已打开的会话。",
+  ],
   sessions: ["Sessions", "会话"],
   sessions_words: ["Browsers that are signed in.", "已登录的浏览器。"],
   sessions_of: ["{count} signed in", "{count} 个会话"],
@@ -102,8 +117,14 @@ export const SETTINGS_TEXTS = {
   done: ["Done.", "已完成。"],
   not_done: ["Not done: {text}", "未完成：{text}"],
   about: ["About", "关于"],
-  about_words: ["robomesh: a service mesh for industrial robot arms over Zenoh.", "robomesh：基于 Zenoh 的工业机械臂服务网格。"],
-  licence: ["Licence: Apache-2.0. This page is built with Preact, three.js (MIT), uPlot (MIT), Protobuf-ES (Apache-2.0, BSD-3-Clause).", "许可：Apache-2.0。本页使用 Preact、three.js（MIT）、uPlot（MIT）、Protobuf-ES（Apache-2.0、BSD-3-Clause）。"],
+  about_words: [
+    "robomesh: a service mesh for industrial robot arms over Zenoh.",
+    "robomesh：基于 Zenoh 的工业机械臂服务网格。",
+  ],
+  licence: [
+    "Licence: Apache-2.0. This page is built with Preact, three.js (MIT), uPlot (MIT), Protobuf-ES (Apache-2.0, BSD-3-Clause).",
+    "许可：Apache-2.0。本页使用 Preact、three.js（MIT）、uPlot（MIT）、Protobuf-ES（Apache-2.0、BSD-3-Clause）。",
+  ],
 } as const;
 
 export type SettingsTextName = keyof typeof SETTINGS_TEXTS;

@@ -110,7 +110,8 @@ export function followPerson(connect: () => void): void {
     told = at;
     void post("active").catch(() => undefined);
   };
-  for (const kind of ["pointerdown", "keydown"] as const) addEventListener(kind, touched, { capture: true, passive: true });
+  for (const kind of ["pointerdown", "keydown"] as const)
+    addEventListener(kind, touched, { capture: true, passive: true });
   hello.subscribe((greeting) => {
     if (greeting?.account && greeting.mayCommand !== me.value?.may_command) void whoAmI();
   });

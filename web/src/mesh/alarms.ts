@@ -3,21 +3,21 @@
 import { fromBinary } from "@bufbuild/protobuf";
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import { computed, signal } from "@preact/signals";
-import { operator } from "./control";
+import type { Alarm, AlarmList } from "../gen/robomesh_pb";
 import {
+  AlarmRequest_Action as Action,
   AlarmListSchema,
   AlarmRequestSchema,
-  AlarmRequest_Action as Action,
   Alarm_Priority as Priority,
   Alarm_State as State,
 } from "../gen/robomesh_pb";
-import type { Alarm, AlarmList } from "../gen/robomesh_pb";
 import { ask, hello, watch } from "./connection";
-import { ageOf, isStale } from "./topics";
+import { operator } from "./control";
 import type { Latest } from "./topics";
+import { ageOf, isStale } from "./topics";
 
-export { Action, Priority, State };
 export type { Alarm };
+export { Action, Priority, State };
 
 export const PRIORITIES = [Priority.CRITICAL, Priority.HIGH, Priority.MEDIUM, Priority.LOW] as const;
 
@@ -40,8 +40,7 @@ export const alarms = computed<readonly Alarm[]>(() =>
   [...lists.value]
     .flatMap(([site, { message }]) => message.alarms.map((alarm) => ({ ...alarm, site: alarm.site || site })))
     .sort(
-      (a, b) =>
-        STATES.indexOf(a.state) - STATES.indexOf(b.state) || b.priority - a.priority || lastMs(b) - lastMs(a),
+      (a, b) => STATES.indexOf(a.state) - STATES.indexOf(b.state) || b.priority - a.priority || lastMs(b) - lastMs(a),
     ),
 );
 

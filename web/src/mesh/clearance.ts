@@ -1,10 +1,10 @@
 // How near a robot is to what stands around it, and to itself: level and words.
 
-import { fixed } from "../i18n/format";
-import { DescriptionSchema } from "../gen/robomesh_pb";
 import type { Clearance, Description } from "../gen/robomesh_pb";
-import type { Level } from "./robot-state";
+import { DescriptionSchema } from "../gen/robomesh_pb";
+import { fixed } from "../i18n/format";
 import { t } from "../i18n/texts";
+import type { Level } from "./robot-state";
 import { useTopic } from "./topics";
 
 /** The floor in a pair of two that are near each other; the contract's word. */

@@ -2,12 +2,12 @@
 
 import { timestampFromMs } from "@bufbuild/protobuf/wkt";
 import { signal } from "@preact/signals";
-import { controlNotice, held, reasonOf } from "./control";
-import type { Notice } from "./control";
-import { CommandAnswerSchema, CommandRequestSchema, CommandRequest_Command as Command } from "../gen/robomesh_pb";
-import { ask } from "./connection";
+import { CommandRequest_Command as Command, CommandAnswerSchema, CommandRequestSchema } from "../gen/robomesh_pb";
 import { reasonText } from "../i18n/reasons";
 import { t } from "../i18n/texts";
+import { ask } from "./connection";
+import type { Notice } from "./control";
+import { controlNotice, held, reasonOf } from "./control";
 
 /** Values of a command beyond its name. */
 export interface CommandValues {
@@ -46,8 +46,7 @@ export async function command(
     return false;
   }
   tell({ kind: "busy", text: t("sending", { what }) });
-  const [validMs, withinS] =
-    name === Command.RUN_PROGRAM ? [CHECKED_S * 1000, CHECKED_S] : [VALID_MS, ANSWERED_S];
+  const [validMs, withinS] = name === Command.RUN_PROGRAM ? [CHECKED_S * 1000, CHECKED_S] : [VALID_MS, ANSWERED_S];
   const request = {
     lease: mine.lease,
     id: ++lastId,
@@ -62,7 +61,8 @@ export async function command(
     if (answer.accepted && MOTIONS.includes(name)) newestMotion.value = request.id;
     // An earlier gateway has the warning in its sentence alone.
     const mind = reasonText(answer.warning, answer.text.split("; mind: ")[1]);
-    if (answer.accepted) tell({ kind: "done", text: t("sent", { what }), ...(mind && { mind }), ...(target && { target }) });
+    if (answer.accepted)
+      tell({ kind: "done", text: t("sent", { what }), ...(mind && { mind }), ...(target && { target }) });
     else tell({ kind: "refused", text: t("not_sent", { text: answer.text }) });
     return answer.accepted;
   } catch (error) {

@@ -1,13 +1,13 @@
 // The page's one WebSocket to the console's server: keys watched, requests asked.
 
-import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
 import type { DescMessage, MessageInitShape, MessageShape } from "@bufbuild/protobuf";
+import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
 import { signal } from "@preact/signals";
-import { ageClock } from "./age-clock";
-import { FromPageSchema, ToPageSchema } from "../gen/robomesh_pb";
 import type { Reason, ToPage_Hello } from "../gen/robomesh_pb";
-import { lateness } from "./delay";
+import { FromPageSchema, ToPageSchema } from "../gen/robomesh_pb";
 import { t } from "../i18n/texts";
+import { ageClock } from "./age-clock";
+import { lateness } from "./delay";
 
 /** A publication as it came. Times are on this page's monotonic clock, in ms; ages on that of `ageClock`. */
 export interface Sample {

@@ -4,15 +4,15 @@
 // and the robot stops if its motion runs. A tab whose connection is gone has lost control at once.
 // A browser that was seen to be slow asks for longer leases, and is told when it was too slow all the same.
 
-import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { Timestamp } from "@bufbuild/protobuf/wkt";
+import { timestampMs } from "@bufbuild/protobuf/wkt";
 import { signal } from "@preact/signals";
-import { LeaseAnswerSchema, LeaseRequestSchema, LeaseRequest_Action as Action } from "../gen/robomesh_pb";
 import type { Lease, LeaseAnswer } from "../gen/robomesh_pb";
-import { AskError, ask, hello, lostAt } from "./connection";
-import { t } from "../i18n/texts";
-import type { TextName } from "../i18n/texts";
+import { LeaseRequest_Action as Action, LeaseAnswerSchema, LeaseRequestSchema } from "../gen/robomesh_pb";
 import { reasonText } from "../i18n/reasons";
+import type { TextName } from "../i18n/texts";
+import { t } from "../i18n/texts";
+import { AskError, ask, hello, lostAt } from "./connection";
 
 /** What became of an action, in words, shown where the action was. */
 export interface Notice {
@@ -257,7 +257,10 @@ function seeLoss(robotKey: string, lease: Lease): void {
   controlNotice.value =
     offeredTo && lease.holder === offeredTo
       ? { kind: "done", text: t("handed_over", { name: offeredTo }) }
-      : { kind: "lost", text: t("control_lost", { text: reasonText(lease.endedReason, lease.ended) || t("lost_unknown") }) };
+      : {
+          kind: "lost",
+          text: t("control_lost", { text: reasonText(lease.endedReason, lease.ended) || t("lost_unknown") }),
+        };
 }
 
 /** A loss is told of until somebody else is in control than was right after it. */

@@ -30,7 +30,13 @@ export function lateness(key: string, publisher: bigint, sourceTime: number, arr
   // A single sample dated ahead makes no other late.
   const ofTwo = Math.max(lag, before.last);
   const datedAhead = before.alone && lag - leastOfAll > MOST_WAITED_MS;
-  const now = { publisher, lag: datedAhead ? ofTwo : Math.min(leastOfAll, ofTwo), last: lag, at: arrived, alone: false };
+  const now = {
+    publisher,
+    lag: datedAhead ? ofTwo : Math.min(leastOfAll, ofTwo),
+    last: lag,
+    at: arrived,
+    alone: false,
+  };
   least.set(key, now);
   return Math.max(lag - now.lag, 0);
 }

@@ -4,11 +4,11 @@
 // rests where the last one leads: two quick presses of 1° are 2°, not something less.
 
 import { useEffect, useRef, useState } from "preact/hooks";
+import type { Description_Joint } from "../gen/robomesh_pb";
+import { jointText } from "../i18n/format";
+import { t } from "../i18n/texts";
 import { Command, command } from "./command";
 import type { Notice } from "./control";
-import { jointText } from "../i18n/format";
-import type { Description_Joint } from "../gen/robomesh_pb";
-import { t } from "../i18n/texts";
 
 const MOST_WAITING = 10;
 const ARRIVED = 0.1; // of the step

@@ -1,9 +1,9 @@
 // A message ends with what it is about: a motion's when the motion does, the others' after a while.
 
 import { useEffect, useRef } from "preact/hooks";
+import { t } from "../i18n/texts";
 import { newestMotion } from "./command";
 import type { Notice } from "./control";
-import { t } from "../i18n/texts";
 
 const REACHED = 0.002; // rad or m: half of what a person reads off
 const BEGINS_WITHIN_MS = 1500;
@@ -34,10 +34,10 @@ export function useNoticeEnd(notice: Notice | null, tell: (notice: Notice | null
       return () => clearTimeout(timer);
     }
     if (stopped) return tell(null);
-    const isThere = () =>
-      target.positions.every((each, i) => Math.abs(each - (positions.current[i] ?? NaN)) < REACHED);
+    const isThere = () => target.positions.every((each, i) => Math.abs(each - (positions.current[i] ?? NaN)) < REACHED);
     // Another motion goes on from here: if this one was not done yet, it never will be, as was wanted.
-    if (overtaken) return tell(isThere() ? { kind: "done", text: t("motion_done", { what: target.what }), ...warned } : null);
+    if (overtaken)
+      return tell(isThere() ? { kind: "done", text: t("motion_done", { what: target.what }), ...warned } : null);
     if (running) {
       ran.current = notice;
       return;

@@ -1,9 +1,9 @@
 // What is asked of a robot's recorder: begin, end, keep the last minutes.
 
-import { AskError, ask } from "./connection";
-import { RecorderRequestSchema, RecorderRequest_Action as Action, RecordingSchema } from "../gen/robomesh_pb";
 import type { Recording } from "../gen/robomesh_pb";
+import { RecorderRequest_Action as Action, RecorderRequestSchema, RecordingSchema } from "../gen/robomesh_pb";
 import { r } from "../i18n/recordings";
+import { AskError, ask } from "./connection";
 
 // Closing writes the file again.
 const WITHIN_S = 20;
@@ -17,7 +17,13 @@ export async function askRecorder(
   values: { name?: string; views?: string[] } = {},
 ): Promise<Recording> {
   try {
-    return await ask(`${robotKey}/recorder/request`, RecorderRequestSchema, { action, ...values }, RecordingSchema, WITHIN_S);
+    return await ask(
+      `${robotKey}/recorder/request`,
+      RecorderRequestSchema,
+      { action, ...values },
+      RecordingSchema,
+      WITHIN_S,
+    );
   } catch (error) {
     throw error instanceof AskError && error.noAnswer ? new Error(r("record_no_answer")) : error;
   }

@@ -1,11 +1,11 @@
 // A replay: where it is, and what is asked of it.
 
-import { fromBinary } from "@bufbuild/protobuf";
 import type { MessageInitShape } from "@bufbuild/protobuf";
+import { fromBinary } from "@bufbuild/protobuf";
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import { signal } from "@preact/signals";
-import { ReplayRequestSchema, ReplayRequest_Action as Action, ReplayStateSchema } from "../gen/robomesh_pb";
 import type { ReplayState } from "../gen/robomesh_pb";
+import { ReplayRequest_Action as Action, ReplayRequestSchema, ReplayStateSchema } from "../gen/robomesh_pb";
 import { ask, watch } from "./connection";
 import { isStale, now } from "./topics";
 

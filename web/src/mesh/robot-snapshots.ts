@@ -1,16 +1,16 @@
 // What the fleet knows of each robot, kept apart by robot: one that changes has one tile drawn, not two hundred.
 
-import { fromBinary } from "@bufbuild/protobuf";
 import type { DescMessage, MessageShape } from "@bufbuild/protobuf";
-import { batch, signal } from "@preact/signals";
+import { fromBinary } from "@bufbuild/protobuf";
 import type { Signal } from "@preact/signals";
+import { batch, signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
-import { ControllerStateSchema, LeaseSchema } from "../gen/robomesh_pb";
 import type { ControllerState, Description, Lease } from "../gen/robomesh_pb";
-import { watch } from "./connection";
+import { ControllerStateSchema, LeaseSchema } from "../gen/robomesh_pb";
 import type { Sample } from "./connection";
-import type { Latest } from "./topics";
+import { watch } from "./connection";
 import { seeRobots } from "./known-robots";
+import type { Latest } from "./topics";
 
 const TAKEN_EACH_MS = 250;
 

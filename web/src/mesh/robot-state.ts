@@ -1,20 +1,20 @@
 // How a robot is, in one word with its colour and shape; whether it heeds a stop; why it takes no motion.
 
-import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { Timestamp } from "@bufbuild/protobuf/wkt";
+import { timestampMs } from "@bufbuild/protobuf/wkt";
+import type { ControllerState, Event } from "../gen/robomesh_pb";
 import {
   ControllerState_Activity as Activity,
   ControllerState_Known as Known,
   ControllerState_Link as Link,
   ControllerState_Mode as Mode,
 } from "../gen/robomesh_pb";
-import type { ControllerState, Event } from "../gen/robomesh_pb";
 import { stampTime } from "../i18n/format";
 import { reasonsText } from "../i18n/reasons";
-import { ageOf, isStale } from "./topics";
-import type { Latest } from "./topics";
-import { t } from "../i18n/texts";
 import type { TextName } from "../i18n/texts";
+import { t } from "../i18n/texts";
+import type { Latest } from "./topics";
+import { ageOf, isStale } from "./topics";
 
 /** How much a state asks to be looked at; each has a colour and a shape of its own. */
 export type Level = "normal" | "warning" | "alarm";

@@ -1,9 +1,9 @@
 // What each site's watch says of the mesh, and what is wrong of it in words.
 
-import { MeshStateSchema } from "../gen/robomesh_pb";
 import type { MeshState, MeshState_Seen as Seen } from "../gen/robomesh_pb";
-import { ageOf, isStale, useTopics } from "./topics";
+import { MeshStateSchema } from "../gen/robomesh_pb";
 import type { Latest } from "./topics";
+import { ageOf, isStale, useTopics } from "./topics";
 
 /** s: from there on, times of two machines can no longer be compared by eye. */
 export const CLOCK_OFF_S = 0.5;
@@ -31,4 +31,3 @@ export function isClockOff({ clockOffsetS, roundTripS }: Seen): boolean {
 export function isMeshStale(latest: Latest<MeshState> | undefined): boolean {
   return !latest || isStale("mesh", ageOf(latest));
 }
-

@@ -1,12 +1,12 @@
 // The stop request: needs no control, waits for nothing.
 
 import { signal } from "@preact/signals";
-import { operator, reasonOf } from "./control";
-import type { Notice } from "./control";
 import { StopAnswerSchema, StopRequestSchema } from "../gen/robomesh_pb";
-import { AskError, ask, reopenIfSilent } from "./connection";
 import { reasonText } from "../i18n/reasons";
 import { t } from "../i18n/texts";
+import { AskError, ask, reopenIfSilent } from "./connection";
+import type { Notice } from "./control";
+import { operator, reasonOf } from "./control";
 
 const TOLD_MS = 15_000; // how long a stop that went well is told of
 

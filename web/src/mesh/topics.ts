@@ -1,17 +1,17 @@
 // What the page knows of the mesh: the newest message per key, and how old it is.
 
-import { fromBinary } from "@bufbuild/protobuf";
 import type { DescMessage, MessageShape } from "@bufbuild/protobuf";
-import { timestampMs } from "@bufbuild/protobuf/wkt";
+import { fromBinary } from "@bufbuild/protobuf";
 import type { Timestamp } from "@bufbuild/protobuf/wkt";
-import { signal } from "@preact/signals";
+import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { Signal } from "@preact/signals";
+import { signal } from "@preact/signals";
 import { useEffect, useMemo } from "preact/hooks";
-import { ageClock } from "./age-clock";
-import { AuditListSchema, AuditEntrySchema, EventListSchema, EventSchema } from "../gen/robomesh_pb";
 import type { AuditEntry, ControllerState, Event } from "../gen/robomesh_pb";
-import { hello, watch } from "./connection";
+import { AuditEntrySchema, AuditListSchema, EventListSchema, EventSchema } from "../gen/robomesh_pb";
+import { ageClock } from "./age-clock";
 import type { Sample } from "./connection";
+import { hello, watch } from "./connection";
 
 export interface Latest<M> {
   key: string;
@@ -100,9 +100,7 @@ export function useEvents(robotKey: string): readonly Event[] {
 /** The last audit entries of a robot, newest first. */
 export function useAudit(robotKey: string): readonly AuditEntry[] {
   return useList([`${robotKey}/audit`], (sample) =>
-    sample.live
-      ? [fromBinary(AuditEntrySchema, sample.payload)]
-      : fromBinary(AuditListSchema, sample.payload).entries,
+    sample.live ? [fromBinary(AuditEntrySchema, sample.payload)] : fromBinary(AuditListSchema, sample.payload).entries,
   );
 }
 

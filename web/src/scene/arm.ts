@@ -1,12 +1,12 @@
 // An arm in the 3-D view: its links where its frames say, grey when those are old, and its ghost.
 
-import * as THREE from "three";
 import { fromBinary } from "@bufbuild/protobuf";
+import * as THREE from "three";
 import { FrameTransformsSchema } from "../gen/foxglove/FrameTransforms_pb";
 import type { Description } from "../gen/robomesh_pb";
 import { FramePlayer } from "./frame-player";
-import { colourGhost, dressed, ghostOf, loadModel, paint } from "./models";
 import type { Kind } from "./models";
+import { colourGhost, dressed, ghostOf, loadModel, paint } from "./models";
 import { palette } from "./surroundings";
 
 const SAME_PLACE = 2e-3; // m, or of a rotation's matrix
@@ -38,7 +38,11 @@ export class Arm {
       description.links.map(async ({ name, mesh, meshSha256, color }) => {
         if (!mesh) return;
         const url = meshUrl(this.prefix, mesh, meshSha256);
-        const model = await loadOrSay(url, () => !this.removed, (why) => failed(name, why));
+        const model = await loadOrSay(
+          url,
+          () => !this.removed,
+          (why) => failed(name, why),
+        );
         if (model) this.addLink(`${this.prefix}/${name}`, model, color, made);
       }),
     );

@@ -12,10 +12,7 @@ const NEAR_MS = 25; // half of the time between two
 /** A line over everything that is there: a way behind a link is still a way. */
 function line(points: number): THREE.Line<THREE.BufferGeometry, THREE.LineBasicMaterial> {
   const made = new THREE.Line(
-    new THREE.BufferGeometry().setAttribute(
-      "position",
-      new THREE.BufferAttribute(new Float32Array(points * 3), 3),
-    ),
+    new THREE.BufferGeometry().setAttribute("position", new THREE.BufferAttribute(new Float32Array(points * 3), 3)),
     new THREE.LineBasicMaterial({ transparent: true, opacity: 0.9 }),
   );
   made.frustumCulled = false;
@@ -78,9 +75,7 @@ export class Gap {
   readonly group = new THREE.Group();
   private readonly line = line(2);
   private readonly material = new THREE.MeshBasicMaterial({ depthTest: false, transparent: true });
-  private readonly ends = [0, 1].map(
-    () => new THREE.Mesh(new THREE.SphereGeometry(END_RADIUS, 12, 8), this.material),
-  );
+  private readonly ends = [0, 1].map(() => new THREE.Mesh(new THREE.SphereGeometry(END_RADIUS, 12, 8), this.material));
   private words: { text: string; level: Level } = { text: "", level: "normal" };
   private waiting: { time: number; nearest: Nearest }[] = []; // by source time, ms
 

@@ -1,13 +1,13 @@
 // The other robots of the cell in the 3-D view of one of them.
 
 import { useEffect, useRef } from "preact/hooks";
-import { useFramesAge } from "./frames-age";
-import { DescriptionSchema } from "../gen/robomesh_pb";
 import type { Description } from "../gen/robomesh_pb";
+import { DescriptionSchema } from "../gen/robomesh_pb";
 import { watch } from "../mesh/connection";
-import type { RobotScene } from "./scene";
-import type { Arm } from "./arm";
 import { isStale, useTopics } from "../mesh/topics";
+import type { Arm } from "./arm";
+import { useFramesAge } from "./frames-age";
+import type { RobotScene } from "./scene";
 
 /** The other robots of a cell. */
 export function Neighbours(props: { robotKey: string; cell: string; scene: RobotScene }) {

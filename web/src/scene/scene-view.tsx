@@ -1,27 +1,27 @@
 // The live 3-D panel: views of the description, trail and frames, and a word when it is stale.
 
-import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { create } from "@bufbuild/protobuf";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { Vector3 } from "three";
-import { distanceText, useClearanceLevel } from "../mesh/clearance";
-import { staleText, timeOfDay } from "../i18n/format";
-import { KinematicStateSchema, ReplayStateSchema, ViewSchema, View_Projection } from "../gen/robomesh_pb";
 import type { Description, Vector3 as Point, View } from "../gen/robomesh_pb";
-import { forwardOf } from "./forward-kinematics";
-import { ghost, redLinks, toolPath } from "./ghost";
-import { watch } from "../mesh/connection";
-import { Choice, Toggle } from "../ui/parts";
-import { RobotScene } from "./scene";
-import type { Stage } from "./scene";
-import type { Nearest } from "./lines";
-import { Neighbours } from "./neighbours";
-import type { OfMoment } from "../mesh/replay-moment";
-import { framesOf, framesTopic } from "./topic-selection";
+import { KinematicStateSchema, ReplayStateSchema, View_Projection, ViewSchema } from "../gen/robomesh_pb";
+import { staleText, timeOfDay } from "../i18n/format";
 import { r } from "../i18n/recordings";
 import { t, viewText } from "../i18n/texts";
-import { theme } from "../ui/theme";
-import { useFramesAge } from "./frames-age";
+import { distanceText, useClearanceLevel } from "../mesh/clearance";
+import { watch } from "../mesh/connection";
+import type { OfMoment } from "../mesh/replay-moment";
 import { ageOf, isStale, useTopic } from "../mesh/topics";
+import { Choice, Toggle } from "../ui/parts";
+import { theme } from "../ui/theme";
+import { forwardOf } from "./forward-kinematics";
+import { useFramesAge } from "./frames-age";
+import { ghost, redLinks, toolPath } from "./ghost";
+import type { Nearest } from "./lines";
+import { Neighbours } from "./neighbours";
+import type { Stage } from "./scene";
+import { RobotScene } from "./scene";
+import { framesOf, framesTopic } from "./topic-selection";
 
 // Where the free camera stands, from the target, in lengths of the arm's reach.
 const FREE_EYE = { x: 1.2, y: -1.69, z: 0.72 };
@@ -86,7 +86,12 @@ export function SceneView(props: {
     [description],
   );
   const forward = useMemo(
-    () => description && forwardOf(description.urdf, description.joints.map((joint) => joint.name)),
+    () =>
+      description &&
+      forwardOf(
+        description.urdf,
+        description.joints.map((joint) => joint.name),
+      ),
     [description],
   );
   useEffect(() => {

@@ -1,15 +1,15 @@
 // The live 3-D picture of one robot: three.js behind five functions, drawn only when something changed.
 
+import { create } from "@bufbuild/protobuf";
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import { create } from "@bufbuild/protobuf";
-import { ViewSchema, View_Projection } from "../gen/robomesh_pb";
 import type { Description, View } from "../gen/robomesh_pb";
+import { View_Projection, ViewSchema } from "../gen/robomesh_pb";
 import { floorOf } from "../mesh/clearance";
-import { Arm, loadOrSay, meshUrl } from "./arm";
 import type { Failed } from "./arm";
-import { Gap, Path, Trail } from "./lines";
+import { Arm, loadOrSay, meshUrl } from "./arm";
 import type { Nearest } from "./lines";
+import { Gap, Path, Trail } from "./lines";
 import { colourEdges, dressedFixture, paint } from "./models";
 import { floor, lights, palette } from "./surroundings";
 
@@ -111,7 +111,15 @@ export class RobotScene {
 
   stage(): Stage {
     const { scene, canvas, changed } = this;
-    return { scene, canvas, base: () => this.base, camera: () => this.camera, controls: () => this.controls, view: () => this.view(), changed };
+    return {
+      scene,
+      canvas,
+      base: () => this.base,
+      camera: () => this.camera,
+      controls: () => this.controls,
+      view: () => this.view(),
+      changed,
+    };
   }
 
   /** Loads the models of the arm and of what stands around it. */
@@ -135,7 +143,11 @@ export class RobotScene {
     await Promise.all(
       fixtures.map(async ({ name, mesh, meshSha256, fixtureToSite, color }) => {
         const url = meshUrl(this.prefix, mesh, meshSha256);
-        const model = await loadOrSay(url, () => !this.disposed, (why) => failed(name, why));
+        const model = await loadOrSay(
+          url,
+          () => !this.disposed,
+          (why) => failed(name, why),
+        );
         if (!model) return;
         const group = dressedFixture(model, color);
         if (fixtureToSite.length === 16) group.matrix.fromArray(fixtureToSite).transpose();

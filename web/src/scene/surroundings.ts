@@ -59,7 +59,11 @@ export function floor(colours: Palette): THREE.Group {
   );
   disc.position.z = -0.002;
   disc.receiveShadow = true;
-  group.add(disc, gridLines(colours.grid, (i) => i % 5 !== 0), gridLines(colours.gridStrong, (i) => i % 5 === 0));
+  group.add(
+    disc,
+    gridLines(colours.grid, (i) => i % 5 !== 0),
+    gridLines(colours.gridStrong, (i) => i % 5 === 0),
+  );
   return group;
 }
 

@@ -3,12 +3,12 @@
 import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
 import { signal } from "@preact/signals";
 import * as THREE from "three";
-import type { Forward } from "./forward-kinematics";
 import { FrameTransformsSchema } from "../gen/foxglove/FrameTransforms_pb";
 import { JointStatesSchema } from "../gen/foxglove/JointStates_pb";
 import type { Description } from "../gen/robomesh_pb";
 import { hello } from "../mesh/connection";
 import { isReplay } from "../mesh/robot-name";
+import type { Forward } from "./forward-kinematics";
 
 export const REACHES = ["slow", "all"] as const;
 export type Reach = (typeof REACHES)[number];
@@ -40,7 +40,11 @@ export function framesTopic(robotKey: string): "frames" | "joints/slow" {
 }
 
 /** Makes a FrameTransforms payload of a JointStates payload: over a slow link placements are computed here. */
-export function framesOf(prefix: string, description: Description, forward: Forward): (joints: Uint8Array) => Uint8Array {
+export function framesOf(
+  prefix: string,
+  description: Description,
+  forward: Forward,
+): (joints: Uint8Array) => Uint8Array {
   const base = matrixOf(description.baseToSite);
   const { joints, frames } = description;
   return (payload) => {

@@ -1,7 +1,7 @@
 // Services alive for a robot or a site, by presence.
 
-import { presence } from "../mesh/connection";
 import { t } from "../i18n/texts";
+import { presence } from "../mesh/connection";
 import { OPERATOR } from "../mesh/known-robots";
 
 /** `of`: `robomesh/<site>/<robot>`. */

@@ -1,10 +1,10 @@
 // A new password of one's own.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { AccountError, me, post } from "../mesh/account";
-import type { Me } from "../mesh/account";
-import { PasswordField } from "./password-field";
 import { a, refusedText } from "../i18n/account";
+import type { Me } from "../mesh/account";
+import { AccountError, me, post } from "../mesh/account";
+import { PasswordField } from "./password-field";
 
 export function ChangePassword({ close }: { close: () => void }) {
   const [old, setOld] = useState("");

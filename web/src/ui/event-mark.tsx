@@ -1,8 +1,8 @@
 // The mark of an event's severity and of an audit entry's outcome: a word, with a shape where a person must look.
 
 import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "../gen/robomesh_pb";
-import { t } from "../i18n/texts";
 import type { TextName } from "../i18n/texts";
+import { t } from "../i18n/texts";
 
 export const SEVERITIES: Partial<Record<Severity, [TextName, string]>> = {
   [Severity.DEBUG]: ["severity_debug", "normal"],

@@ -1,13 +1,13 @@
 // How far the arm is from what it must not come to, as bars: grey while there is room, amber where it is short.
 
 import type { ComponentChildren } from "preact";
-import { distanceText, ownLevel, pairText, useClearanceLevel } from "../mesh/clearance";
-import { fixed, toDegrees } from "../i18n/format";
-import { Description_Joint_Type } from "../gen/robomesh_pb";
 import type { Description, KinematicState } from "../gen/robomesh_pb";
-import { Unit } from "./parts";
-import type { Level } from "../mesh/robot-state";
+import { Description_Joint_Type } from "../gen/robomesh_pb";
+import { fixed, toDegrees } from "../i18n/format";
 import { t } from "../i18n/texts";
+import { distanceText, ownLevel, pairText, useClearanceLevel } from "../mesh/clearance";
+import type { Level } from "../mesh/robot-state";
+import { Unit } from "./parts";
 
 // A bar is full from here on; what lies beyond is room enough.
 const FULL_CLEARANCE_M = 0.3;
@@ -97,7 +97,11 @@ function Margin(props: {
       <span class="margin-label">
         {level !== "normal" && <span class={`shape ${level}`} aria-hidden="true" />}
         {label}
-        {of && <span class="margin-of" title={of}>{of}</span>}
+        {of && (
+          <span class="margin-of" title={of}>
+            {of}
+          </span>
+        )}
       </span>
       <span class="margin-bar" aria-hidden="true">
         {share !== undefined && <span style={{ width: `${100 * full}%` }} />}

@@ -88,9 +88,7 @@ export function JointTrack(props: TrackProps) {
     <div class={`track ${props.stale ? "stale" : ""}`} ref={track}>
       <div class="track-bar" />
       {lower < 0 && upper > 0 && <div class="track-zero" style={{ left: share(0) }} />}
-      {position !== undefined && (
-        <div class="track-position" style={{ left: share(position) }} />
-      )}
+      {position !== undefined && <div class="track-position" style={{ left: share(position) }} />}
       {shown !== undefined && enabled && (
         <div
           class={`track-handle ${unsent !== undefined ? "unsent" : ""}`}

@@ -1,10 +1,10 @@
 // A joint's value; pressed, it becomes a field for an exact target: Enter sends, Escape takes back.
 
 import { useState } from "preact/hooks";
-import { DASH, fixed, jointUnit } from "../i18n/format";
 import type { Description_Joint } from "../gen/robomesh_pb";
-import { Unit } from "./parts";
+import { DASH, fixed, jointUnit } from "../i18n/format";
 import { t } from "../i18n/texts";
+import { Unit } from "./parts";
 
 export function JointValue(props: {
   joint: Description_Joint;

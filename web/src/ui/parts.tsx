@@ -1,18 +1,13 @@
 // Small parts that every screen uses.
 
 import type { ComponentChildren } from "preact";
-import type { Notice } from "../mesh/control";
 import { staleText } from "../i18n/format";
-import type { StateWord } from "../mesh/robot-state";
 import { t } from "../i18n/texts";
+import type { Notice } from "../mesh/control";
+import type { StateWord } from "../mesh/robot-state";
 
 /** A panel with a heading; `end` stands right of the heading. */
-export function Panel(props: {
-  title: string;
-  name: string;
-  end?: ComponentChildren;
-  children: ComponentChildren;
-}) {
+export function Panel(props: { title: string; name: string; end?: ComponentChildren; children: ComponentChildren }) {
   return (
     <section class={`panel ${props.name}`} aria-label={props.title}>
       <div class="panel-head">

@@ -1,8 +1,8 @@
 // An alarm's priority: a shape, a colour and a word, never the colour alone.
 
 import { Alarm_Priority as Priority } from "../gen/robomesh_pb";
-import { e } from "../i18n/events";
 import type { EventsTextName } from "../i18n/events";
+import { e } from "../i18n/events";
 import "./priority.css";
 
 const WORDS: Record<Priority, [EventsTextName, string]> = {

@@ -1,9 +1,9 @@
 // What marks everything that is played back, in magenta and in words.
 
 import { fullTime } from "../i18n/format";
-import { Tag } from "./parts";
 import { dateText } from "../i18n/recording-format";
 import { r } from "../i18n/recordings";
+import { Tag } from "./parts";
 
 /** Of which robot, and when it was. */
 export function ReplayTag({ robot, start }: { robot: string; start: number }) {

@@ -1,13 +1,13 @@
 // The recordings that are being played back now, apart from the robots that are live.
 
 import { timestampMs } from "@bufbuild/protobuf/wkt";
-import { ReplayStateSchema } from "../gen/robomesh_pb";
 import type { ReplayState } from "../gen/robomesh_pb";
-import { recordingsLink, robotLink } from "./route";
-import { ageOf, isStale, useTopics } from "../mesh/topics";
+import { ReplayStateSchema } from "../gen/robomesh_pb";
 import { momentText } from "../i18n/recording-format";
-import { ReplayTag } from "./replay-tag";
 import { r } from "../i18n/recordings";
+import { ageOf, isStale, useTopics } from "../mesh/topics";
+import { ReplayTag } from "./replay-tag";
+import { recordingsLink, robotLink } from "./route";
 import "./replay.css";
 
 export function Replays() {

@@ -2,11 +2,11 @@
 
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import { useState } from "preact/hooks";
-import { stampFull, stampTime } from "../i18n/format";
-import { Event_Severity as Severity } from "../gen/robomesh_pb";
 import type { ControllerState, Event } from "../gen/robomesh_pb";
-import { DISOBEYED, before, disobeys } from "../mesh/robot-state";
+import { Event_Severity as Severity } from "../gen/robomesh_pb";
+import { stampFull, stampTime } from "../i18n/format";
 import { t } from "../i18n/texts";
+import { before, DISOBEYED, disobeys } from "../mesh/robot-state";
 
 const SHOWN_MS = 600_000; // unless it is dismissed before
 

@@ -1,11 +1,11 @@
 // A robot that is not there: said, with those that are.
 
 import { useEffect, useState } from "preact/hooks";
-import { fleetRobots } from "../mesh/known-robots";
-import { hello, lostAt } from "../mesh/connection";
-import { robotLink } from "./route";
-import type { RobotName } from "../mesh/robot-name";
 import { t } from "../i18n/texts";
+import { hello, lostAt } from "../mesh/connection";
+import { fleetRobots } from "../mesh/known-robots";
+import type { RobotName } from "../mesh/robot-name";
+import { robotLink } from "./route";
 
 const SHOWS_WITHIN_MS = 4000;
 

@@ -4,8 +4,8 @@
 // #/wall the wall, with /<site>/<robot>/<view> for each picture that was chosen, #/events and #/settings.
 
 import { signal } from "@preact/signals";
-import { canBe } from "../mesh/robot-name";
 import type { RobotName } from "../mesh/robot-name";
+import { canBe } from "../mesh/robot-name";
 
 // A site of such a name would have its robots' pages hidden behind these.
 const DEFINE = "define";
@@ -114,5 +114,7 @@ export function recordingsLink(...shown: readonly RecordingName[]): string {
 
 /** Of the wall with these pictures. */
 export function wallLink(shown: readonly ViewName[]): string {
-  return ["#", WALL, ...shown.flatMap(({ site, robot, view }) => [site, robot, view].map(encodeURIComponent))].join("/");
+  return ["#", WALL, ...shown.flatMap(({ site, robot, view }) => [site, robot, view].map(encodeURIComponent))].join(
+    "/",
+  );
 }

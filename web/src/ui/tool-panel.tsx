@@ -1,12 +1,12 @@
 // Where the tool is, how fast, and how far the arm is from what it must not come to.
 
-import { fixed, rollPitchYaw, toDegrees } from "../i18n/format";
 import type { Description, KinematicState } from "../gen/robomesh_pb";
+import { fixed, rollPitchYaw, toDegrees } from "../i18n/format";
+import { t } from "../i18n/texts";
+import type { Latest } from "../mesh/topics";
+import { ageOf, isStale } from "../mesh/topics";
 import { Margins } from "./joint-limits-panel";
 import { Age, Panel, Unit } from "./parts";
-import { t } from "../i18n/texts";
-import { ageOf, isStale } from "../mesh/topics";
-import type { Latest } from "../mesh/topics";
 
 export function ToolPanel(props: {
   robotKey: string;

@@ -4,11 +4,11 @@ import { fromBinary } from "@bufbuild/protobuf";
 import type { JSX, RefObject } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { CompressedImageSchema } from "../gen/foxglove/CompressedImage_pb";
-import { watch } from "../mesh/connection";
-import { isStanding, withView } from "./own-view";
-import type { Wanted } from "./own-view";
 import { t } from "../i18n/texts";
+import { watch } from "../mesh/connection";
 import { isStale, now } from "../mesh/topics";
+import type { Wanted } from "./own-view";
+import { isStanding, withView } from "./own-view";
 import { decodesVideo, playVideo } from "./video-canvas";
 
 const QUIET_MS = 4000;

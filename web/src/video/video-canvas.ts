@@ -3,9 +3,9 @@
 import { fromBinary } from "@bufbuild/protobuf";
 import { CompressedVideoSchema } from "../gen/foxglove/CompressedVideo_pb";
 import { VideoFramesSchema } from "../gen/robomesh_pb";
-import { codecName, isKeyFrame } from "./h264";
-import { watch } from "../mesh/connection";
 import type { Sample } from "../mesh/connection";
+import { watch } from "../mesh/connection";
+import { codecName, isKeyFrame } from "./h264";
 
 /** Whether this browser decodes video here (it does so only over https, or on localhost). */
 export const decodesVideo = "VideoDecoder" in window;

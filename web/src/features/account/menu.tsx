@@ -1,10 +1,10 @@
 // In the bar: who is signed in, as what; signing out; a new password.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { hello } from "../../mesh/connection";
-import { me, onlyWatches, rests, signOut } from "../../mesh/account";
-import { ChangePassword } from "../../ui/change-password";
 import { a, roleText } from "../../i18n/account";
+import { me, onlyWatches, rests, signOut } from "../../mesh/account";
+import { hello } from "../../mesh/connection";
+import { ChangePassword } from "../../ui/change-password";
 import "../../ui/account.css";
 
 export function AccountMenu() {
@@ -28,8 +28,7 @@ export function AccountMenu() {
   return (
     <details ref={menu} class="account-menu" onKeyDown={(event) => event.key === "Escape" && close()}>
       <summary title={a("menu", { account, role: roleText(role) })}>
-        <span class="account-name">{account}</span>{" "}
-        <span class="account-role dim">{roleText(role)}</span>
+        <span class="account-name">{account}</span> <span class="account-role dim">{roleText(role)}</span>
       </summary>
       <div class="account-sheet">
         {changing ? (

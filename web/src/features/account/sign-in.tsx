@@ -1,11 +1,11 @@
 // The page before one is signed in: what console this is, how it is reached, and who one is.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { AccountError, endedBy, me, signIn } from "../../mesh/account";
-import { switchLanguage, t } from "../../i18n/texts";
-import { switchTheme, theme } from "../../ui/theme";
-import { PasswordField } from "../../ui/password-field";
 import { a, endText } from "../../i18n/account";
+import { switchLanguage, t } from "../../i18n/texts";
+import { AccountError, endedBy, me, signIn } from "../../mesh/account";
+import { PasswordField } from "../../ui/password-field";
+import { switchTheme, theme } from "../../ui/theme";
 import "../../ui/account.css";
 
 export function SignIn() {

@@ -1,15 +1,15 @@
 // The chain as a list: the base, each joint with its link, the tool.
 
-import { useState } from "preact/hooks";
 import type { ComponentChildren } from "preact";
+import { useState } from "preact/hooks";
+import { d } from "../../i18n/define";
 import { problemsAt } from "./checks";
-import { linkName } from "./description";
 import type { Joint } from "./description";
+import { linkName } from "./description";
 import { draft, edit } from "./draft";
 import { insertJoint, moveJoint, removeJoint } from "./edits";
-import { d } from "../../i18n/define";
-import { choose, chosen } from "./workbench";
 import type { Part } from "./workbench";
+import { choose, chosen } from "./workbench";
 
 function add(at: number): void {
   edit((now) => void insertJoint(now.description, at));
@@ -48,7 +48,14 @@ export function Chain() {
         </button>
       </div>
       <ol class="chain-list" title={d("chain_hint")}>
-        <Row part="base" mark="0" name={d("base")} facts={base.mesh ? fileName(base.mesh) : d("no_shape")} faint={!base.mesh} path="base" />
+        <Row
+          part="base"
+          mark="0"
+          name={d("base")}
+          facts={base.mesh ? fileName(base.mesh) : d("no_shape")}
+          faint={!base.mesh}
+          path="base"
+        />
         {joints.map((joint, index) => (
           <li
             key={index}
@@ -94,10 +101,22 @@ export function Chain() {
             />
           </li>
         ))}
-        <Row part="tool" mark={<ToolMark />} name={d("tool")} facts={now.description.tool.xyz.map((value) => Math.round(value * 100) / 100).join(" · ")} faint={false} path="tool" />
+        <Row
+          part="tool"
+          mark={<ToolMark />}
+          name={d("tool")}
+          facts={now.description.tool.xyz.map((value) => Math.round(value * 100) / 100).join(" · ")}
+          faint={false}
+          path="tool"
+        />
       </ol>
       <div class="chain-tools" role="group" aria-label={d("chain")}>
-        <button class="quiet" disabled={selected === null} title={d("insert_before")} onClick={() => add(selected ?? 0)}>
+        <button
+          class="quiet"
+          disabled={selected === null}
+          title={d("insert_before")}
+          onClick={() => add(selected ?? 0)}
+        >
           {d("insert")}
         </button>
         <button

@@ -1,13 +1,13 @@
 // What the server finds wrong with the draft as one types, and where it says the tool is.
 
 import { computed, effect, signal } from "@preact/signals";
-import { bodies } from "./description";
-import { draft, identity } from "./draft";
-import type { Draft } from "./draft";
-import { check, Refused } from "./server";
-import type { Checked, Problem } from "./server";
-import { shapeOf } from "./shapes";
 import { d } from "../../i18n/define";
+import { bodies } from "./description";
+import type { Draft } from "./draft";
+import { draft, identity } from "./draft";
+import type { Checked, Problem } from "./server";
+import { check, Refused } from "./server";
+import { shapeOf } from "./shapes";
 import { positions } from "./workbench";
 
 const AFTER_MS = 200;
@@ -38,7 +38,9 @@ export function noNumber(path: string, text: string | null): void {
 }
 
 // In another draft, or after links came, went or moved, a path is another field's.
-const fields = computed(() => `${identity.value.id} ${draft.value?.description.joint.map(({ name }) => name).join(" ") ?? ""}`);
+const fields = computed(
+  () => `${identity.value.id} ${draft.value?.description.joint.map(({ name }) => name).join(" ") ?? ""}`,
+);
 effect(() => {
   if (fields.value) unread.value = new Map();
 });
@@ -66,7 +68,10 @@ function oddShapes(): Problem[] {
     const size = Math.max(...max.map((value, axis) => value - (min[axis] ?? 0))) * scale;
     if (triangles === 0 || (size >= SMALLEST_M && size <= LARGEST_M)) return [];
     const told = size >= 1 ? `${Number(size.toPrecision(3))} m` : `${Number((size * 1000).toPrecision(2))} mm`;
-    return { path: [...place, "mesh_scale"], text: d("odd_size", { file: mesh.split("/").at(-1) ?? mesh, size: told }) };
+    return {
+      path: [...place, "mesh_scale"],
+      text: d("odd_size", { file: mesh.split("/").at(-1) ?? mesh, size: told }),
+    };
   });
 }
 
@@ -126,6 +131,10 @@ async function ask(of: Draft, joints: readonly number[]): Promise<void> {
 export function problemsAt(path: string): readonly Problem[] {
   return problems.value.filter((problem) => {
     const at = problem.path.join("/");
-    return at === path || at.startsWith(`${path}/`) || (at !== "" && /^\/\d$/.test(path.slice(at.length)) && path.startsWith(at));
+    return (
+      at === path ||
+      at.startsWith(`${path}/`) ||
+      (at !== "" && /^\/\d$/.test(path.slice(at.length)) && path.startsWith(at))
+    );
   });
 }

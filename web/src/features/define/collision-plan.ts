@@ -2,10 +2,10 @@
 
 import { computed, effect, signal } from "@preact/signals";
 import { concise, linkNames } from "./description";
-import { draft, identity, isOpen } from "./draft";
 import type { Draft } from "./draft";
-import { collisions } from "./server";
+import { draft, identity, isOpen } from "./draft";
 import type { Pair, PairKind } from "./server";
+import { collisions } from "./server";
 
 type Links = readonly [string, string];
 
@@ -113,7 +113,8 @@ async function work(): Promise<void> {
   working.value = of.id;
   try {
     const { pairs } = await collisions(now);
-    if (isOpen(of)) plan.value = { subject: own, id: of.id, pairs: pairs.sort((one, other) => rank(one) - rank(other)) };
+    if (isOpen(of))
+      plan.value = { subject: own, id: of.id, pairs: pairs.sort((one, other) => rank(one) - rank(other)) };
   } catch (error) {
     if (isOpen(of)) failure.value = { subject: own, text: error instanceof Error ? error.message : String(error) };
   }

@@ -1,13 +1,22 @@
 // How each pair of links is checked, or why it is ignored; the user may ignore more.
 
 import { useEffect } from "preact/hooks";
-import { isPlanned, isSame, isTouching, keepPlanning, pairRows, planAgain, planFailed, planning } from "./collision-plan";
+import type { DefineText } from "../../i18n/define";
+import { d } from "../../i18n/define";
 import type { PairRow } from "./collision-plan";
+import {
+  isPlanned,
+  isSame,
+  isTouching,
+  keepPlanning,
+  pairRows,
+  planAgain,
+  planFailed,
+  planning,
+} from "./collision-plan";
 import { draft, edit, seal } from "./draft";
 import { ProblemWords } from "./fields";
 import type { PairKind } from "./server";
-import { d } from "../../i18n/define";
-import type { DefineText } from "../../i18n/define";
 
 const WAYS: Readonly<Partial<Record<PairKind, DefineText>>> = {
   collision_meshes: "way_collision_meshes",
@@ -93,7 +102,11 @@ function PlanState({ rows }: { rows: readonly PairRow[] }) {
         <>
           <p class={touching ? "problem-word" : "small"}>
             <span class={`shape ${touching ? "warning" : "info"}`} aria-hidden="true" />
-            {touching === 0 ? d("plan_free") : touching === 1 ? d("plan_touching_one") : d("plan_touching", { count: touching })}
+            {touching === 0
+              ? d("plan_free")
+              : touching === 1
+                ? d("plan_touching_one")
+                : d("plan_touching", { count: touching })}
           </p>
           <p class="dim small">{d("plan_counts", { checked: rows.length - ignored, ignored })}</p>
         </>

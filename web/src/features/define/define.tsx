@@ -2,6 +2,7 @@
 
 import { signal } from "@preact/signals";
 import { useEffect, useLayoutEffect } from "preact/hooks";
+import { d } from "../../i18n/define";
 import { Chain } from "./chain";
 import { keepChecking } from "./checks";
 import { CollisionsTab } from "./collisions-tab";
@@ -20,11 +21,10 @@ import { RobotTab } from "./robot-tab";
 import { ScenePanel } from "./scene-panel";
 import { keepReading, missingFiles } from "./shapes";
 import { Start } from "./start";
-import { d } from "../../i18n/define";
 import { Outcomes, Toolbar } from "./toolbar";
 import { ViewsTab } from "./views-tab";
-import { TABS, tab } from "./workbench";
 import type { Tab } from "./workbench";
+import { TABS, tab } from "./workbench";
 import "./define.css";
 
 const draggedOver = signal(false);
@@ -137,7 +137,8 @@ function useKeys(): void {
     const onKey = (event: KeyboardEvent) => {
       if (!(event.ctrlKey || event.metaKey) || event.altKey || !draft.value) return;
       const key = event.key.toLowerCase();
-      const action = key === "z" ? (event.shiftKey ? redo : undo) : key === "y" ? redo : key === "s" ? () => void save(false) : null;
+      const action =
+        key === "z" ? (event.shiftKey ? redo : undo) : key === "y" ? redo : key === "s" ? () => void save(false) : null;
       if (!action) return;
       event.preventDefault();
       action();
@@ -160,7 +161,9 @@ function useDrop(): void {
       draggedOver.value = true;
     };
     addEventListener("dragover", over, { signal: until });
-    addEventListener("dragleave", (event) => event.relatedTarget === null && (draggedOver.value = false), { signal: until });
+    addEventListener("dragleave", (event) => event.relatedTarget === null && (draggedOver.value = false), {
+      signal: until,
+    });
     addEventListener(
       "drop",
       (event) => {

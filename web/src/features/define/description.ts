@@ -73,11 +73,7 @@ export interface Description {
 }
 
 /** What the server sends: every key may be left out, as in the file. */
-export type Partly<T> = T extends readonly unknown[]
-  ? T
-  : T extends object
-    ? { [K in keyof T]?: Partly<T[K]> }
-    : T;
+export type Partly<T> = T extends readonly unknown[] ? T : T extends object ? { [K in keyof T]?: Partly<T[K]> } : T;
 export type GivenDescription = Omit<Partly<Description>, "joint" | "frame" | "view"> & {
   joint?: Partly<Joint>[];
   frame?: Partly<NamedFrame>[];

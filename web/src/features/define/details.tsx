@@ -1,16 +1,16 @@
 // The chosen part: a joint's motion, a link's looks, the tool's pose.
 
+import { d } from "../../i18n/define";
 import { Choice } from "../../ui/parts";
-import { angleUnit, jointUnit } from "./description";
+import { fileName } from "./chain";
 import type { Body, Description, Joint, Range } from "./description";
+import { angleUnit, jointUnit } from "./description";
 import { draft, edit, seal } from "./draft";
 import { takeShapeFor } from "./drop";
 import { renameJoint, renameLink, setType } from "./edits";
 import { NumberField, PoseFields, ProblemWords, Section, TextField } from "./fields";
-import { fileName } from "./chain";
 import { FileButton } from "./file-button";
 import { shapeOf } from "./shapes";
-import { d } from "../../i18n/define";
 import { chosen, chosenBody, chosenJoint, chosenLinkName } from "./workbench";
 
 const MOTION = ["max_speed", "max_acceleration", "max_jerk"] as const;
@@ -78,7 +78,13 @@ function JointDetails({ joint, index, description }: { joint: Joint; index: numb
           value={joint.name}
           set={(name) => edit((now) => renameJoint(now.description, index, name), `${path}/name`)}
         />
-        <NumberField path={`${path}/home`} label={d("home")} value={joint.home} unit={unit} set={(value) => set("home", (own) => void (own.home = value))} />
+        <NumberField
+          path={`${path}/home`}
+          label={d("home")}
+          value={joint.home}
+          unit={unit}
+          set={(value) => set("home", (own) => void (own.home = value))}
+        />
         {limit(0)}
         {limit(1)}
       </div>
@@ -107,7 +113,8 @@ function BodyDetails({ body, description }: { body: Body; description: Descripti
   const path = part === "base" ? "base" : `joint/${part}/link`;
   const joint = chosenJoint(description);
   const name = chosenLinkName(description);
-  const find = (of: Description) => (part === "base" ? of.base : typeof part === "number" ? of.joint[part]?.link : undefined);
+  const find = (of: Description) =>
+    part === "base" ? of.base : typeof part === "number" ? of.joint[part]?.link : undefined;
   const set = (field: string, change: (body: Body) => void) =>
     edit((now) => {
       const own = find(now.description);
@@ -135,7 +142,12 @@ function BodyDetails({ body, description }: { body: Body; description: Descripti
             <span class="dim small"> {d("mesh_checked", { file: fileName(body.collision_mesh) })}</span>
           )}
         </span>
-        <FileButton path={`${path}/mesh`} label={d("mesh_choose")} quiet take={(files) => void takeShapeFor(files, find)} />
+        <FileButton
+          path={`${path}/mesh`}
+          label={d("mesh_choose")}
+          quiet
+          take={(files) => void takeShapeFor(files, find)}
+        />
         {body.mesh && (
           <button
             class="quiet"

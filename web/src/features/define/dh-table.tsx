@@ -1,10 +1,10 @@
 // All D-H rows at a glance, and in place to be typed over.
 
+import { d } from "../../i18n/define";
 import { problemsAt } from "./checks";
 import { angleUnit, jointUnit } from "./description";
 import { draft, edit } from "./draft";
 import { NumberField } from "./fields";
-import { d } from "../../i18n/define";
 import { choose, chosen } from "./workbench";
 
 const COLUMNS = ["a", "alpha", "d", "theta"] as const;
@@ -40,7 +40,11 @@ export function DhTable() {
             {COLUMNS.map((column) => {
               const varies = column === (joint.type === "rotary" ? "theta" : "d");
               return (
-                <td key={column} class={varies ? "varies" : ""} title={varies ? d("variable", { unit: jointUnit(joint.type, units) }) : ""}>
+                <td
+                  key={column}
+                  class={varies ? "varies" : ""}
+                  title={varies ? d("variable", { unit: jointUnit(joint.type, units) }) : ""}
+                >
                   <NumberField
                     quiet
                     path={`joint/${index}/${column}`}

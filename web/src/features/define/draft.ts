@@ -176,7 +176,11 @@ export function hasKept(owner: string): boolean {
 export function newDrafts(): { id: string; name: string; at: number }[] {
   const kept = keys(NEW).flatMap((key) => keptAt(key) ?? []);
   return kept
-    .map(({ draft: { description }, identity: { id }, at }) => ({ id, name: description.title || description.name, at }))
+    .map(({ draft: { description }, identity: { id }, at }) => ({
+      id,
+      name: description.title || description.name,
+      at,
+    }))
     .sort((one, other) => other.at - one.at);
 }
 

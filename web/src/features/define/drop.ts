@@ -1,16 +1,16 @@
 // Files that are dropped or chosen: sent to the server, and made links, companions or a URDF's robot.
 
 import { signal } from "@preact/signals";
-import { complete, empty, radians, tidy } from "./description";
+import { d } from "../../i18n/define";
 import type { Body, Description } from "./description";
-import { begin, draft, edit, identity, isOpen } from "./draft";
+import { complete, empty, radians, tidy } from "./description";
 import type { Draft, Identity } from "./draft";
+import { begin, draft, edit, identity, isOpen } from "./draft";
 import { freshName, insertJoint, nameFromFile } from "./edits";
 import { keep } from "./kept-files";
-import { importRobot, mesh, unzip, upload } from "./server";
 import type { MeshInfo } from "./server";
+import { importRobot, mesh, unzip, upload } from "./server";
 import { beside, missingFiles, readShape, setShape } from "./shapes";
-import { d } from "../../i18n/define";
 import { choose, resetWorkbench } from "./workbench";
 
 /** What looks like a mesh file; which of them are read, and why not, the server says. */
@@ -179,7 +179,8 @@ async function takeShapes(sent: Map<string, string>): Promise<void> {
   if ((draft.value?.description.joint.length ?? 0) > links) choose(links);
   const files = draft.value?.files ?? {};
   await Promise.all(changed.map((path) => readShape(path, files)));
-  const whole = sent.size === 1 ? d("read_one", { name: [...sent.keys()][0] ?? "" }) : d("read_done", { count: sent.size });
+  const whole =
+    sent.size === 1 ? d("read_one", { name: [...sent.keys()][0] ?? "" }) : d("read_done", { count: sent.size });
   if (fileNotices.value.length === 0) notice("done", whole);
 }
 
@@ -192,7 +193,9 @@ async function readLinks(paths: readonly string[], files: Readonly<Record<string
     reading.value = d("reading", { name: path, number: index + 1, count: paths.length });
     try {
       // Alone first: what it then lacks of the others are its parts.
-      const alone = Object.fromEntries(Object.entries(files).filter(([name]) => name === path || !paths.includes(name)));
+      const alone = Object.fromEntries(
+        Object.entries(files).filter(([name]) => name === path || !paths.includes(name)),
+      );
       let info = await mesh(path, alone);
       const own = info.missing.map((name) => beside(path, name)).filter((name) => paths.includes(name));
       for (const part of own) parts.add(part);
@@ -234,7 +237,10 @@ export function takeShapeFor(dropped: readonly Dropped[], find: (of: Description
   return inTurn(async () => {
     const sent = [...(await sendAll(dropped))].map(([path, sha]): [string, string] => [`${MESH_FOLDER}/${path}`, sha]);
     const added = Object.fromEntries(sent);
-    const { infos } = await readLinks(Object.keys(added).filter((path) => SHAPE.test(path)), { ...draft.value?.files, ...added });
+    const { infos } = await readLinks(
+      Object.keys(added).filter((path) => SHAPE.test(path)),
+      { ...draft.value?.files, ...added },
+    );
     const [first] = infos;
     if (!first || isLeft()) return;
     edit((now) => {

@@ -1,7 +1,7 @@
 // Changes of a description that touch more than one value. Each changes the copy that it is given.
 
-import { linkName, linkNames, metres, newJoint, radians, tidy, usualLimits } from "./description";
 import type { Description, Joint, JointType, Pose, Triple, Units } from "./description";
+import { linkName, linkNames, metres, newJoint, radians, tidy, usualLimits } from "./description";
 
 /** A name that is not taken: "joint3". */
 export function freshName(stem: string, taken: readonly string[]): string {

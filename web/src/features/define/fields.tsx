@@ -1,11 +1,11 @@
 // Fields of the forms: numbers with units, texts, choices; each knows its place in the description.
 
-import { useId, useState } from "preact/hooks";
 import type { ComponentChildren } from "preact";
+import { useId, useState } from "preact/hooks";
+import { d } from "../../i18n/define";
 import { noNumber, problemsAt, unread } from "./checks";
 import type { Pose, Triple } from "./description";
 import { seal } from "./draft";
-import { d } from "../../i18n/define";
 
 interface Place {
   /** Its place in the description, as the server's problems name it: "joint/2/limits/0". */
@@ -115,7 +115,12 @@ export function TextField(
 }
 
 export function SelectField<Value extends string>(
-  props: Place & { value: Value; values: readonly Value[]; text: (value: Value) => string; set: (value: Value) => void },
+  props: Place & {
+    value: Value;
+    values: readonly Value[];
+    text: (value: Value) => string;
+    set: (value: Value) => void;
+  },
 ) {
   const id = useId();
   const wrong = problemsAt(props.path).length > 0;

@@ -3,12 +3,7 @@
 import { useRef } from "preact/hooks";
 import type { Dropped } from "./drop";
 
-export function FileButton(props: {
-  label: string;
-  take: (files: Dropped[]) => void;
-  quiet?: boolean;
-  path?: string;
-}) {
+export function FileButton(props: { label: string; take: (files: Dropped[]) => void; quiet?: boolean; path?: string }) {
   const input = useRef<HTMLInputElement>(null);
   return (
     <>

@@ -1,11 +1,11 @@
 // Named frames on links, and limits on sums of joint positions.
 
-import { angleUnit, jointUnit, linkNames } from "./description";
+import { d } from "../../i18n/define";
 import type { Constraint, NamedFrame, Range } from "./description";
+import { angleUnit, jointUnit, linkNames } from "./description";
 import { draft, edit, seal } from "./draft";
 import { freshName } from "./edits";
 import { NumberField, PoseFields, ProblemWords, Section, SelectField, TextField } from "./fields";
-import { d } from "../../i18n/define";
 
 function RemoveButton({ name, remove }: { name: string; remove: () => void }) {
   return (
@@ -49,10 +49,20 @@ export function FramesTab() {
         <Section
           key={index}
           title={frame.name}
-          end={<RemoveButton name={frame.name} remove={() => edit(({ description }) => void description.frame.splice(index, 1))} />}
+          end={
+            <RemoveButton
+              name={frame.name}
+              remove={() => edit(({ description }) => void description.frame.splice(index, 1))}
+            />
+          }
         >
           <div class="grid-2">
-            <TextField path={`frame/${index}/name`} label={d("name")} value={frame.name} set={(name) => set(index, "name", (own) => void (own.name = name))} />
+            <TextField
+              path={`frame/${index}/name`}
+              label={d("name")}
+              value={frame.name}
+              set={(name) => set(index, "name", (own) => void (own.name = name))}
+            />
             <SelectField
               path={`frame/${index}/link`}
               label={d("on_link")}
@@ -90,7 +100,10 @@ export function ConstraintsTab() {
     edit(({ description }) => {
       const named = description.joint.filter((joint) => joint.type === "rotary").slice(1, 3);
       const joined = Object.fromEntries(named.map((joint) => [joint.name, 1]));
-      description.constraint.push({ joints: joined, limits: description.units.angle === "deg" ? [-180, 180] : [-3.14, 3.14] });
+      description.constraint.push({
+        joints: joined,
+        limits: description.units.angle === "deg" ? [-180, 180] : [-3.14, 3.14],
+      });
     });
   return (
     <>
@@ -123,7 +136,12 @@ export function ConstraintsTab() {
           <Section
             key={index}
             title={title}
-            end={<RemoveButton name={title} remove={() => edit(({ description }) => void description.constraint.splice(index, 1))} />}
+            end={
+              <RemoveButton
+                name={title}
+                remove={() => edit(({ description }) => void description.constraint.splice(index, 1))}
+              />
+            }
           >
             <div class="grid-3">
               {joints.map((joint) => (

@@ -1,12 +1,12 @@
 // Opening a robot to be defined: as it is saved, or its unsaved draft.
 
 import { signal } from "@preact/signals";
+import { d } from "../../i18n/define";
 import { complete } from "./description";
 import { begin, bringBack, discard, identity, isOpen, leave } from "./draft";
 import { fileNotices, waitingUrdf } from "./drop";
 import { known, listRobots, outcome } from "./outcome";
 import { robot } from "./server";
-import { d } from "../../i18n/define";
 import { resetWorkbench } from "./workbench";
 
 /** What is being opened, in words; "": nothing. */

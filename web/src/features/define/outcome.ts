@@ -1,12 +1,12 @@
 // Saving, downloading, starting: what the toolbar does, and what became of it.
 
 import { signal } from "@preact/signals";
-import { draft, identity, isOpen, isUnsaved, savedAs } from "./draft";
-import { goTo } from "./workbench";
-import * as server from "./server";
-import type { Robots } from "./server";
-import { checked, placeOf, unread } from "./checks";
 import { d } from "../../i18n/define";
+import { checked, placeOf, unread } from "./checks";
+import { draft, identity, isOpen, isUnsaved, savedAs } from "./draft";
+import type { Robots } from "./server";
+import * as server from "./server";
+import { goTo } from "./workbench";
 
 export type Outcome =
   | { kind: "done" | "refused"; text: string }
@@ -72,7 +72,9 @@ export async function save(thenStart: boolean, over = ""): Promise<boolean> {
     } catch (error) {
       if (!(error instanceof server.Refused) || !isOpen(of)) throw error;
       if (error.status === 409) {
-        const text = error.isChanged ? d("exists_changed", { name }) : d("exists", { text: error.message.replace(/\.$/, "") });
+        const text = error.isChanged
+          ? d("exists_changed", { name })
+          : d("exists", { text: error.message.replace(/\.$/, "") });
         outcome.value = { kind: "exists", text, name, thenStart };
         return undefined;
       }

@@ -1,8 +1,8 @@
 // Where links are: the product of standard D-H rows, for drawing. The server's answer is what counts.
 
 import { Euler, Matrix4, Quaternion, Vector3 } from "three";
-import { metres, radians, tidy } from "./description";
 import type { Description, Joint, Pose, Triple, Units } from "./description";
+import { metres, radians, tidy } from "./description";
 
 const UNIT_SCALE = new Vector3(1, 1, 1);
 
@@ -59,7 +59,8 @@ export function poseOf(placement: Matrix4, units: Units): Pose {
   const turn = new Quaternion();
   placement.decompose(at, turn, new Vector3());
   const { x: roll, y: pitch, z: yaw } = new Euler().setFromQuaternion(turn, "ZYX");
-  const degrees = (angle: number) => tidy(((Math.round((angle * 180e3) / Math.PI) / 1e3) * Math.PI) / 180 / radians(units));
+  const degrees = (angle: number) =>
+    tidy(((Math.round((angle * 180e3) / Math.PI) / 1e3) * Math.PI) / 180 / radians(units));
   const length = (value: number) => tidy(Math.round(value * 1e6) / 1e6 / metres(units));
   return {
     xyz: [length(at.x), length(at.y), length(at.z)],

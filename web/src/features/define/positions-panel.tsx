@@ -1,14 +1,14 @@
 // The joints' sliders, and where the server says that the tool is.
 
 import { Matrix4 } from "three";
+import { d } from "../../i18n/define";
 import { Unit } from "../../ui/parts";
-import { checkFailed, checked, checking } from "./checks";
-import { jointUnit } from "./description";
+import { checked, checkFailed, checking } from "./checks";
 import type { Joint, Units } from "./description";
+import { jointUnit } from "./description";
 import { draft, edit } from "./draft";
 import { NumberField, numberText } from "./fields";
 import { poseOf } from "./placements";
-import { d } from "../../i18n/define";
 import { positionOf, slid } from "./workbench";
 
 const SI_TO_SHOWN: Units = { length: "mm", angle: "deg" };
@@ -95,7 +95,12 @@ function ToolAt() {
     <div key={label}>
       <dt>{label}</dt>
       <dd>
-        {value === undefined ? "–" : value.toFixed(digits).replace(/^-(?=0\.?0*$)/, "").replace("-", "−")}
+        {value === undefined
+          ? "–"
+          : value
+              .toFixed(digits)
+              .replace(/^-(?=0\.?0*$)/, "")
+              .replace("-", "−")}
         <Unit of={unit} />
       </dd>
     </div>
@@ -103,15 +108,15 @@ function ToolAt() {
   return (
     <div class="tool-line">
       <h3>{d("tool")}</h3>
-    <dl
-      class={`tool-at ${checking.value || checkFailed.value ? "waiting" : ""}`}
-      aria-label={d("tool_at")}
-      data-tool={tool ? JSON.stringify(tool) : ""}
-      data-checking={checking.value}
-    >
-      {["x", "y", "z"].map((label, index) => number(label, pose?.xyz[index], 1, "mm"))}
-      {[d("roll"), d("pitch"), d("yaw")].map((label, index) => number(label, pose?.rpy[index], 2, "°"))}
-    </dl>
+      <dl
+        class={`tool-at ${checking.value || checkFailed.value ? "waiting" : ""}`}
+        aria-label={d("tool_at")}
+        data-tool={tool ? JSON.stringify(tool) : ""}
+        data-checking={checking.value}
+      >
+        {["x", "y", "z"].map((label, index) => number(label, pose?.xyz[index], 1, "mm"))}
+        {[d("roll"), d("pitch"), d("yaw")].map((label, index) => number(label, pose?.rpy[index], 2, "°"))}
+      </dl>
     </div>
   );
 }

@@ -1,7 +1,7 @@
 // What is wrong with the draft, in the server's words; a click goes to the field.
 
-import { checkFailed, checked, checking, problems, readingShapes } from "./checks";
 import { d } from "../../i18n/define";
+import { checked, checkFailed, checking, problems, readingShapes } from "./checks";
 import { goTo } from "./workbench";
 
 export function ProblemsPanel() {

@@ -1,10 +1,10 @@
 // What belongs to the whole robot: its name, where its dimensions come from, its units.
 
-import { SelectField, Section, TextField, ProblemWords } from "./fields";
+import { d } from "../../i18n/define";
 import type { Units } from "./description";
 import { draft, edit, seal } from "./draft";
 import { setUnits } from "./edits";
-import { d } from "../../i18n/define";
+import { ProblemWords, Section, SelectField, TextField } from "./fields";
 
 export function RobotTab() {
   const now = draft.value;
@@ -35,8 +35,22 @@ export function RobotTab() {
       </Section>
       <Section title={d("units")}>
         <div class="grid-2">
-          <SelectField path="units/length" label={d("unit_length")} value={units.length} values={["mm", "m"]} text={(unit) => unit} set={(length) => inUnits({ length })} />
-          <SelectField path="units/angle" label={d("unit_angle")} value={units.angle} values={["deg", "rad"]} text={(unit) => (unit === "deg" ? "°" : unit)} set={(angle) => inUnits({ angle })} />
+          <SelectField
+            path="units/length"
+            label={d("unit_length")}
+            value={units.length}
+            values={["mm", "m"]}
+            text={(unit) => unit}
+            set={(length) => inUnits({ length })}
+          />
+          <SelectField
+            path="units/angle"
+            label={d("unit_angle")}
+            value={units.angle}
+            values={["deg", "rad"]}
+            text={(unit) => (unit === "deg" ? "°" : unit)}
+            set={(angle) => inUnits({ angle })}
+          />
         </div>
         <p class="dim small">{d("units_hint")}</p>
       </Section>

@@ -1,22 +1,22 @@
 // The 3-D panel: the arm at the sliders' positions, its D-H rows, and the gizmo.
 
 import { signal } from "@preact/signals";
-import { Matrix4 } from "three";
 import { useEffect, useRef, useState } from "preact/hooks";
-import { Choice, Toggle } from "../../ui/parts";
-import { t, viewText } from "../../i18n/texts";
-import { theme } from "../../ui/theme";
-import { bodies, linkNames } from "./description";
-import type { Pose } from "./description";
-import { draft, edit, seal } from "./draft";
-import type { Draft } from "./draft";
-import { linkPlacements, poseMatrix, poseOf, rowAt } from "./placements";
-import { DefineScene } from "./scene";
-import type { Dragging, Picture, Shown } from "./scene";
-import { readShape, shapeOf } from "./shapes";
+import { Matrix4 } from "three";
 import { d } from "../../i18n/define";
-import { USUAL_VIEWS, lookOf, sizeOf } from "./views";
+import { t, viewText } from "../../i18n/texts";
+import { Choice, Toggle } from "../../ui/parts";
+import { theme } from "../../ui/theme";
+import type { Pose } from "./description";
+import { bodies, linkNames } from "./description";
+import type { Draft } from "./draft";
+import { draft, edit, seal } from "./draft";
+import { linkPlacements, poseMatrix, poseOf, rowAt } from "./placements";
+import type { Dragging, Picture, Shown } from "./scene";
+import { DefineScene } from "./scene";
+import { readShape, shapeOf } from "./shapes";
 import type { Look } from "./viewpoint";
+import { lookOf, sizeOf, USUAL_VIEWS } from "./views";
 import { choose, chosen, chosenBody, positions } from "./workbench";
 
 /** The scene's camera, for the views' tab; null: there is no scene. */
@@ -26,7 +26,9 @@ export const lookFrom = signal<{ name: string }>({ name: "free" });
 
 function pictureOf(now: Draft): Picture {
   const { description } = now;
-  const rows = description.joint.map((joint, index) => rowAt(joint, positions.value[index] ?? joint.home, description.units));
+  const rows = description.joint.map((joint, index) =>
+    rowAt(joint, positions.value[index] ?? joint.home, description.units),
+  );
   let widest = 0;
   const shapes = bodies(description).map((body): Shown | null => {
     const shape = body.mesh ? shapeOf(body.mesh, now.files) : undefined;
@@ -45,7 +47,9 @@ function pictureOf(now: Draft): Picture {
     rows,
     frames: description.frame.map((frame) => ({
       name: frame.name,
-      placement: (placements[links.indexOf(frame.link)] ?? new Matrix4()).clone().multiply(poseMatrix(frame, description.units)),
+      placement: (placements[links.indexOf(frame.link)] ?? new Matrix4())
+        .clone()
+        .multiply(poseMatrix(frame, description.units)),
     })),
     shapes,
     tool: poseMatrix(description.tool, description.units),
@@ -121,7 +125,14 @@ export function ScenePanel() {
   return (
     <section class="panel scene define-scene" aria-label={d("scene")}>
       <div class="canvas-place">
-        <canvas ref={canvas} tabIndex={0} role="img" aria-label={`${d("scene")}. ${d("scene_hint")}`} title="" onKeyDown={onKey} />
+        <canvas
+          ref={canvas}
+          tabIndex={0}
+          role="img"
+          aria-label={`${d("scene")}. ${d("scene_hint")}`}
+          title=""
+          onKeyDown={onKey}
+        />
       </div>
       <div class="scene-tools">
         <Choice

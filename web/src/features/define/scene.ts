@@ -125,7 +125,8 @@ export class DefineScene {
       this.floorScale = scale;
       this.scene.getObjectByName("floor")?.scale.setScalar(scale);
     }
-    while (this.links.length > picture.placements.length) this.scene.remove(this.links.pop()?.group ?? new THREE.Group());
+    while (this.links.length > picture.placements.length)
+      this.scene.remove(this.links.pop()?.group ?? new THREE.Group());
     picture.placements.forEach((placement, index) => {
       const link = this.links[index] ?? this.addLink();
       link.group.matrix.copy(placement);
@@ -138,7 +139,8 @@ export class DefineScene {
     });
     const last = picture.placements.at(-1) ?? new THREE.Matrix4();
     const tool = last.clone().multiply(picture.tool);
-    if (!(this.inDrag && picture.chosen === "tool")) tool.decompose(this.tool.position, this.tool.quaternion, this.tool.scale);
+    if (!(this.inDrag && picture.chosen === "tool"))
+      tool.decompose(this.tool.position, this.tool.quaternion, this.tool.scale);
     const row = typeof picture.chosen === "number" && picture.chosen > 0 ? picture.chosen - 1 : null;
     this.skeleton.update(picture, tool, row);
     this.paintAll();

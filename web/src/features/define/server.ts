@@ -1,11 +1,11 @@
 // Define's requests to the console's server.
 
-import { concise } from "./description";
-import type { GivenDescription } from "./description";
-import { identity } from "./draft";
-import type { Draft } from "./draft";
-import { keptFile } from "./kept-files";
 import { t } from "../../i18n/texts";
+import type { GivenDescription } from "./description";
+import { concise } from "./description";
+import type { Draft } from "./draft";
+import { identity } from "./draft";
+import { keptFile } from "./kept-files";
 
 export interface Problem {
   path: (string | number)[];
@@ -142,7 +142,12 @@ async function withFiles(files: Readonly<Record<string, string>>, asked: () => P
     if (!(error instanceof Refused) || error.status !== FORGOTTEN) throw error;
     // A saved robot's own files are put back by opening it.
     const { owner } = identity.value;
-    let sent = owner ? await robot(owner).then(() => 1, () => 0) : 0;
+    let sent = owner
+      ? await robot(owner).then(
+          () => 1,
+          () => 0,
+        )
+      : 0;
     for (const [path, sha] of Object.entries(files)) {
       const bytes = await keptFile(sha);
       if (bytes) sent += Number((await upload(path, bytes)).sha === sha);

@@ -3,8 +3,8 @@
 import { effect, signal } from "@preact/signals";
 import { bodies } from "./description";
 import { draft } from "./draft";
-import { mesh } from "./server";
 import type { MeshInfo } from "./server";
+import { mesh } from "./server";
 
 export type Shape = { info: MeshInfo } | { error: string } | "reading";
 

@@ -1,8 +1,8 @@
 // The D-H rows as lines: each joint's axis z, its offset d along it, its common normal a, each link's frame.
 
 import * as THREE from "three";
-import { alongAxis } from "./placements";
 import type { Row } from "./placements";
+import { alongAxis } from "./placements";
 
 const AXIS = "#4f9df0";
 const LETTERS = "#d5e8ff";
@@ -82,7 +82,14 @@ export class Skeleton {
     });
   }
 
-  private line(from: THREE.Vector3, to: THREE.Vector3, colour: string, bright: boolean, size: number, width: number): void {
+  private line(
+    from: THREE.Vector3,
+    to: THREE.Vector3,
+    colour: string,
+    bright: boolean,
+    size: number,
+    width: number,
+  ): void {
     const along = to.clone().sub(from);
     const length = along.length();
     if (length < 1e-6) return;
@@ -116,7 +123,12 @@ export class Skeleton {
     const key = `${text} ${colour} ${bright}`;
     let material = this.labels.get(key);
     if (!material) {
-      material = new THREE.SpriteMaterial({ map: lettering(text, colour), opacity: bright ? 1 : FAINT, sizeAttenuation: false, ...ON_TOP });
+      material = new THREE.SpriteMaterial({
+        map: lettering(text, colour),
+        opacity: bright ? 1 : FAINT,
+        sizeAttenuation: false,
+        ...ON_TOP,
+      });
       this.labels.set(key, material);
     }
     const sprite = new THREE.Sprite(material);

@@ -1,14 +1,14 @@
 // Before there is a draft: the ways to begin one.
 
 import { useEffect } from "preact/hooks";
-import { timeOfDay } from "../../i18n/format";
-import { begin, bringBack, hasKept, newDrafts } from "./draft";
-import { insertJoint } from "./edits";
-import { empty } from "./description";
-import { FileButton } from "./file-button";
-import { reading, takeFiles } from "./drop";
-import { known, listRobots } from "./outcome";
 import { d } from "../../i18n/define";
+import { timeOfDay } from "../../i18n/format";
+import { empty } from "./description";
+import { begin, bringBack, hasKept, newDrafts } from "./draft";
+import { reading, takeFiles } from "./drop";
+import { insertJoint } from "./edits";
+import { FileButton } from "./file-button";
+import { known, listRobots } from "./outcome";
 import { resetWorkbench } from "./workbench";
 
 function startEmpty(): void {

@@ -1,14 +1,25 @@
 // Above the columns: what is being defined, undo and redo, save, download, start; and what became of it.
 
 import { useState } from "preact/hooks";
+import { d } from "../../i18n/define";
 import { timeOfDay } from "../../i18n/format";
-import { robotLink } from "../../ui/route";
 import { t } from "../../i18n/texts";
-import { broughtBack, canRedo, canUndo, draft, identity, isUnsaved, keepingFailed, putAside, redo, undo } from "./draft";
+import { robotLink } from "../../ui/route";
+import {
+  broughtBack,
+  canRedo,
+  canUndo,
+  draft,
+  identity,
+  isUnsaved,
+  keepingFailed,
+  putAside,
+  redo,
+  undo,
+} from "./draft";
 import { fileNotices, reading } from "./drop";
 import { discardDraft } from "./opening";
 import { busy, download, isRunning, known, outcome, save, start, stop } from "./outcome";
-import { d } from "../../i18n/define";
 
 export function Toolbar() {
   const now = draft.value;
@@ -131,7 +142,10 @@ export function Outcomes() {
         <div key={text} class={`outcome ${kind}`} role={kind === "refused" ? "alert" : "status"}>
           {kind === "refused" && <span class="shape warning" aria-hidden="true" />}
           <span>{text}</span>
-          <button class="quiet" onClick={() => (fileNotices.value = fileNotices.value.filter((each) => each.text !== text))}>
+          <button
+            class="quiet"
+            onClick={() => (fileNotices.value = fileNotices.value.filter((each) => each.text !== text))}
+          >
             {t("dismiss")}
           </button>
         </div>

@@ -1,12 +1,12 @@
 // Named views: what the video and the 3-D panel look from, set from this page's own camera.
 
 import { useState } from "preact/hooks";
+import { d } from "../../i18n/define";
 import { viewText } from "../../i18n/texts";
 import type { View } from "./description";
 import { draft, edit, seal } from "./draft";
 import { ProblemWords, SelectField, TextField } from "./fields";
 import { cameraNow, lookFrom } from "./scene-panel";
-import { d } from "../../i18n/define";
 import { USUAL_VIEWS, viewOf } from "./views";
 
 function setFromCamera(name: string): void {

@@ -1,8 +1,8 @@
 // A description's cameras: its own, and top, front and left worked out from the arm's reach.
 
 import { Vector3 } from "three";
-import { metres, tidy } from "./description";
 import type { Description, Triple, View } from "./description";
+import { metres, tidy } from "./description";
 import { reach } from "./placements";
 import type { Look } from "./viewpoint";
 

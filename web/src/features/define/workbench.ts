@@ -1,8 +1,8 @@
 // What is looked at while a draft is edited: the chosen part, the open tab, where the joints stand.
 
 import { computed, signal } from "@preact/signals";
-import { linkName } from "./description";
 import type { Body, Description, Joint } from "./description";
+import { linkName } from "./description";
 import { draft } from "./draft";
 
 /** The base, a joint with its link by its place in the chain, or the tool. */
@@ -53,7 +53,12 @@ export const positions = computed<readonly number[]>(() => draft.value?.descript
 /** Goes to where a problem is: opens its part and tab, and puts the focus into the nearest field. */
 export function goTo(path: readonly (string | number)[]): void {
   const [first, second] = path;
-  const tabs: Record<string, Tab> = { frame: "frames", constraint: "constraints", collision: "collisions", view: "views" };
+  const tabs: Record<string, Tab> = {
+    frame: "frames",
+    constraint: "constraints",
+    collision: "collisions",
+    view: "views",
+  };
   if (first === "joint" && typeof second === "number") {
     choose(Math.min(second, (draft.value?.description.joint.length ?? 1) - 1));
   } else if (first === "base" || first === "tool") {

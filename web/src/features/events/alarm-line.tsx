@@ -1,14 +1,14 @@
 // One alarm: how urgent, how it stands, since when, of what, what to do about it, who has seen to it.
 
 import { timestampMs } from "@bufbuild/protobuf/wkt";
-import { stampFull, stampTime, timeOfDay, fullTime } from "../../i18n/format";
-import { robotLink } from "../../ui/route";
-import { State, isUnacknowledged, nameOf } from "../../mesh/alarms";
-import type { Alarm } from "../../mesh/alarms";
 import { alarmAdvice, alarmTitle } from "../../i18n/alarm-words";
-import { PriorityMark } from "../../ui/priority";
-import { e } from "../../i18n/events";
 import type { EventsTextName } from "../../i18n/events";
+import { e } from "../../i18n/events";
+import { fullTime, stampFull, stampTime, timeOfDay } from "../../i18n/format";
+import type { Alarm } from "../../mesh/alarms";
+import { isUnacknowledged, nameOf, State } from "../../mesh/alarms";
+import { PriorityMark } from "../../ui/priority";
+import { robotLink } from "../../ui/route";
 
 const STATE_WORDS = new Map<State, EventsTextName>([
   [State.UNACKNOWLEDGED, "state_unacknowledged"],

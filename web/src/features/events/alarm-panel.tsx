@@ -2,19 +2,31 @@
 
 import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
-import { setOperator, operator, reasonOf } from "../../mesh/control";
-import type { Notice } from "../../mesh/control";
-import { hello } from "../../mesh/connection";
-import { Choice, NoticeLine, Toggle } from "../../ui/parts";
-import { t } from "../../i18n/texts";
-import { Action, Priority, State, act, alarms, anyWatch, asker, isUnacknowledged, mayAct, nameOf, silentSites } from "../../mesh/alarms";
-import type { Alarm } from "../../mesh/alarms";
-import { AlarmLine } from "./alarm-line";
-import { Select } from "../../ui/select";
-import { Shelve } from "./shelve";
-import { setSound, sound } from "../../ui/alarm-sound";
-import { e } from "../../i18n/events";
 import type { EventsTextName } from "../../i18n/events";
+import { e } from "../../i18n/events";
+import { t } from "../../i18n/texts";
+import type { Alarm } from "../../mesh/alarms";
+import {
+  Action,
+  act,
+  alarms,
+  anyWatch,
+  asker,
+  isUnacknowledged,
+  mayAct,
+  nameOf,
+  Priority,
+  State,
+  silentSites,
+} from "../../mesh/alarms";
+import { hello } from "../../mesh/connection";
+import type { Notice } from "../../mesh/control";
+import { operator, reasonOf, setOperator } from "../../mesh/control";
+import { setSound, sound } from "../../ui/alarm-sound";
+import { Choice, NoticeLine, Toggle } from "../../ui/parts";
+import { Select } from "../../ui/select";
+import { AlarmLine } from "./alarm-line";
+import { Shelve } from "./shelve";
 
 const SHOWN = ["all", "unacknowledged", "shelved"] as const;
 type Shown = (typeof SHOWN)[number];
@@ -170,10 +182,7 @@ export function AlarmPanel() {
       {listed.length > drawn.length && (
         <p class="footnote dim">{e("more_alarms", { count: listed.length - drawn.length })}</p>
       )}
-      <NoticeLine
-        notice={notice}
-        idle={mayAct.value ? "" : e("may_not")}
-      />
+      <NoticeLine notice={notice} idle={mayAct.value ? "" : e("may_not")} />
     </section>
   );
 }

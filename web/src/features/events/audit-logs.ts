@@ -1,11 +1,11 @@
 // What is in the gateways' audit logs beyond the last hundred of each: asked for, some gateways at a time.
 
 import { timestampFromMs } from "@bufbuild/protobuf/wkt";
-import { reasonOf } from "../../mesh/control";
 import { AuditListSchema, AuditQuerySchema } from "../../gen/robomesh_pb";
 import { ask } from "../../mesh/connection";
-import { auditLines } from "./entries";
+import { reasonOf } from "../../mesh/control";
 import type { AuditLine } from "./entries";
+import { auditLines } from "./entries";
 
 export const MOST_ASKED = 40;
 const AT_ONCE = 6;

@@ -1,10 +1,10 @@
 // On every page: how many alarms nobody has acknowledged, by priority; calm while there is none.
 
 import { useEffect } from "preact/hooks";
-import { anyWatch, counts, followAlarms, silentSites } from "../../mesh/alarms";
-import { PriorityMark, priorityWord } from "../../ui/priority";
-import { followSound } from "../../ui/alarm-sound";
 import { e } from "../../i18n/events";
+import { anyWatch, counts, followAlarms, silentSites } from "../../mesh/alarms";
+import { followSound } from "../../ui/alarm-sound";
+import { PriorityMark, priorityWord } from "../../ui/priority";
 
 export function AlarmBadge() {
   useEffect(() => {

@@ -2,13 +2,13 @@
 
 import { fromBinary } from "@bufbuild/protobuf";
 import { timestampMs } from "@bufbuild/protobuf/wkt";
-import { signal } from "@preact/signals";
 import type { Signal } from "@preact/signals";
+import { signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
-import { AuditEntrySchema, AuditListSchema, EventListSchema, EventSchema } from "../../gen/robomesh_pb";
 import type { AuditEntry, Event } from "../../gen/robomesh_pb";
-import { watch } from "../../mesh/connection";
+import { AuditEntrySchema, AuditListSchema, EventListSchema, EventSchema } from "../../gen/robomesh_pb";
 import type { Sample } from "../../mesh/connection";
+import { watch } from "../../mesh/connection";
 
 export const MOST_KEPT = 5000;
 const TAKEN_EACH_MS = 250;

@@ -1,22 +1,22 @@
 // What happened and who asked for what, newest first: of all robots and services, narrowed by what one looks for.
 
 import { useEffect, useState } from "preact/hooks";
-import { count, stampFull } from "../../i18n/format";
 import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "../../gen/robomesh_pb";
-import { eventText } from "../../i18n/event-text";
-import { Mark, OUTCOMES, SEVERITIES } from "../../ui/event-mark";
-import { fleetRobots } from "../../mesh/known-robots";
-import { entryText } from "../../i18n/audit-text";
-import { Choice, NoticeLine, Toggle } from "../../ui/parts";
-import type { Notice } from "../../mesh/control";
 import { alarmTitle } from "../../i18n/alarm-words";
-import { Filters, SiteSelect } from "./alarm-panel";
-import { MOST_ASKED, findInLogs } from "./audit-logs";
-import { audits, events, MOST_KEPT, useEntries } from "./entries";
-import type { AuditLine, EventEntry } from "./entries";
-import { Select } from "../../ui/select";
-import { t } from "../../i18n/texts";
+import { entryText } from "../../i18n/audit-text";
+import { eventText } from "../../i18n/event-text";
 import { e } from "../../i18n/events";
+import { count, stampFull } from "../../i18n/format";
+import { t } from "../../i18n/texts";
+import type { Notice } from "../../mesh/control";
+import { fleetRobots } from "../../mesh/known-robots";
+import { Mark, OUTCOMES, SEVERITIES } from "../../ui/event-mark";
+import { Choice, NoticeLine, Toggle } from "../../ui/parts";
+import { Select } from "../../ui/select";
+import { Filters, SiteSelect } from "./alarm-panel";
+import { findInLogs, MOST_ASKED } from "./audit-logs";
+import type { AuditLine, EventEntry } from "./entries";
+import { audits, events, MOST_KEPT, useEntries } from "./entries";
 import { VirtualList } from "./virtual-list";
 
 const KINDS = ["events", "requests"] as const;
@@ -58,7 +58,9 @@ export function Journal() {
       (!wanted || wordsOf(entry).toLowerCase().includes(wanted)),
   );
   const robots = fleetRobots.value.filter((key) => !site || key.split("/")[1] === site);
-  const sites = [...new Set([...fleetRobots.value.map((key) => key.split("/")[1] ?? ""), ...all.map((entry) => entry.site)])];
+  const sites = [
+    ...new Set([...fleetRobots.value.map((key) => key.split("/")[1] ?? ""), ...all.map((entry) => entry.site)]),
+  ];
   const names = [...new Set(robots.map((key) => key.split("/")[2] ?? ""))].sort();
 
   const search = async () => {
@@ -98,13 +100,7 @@ export function Journal() {
         {kind === "events" ? (
           <Select label={e("severity")} value={least} values={keysOf(LEAST)} text={e} choose={setLeast} />
         ) : (
-          <Select
-            label={e("outcome")}
-            value={outcome}
-            values={keysOf(WHAT)}
-            text={outcomeText}
-            choose={setOutcome}
-          />
+          <Select label={e("outcome")} value={outcome} values={keysOf(WHAT)} text={outcomeText} choose={setOutcome} />
         )}
         <Select label={e("time")} value={since} values={keysOf(SINCE_S)} text={e} choose={setSince} />
         <SiteSelect site={site} sites={sites} choose={(name) => (setSite(name), setRobot(""))} />

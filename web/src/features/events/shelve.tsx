@@ -1,10 +1,10 @@
 // Puts alarms aside for a while, with a reason.
 
 import { useState } from "preact/hooks";
-import { Choice } from "../../ui/parts";
-import { Reason } from "../../ui/ask-reason";
-import type { Alarm } from "../../mesh/alarms";
 import { e } from "../../i18n/events";
+import type { Alarm } from "../../mesh/alarms";
+import { Reason } from "../../ui/ask-reason";
+import { Choice } from "../../ui/parts";
 
 const TIMES = { minutes_15: 900, hour: 3600, hours_8: 28_800, day: 86_400 } as const;
 type Time = keyof typeof TIMES;
@@ -20,18 +20,14 @@ export function Shelve(props: {
     <Reason
       required
       title={e("shelve_do")}
-      text={others.length ? e("shelve_count", { count: props.alarms.length }) : e("shelve_one", { text: first?.text ?? "" })}
+      text={
+        others.length ? e("shelve_count", { count: props.alarms.length }) : e("shelve_one", { text: first?.text ?? "" })
+      }
       does={e("shelve_do")}
       close={props.close}
       done={(reason) => props.done(reason, TIMES[time])}
     >
-      <Choice
-        label={e("shelve_for")}
-        values={Object.keys(TIMES) as Time[]}
-        chosen={time}
-        text={e}
-        choose={setTime}
-      />
+      <Choice label={e("shelve_for")} values={Object.keys(TIMES) as Time[]} chosen={time} text={e} choose={setTime} />
     </Reason>
   );
 }

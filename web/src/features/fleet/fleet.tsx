@@ -2,20 +2,20 @@
 
 import { signal, useComputed } from "@preact/signals";
 import { useEffect, useState } from "preact/hooks";
-import { alarmsOf } from "../../mesh/alarms";
+import { f } from "../../i18n/fleet";
 import { ageText } from "../../i18n/format";
-import { lostAt } from "../../mesh/connection";
-import { Replays } from "../../ui/replays";
-import { stateWord } from "../../mesh/robot-state";
-import type { Level, StateWord } from "../../mesh/robot-state";
-import { State } from "../../ui/parts";
-import { isClockOff, isMeshStale, isSilent, seenAge, useMesh } from "../../mesh/site-health";
 import { t } from "../../i18n/texts";
-import { ageOf, now } from "../../mesh/topics";
+import { alarmsOf } from "../../mesh/alarms";
+import { lostAt } from "../../mesh/connection";
 import { fleetRobots } from "../../mesh/known-robots";
 import { robotNow, useFleetNow } from "../../mesh/robot-snapshots";
+import type { Level, StateWord } from "../../mesh/robot-state";
+import { stateWord } from "../../mesh/robot-state";
+import { isClockOff, isMeshStale, isSilent, seenAge, useMesh } from "../../mesh/site-health";
+import { ageOf, now } from "../../mesh/topics";
 import { Services } from "../../ui/alive-services";
-import { f } from "../../i18n/fleet";
+import { State } from "../../ui/parts";
+import { Replays } from "../../ui/replays";
 import { Tile } from "./tile";
 import "./fleet.css";
 
@@ -48,7 +48,14 @@ export function Fleet() {
         <Summary states={[...states.values()]} />
         <Filter sites={[...new Set(robots.map((key) => key.split("/")[1] ?? ""))]} />
       </div>
-      {shown.length === 0 && (robots.length > 0 ? <NoMatch all={robots.length} /> : settled ? <p class="empty">{t("no_robots")}</p> : <Skeletons />)}
+      {shown.length === 0 &&
+        (robots.length > 0 ? (
+          <NoMatch all={robots.length} />
+        ) : settled ? (
+          <p class="empty">{t("no_robots")}</p>
+        ) : (
+          <Skeletons />
+        ))}
       {[...bySite].map(([name, keys]) => (
         <section key={name} class="site" aria-label={`${t("site")} ${name}`}>
           <SiteHead site={name} robots={keys.length} />
@@ -90,7 +97,11 @@ function Filter({ sites }: { sites: readonly string[] }) {
   return (
     <div class="fleet-filter">
       {sites.length > 1 && (
-        <select aria-label={f("site")} value={site.value} onChange={(event) => (site.value = event.currentTarget.value)}>
+        <select
+          aria-label={f("site")}
+          value={site.value}
+          onChange={(event) => (site.value = event.currentTarget.value)}
+        >
           <option value="">{f("every_site")}</option>
           {sites.map((name) => (
             <option key={name} value={name}>
@@ -181,11 +192,14 @@ function Summary({ states }: { states: readonly StateWord[] }) {
   );
   return (
     <ul class="summary">
-      {sorted.map(([first, ...others]) => first && (
-        <li key={first.word}>
-          <State state={first} count={others.length + 1} />
-        </li>
-      ))}
+      {sorted.map(
+        ([first, ...others]) =>
+          first && (
+            <li key={first.word}>
+              <State state={first} count={others.length + 1} />
+            </li>
+          ),
+      )}
     </ul>
   );
 }
@@ -210,7 +224,9 @@ function SiteHead({ site: name, robots }: { site: string; robots: number }) {
         <span class="age">{f("health_stale", { age: ageText(ageOf(latest) ?? 0) })}</span>
       ) : (
         problems.length === 0 && (
-          <span class="dim small">{f("services_all", { count: latest.message.services.filter(({ site }) => site === name).length })}</span>
+          <span class="dim small">
+            {f("services_all", { count: latest.message.services.filter(({ site }) => site === name).length })}
+          </span>
         )
       )}
     </div>

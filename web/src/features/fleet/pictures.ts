@@ -1,13 +1,13 @@
 // Every tile's arm, drawn by one WebGL context: some tiles at a time, the longest not drawn first, within a budget.
 
-import * as THREE from "three";
 import { effect } from "@preact/signals";
-import { floorOf } from "../../mesh/clearance";
+import * as THREE from "three";
 import type { Description } from "../../gen/robomesh_pb";
+import { floorOf } from "../../mesh/clearance";
 import { drawsInSoftware } from "../../scene/scene";
 import { palette } from "../../scene/surroundings";
 import { theme } from "../../ui/theme";
-import { Rig, rigOf } from "./rig";
+import { type Rig, rigOf } from "./rig";
 
 const FIELD_OF_VIEW = 28; // degrees, upright
 const LOOK_FROM = new THREE.Vector3(1.1, -1.7, 0.8).normalize();
@@ -171,7 +171,9 @@ class Pictures {
     const source = renderer.domElement;
     tiles.forEach(({ canvas }, i) => {
       const [x, y] = [(i % COLUMNS) * width, source.height - Math.floor(i / COLUMNS) * height - canvas.height];
-      canvas.getContext("2d", { alpha: false })?.drawImage(source, x, y, canvas.width, canvas.height, 0, 0, canvas.width, canvas.height);
+      canvas
+        .getContext("2d", { alpha: false })
+        ?.drawImage(source, x, y, canvas.width, canvas.height, 0, 0, canvas.width, canvas.height);
       canvas.dataset["drawn"] = String(Number(canvas.dataset["drawn"] ?? 0) + 1);
     });
     const gl = renderer.getContext() as WebGL2RenderingContext;
@@ -185,7 +187,9 @@ class Pictures {
   private fit(tiles: readonly TilePicture[]): void {
     const ratio = this.software ? 1 : Math.min(devicePixelRatio, 1.5);
     for (const { canvas } of tiles) {
-      const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((side) => Math.max(1, Math.round(side * ratio)));
+      const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((side) =>
+        Math.max(1, Math.round(side * ratio)),
+      );
       if (canvas.width !== width) canvas.width = width ?? 1;
       if (canvas.height !== height) canvas.height = height ?? 1;
     }

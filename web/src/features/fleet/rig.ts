@@ -1,10 +1,10 @@
 // An arm as tiles draw it: coarse, one for all robots of a kind, posed by joint positions.
 
 import * as THREE from "three";
-import { forwardOf } from "../../scene/forward-kinematics";
-import type { Forward } from "../../scene/forward-kinematics";
 import type { Description } from "../../gen/robomesh_pb";
 import { meshUrl } from "../../scene/arm";
+import type { Forward } from "../../scene/forward-kinematics";
+import { forwardOf } from "../../scene/forward-kinematics";
 import { loadModel } from "../../scene/models";
 import { coarsen } from "./coarse";
 
@@ -27,27 +27,39 @@ export class Rig {
 
   constructor(prefix: string, description: Description, loaded: () => void) {
     const { joints, links, urdf } = description;
-    this.forward = forwardOf(urdf, joints.map((joint) => joint.name));
+    this.forward = forwardOf(
+      urdf,
+      joints.map((joint) => joint.name),
+    );
     void Promise.all(
       links.map(async ({ name, mesh, meshSha256, color }) => {
         if (!mesh) return;
-        const model = await loadModel(meshUrl(prefix, mesh, meshSha256), () => true, () => undefined);
+        const model = await loadModel(
+          meshUrl(prefix, mesh, meshSha256),
+          () => true,
+          () => undefined,
+        );
         const group = new THREE.Group();
         group.matrixAutoUpdate = false;
         if (model) group.add(dressed(model, color));
         this.links.set(name, group);
         this.group.add(group);
       }),
-    ).then(() => {
-      coarsen(this.group);
-      this.group.traverse((part) => part instanceof THREE.Mesh && this.own.set(part, part.material as THREE.Material));
-      this.complete = true;
-      this.pose(joints.map((joint) => joint.home));
-      new THREE.Box3().setFromObject(this.group).getBoundingSphere(this.bounds);
-      this.bounds.center.set(0, 0, this.bounds.center.z * 1.3);
-      this.bounds.radius *= REACHES;
-      loaded();
-    }, () => rigs.delete(rigName(description))); // the next tile that wants it tries again
+    ).then(
+      () => {
+        coarsen(this.group);
+        this.group.traverse(
+          (part) => part instanceof THREE.Mesh && this.own.set(part, part.material as THREE.Material),
+        );
+        this.complete = true;
+        this.pose(joints.map((joint) => joint.home));
+        new THREE.Box3().setFromObject(this.group).getBoundingSphere(this.bounds);
+        this.bounds.center.set(0, 0, this.bounds.center.z * 1.3);
+        this.bounds.radius *= REACHES;
+        loaded();
+      },
+      () => rigs.delete(rigName(description)),
+    ); // the next tile that wants it tries again
   }
 
   /** Places the links at joint positions [rad] or [m]. */

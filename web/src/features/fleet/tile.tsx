@@ -2,21 +2,21 @@
 
 import { fromBinary } from "@bufbuild/protobuf";
 import { useEffect, useRef, useState } from "preact/hooks";
-import { alarmsOf } from "../../mesh/alarms";
-import { PriorityMark } from "../../ui/priority";
-import { staleText, stampFull, stampTime } from "../../i18n/format";
 import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
-import { DescriptionSchema } from "../../gen/robomesh_pb";
 import type { Description } from "../../gen/robomesh_pb";
-import { hello, watch } from "../../mesh/connection";
-import { Silhouette, State, Tag } from "../../ui/parts";
-import { problemOf, stateWord } from "../../mesh/robot-state";
-import { robotLink } from "../../ui/route";
-import { t } from "../../i18n/texts";
-import { ageOf, isStale, now, staleAfter, useTopic } from "../../mesh/topics";
-import { robotNow } from "../../mesh/robot-snapshots";
-import { Services } from "../../ui/alive-services";
+import { DescriptionSchema } from "../../gen/robomesh_pb";
 import { f } from "../../i18n/fleet";
+import { staleText, stampFull, stampTime } from "../../i18n/format";
+import { t } from "../../i18n/texts";
+import { alarmsOf } from "../../mesh/alarms";
+import { hello, watch } from "../../mesh/connection";
+import { robotNow } from "../../mesh/robot-snapshots";
+import { problemOf, stateWord } from "../../mesh/robot-state";
+import { ageOf, isStale, now, staleAfter, useTopic } from "../../mesh/topics";
+import { Services } from "../../ui/alive-services";
+import { Silhouette, State, Tag } from "../../ui/parts";
+import { PriorityMark } from "../../ui/priority";
+import { robotLink } from "../../ui/route";
 import { useVisible } from "./visible";
 
 export function Tile({ robotKey }: { robotKey: string }) {
@@ -134,7 +134,10 @@ function Picture(props: { robotKey: string; description: Description | undefined
         last.newAt = sample.newAt;
         const { joints } = fromBinary(JointStatesSchema, sample.payload);
         const positions = new Map(joints.map((joint) => [joint.name, joint.position]));
-        made.take(description.joints.map((joint) => positions.get(joint.name) ?? joint.home), sample.arrived);
+        made.take(
+          description.joints.map((joint) => positions.get(joint.name) ?? joint.home),
+          sample.arrived,
+        );
       });
       end = () => {
         stop();

@@ -1,10 +1,10 @@
 // What is being taught: a pose of the ghost, set by sliders, by numbers or by the gizmo. It moves nothing.
 
 import { computed, signal } from "@preact/signals";
-import { reasonOf } from "../../mesh/control";
-import { rollPitchYaw, toDegrees, toRadians } from "../../i18n/format";
 import { InverseAnswerSchema, InverseRequestSchema, InverseRequest_Task as Task } from "../../gen/robomesh_pb";
+import { rollPitchYaw, toDegrees, toRadians } from "../../i18n/format";
 import { ask } from "../../mesh/connection";
+import { reasonOf } from "../../mesh/control";
 import { robotKey, toolAt } from "./subject";
 
 const WITHIN_S = 5;

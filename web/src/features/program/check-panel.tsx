@@ -1,18 +1,18 @@
 // What the check found: the verdict in words, what it assumed, and a row a violation.
 
-import { timeOfDay } from "../../i18n/format";
 import type { CheckAnswer } from "../../gen/robomesh_pb";
-import { Panel } from "../../ui/parts";
+import { timeOfDay } from "../../i18n/format";
+import { p } from "../../i18n/program";
 import { reasonText } from "../../i18n/reasons";
 import { t } from "../../i18n/texts";
-import { checkFailed, checkNow, checked, checking, errorsOf, isCurrent } from "./check";
+import { Panel } from "../../ui/parts";
+import { checked, checkFailed, checking, checkNow, errorsOf, isCurrent } from "./check";
 import { draft, goToLine } from "./draft";
-import { grouped } from "./grouped";
 import type { Group } from "./grouped";
-import { chosen, showMoment } from "./showing";
-import { kindText, severityOf } from "./severity";
+import { grouped } from "./grouped";
 import { distanceText, seconds } from "./numbers";
-import { p } from "../../i18n/program";
+import { kindText, severityOf } from "./severity";
+import { chosen, showMoment } from "./showing";
 import "./check-panel.css";
 
 export function CheckPanel({ moved }: { moved: boolean }) {
@@ -56,7 +56,11 @@ function Verdict({ moved }: { moved: boolean }) {
   }
   if (!answer || !checked.value) {
     const idle = draft.value?.text.trim() ? p("checking") : p("check_empty");
-    return <p class="verdict dim" role="status">{idle}</p>;
+    return (
+      <p class="verdict dim" role="status">
+        {idle}
+      </p>
+    );
   }
   const errors = errorsOf(answer).length;
   const count = answer.violations.length;
@@ -73,7 +77,13 @@ function Verdict({ moved }: { moved: boolean }) {
       <span class={`shape ${level}`} aria-hidden="true" />
       <strong>{words}</strong>
       <span class="dim small">
-        {busy ? p("checking") : errors ? "" : moved ? p("moved_since") : p("checked_at", { time: timeOfDay(checked.value.at) })}
+        {busy
+          ? p("checking")
+          : errors
+            ? ""
+            : moved
+              ? p("moved_since")
+              : p("checked_at", { time: timeOfDay(checked.value.at) })}
       </span>
     </p>
   );
@@ -119,7 +129,8 @@ function Row({ group: { worst, first, last, fromS, untilS } }: { group: Group })
       </span>
       <span class="violation-where dim">
         {line > 0 && (first < last ? p("lines_to", { first, last }) : p("line", { line }))}
-        {!isText && ` · ${untilS > fromS + 0.05 ? p("from_to", { from: seconds(fromS), to: seconds(untilS) }) : seconds(fromS)}`}
+        {!isText &&
+          ` · ${untilS > fromS + 0.05 ? p("from_to", { from: seconds(fromS), to: seconds(untilS) }) : seconds(fromS)}`}
         {distance !== undefined && pair.length > 0 && ` · ${distance > 0 ? distanceText(distance) : p("touch")}`}
       </span>
       <span class="violation-text">{reasonText(worst.reason, text) || pair.join(" – ") || t("state_unknown")}</span>

@@ -1,10 +1,10 @@
 // The check of the text as it stands: asked of the mesh when typing ends, the newest only.
 
 import { effect, signal } from "@preact/signals";
-import { CheckAnswerSchema, CheckRequestSchema } from "../../gen/robomesh_pb";
 import type { CheckAnswer, CheckAnswer_Violation } from "../../gen/robomesh_pb";
-import { reasonOf } from "../../mesh/control";
+import { CheckAnswerSchema, CheckRequestSchema } from "../../gen/robomesh_pb";
 import { ask, inOwnName } from "../../mesh/connection";
+import { reasonOf } from "../../mesh/control";
 import { draft } from "./draft";
 
 const TYPING_ENDS_MS = 800;

@@ -4,12 +4,12 @@ import { useEffect, useRef } from "preact/hooks";
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { jointUnit } from "../../i18n/format";
+import { p } from "../../i18n/program";
 import { plotLook } from "../../ui/plot-axis";
 import { theme } from "../../ui/theme";
 import { moment, path } from "./motion";
 import { showMoment } from "./showing";
 import { description } from "./subject";
-import { p } from "../../i18n/program";
 
 const CURVES = ["--curve-1", "--curve-2", "--curve-3", "--curve-4", "--curve-5", "--curve-6", "--curve-7"];
 const MOST_POINTS = 2000; // more than there are pixels
@@ -61,7 +61,16 @@ export function Curves() {
             points: { show: false },
           })),
           ...(near
-            ? [{ label: p("clearance"), scale: CLEARANCE, stroke: colour("--text"), width: 1.5, dash: [6, 4], points: { show: false } }]
+            ? [
+                {
+                  label: p("clearance"),
+                  scale: CLEARANCE,
+                  stroke: colour("--text"),
+                  width: 1.5,
+                  dash: [6, 4],
+                  points: { show: false },
+                },
+              ]
             : []),
         ],
         hooks: {
@@ -87,7 +96,9 @@ export function Curves() {
     };
     made.setData([
       rows.map((row) => of.timesS[row] ?? 0),
-      ...joints.map((joint, i) => rows.map((row) => (of.jointPositions[row * width + i] ?? 0) * jointUnit(joint).factor)),
+      ...joints.map((joint, i) =>
+        rows.map((row) => (of.jointPositions[row * width + i] ?? 0) * jointUnit(joint).factor),
+      ),
       ...(near ? [rows.map(clearance)] : []),
     ] as uPlot.AlignedData);
     made.over.addEventListener("click", (event) => showMoment(made.posToVal(event.offsetX, "x")));

@@ -2,14 +2,14 @@
 
 import { Component } from "preact";
 import { useLayoutEffect, useRef } from "preact/hooks";
+import { p } from "../../i18n/program";
 import { Panel } from "../../ui/parts";
 import { checked, isCurrent } from "./check";
-import { LINE_PX, download, draft, insert, keepingFailed, redo, typed, undo, setField } from "./draft";
+import { download, draft, insert, keepingFailed, LINE_PX, redo, setField, typed, undo } from "./draft";
 import { lineNow } from "./motion";
 import { runningLine } from "./running";
 import { severityOf } from "./severity";
 import { coloured } from "./text";
-import { p } from "../../i18n/program";
 import "./editor.css";
 
 type Mark = "shown" | "warning" | "alarm" | "running";
@@ -62,12 +62,12 @@ export function Editor() {
             onInput={typed}
             onBeforeInput={(event) => {
               const step = { historyUndo: undo, historyRedo: redo }[event.inputType];
-              if (step) (event.preventDefault(), step());
+              if (step) event.preventDefault(), step();
             }}
             onKeyDown={(event) => {
               const letter = event.ctrlKey || event.metaKey ? event.key.toLowerCase() : "";
               const action = letter === "z" ? (event.shiftKey ? redo : undo) : { y: redo, s: download }[letter];
-              if (action && !event.altKey) (event.preventDefault(), action());
+              if (action && !event.altKey) event.preventDefault(), action();
             }}
             onPaste={(event) => {
               // By itself the field takes seconds for a thousand lines.
@@ -103,7 +103,15 @@ class Line extends Component<{ text: string }> {
   override render() {
     return (
       <>
-        {coloured(this.props.text).map(({ text, is }, index) => (is ? <span key={index} class={is}>{text}</span> : text))}
+        {coloured(this.props.text).map(({ text, is }, index) =>
+          is ? (
+            <span key={index} class={is}>
+              {text}
+            </span>
+          ) : (
+            text
+          ),
+        )}
         {"\n"}
       </>
     );

@@ -54,7 +54,8 @@ export function addGizmo(stage: Stage): () => void {
       inBase.matrix.copy(stage.base());
       inBase.matrixWorldNeedsUpdate = true;
       // What is being dragged stays in the hand.
-      if (!controls.dragging) new Matrix4().fromArray(pose).transpose().decompose(tool.position, tool.quaternion, tool.scale);
+      if (!controls.dragging)
+        new Matrix4().fromArray(pose).transpose().decompose(tool.position, tool.quaternion, tool.scale);
       controls.setMode(mode);
       if (controls.object !== tool) controls.attach(tool);
     }

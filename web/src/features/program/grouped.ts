@@ -18,7 +18,8 @@ const MOVES = /^\s*(home|move_)/;
  * Errors of the text are one row only where their words are the same. */
 export function grouped(violations: readonly CheckAnswer_Violation[], text: string): readonly Group[] {
   const lines = text.split("\n");
-  const none = (from: number, to: number) => !lines.slice(from, Math.max(from, to - 1)).some((line) => MOVES.test(line));
+  const none = (from: number, to: number) =>
+    !lines.slice(from, Math.max(from, to - 1)).some((line) => MOVES.test(line));
   const groups: Group[] = [];
   const newest = new Map<string, Group>();
   for (const each of violations) {

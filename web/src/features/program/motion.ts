@@ -56,6 +56,8 @@ export const redNow = computed<ReadonlySet<string>>(() => {
   const time = moment.value;
   const violations = checked.value?.answer.violations ?? [];
   if (time === null) return new Set();
-  const now = violations.filter((each) => each.timeS <= time + 1e-6 && time <= Math.max(each.timeS, each.untilS) + 1e-6);
+  const now = violations.filter(
+    (each) => each.timeS <= time + 1e-6 && time <= Math.max(each.timeS, each.untilS) + 1e-6,
+  );
   return new Set(now.flatMap((each) => each.pair));
 });

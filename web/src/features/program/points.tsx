@@ -1,14 +1,14 @@
 // The points that the text has: shown by the ghost, named, deleted.
 
 import { useState } from "preact/hooks";
+import type { Words } from "../../i18n/program";
+import { p } from "../../i18n/program";
 import { aim, aimAtPose, poseOf } from "./aim";
 import { draft, goToLine, replace } from "./draft";
 import { teach } from "./showing";
 import { description, livePositions } from "./subject";
-import { isName, jointsOf, pointsOf, renamed, usesOf, withoutLine } from "./text";
 import type { Point } from "./text";
-import { p } from "../../i18n/program";
-import type { Words } from "../../i18n/program";
+import { isName, jointsOf, pointsOf, renamed, usesOf, withoutLine } from "./text";
 
 export function Points({ tell }: { tell: (words: Words) => void }) {
   const text = draft.value?.text ?? "";

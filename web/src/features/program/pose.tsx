@@ -2,10 +2,10 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { DASH, fixed } from "../../i18n/format";
+import { p } from "../../i18n/program";
 import { Choice } from "../../ui/parts";
 import { aimAtPose, aimPose, poseNumbers, poseOf, settle } from "./aim";
 import { gizmoMode } from "./gizmo";
-import { p } from "../../i18n/program";
 
 const GIZMO = ["translate", "rotate"] as const;
 const AXES = ["x", "y", "z"] as const;

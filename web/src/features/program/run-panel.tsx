@@ -1,21 +1,21 @@
 // Running the program: by whoever is in control, step by step, for everybody to see.
 
 import { useState } from "preact/hooks";
-import { Command, command } from "../../mesh/command";
-import { holds, ms } from "../../mesh/control";
-import type { Notice } from "../../mesh/control";
-import { clock, stampTime } from "../../i18n/format";
-import { reasonText } from "../../i18n/reasons";
-import { ProgramState_Outcome as Outcome } from "../../gen/robomesh_pb";
 import type { ControllerState, ProgramState } from "../../gen/robomesh_pb";
-import { NoticeLine, Panel } from "../../ui/parts";
+import { ProgramState_Outcome as Outcome } from "../../gen/robomesh_pb";
+import { clock, stampTime } from "../../i18n/format";
+import { p } from "../../i18n/program";
+import { reasonText } from "../../i18n/reasons";
+import { Command, command } from "../../mesh/command";
+import type { Notice } from "../../mesh/control";
+import { holds, ms } from "../../mesh/control";
 import { whyNoMotion } from "../../mesh/robot-state";
+import { NoticeLine, Panel } from "../../ui/parts";
 import { checked, errorsOf, isCurrent } from "./check";
-import { draft } from "./draft";
 import type { Draft } from "./draft";
+import { draft } from "./draft";
 import { program } from "./running";
 import { hideMoment } from "./showing";
-import { p } from "../../i18n/program";
 import "./run-panel.css";
 
 export function RunPanel(props: { robotKey: string; controller: ControllerState | undefined }) {
@@ -78,7 +78,11 @@ function Progress({ state }: { state: ProgramState }) {
         <strong>{name}</strong>
         <span class="dim small">{p("by_since", { name: operator, time: stampTime(state.since) })}</span>
       </p>
-      <progress max={Math.max(1, steps)} value={outcome === Outcome.DONE ? steps : Math.max(0, step - 1)} aria-label={p("progress")} />
+      <progress
+        max={Math.max(1, steps)}
+        value={outcome === Outcome.DONE ? steps : Math.max(0, step - 1)}
+        aria-label={p("progress")}
+      />
       <p class="progress-line">
         {line > 0 && <span class="dim">{p("line", { line })}</span>} <code>{statement}</code>
         <span class="dim small">

@@ -1,8 +1,8 @@
 // The program that the gateway runs, or ran last: what every monitor is told of it.
 
 import { signal } from "@preact/signals";
-import { ProgramState_Outcome as Outcome } from "../../gen/robomesh_pb";
 import type { ProgramState } from "../../gen/robomesh_pb";
+import { ProgramState_Outcome as Outcome } from "../../gen/robomesh_pb";
 
 /** The newest, while it is fresh; null: nobody says so now. */
 export const program = signal<ProgramState | null>(null);

@@ -2,8 +2,8 @@
 
 import { computed, signal } from "@preact/signals";
 import { Matrix4 } from "three";
-import { forwardOf } from "../../scene/forward-kinematics";
 import type { Description } from "../../gen/robomesh_pb";
+import { forwardOf } from "../../scene/forward-kinematics";
 
 export const robotKey = signal("");
 export const description = signal<Description | undefined>(undefined);
@@ -15,7 +15,10 @@ export const toolAt = computed(() => {
   const of = description.value;
   const frame = of?.frames.find(({ name }) => name === "tool");
   if (!of || frame?.frameToLink.length !== 16) return () => null;
-  const forward = forwardOf(of.urdf, of.joints.map((joint) => joint.name));
+  const forward = forwardOf(
+    of.urdf,
+    of.joints.map((joint) => joint.name),
+  );
   const toLink = new Matrix4().fromArray(frame.frameToLink).transpose();
   return (positions: readonly number[]): readonly number[] | null => {
     const link = forward(positions).get(frame.link);

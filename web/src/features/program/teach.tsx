@@ -2,6 +2,8 @@
 
 import { useState } from "preact/hooks";
 import { jointText, jointUnit } from "../../i18n/format";
+import type { Words } from "../../i18n/program";
+import { noWords, p } from "../../i18n/program";
 import { JointTrack } from "../../ui/joint-track";
 import { JointValue } from "../../ui/joint-value";
 import { Choice, NoticeLine, Panel } from "../../ui/parts";
@@ -11,10 +13,8 @@ import { Points } from "./points";
 import { Pose } from "./pose";
 import { teach } from "./showing";
 import { description, livePositions } from "./subject";
-import { freeName, jointsText, withPoint } from "./text";
 import type { Move } from "./text";
-import { noWords, p } from "../../i18n/program";
-import type { Words } from "../../i18n/program";
+import { freeName, jointsText, withPoint } from "./text";
 import "./teach.css";
 
 const WAYS = ["joints", "pose"] as const;
@@ -77,7 +77,9 @@ export function Teach() {
         </div>
       )}
       <Points tell={(words) => setTold({ words })} />
-      <p class="notice" role="status">{told.words() || "\u00a0"}</p>
+      <p class="notice" role="status">
+        {told.words() || "\u00a0"}
+      </p>
     </Panel>
   );
 }

@@ -1,8 +1,8 @@
 // The program's text as far as the page reads it: its points, and what is coloured. The check reads the rest.
 
-import { jointUnit } from "../../i18n/format";
-import { Description_Joint_Type as JointType } from "../../gen/robomesh_pb";
 import type { Description, Description_Joint } from "../../gen/robomesh_pb";
+import { Description_Joint_Type as JointType } from "../../gen/robomesh_pb";
+import { jointUnit } from "../../i18n/format";
 
 /** A named point: joint positions, or a pose of the tool, in degrees and millimetres as written. */
 export interface Point {
@@ -18,9 +18,7 @@ export type Move = "move_joints" | "move_line";
 const POINT = /^\s*point\s+(\S+)\s*=\s*(joints|pose)\b([^#]*)/;
 const NAME = /^[a-z][a-z0-9_-]*$/;
 const MOVES_TO = /^(\s*(?:move_joints|move_line)\s+)(\S+)/;
-const KEYWORDS = new Set(
-  "point home speed tool_speed move_joints move_line wait trace repeat end".split(" "),
-);
+const KEYWORDS = new Set("point home speed tool_speed move_joints move_line wait trace repeat end".split(" "));
 const SMALL = Math.PI / 6;
 
 export const isName = (text: string): boolean => NAME.test(text);
@@ -75,7 +73,10 @@ export function renamed(text: string, from: string, to: string): string {
 }
 
 export function withoutLine(text: string, line: number): string {
-  return text.split("\n").toSpliced(line - 1, 1).join("\n");
+  return text
+    .split("\n")
+    .toSpliced(line - 1, 1)
+    .join("\n");
 }
 
 /** Parts of a line with what they are. */
@@ -86,7 +87,11 @@ export function coloured(line: string): readonly { text: string; is: "" | "keywo
   const known = word && KEYWORDS.has(word[2] ?? "");
   return [
     ...(known
-      ? ([{ text: word[1] ?? "", is: "" }, { text: word[2] ?? "", is: "keyword" }, { text: word[3] ?? "", is: "" }] as const)
+      ? ([
+          { text: word[1] ?? "", is: "" },
+          { text: word[2] ?? "", is: "keyword" },
+          { text: word[3] ?? "", is: "" },
+        ] as const)
       : ([{ text: code, is: "" }] as const)),
     ...(at < 0 ? [] : [{ text: line.slice(at), is: "comment" } as const]),
   ].filter((part) => part.text);

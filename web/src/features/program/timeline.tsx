@@ -1,6 +1,7 @@
 // The checked motion over time: a scrubber that moves the ghost, and the joints and the clearance as curves.
 
 import { useEffect } from "preact/hooks";
+import { p } from "../../i18n/program";
 import { Panel } from "../../ui/parts";
 import { checked } from "./check";
 import { Curves } from "./curves";
@@ -8,7 +9,6 @@ import { clearanceNow, duration, lineNow, moment, path, playing } from "./motion
 import { distanceText, seconds } from "./numbers";
 import { severityOf } from "./severity";
 import { hideMoment, showMoment } from "./showing";
-import { p } from "../../i18n/program";
 import "./timeline.css";
 
 const STEP_S = 0.05;
@@ -27,10 +27,15 @@ export function Timeline() {
   };
   const line = lineNow.value;
   const clearance = clearanceNow.value;
-  const words = time === null ? p("scrub_hint") : [
-    line ? p("line", { line }) : "",
-    clearance === null ? "" : p("clearance_now", { distance: distanceText(clearance) }),
-  ].filter(Boolean).join(" · "); // prettier-ignore
+  const words =
+    time === null
+      ? p("scrub_hint")
+      : [
+          line ? p("line", { line }) : "",
+          clearance === null ? "" : p("clearance_now", { distance: distanceText(clearance) }),
+        ]
+          .filter(Boolean)
+          .join(" · "); // prettier-ignore
   return (
     <Panel
       name="timeline"

@@ -1,11 +1,11 @@
 // Above the text: its name, files, undo and redo.
 
 import { useRef } from "preact/hooks";
-import { FILE_ENDING, canRedo, canUndo, download, draft, redo, rename, replace, undo } from "./draft";
+import type { Words } from "../../i18n/program";
+import { p } from "../../i18n/program";
+import { canRedo, canUndo, download, draft, FILE_ENDING, redo, rename, replace, undo } from "./draft";
 import { description } from "./subject";
 import { example } from "./text";
-import { p } from "../../i18n/program";
-import type { Words } from "../../i18n/program";
 import "./toolbar.css";
 
 const LARGEST = 64 * 1024; // what a check reads

@@ -3,24 +3,24 @@
 import { create, fromBinary } from "@bufbuild/protobuf";
 import { timestampFromMs, timestampMs } from "@bufbuild/protobuf/wkt";
 import { useEffect, useState } from "preact/hooks";
-import { entryText } from "../../i18n/audit-text";
+import type { AuditEntry, Event, Recording, SeriesAnswer, SeriesAnswer_Series } from "../../gen/robomesh_pb";
 import {
   AuditEntrySchema,
-  AuditEntry_Outcome as Outcome,
   EventSchema,
-  Event_Severity as Severity,
+  AuditEntry_Outcome as Outcome,
   RangeRequestSchema,
   RecordedMessagesSchema,
   RecordingQuerySchema,
   RecordingSchema,
   SeriesAnswerSchema,
   SeriesRequestSchema,
+  Event_Severity as Severity,
 } from "../../gen/robomesh_pb";
-import type { AuditEntry, Event, Recording, SeriesAnswer, SeriesAnswer_Series } from "../../gen/robomesh_pb";
-import { AskError, ask, inOwnName, lostAt } from "../../mesh/connection";
-import type { RecordingName } from "../../ui/route";
+import { entryText } from "../../i18n/audit-text";
 import { startMs, topicOf } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
+import { AskError, ask, inOwnName, lostAt } from "../../mesh/connection";
+import type { RecordingName } from "../../ui/route";
 
 const WITHIN_S = 20;
 const MOST_EVENTS = 1000;
@@ -67,15 +67,26 @@ export interface Happened {
 }
 
 /** The events of a recording, oldest first, of every service, and what was asked of the robot. */
-export function useHappened(name: RecordingName | null, info: Recording | null): Asked<{ list: readonly Happened[]; cut: boolean }> {
+export function useHappened(
+  name: RecordingName | null,
+  info: Recording | null,
+): Asked<{ list: readonly Happened[]; cut: boolean }> {
   return useAsked(
     name && info
       ? async () => {
           const start = startMs(info);
-          const channels = info.topics.map(({ topic }) => topic).filter((topic) => /^(events(\/.*)?|audit)$/.test(topicOf(topic)));
+          const channels = info.topics
+            .map(({ topic }) => topic)
+            .filter((topic) => /^(events(\/.*)?|audit)$/.test(topicOf(topic)));
           const answers = await Promise.all(
             channels.map((topic) =>
-              ask(inOwnName(keyOf(name, "range")), RangeRequestSchema, { file: name.file, topic, most: MOST_EVENTS }, RecordedMessagesSchema, WITHIN_S),
+              ask(
+                inOwnName(keyOf(name, "range")),
+                RangeRequestSchema,
+                { file: name.file, topic, most: MOST_EVENTS },
+                RecordedMessagesSchema,
+                WITHIN_S,
+              ),
             ),
           );
           const list = answers
@@ -100,7 +111,12 @@ function askedFor(entry: AuditEntry): Event {
   const words = outcome === Outcome.REFUSED ? "asked_refused" : outcome === Outcome.FAILED ? "asked_failed" : "asked";
   const said = r(words, { who: operator || source, what: request.toLowerCase().replaceAll("_", " ") });
   const severity = words === "asked" ? Severity.INFO : Severity.WARNING;
-  const event = create(EventSchema, { severity, source, code: request, text: text ? `${said}: ${entryText(entry)}` : said });
+  const event = create(EventSchema, {
+    severity,
+    source,
+    code: request,
+    text: text ? `${said}: ${entryText(entry)}` : said,
+  });
   if (timestamp) event.timestamp = timestamp;
   return event;
 }
@@ -114,7 +130,13 @@ export function useFirst(name: RecordingName | null, info: Recording | null): nu
             const topic = info.topics.find((each) => topicOf(each.topic) === "frames")?.topic;
             if (!topic) return 0;
             const request = { file: name.file, topic, most: 1 };
-            const { messages } = await ask(inOwnName(keyOf(name, "range")), RangeRequestSchema, request, RecordedMessagesSchema, WITHIN_S);
+            const { messages } = await ask(
+              inOwnName(keyOf(name, "range")),
+              RangeRequestSchema,
+              request,
+              RecordedMessagesSchema,
+              WITHIN_S,
+            );
             const received = messages[0]?.received;
             return received ? (timestampMs(received) - startMs(info)) / 1000 : 0;
           }
@@ -157,7 +179,13 @@ export function useSeries(
 }
 
 function askSeries(name: RecordingName, request: object): Promise<SeriesAnswer> {
-  return ask(inOwnName(keyOf(name, "series")), SeriesRequestSchema, { file: name.file, ...request }, SeriesAnswerSchema, WITHIN_S);
+  return ask(
+    inOwnName(keyOf(name, "series")),
+    SeriesRequestSchema,
+    { file: name.file, ...request },
+    SeriesAnswerSchema,
+    WITHIN_S,
+  );
 }
 
 function keyOf({ site }: RecordingName, what: string): string {

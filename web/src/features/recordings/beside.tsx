@@ -1,11 +1,11 @@
 // How a second recording lies beside the first: aligned at their starts, or at an event of each.
 
 import { eventText } from "../../i18n/event-text";
-import { recordingsLink } from "../../ui/route";
-import type { RecordingName } from "../../ui/route";
-import type { Happened } from "./asked";
 import { momentText } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
+import type { RecordingName } from "../../ui/route";
+import { recordingsLink } from "../../ui/route";
+import type { Happened } from "./asked";
 
 const SHOWN_TEXT = 60;
 

@@ -2,14 +2,25 @@
 
 import type { Signal } from "@preact/signals";
 import { useState } from "preact/hooks";
-import { count, fullTime } from "../../i18n/format";
 import type { Recording } from "../../gen/robomesh_pb";
-import { Silhouette } from "../../ui/parts";
-import { recordingsLink } from "../../ui/route";
-import type { RecordingName } from "../../ui/route";
-import { dateText, durationS, fileUrl, isEmpty, lostText, messagesOf, momentText, sizeText, startMs, startedText } from "../../i18n/recording-format";
-import type { Row } from "./listed";
+import { count, fullTime } from "../../i18n/format";
+import {
+  dateText,
+  durationS,
+  fileUrl,
+  isEmpty,
+  lostText,
+  messagesOf,
+  momentText,
+  sizeText,
+  startedText,
+  startMs,
+} from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
+import { Silhouette } from "../../ui/parts";
+import type { RecordingName } from "../../ui/route";
+import { recordingsLink } from "../../ui/route";
+import type { Row } from "./listed";
 
 export function Card(props: { row: Row; sited: boolean; first: Signal<(RecordingName & { name: string }) | null> }) {
   const { recording, site } = props.row;
@@ -59,7 +70,11 @@ export function Card(props: { row: Row; sited: boolean; first: Signal<(Recording
       <div class="recording-does">
         {!empty && (
           <>
-            <a class={`action ${first ? "" : "primary"}`} href={recordingsLink(mine)} aria-label={r("play_of", { name })}>
+            <a
+              class={`action ${first ? "" : "primary"}`}
+              href={recordingsLink(mine)}
+              aria-label={r("play_of", { name })}
+            >
               {r("play")}
             </a>
             {first && !isFirst ? (
@@ -110,7 +125,12 @@ function Thumbnail({ site, recording }: { site: string; recording: Recording }) 
   return (
     <a class="thumbnail" href={recordingsLink({ site, file: recording.file })} tabIndex={-1} aria-hidden="true">
       {has ? (
-        <img src={fileUrl(site, recording.file, "/thumbnail.jpg")} alt="" loading="lazy" onError={() => setNone(true)} />
+        <img
+          src={fileUrl(site, recording.file, "/thumbnail.jpg")}
+          alt=""
+          loading="lazy"
+          onError={() => setNone(true)}
+        />
       ) : (
         <Silhouette label={r("no_thumbnail")} />
       )}

@@ -4,12 +4,12 @@ import type { ReadonlySignal } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
-import { DASH, fixed } from "../../i18n/format";
 import type { SeriesAnswer_Series as Series } from "../../gen/robomesh_pb";
+import { DASH, fixed } from "../../i18n/format";
+import { momentText } from "../../i18n/recording-format";
 import { plotLook } from "../../ui/plot-axis";
 import { theme } from "../../ui/theme";
 import type { Window } from "./asked";
-import { momentText } from "../../i18n/recording-format";
 import { commonOf, labelOf, shownUnit } from "./units";
 
 const GAP = 3; // times the usual step, and
@@ -174,10 +174,20 @@ function joined(curves: readonly Curve[], factor: number): uPlot.AlignedData {
     });
     return columns;
   });
-  return tables.length ? uPlot.join(tables, tables.map(() => [0, 2, 2])) : [[]];
+  return tables.length
+    ? uPlot.join(
+        tables,
+        tables.map(() => [0, 2, 2]),
+      )
+    : [[]];
 }
 
-function push([times, low, high]: [number[], (number | null)[], (number | null)[]], time: number, least: number | null, most: number | null): void {
+function push(
+  [times, low, high]: [number[], (number | null)[], (number | null)[]],
+  time: number,
+  least: number | null,
+  most: number | null,
+): void {
   times.push(time);
   low.push(least);
   high.push(most);

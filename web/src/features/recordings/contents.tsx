@@ -1,13 +1,13 @@
 // What a recording's file holds, and what can be taken out of it.
 
 import { useState } from "preact/hooks";
-import { count } from "../../i18n/format";
 import type { Recording } from "../../gen/robomesh_pb";
+import { count } from "../../i18n/format";
+import { lostText, sizeText, startedText, topicOf } from "../../i18n/recording-format";
+import { r, viewName } from "../../i18n/recordings";
 import { Panel } from "../../ui/parts";
 import type { RecordingName } from "../../ui/route";
 import { Download } from "./card";
-import { lostText, sizeText, startedText, topicOf } from "../../i18n/recording-format";
-import { r, viewName } from "../../i18n/recordings";
 import "./contents.css";
 
 export function Contents(props: {
@@ -73,7 +73,9 @@ function Topics({ info }: { info: Recording }) {
       <p class="footnote dim">
         {[startedText(info), info.cause && r("cause", { text: info.cause })].filter(Boolean).join(" · ")}
       </p>
-      {info.attachments.length > 0 && <p class="footnote dim">{r("attached", { names: info.attachments.join(", ") })}</p>}
+      {info.attachments.length > 0 && (
+        <p class="footnote dim">{r("attached", { names: info.attachments.join(", ") })}</p>
+      )}
     </>
   );
 }

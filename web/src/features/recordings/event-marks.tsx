@@ -1,17 +1,17 @@
 // The events of a recording: marks on its line of time, and the same in words.
 
-import { useComputed, useSignal } from "@preact/signals";
+import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { ReadonlySignal } from "@preact/signals";
+import { useComputed, useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { eventText } from "../../i18n/event-text";
-import { SEVERITIES } from "../../ui/event-mark";
 import { count, fullTime } from "../../i18n/format";
-import { timestampMs } from "@bufbuild/protobuf/wkt";
-import { Panel } from "../../ui/parts";
-import { t } from "../../i18n/texts";
-import type { Asked, Happened } from "./asked";
 import { momentText } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
+import { t } from "../../i18n/texts";
+import { SEVERITIES } from "../../ui/event-mark";
+import { Panel } from "../../ui/parts";
+import type { Asked, Happened } from "./asked";
 import "./contents.css";
 
 const NONE: readonly Happened[] = [];
@@ -81,7 +81,10 @@ export function EventList(props: {
           const { event, at } = happened;
           return (
             <li key={i} aria-current={i === last ? "true" : undefined}>
-              <button title={`${event.timestamp ? fullTime(timestampMs(event.timestamp)) : ""} · ${event.source} · ${event.code}`} onClick={() => props.seek(at)}>
+              <button
+                title={`${event.timestamp ? fullTime(timestampMs(event.timestamp)) : ""} · ${event.source} · ${event.code}`}
+                onClick={() => props.seek(at)}
+              >
                 <time>{momentText(at)}</time>
                 <span class="event-text">
                   {level !== "normal" && (

@@ -2,16 +2,16 @@
 
 import { signal } from "@preact/signals";
 import { useEffect, useState } from "preact/hooks";
+import { sizeText, startMs } from "../../i18n/recording-format";
+import { r } from "../../i18n/recordings";
 import type { Notice } from "../../mesh/control";
 import { fleetRobots } from "../../mesh/known-robots";
+import { Action, askRecorder } from "../../mesh/recorder";
 import { NoticeLine } from "../../ui/parts";
 import type { RecordingName } from "../../ui/route";
 import { Card } from "./card";
-import { sizeText, startMs } from "../../i18n/recording-format";
-import { useListed } from "./listed";
 import type { Row, Told } from "./listed";
-import { Action, askRecorder } from "../../mesh/recorder";
-import { r } from "../../i18n/recordings";
+import { useListed } from "./listed";
 import "./list.css";
 
 const HOUR_MS = 3_600_000;
@@ -45,13 +45,21 @@ export function List() {
             value={search.value}
             onInput={(event) => (search.value = event.currentTarget.value)}
           />
-          <select aria-label={r("robot")} value={robot.value} onChange={(event) => (robot.value = event.currentTarget.value)}>
+          <select
+            aria-label={r("robot")}
+            value={robot.value}
+            onChange={(event) => (robot.value = event.currentTarget.value)}
+          >
             <option value={EVERY}>{r("every_robot")}</option>
             {robots.map((name) => (
               <option key={name}>{name}</option>
             ))}
           </select>
-          <select aria-label={r("time")} value={span.value} onChange={(event) => (span.value = event.currentTarget.value as Span)}>
+          <select
+            aria-label={r("time")}
+            value={span.value}
+            onChange={(event) => (span.value = event.currentTarget.value as Span)}
+          >
             {(Object.keys(SPANS) as Span[]).map((name) => (
               <option key={name} value={name}>
                 {r(name)}
@@ -104,7 +112,9 @@ function countText(shown: number, count: number): string {
 function SiteLine({ site, told: { list, problem }, named }: { site: string; told: Told; named: boolean }) {
   const [notice, setNotice] = useState<Notice | null>(null);
   const [of, setOf] = useState("");
-  const robots = fleetRobots.value.filter((key) => key.startsWith(`robomesh/${site}/`)).map((key) => key.split("/")[2] ?? "");
+  const robots = fleetRobots.value
+    .filter((key) => key.startsWith(`robomesh/${site}/`))
+    .map((key) => key.split("/")[2] ?? "");
   const chosen = robots.includes(of) ? of : (robots[0] ?? "");
   const save = async () => {
     setNotice({ kind: "busy", text: r("saving", { robot: chosen }) });
@@ -112,7 +122,10 @@ function SiteLine({ site, told: { list, problem }, named }: { site: string; told
       const { name } = await askRecorder(`robomesh/${site}/${chosen}`, Action.SAVE);
       setNotice({ kind: "done", text: r("saved", { robot: chosen, name }) });
     } catch (error) {
-      setNotice({ kind: "refused", text: r("not_saved", { text: error instanceof Error ? error.message : String(error) }) });
+      setNotice({
+        kind: "refused",
+        text: r("not_saved", { text: error instanceof Error ? error.message : String(error) }),
+      });
     }
   };
   const free = list?.freeBytes ?? 0n;

@@ -1,14 +1,14 @@
 // The recordings of every site, asked of its recorder, with what the open ones tell of themselves.
 
+import { EmptySchema } from "@bufbuild/protobuf/wkt";
 import { signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
-import { EmptySchema } from "@bufbuild/protobuf/wkt";
-import { RecordingListSchema, RecordingSchema } from "../../gen/robomesh_pb";
 import type { Recording, RecordingList } from "../../gen/robomesh_pb";
-import { AskError, ask, hello, lostAt, presence } from "../../mesh/connection";
-import { ageOf, isStale, useTopics } from "../../mesh/topics";
+import { RecordingListSchema, RecordingSchema } from "../../gen/robomesh_pb";
 import { startMs } from "../../i18n/recording-format";
 import { r } from "../../i18n/recordings";
+import { AskError, ask, hello, lostAt, presence } from "../../mesh/connection";
+import { ageOf, isStale, useTopics } from "../../mesh/topics";
 
 const AGAIN_MS = 5000;
 const LIST_S = 10;
@@ -74,7 +74,8 @@ export function useListed(): Listed {
   }, [sites.join(" "), changes, connected]);
   const rows = new Map<string, Row>();
   for (const site of sites) {
-    for (const recording of told.value.get(site)?.list?.recordings ?? []) rows.set(`${site}/${recording.file}`, { site, recording });
+    for (const recording of told.value.get(site)?.list?.recordings ?? [])
+      rows.set(`${site}/${recording.file}`, { site, recording });
   }
   for (const latest of live.values()) {
     const [, site = ""] = latest.key.split("/");

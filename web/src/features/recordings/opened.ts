@@ -1,13 +1,13 @@
 // Replays that this page opens: closed when it goes, and by the player when its connection does.
 
-import { useSignal } from "@preact/signals";
 import type { Signal } from "@preact/signals";
+import { useSignal } from "@preact/signals";
 import { useEffect, useState } from "preact/hooks";
 import { PlayRequestSchema, ReplayStateSchema } from "../../gen/robomesh_pb";
-import { AskError, ask, hello, presence } from "../../mesh/connection";
-import type { RecordingName } from "../../ui/route";
-import { Replay } from "../../mesh/replay";
 import { r } from "../../i18n/recordings";
+import { AskError, ask, hello, presence } from "../../mesh/connection";
+import { Replay } from "../../mesh/replay";
+import type { RecordingName } from "../../ui/route";
 
 const WITHIN_S = 15; // a long file is read first
 const COMES_WITHIN_MS = 1500; // presence is told after the greeting
@@ -27,7 +27,8 @@ export function useOpened(name: RecordingName | null, paused = false): Opened {
   const [problem, setProblem] = useState("");
   const [tries, setTries] = useState(0);
   const session = hello.value?.session ?? "";
-  const there = name !== null && [...presence.value].some((key) => key.startsWith(`robomesh/${name.site}/-/alive/player/`));
+  const there =
+    name !== null && [...presence.value].some((key) => key.startsWith(`robomesh/${name.site}/-/alive/player/`));
   useEffect(() => {
     if (!name || !session) return;
     let wanted = true;

@@ -32,7 +32,10 @@ export function savePicture(element: HTMLElement, name: string): void {
     write(chart.dataset["unit"] ?? "", colour("--dim"));
     for (const each of chart.querySelectorAll<HTMLElement>(".legend > span:has(.curve)")) {
       const mark = each.querySelector(".curve");
-      write(each.querySelector("[title]")?.textContent ?? "", mark ? getComputedStyle(mark).backgroundColor : colour("--text"));
+      write(
+        each.querySelector("[title]")?.textContent ?? "",
+        mark ? getComputedStyle(mark).backgroundColor : colour("--text"),
+      );
     }
     y += LINE_PX * scale;
     context.drawImage(canvas, EDGE_PX * scale, y);

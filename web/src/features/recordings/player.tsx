@@ -1,26 +1,26 @@
 // A recording played back: 3-D, video, curves and events on one line of time; a second one beside it, if wanted.
 
 import { useEffect, useMemo, useState } from "preact/hooks";
-import { DescriptionSchema } from "../../gen/robomesh_pb";
 import type { Recording } from "../../gen/robomesh_pb";
-import { recordingsLink } from "../../ui/route";
-import type { RecordingName } from "../../ui/route";
-import { SceneView, viewsOf } from "../../scene/scene-view";
+import { DescriptionSchema } from "../../gen/robomesh_pb";
+import { durationS, recordedViews, startMs } from "../../i18n/recording-format";
+import { r, recordedView } from "../../i18n/recordings";
+import type { Replay } from "../../mesh/replay";
+import type { OfMoment } from "../../mesh/replay-moment";
+import { useOfMoment } from "../../mesh/replay-moment";
 import { useTopic } from "../../mesh/topics";
+import { SceneView, viewsOf } from "../../scene/scene-view";
+import { ReplayTag } from "../../ui/replay-tag";
+import type { RecordingName } from "../../ui/route";
+import { recordingsLink } from "../../ui/route";
 import { useFirst, useHappened, useInfo } from "./asked";
 import { Beside } from "./beside";
 import { Contents } from "./contents";
 import { EventList } from "./event-marks";
-import { durationS, recordedViews, startMs } from "../../i18n/recording-format";
-import { useOfMoment } from "../../mesh/replay-moment";
-import type { OfMoment } from "../../mesh/replay-moment";
 import { useFollowing, useMoment, useOpened } from "./opened";
 import { Plots } from "./plots";
-import type { Replay } from "../../mesh/replay";
-import { ReplayTag } from "../../ui/replay-tag";
-import { useSecondGhost } from "./second-ghost";
 import { ReplayVideo } from "./replay-video";
-import { r, recordedView } from "../../i18n/recordings";
+import { useSecondGhost } from "./second-ghost";
 import { Transport } from "./transport";
 import "./player.css";
 
@@ -47,7 +47,10 @@ export function Player({ first, second }: { first: RecordingName; second: Record
   const arm = useOfMoment(replay, "frames", FRAMES_HOLD_S);
   const otherArm = useOfMoment(other.replay, "joints", FRAMES_HOLD_S);
   const ghosted = useSecondGhost(key, description, other.replay?.robotKey ?? null, otherArm === "here");
-  const beside = useMemo(() => second && { name: second, info: secondInfo.value, shift }, [second, secondInfo.value, shift]);
+  const beside = useMemo(
+    () => second && { name: second, info: secondInfo.value, shift },
+    [second, secondInfo.value, shift],
+  );
   const state = replay?.state.value;
   const gone = replay?.gone ?? false;
   const trouble = opened.problem || (gone ? r("player_gone") : state?.text && r("closed", { text: state.text }));
@@ -88,7 +91,15 @@ export function Player({ first, second }: { first: RecordingName; second: Record
           />
         )}
       </div>
-      <SceneView key={key} robotKey={key} description={description} stale={gone} age={undefined} lostAt={null} arm={replay ? arm : "coming"} />
+      <SceneView
+        key={key}
+        robotKey={key}
+        description={description}
+        stale={gone}
+        age={undefined}
+        lostAt={null}
+        arm={replay ? arm : "coming"}
+      />
       <div class="player-videos">
         <ReplayVideo replay={replay} arm={arm} description={description} recorded={recorded} title={r("video")} />
         {other.replay && <SecondVideo replay={other.replay} arm={otherArm} info={secondInfo.value} />}

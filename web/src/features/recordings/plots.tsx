@@ -3,14 +3,14 @@
 import type { ReadonlySignal } from "@preact/signals";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import type { Recording, SeriesAnswer_Series as Series } from "../../gen/robomesh_pb";
+import { r } from "../../i18n/recordings";
 import { Panel, Toggle } from "../../ui/parts";
 import type { RecordingName } from "../../ui/route";
-import { useKnown, useSeries } from "./asked";
 import type { Window } from "./asked";
-import { Chart } from "./chart";
+import { useKnown, useSeries } from "./asked";
 import type { Curve } from "./chart";
+import { Chart } from "./chart";
 import { savePicture } from "./picture";
-import { r } from "../../i18n/recordings";
 import { Values } from "./values";
 import "./plots.css";
 
@@ -50,7 +50,10 @@ export function Plots(props: {
   const shift = beside?.shift ?? 0;
   const later = useMemo(() => ({ from: shown.from + shift, to: shown.to + shift }), [shown, shift]);
   const second = useSeries(beside?.name ?? null, beside?.info ?? null, values, later, POINTS);
-  const units = useMemo(() => byUnit(values, asked.value ?? [], second.value ?? [], shift), [asked.value, second.value, shift, values]);
+  const units = useMemo(
+    () => byUnit(values, asked.value ?? [], second.value ?? [], shift),
+    [asked.value, second.value, shift, values],
+  );
   const zoom = ({ from, to }: Window) => {
     const middle = (from + to) / 2;
     const half = Math.max(NARROWEST_S, to - from) / 2;

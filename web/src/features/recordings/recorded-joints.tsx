@@ -1,10 +1,16 @@
 // Joint positions as they were, within their limits.
 
-import { jointText } from "../../i18n/format";
 import type { JointStates } from "../../gen/foxglove/JointStates_pb";
 import type { Description } from "../../gen/robomesh_pb";
+import { jointText } from "../../i18n/format";
 
-export function RecordedJoints({ description, joints }: { description: Description | undefined; joints: JointStates | undefined }) {
+export function RecordedJoints({
+  description,
+  joints,
+}: {
+  description: Description | undefined;
+  joints: JointStates | undefined;
+}) {
   const positions = new Map(joints?.joints.map((joint) => [joint.name, joint.position]));
   return (
     <dl class="recorded-joints">

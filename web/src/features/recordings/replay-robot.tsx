@@ -3,22 +3,22 @@
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import { useEffect, useState } from "preact/hooks";
 import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
-import { DescriptionSchema, KinematicStateSchema, ReplayStateSchema } from "../../gen/robomesh_pb";
 import type { ReplayState } from "../../gen/robomesh_pb";
-import { Missing, useMissing } from "../../ui/robot-not-found";
-import { Panel } from "../../ui/parts";
-import { recordingsLink } from "../../ui/route";
-import type { RobotName } from "../../mesh/robot-name";
-import { SceneView } from "../../scene/scene-view";
-import { ToolPanel } from "../../ui/tool-panel";
-import { isStale, ageOf, useTopic } from "../../mesh/topics";
+import { DescriptionSchema, KinematicStateSchema, ReplayStateSchema } from "../../gen/robomesh_pb";
+import { r } from "../../i18n/recordings";
+import { Replay } from "../../mesh/replay";
 import { useOfMoment } from "../../mesh/replay-moment";
+import type { RobotName } from "../../mesh/robot-name";
+import { ageOf, isStale, useTopic } from "../../mesh/topics";
+import { SceneView } from "../../scene/scene-view";
+import { Panel } from "../../ui/parts";
+import { ReplayTag } from "../../ui/replay-tag";
+import { Missing, useMissing } from "../../ui/robot-not-found";
+import { recordingsLink } from "../../ui/route";
+import { ToolPanel } from "../../ui/tool-panel";
 import { useMoment } from "./opened";
 import { RecordedJoints } from "./recorded-joints";
-import { Replay } from "../../mesh/replay";
-import { ReplayTag } from "../../ui/replay-tag";
 import { ReplayVideo } from "./replay-video";
-import { r } from "../../i18n/recordings";
 import { Transport } from "./transport";
 import "../../ui/replay.css";
 import "./player.css";
@@ -42,7 +42,10 @@ export function ReplayRobot({ site, robot }: RobotName) {
       <div class="player-head">
         <div class="headline">
           <h1>{robot}</h1>
-          <ReplayTag robot={state?.ofRobot ?? description?.replay?.robot ?? ""} start={state?.start ? timestampMs(state.start) : 0} />
+          <ReplayTag
+            robot={state?.ofRobot ?? description?.replay?.robot ?? ""}
+            start={state?.start ? timestampMs(state.start) : 0}
+          />
           <span class="dim small">{r("replay_words")}</span>
           {state && (
             <a class="page-link" href={recordingsLink({ site, file: state.file })}>
@@ -57,7 +60,15 @@ export function ReplayRobot({ site, robot }: RobotName) {
           </p>
         )}
       </div>
-      <SceneView key={key} robotKey={key} description={description} stale={gone} age={undefined} lostAt={null} arm={arm} />
+      <SceneView
+        key={key}
+        robotKey={key}
+        description={description}
+        stale={gone}
+        age={undefined}
+        lostAt={null}
+        arm={arm}
+      />
       <div class="player-videos">
         <ReplayVideo replay={replay} arm={arm} description={description} recorded={NONE} title={r("video")} />
       </div>

@@ -2,15 +2,15 @@
 
 import { useState } from "preact/hooks";
 import type { Description } from "../../gen/robomesh_pb";
+import { r, viewName } from "../../i18n/recordings";
+import { t } from "../../i18n/texts";
+import type { Replay } from "../../mesh/replay";
+import type { OfMoment } from "../../mesh/replay-moment";
+import { useOfMoment } from "../../mesh/replay-moment";
+import { viewsOf } from "../../scene/scene-view";
+import { Panel } from "../../ui/parts";
 import { useLive } from "../../video/live-video";
 import { standing } from "../../video/own-view";
-import { Panel } from "../../ui/parts";
-import { viewsOf } from "../../scene/scene-view";
-import { t } from "../../i18n/texts";
-import { useOfMoment } from "../../mesh/replay-moment";
-import type { OfMoment } from "../../mesh/replay-moment";
-import type { Replay } from "../../mesh/replay";
-import { r, viewName } from "../../i18n/recordings";
 
 const PICTURE_HOLDS_S = 2; // a busy renderer films less often than it is asked to
 
@@ -27,7 +27,11 @@ export function ReplayVideo(props: {
   const [view, setView] = useState("");
   const names = description ? [...recorded, ...viewsOf(description).map(({ name }) => name)] : [];
   const shown = names.includes(view) ? view : (names[0] ?? "");
-  const live = useLive(replay?.robotKey ?? "robomesh/-/-", replay && shown ? standing(shown) : null, `${props.title}: ${viewName(shown)}`);
+  const live = useLive(
+    replay?.robotKey ?? "robomesh/-/-",
+    replay && shown ? standing(shown) : null,
+    `${props.title}: ${viewName(shown)}`,
+  );
   const filmed = recorded.includes(shown);
   const picture = useOfMoment(replay, filmed ? `video/${shown}` : "", PICTURE_HOLDS_S);
   const state = filmed ? picture : props.arm;

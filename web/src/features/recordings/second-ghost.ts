@@ -3,16 +3,21 @@
 import { fromBinary } from "@bufbuild/protobuf";
 import { useEffect } from "preact/hooks";
 import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
-import { DescriptionSchema } from "../../gen/robomesh_pb";
 import type { Description } from "../../gen/robomesh_pb";
-import { ghostAt } from "../../scene/ghost";
+import { DescriptionSchema } from "../../gen/robomesh_pb";
 import { watch } from "../../mesh/connection";
 import { useTopic } from "../../mesh/topics";
+import { ghostAt } from "../../scene/ghost";
 
 const names = (description: Description | undefined) => description?.joints.map((joint) => joint.name).join(" ") ?? "";
 
 /** Draws it over `robotKey`'s arm while its joints are `here`, of this moment; whether it can be. */
-export function useSecondGhost(robotKey: string, description: Description | undefined, second: string | null, here: boolean): boolean {
+export function useSecondGhost(
+  robotKey: string,
+  description: Description | undefined,
+  second: string | null,
+  here: boolean,
+): boolean {
   const other = useTopic(DescriptionSchema, `${second ?? "robomesh/-/-"}/description`)?.message;
   const order = names(description);
   const alike = second !== null && order !== "" && order === names(other);

@@ -1,17 +1,17 @@
 // What drives a replay: play, pause, step, seek, speed, loop; and its events on the line of time.
 
+import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { ReadonlySignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
-import { held } from "../../mesh/control";
 import { fullTime } from "../../i18n/format";
-import { timestampMs } from "@bufbuild/protobuf/wkt";
+import { dateText, momentText } from "../../i18n/recording-format";
+import { r } from "../../i18n/recordings";
+import { held } from "../../mesh/control";
+import type { Replay } from "../../mesh/replay";
+import { SPEEDS } from "../../mesh/replay";
 import { Toggle } from "../../ui/parts";
 import type { Happened } from "./asked";
 import { EventMarks } from "./event-marks";
-import { dateText, momentText } from "../../i18n/recording-format";
-import { SPEEDS } from "../../mesh/replay";
-import type { Replay } from "../../mesh/replay";
-import { r } from "../../i18n/recordings";
 import "./transport.css";
 
 const STEP_S = 0.05;
@@ -41,7 +41,11 @@ export function Transport(props: { replay: Replay; moment: ReadonlySignal<number
       <div class="transport-row">
         <div class="transport-buttons">
           <Press name={r("to_start")} shape="start" press={() => replay.seek(0)} />
-          <Press name={r("step_back", { step: STEP_S })} shape="back" press={() => replay.seek(replay.position() - STEP_S)} />
+          <Press
+            name={r("step_back", { step: STEP_S })}
+            shape="back"
+            press={() => replay.seek(replay.position() - STEP_S)}
+          />
           <button
             class="action primary play"
             aria-label={r(playing ? "pause" : "play")}
@@ -49,7 +53,11 @@ export function Transport(props: { replay: Replay; moment: ReadonlySignal<number
           >
             <span class={playing ? "pause-shape" : "play-shape"} aria-hidden="true" />
           </button>
-          <Press name={r("step_on", { step: STEP_S })} shape="on" press={() => replay.seek(replay.position() + STEP_S)} />
+          <Press
+            name={r("step_on", { step: STEP_S })}
+            shape="on"
+            press={() => replay.seek(replay.position() + STEP_S)}
+          />
         </div>
         <div class="transport-time">
           <span class="recorded-clock" title={fullTime(recordedMs)}>
@@ -62,7 +70,11 @@ export function Transport(props: { replay: Replay; moment: ReadonlySignal<number
         <div class="transport-end">
           <label>
             <span class="dim small">{r("speed")}</span>
-            <select aria-label={r("speed")} value={String(nearest(speed))} onChange={(event) => replay.setSpeed(Number(event.currentTarget.value))}>
+            <select
+              aria-label={r("speed")}
+              value={String(nearest(speed))}
+              onChange={(event) => replay.setSpeed(Number(event.currentTarget.value))}
+            >
               {SPEEDS.map((each) => (
                 <option key={each} value={String(each)}>
                   {`${each}×`}
@@ -98,7 +110,9 @@ function Press({ name, shape, press }: { name: string; shape: string; press: () 
 }
 
 function nearest(speed: number): number {
-  return [...SPEEDS].sort((a, b) => Math.abs(Math.log(a / (speed || 1))) - Math.abs(Math.log(b / (speed || 1))))[0] ?? 1;
+  return (
+    [...SPEEDS].sort((a, b) => Math.abs(Math.log(a / (speed || 1))) - Math.abs(Math.log(b / (speed || 1))))[0] ?? 1
+  );
 }
 
 /** Keys of the whole page, typing and what has keys of its own excepted. Space is a stop's while in control. */
@@ -123,7 +137,12 @@ function useKeys(replay: Replay): void {
       };
       const act = keys[event.key];
       // A button that has the focus is pressed by space; the 3-D view is turned by arrows.
-      if (!act || (event.key === " " && target?.closest("button, a")) || (event.key.startsWith("Arrow") && target?.closest("canvas"))) return;
+      if (
+        !act ||
+        (event.key === " " && target?.closest("button, a")) ||
+        (event.key.startsWith("Arrow") && target?.closest("canvas"))
+      )
+        return;
       event.preventDefault();
       act();
     };

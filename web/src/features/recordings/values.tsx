@@ -1,13 +1,17 @@
 // Which values are plotted, chosen by topic.
 
 import { useState } from "preact/hooks";
-import { r } from "../../i18n/recordings";
 import type { RecordingsText } from "../../i18n/recordings";
+import { r } from "../../i18n/recordings";
 import { labelOf } from "./units";
 
 /** What people look for first, by its topic. */
-const GROUPS: Partial<Record<string, RecordingsText>> = { joints: "joints", kinematics: "tool_and_margins", controller: "controller" };
-const rank = (topic: string) => (Object.keys(GROUPS).indexOf(topic) + 1 || 99);
+const GROUPS: Partial<Record<string, RecordingsText>> = {
+  joints: "joints",
+  kinematics: "tool_and_margins",
+  controller: "controller",
+};
+const rank = (topic: string) => Object.keys(GROUPS).indexOf(topic) + 1 || 99;
 const topicOfValue = (value: string) => value.split("/")[0] ?? "";
 
 export function Values(props: {
@@ -36,20 +40,22 @@ export function Values(props: {
         {full && <span class="dim small">{r("values_many", { count: most })}</span>}
       </div>
       <div class="values-groups">
-        {[...Map.groupBy(shown, topicOfValue)].sort(([a], [b]) => rank(a) - rank(b)).map(([topic, values]) => (
-          <fieldset key={topic}>
-            <legend>{GROUPS[topic] ? r(GROUPS[topic]) : topic}</legend>
-            {values.map((value) => {
-              const on = chosen.includes(value);
-              return (
-                <label key={value} title={value}>
-                  <input type="checkbox" checked={on} disabled={!on && full} onChange={() => turn(value)} />
-                  {labelOf(value, "").replaceAll("_", " ")}
-                </label>
-              );
-            })}
-          </fieldset>
-        ))}
+        {[...Map.groupBy(shown, topicOfValue)]
+          .sort(([a], [b]) => rank(a) - rank(b))
+          .map(([topic, values]) => (
+            <fieldset key={topic}>
+              <legend>{GROUPS[topic] ? r(GROUPS[topic]) : topic}</legend>
+              {values.map((value) => {
+                const on = chosen.includes(value);
+                return (
+                  <label key={value} title={value}>
+                    <input type="checkbox" checked={on} disabled={!on && full} onChange={() => turn(value)} />
+                    {labelOf(value, "").replaceAll("_", " ")}
+                  </label>
+                );
+              })}
+            </fieldset>
+          ))}
       </div>
     </div>
   );

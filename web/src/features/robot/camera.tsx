@@ -1,16 +1,16 @@
 // The renderer's picture of the robot: a view of the description's, or what the 3-D view shows.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { clock } from "../../i18n/format";
 import type { Description, View } from "../../gen/robomesh_pb";
-import { useLive } from "../../video/live-video";
-import { standing } from "../../video/own-view";
-import type { Wanted } from "../../video/own-view";
-import { Age, Panel } from "../../ui/parts";
+import { clock } from "../../i18n/format";
+import { t, viewText } from "../../i18n/texts";
 import { viewsOf } from "../../scene/scene-view";
 import { isFar, reachOf } from "../../scene/topic-selection";
+import { Age, Panel } from "../../ui/parts";
+import { useLive } from "../../video/live-video";
+import type { Wanted } from "../../video/own-view";
+import { standing } from "../../video/own-view";
 import { saveBlob, saveStill, useRecording } from "./export";
-import { t, viewText } from "../../i18n/texts";
 
 /** Where the video stands: beside the 3-D view, in its corner, or in its place. */
 export type VideoPlace = "beside" | "inset" | "large";
@@ -36,7 +36,9 @@ export function Camera(props: {
   const far = reachOf(robotKey) === "slow";
   const [chosen, setView] = useState("");
   const view = chosen || (far ? FAR : "front");
-  const names = [...new Set([...viewsOf(description).map((each) => each.name), CLOSE, ...(isFar(robotKey) ? [FAR] : []), OWN])];
+  const names = [
+    ...new Set([...viewsOf(description).map((each) => each.name), CLOSE, ...(isFar(robotKey) ? [FAR] : []), OWN]),
+  ];
   const shown = names.includes(view) ? view : (names[0] ?? "free");
   const own = useOwnView(shown === OWN, props.sceneView);
   const wanted: Wanted | null = shown !== OWN ? standing(shown) : own && { of: OWN, view: own, ...OWN_SIZE };
@@ -123,7 +125,9 @@ function useOwnView(on: boolean, sceneView: () => View | null): View | null {
     let settled = "";
     const timer = setInterval(() => {
       const next = look.current();
-      const identity = next ? [next.eye, next.target].flatMap((p) => [p?.x, p?.y, p?.z].map((v) => v?.toFixed(3))).join() : "";
+      const identity = next
+        ? [next.eye, next.target].flatMap((p) => [p?.x, p?.y, p?.z].map((v) => v?.toFixed(3))).join()
+        : "";
       if (next && identity === before && identity !== settled) {
         settled = identity;
         setView(next);

@@ -1,16 +1,16 @@
 // What happened to the robot, who asked what of it, newest first, and how its link does.
 
 import { useState } from "preact/hooks";
-import { count, stampFull, stampTime } from "../../i18n/format";
-import { entryText } from "../../i18n/audit-text";
 import type { AuditEntry, ControllerState, Event } from "../../gen/robomesh_pb";
+import { entryText } from "../../i18n/audit-text";
 import { eventText } from "../../i18n/event-text";
-import { LinkFacts } from "./link-facts";
+import { count, stampFull, stampTime } from "../../i18n/format";
+import { t } from "../../i18n/texts";
+import type { Latest } from "../../mesh/topics";
+import { useAudit } from "../../mesh/topics";
 import { Mark, OUTCOMES, SEVERITIES } from "../../ui/event-mark";
 import { Choice, Panel } from "../../ui/parts";
-import { t } from "../../i18n/texts";
-import { useAudit } from "../../mesh/topics";
-import type { Latest } from "../../mesh/topics";
+import { LinkFacts } from "./link-facts";
 
 const SHOWN = ["events", "requests", "link"] as const;
 
@@ -27,15 +27,7 @@ export function EventsPanel(props: {
     <Panel
       name="events"
       title={t(shown)}
-      end={
-        <Choice
-          label={t("events")}
-          values={SHOWN}
-          chosen={shown}
-          text={(each) => t(each)}
-          choose={setShown}
-        />
-      }
+      end={<Choice label={t("events")} values={SHOWN} chosen={shown} text={(each) => t(each)} choose={setShown} />}
     >
       {shown === "link" ? (
         <LinkFacts controller={props.controller} />

@@ -80,7 +80,8 @@ export function useRecording(address: string, name: string): VideoRecording {
       }
       stop.abort();
     } catch (error) {
-      if (!stop.signal.aborted) setProblem(t("record_failed", { text: error instanceof Error ? error.message : String(error) }));
+      if (!stop.signal.aborted)
+        setProblem(t("record_failed", { text: error instanceof Error ? error.message : String(error) }));
     }
     end.current = null;
     setSince(null);

@@ -1,23 +1,23 @@
 // Joint values between their limits, and the targets that move them.
 
 import { useEffect, useState } from "preact/hooks";
+import type { JointStates } from "../../gen/foxglove/JointStates_pb";
+import type { ControllerState, Description, Description_Joint } from "../../gen/robomesh_pb";
+import { ControllerState_Activity as Activity } from "../../gen/robomesh_pb";
+import { fixed, jointText, jointUnit } from "../../i18n/format";
+import { t } from "../../i18n/texts";
 import { onlyWatches } from "../../mesh/account";
 import { Command, command } from "../../mesh/command";
-import { controlNotice, holds } from "../../mesh/control";
 import type { Notice } from "../../mesh/control";
-import { fixed, jointText, jointUnit } from "../../i18n/format";
-import type { JointStates } from "../../gen/foxglove/JointStates_pb";
-import { ControllerState_Activity as Activity } from "../../gen/robomesh_pb";
-import type { ControllerState, Description, Description_Joint } from "../../gen/robomesh_pb";
+import { controlNotice, holds } from "../../mesh/control";
+import { useSteps } from "../../mesh/joint-steps";
+import type { Motion } from "../../mesh/notice-end";
+import { useNoticeEnd } from "../../mesh/notice-end";
+import { whyNoMove } from "../../mesh/robot-state";
 import { ghostAt } from "../../scene/ghost";
 import { JointTrack } from "../../ui/joint-track";
 import { JointValue } from "../../ui/joint-value";
-import { useNoticeEnd } from "../../mesh/notice-end";
-import type { Motion } from "../../mesh/notice-end";
 import { Age, Choice, NoticeLine, Panel } from "../../ui/parts";
-import { whyNoMove } from "../../mesh/robot-state";
-import { useSteps } from "../../mesh/joint-steps";
-import { t } from "../../i18n/texts";
 
 const REACHED = 0.002; // rad or m: half of what a person reads off
 const ABANDONED_MS = 1500;
@@ -131,14 +131,20 @@ export function JointsPanel(props: {
           const { unit, factor } = jointUnit(joint);
           const beyond = position !== undefined && (position < joint.lower || position > joint.upper);
           const refused = steps.refused?.index === index ? Math.sign(steps.refused.offset) : 0;
-          const stepBy = (sign: 1 | -1) => onlyWatches.value ? <span /> : (
-            <StepButton
-              name={t(sign > 0 ? "step_plus" : "step_minus", { joint: joint.name, step: unit === "°" ? `${size}°` : `${size}\u202f${unit}` })}
-              sign={sign}
-              enabled={canStep}
-              press={() => steps.press(index, (sign * Number(size)) / factor)}
-            />
-          );
+          const stepBy = (sign: 1 | -1) =>
+            onlyWatches.value ? (
+              <span />
+            ) : (
+              <StepButton
+                name={t(sign > 0 ? "step_plus" : "step_minus", {
+                  joint: joint.name,
+                  step: unit === "°" ? `${size}°` : `${size}\u202f${unit}`,
+                })}
+                sign={sign}
+                enabled={canStep}
+                press={() => steps.press(index, (sign * Number(size)) / factor)}
+              />
+            );
           return (
             <div key={joint.name} class={`joint-row ${beyond ? "beyond" : ""}`}>
               <span class="joint-name">{joint.name}</span>
@@ -174,7 +180,10 @@ export function JointsPanel(props: {
           );
         })}
       </div>
-      <NoticeLine notice={preview || (steps.waiting && notice?.kind !== "refused") ? null : (notice ?? lost)} idle={idle} />
+      <NoticeLine
+        notice={preview || (steps.waiting && notice?.kind !== "refused") ? null : (notice ?? lost)}
+        idle={idle}
+      />
     </Panel>
   );
 }

@@ -1,12 +1,12 @@
 // How the link to the controller does, what old client programs are attached, where the audit log ends.
 
-import { count, fixed } from "../../i18n/format";
 import type { ControllerState } from "../../gen/robomesh_pb";
-import { Unit } from "../../ui/parts";
-import { t } from "../../i18n/texts";
+import { count, fixed } from "../../i18n/format";
 import type { TextName } from "../../i18n/texts";
-import { ageOf, isStale } from "../../mesh/topics";
+import { t } from "../../i18n/texts";
 import type { Latest } from "../../mesh/topics";
+import { ageOf, isStale } from "../../mesh/topics";
+import { Unit } from "../../ui/parts";
 
 const HASH_SHOWN = 4; // bytes of the log's end: enough to compare by eye
 
@@ -32,7 +32,10 @@ export function LinkFacts({ controller }: { controller: Latest<ControllerState> 
     if (counters.unitsSkipped) facts.push(["link_skipped", count(counters.unitsSkipped)]);
   }
   if (legacyClients) {
-    facts.push(["legacy_attached", count(legacyClients.attached)], ["legacy_refused", count(legacyClients.unitsRefused)]);
+    facts.push(
+      ["legacy_attached", count(legacyClients.attached)],
+      ["legacy_refused", count(legacyClients.unitsRefused)],
+    );
     facts.push(["legacy_turned_away", count(legacyClients.turnedAway)], ["legacy_closed", count(legacyClients.closed)]);
   }
   if (auditHead) {

@@ -1,9 +1,9 @@
 // Of a robot at another site: how much of it is taken; and whether that site's times can be trusted.
 
-import { Choice } from "../../ui/parts";
-import { REACHES, askReach, isFar, reachOf } from "../../scene/topic-selection";
-import { isClockOff, useMesh } from "../../mesh/site-health";
 import { t } from "../../i18n/texts";
+import { isClockOff, useMesh } from "../../mesh/site-health";
+import { askReach, isFar, REACHES, reachOf } from "../../scene/topic-selection";
+import { Choice } from "../../ui/parts";
 
 export function FarChoice({ robotKey }: { robotKey: string }) {
   if (!isFar(robotKey)) return null;
@@ -23,7 +23,9 @@ export function FarChoice({ robotKey }: { robotKey: string }) {
 
 /** By that site's own watch; nothing is said where there is none. */
 export function ClockHint({ site }: { site: string }) {
-  const off = useMesh().get(site)?.message.services.find((seen) => seen.site === site && isClockOff(seen));
+  const off = useMesh()
+    .get(site)
+    ?.message.services.find((seen) => seen.site === site && isClockOff(seen));
   if (!off) return null;
   const seconds = Math.abs(off.clockOffsetS ?? 0).toFixed(1);
   return (

@@ -1,20 +1,23 @@
 // The program that the gateway runs, or ran just now, in one line for everybody.
 
-import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { Timestamp } from "@bufbuild/protobuf/wkt";
+import { timestampMs } from "@bufbuild/protobuf/wkt";
+import type { Event, ProgramState } from "../../gen/robomesh_pb";
+import { ProgramState_Outcome as Outcome } from "../../gen/robomesh_pb";
 import { clock, staleText } from "../../i18n/format";
 import { reasonText } from "../../i18n/reasons";
-import { ProgramState_Outcome as Outcome } from "../../gen/robomesh_pb";
-import type { Event, ProgramState } from "../../gen/robomesh_pb";
 import { t } from "../../i18n/texts";
-import { ageOf, isStale } from "../../mesh/topics";
 import type { Latest } from "../../mesh/topics";
+import { ageOf, isStale } from "../../mesh/topics";
 
 const SHOWN_MS = 60_000; // after its end
 const ENDS = new Set(["program.done", "program.ended"]);
 
 /** Whether there is a run to speak of: one that goes on, or one that ended within the last minute. */
-export function isTold(latest: Latest<ProgramState> | undefined, events: readonly Event[]): latest is Latest<ProgramState> {
+export function isTold(
+  latest: Latest<ProgramState> | undefined,
+  events: readonly Event[],
+): latest is Latest<ProgramState> {
   if (!latest) return false;
   const { outcome, timestamp } = latest.message;
   if (outcome === Outcome.RUNNING) return true;

@@ -3,17 +3,17 @@
 import { signal } from "@preact/signals";
 import type { JSX } from "preact";
 import { useState } from "preact/hooks";
-import { ageText, count } from "../../i18n/format";
-import { RecordingSchema } from "../../gen/robomesh_pb";
 import type { Description, Recording } from "../../gen/robomesh_pb";
-import { presence } from "../../mesh/connection";
+import { RecordingSchema } from "../../gen/robomesh_pb";
+import { ageText, count } from "../../i18n/format";
 import { durationS, lostText, messagesOf, momentText, sizeText, startedText } from "../../i18n/recording-format";
-import { Action, askRecorder } from "../../mesh/recorder";
 import { r } from "../../i18n/recordings";
-import { recordingsLink } from "../../ui/route";
-import { viewsOf } from "../../scene/scene-view";
 import { viewText } from "../../i18n/texts";
+import { presence } from "../../mesh/connection";
+import { Action, askRecorder } from "../../mesh/recorder";
 import { ageOf, isStale, useTopic } from "../../mesh/topics";
+import { viewsOf } from "../../scene/scene-view";
+import { recordingsLink } from "../../ui/route";
 import "../../ui/replay.css";
 import "./record-panel.css";
 
@@ -66,13 +66,17 @@ export function RecordPanel({ robotKey, description }: { robotKey: string; descr
       await askRecorder(robotKey, action, values);
       setNotice(null);
     } catch (error) {
-      setNotice({ kind: "refused", text: r("record_refused", { text: error instanceof Error ? error.message : String(error) }) });
+      setNotice({
+        kind: "refused",
+        text: r("record_refused", { text: error instanceof Error ? error.message : String(error) }),
+      });
     }
   };
   if (!shown.value) return null;
   const busy = notice?.kind === "busy";
   const words =
-    notice?.text ?? (!there ? r("record_gone") : staleFor !== null ? r("record_stale", { age: ageText(staleFor) }) : "");
+    notice?.text ??
+    (!there ? r("record_gone") : staleFor !== null ? r("record_stale", { age: ageText(staleFor) }) : "");
   return (
     <section class="panel record-panel" aria-label={r("record")}>
       {open && recording ? (
@@ -148,7 +152,12 @@ function Start(props: {
 
 /** The last one, to be looked at. */
 function Last({ site, recording }: { site: string; recording: Recording | undefined }) {
-  if (!recording?.name) return <a class="record-last" href={recordingsLink()}>{r("back")}</a>;
+  if (!recording?.name)
+    return (
+      <a class="record-last" href={recordingsLink()}>
+        {r("back")}
+      </a>
+    );
   return (
     <span class="record-last dim">
       {r("record_last")}

@@ -1,41 +1,44 @@
 // One robot: what it looks like, what it does, and control of it.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { Alarm } from "../../ui/robot-alarm";
-import { Camera } from "./camera";
-import type { VideoPlace } from "./camera";
-import { seeLease } from "../../mesh/control";
-import { ControlPanel } from "../../ui/control/control-panel";
-import { EventsPanel } from "./events-panel";
-import { reasonText, reasonsText } from "../../i18n/reasons";
+import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
+import type { ControllerState, Description, Event, ProgramState } from "../../gen/robomesh_pb";
 import {
-  ControllerStateSchema,
   ControllerState_Check as Check,
+  ControllerStateSchema,
+  DescriptionSchema,
+  KinematicStateSchema,
   ControllerState_Known as Known,
+  LeaseSchema,
   ControllerState_Link as Link,
   ControllerState_Mode as Mode,
+  ProgramStateSchema,
 } from "../../gen/robomesh_pb";
-import { DescriptionSchema, KinematicStateSchema, LeaseSchema, ProgramStateSchema } from "../../gen/robomesh_pb";
-import type { ControllerState, Description, Event, ProgramState } from "../../gen/robomesh_pb";
-import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
-import { History } from "./history";
-import { JointsPanel } from "./joints-panel";
-import { Missing, useMissing } from "../../ui/robot-not-found";
-import { State, Tag } from "../../ui/parts";
-import { ProgramLine, isTold } from "./program-line";
-import { disobeys, stateWord, stoppedByItself, stopText } from "../../mesh/robot-state";
-import { RecordButton, RecordPanel } from "./record-panel";
-import { FarChoice, ClockHint } from "./low-bandwidth";
-import { jointsTopic } from "../../scene/topic-selection";
-import { programLink } from "../../ui/route";
+import { reasonsText, reasonText } from "../../i18n/reasons";
+import type { TextName } from "../../i18n/texts";
+import { t } from "../../i18n/texts";
+import { seeLease } from "../../mesh/control";
 import type { RobotName } from "../../mesh/robot-name";
+import { disobeys, stateWord, stoppedByItself, stopText } from "../../mesh/robot-state";
+import type { Latest } from "../../mesh/topics";
+import { ageOf, isStale, jointsAge, useEvents, useTopic } from "../../mesh/topics";
 import type { Stage } from "../../scene/scene";
 import { SceneView } from "../../scene/scene-view";
-import { t } from "../../i18n/texts";
-import type { TextName } from "../../i18n/texts";
+import { jointsTopic } from "../../scene/topic-selection";
+import { ControlPanel } from "../../ui/control/control-panel";
+import { State, Tag } from "../../ui/parts";
+import { Alarm } from "../../ui/robot-alarm";
+import { Missing, useMissing } from "../../ui/robot-not-found";
+import { programLink } from "../../ui/route";
 import { ToolPanel } from "../../ui/tool-panel";
-import { ageOf, isStale, jointsAge, useEvents, useTopic } from "../../mesh/topics";
-import type { Latest } from "../../mesh/topics";
+import type { VideoPlace } from "./camera";
+import { Camera } from "./camera";
+import { EventsPanel } from "./events-panel";
+import { History } from "./history";
+import { JointsPanel } from "./joints-panel";
+import { ClockHint, FarChoice } from "./low-bandwidth";
+import { isTold, ProgramLine } from "./program-line";
+import { RecordButton, RecordPanel } from "./record-panel";
 
 /** The page of one robot that is live; a replay has a page of its own, without commands. */
 export function Robot({ site, robot }: RobotName) {
@@ -146,7 +149,9 @@ function Headline(props: {
   const facts: string[] = [];
   // What was so is not said as if it were so.
   if (message && !isStale("controller", ageOf(controller))) {
-    facts.push(t(message.mode === Mode.LOCAL ? "mode_local" : message.mode === Mode.REMOTE ? "mode_remote" : "mode_unknown"));
+    facts.push(
+      t(message.mode === Mode.LOCAL ? "mode_local" : message.mode === Mode.REMOTE ? "mode_remote" : "mode_unknown"),
+    );
     facts.push(t(message.homed === Known.YES ? "homed" : message.homed === Known.NO ? "not_homed" : "homed_unknown"));
     const check = CHECKS[message.check];
     if (check) facts.push(t(check));
@@ -180,9 +185,7 @@ function Headline(props: {
           {t("flooding")}
         </span>
       )}
-      {message?.stop && (
-        <span class="trouble">{stopText(message, disobeys(message, events))}</span>
-      )}
+      {message?.stop && <span class="trouble">{stopText(message, disobeys(message, events))}</span>}
       {message?.checkText && (
         <span class="trouble warning">
           <span class="shape warning" aria-hidden="true" />
@@ -194,10 +197,12 @@ function Headline(props: {
       {/* In the place of what matters less, so that nothing below moves. */}
       {isTold(program, events) ? (
         <ProgramLine latest={program} />
-      ) : description?.provenance && (
-        <span class="provenance dim" lang="en" title={description.provenance}>
-          {description.title}: {description.provenance}
-        </span>
+      ) : (
+        description?.provenance && (
+          <span class="provenance dim" lang="en" title={description.provenance}>
+            {description.title}: {description.provenance}
+          </span>
+        )
       )}
       <RecordPanel robotKey={`robomesh/${props.site}/${props.name}`} description={description} />
     </div>

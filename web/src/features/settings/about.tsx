@@ -1,7 +1,7 @@
 // What this is, and under which terms.
 
-import { Panel } from "../../ui/parts";
 import { s } from "../../i18n/settings";
+import { Panel } from "../../ui/parts";
 
 export function About() {
   return (

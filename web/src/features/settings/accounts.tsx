@@ -1,13 +1,13 @@
 // The console's accounts, for an administrator: added, given another role or password, disabled, removed.
 
 import { useEffect, useState } from "preact/hooks";
-import { me, post } from "../../mesh/account";
-import { refusalText } from "../../ui/change-password";
-import type { Notice } from "../../mesh/control";
 import { fullTime } from "../../i18n/format";
-import { Select } from "../../ui/select";
-import { NoticeLine, Panel } from "../../ui/parts";
 import { s } from "../../i18n/settings";
+import { me, post } from "../../mesh/account";
+import type { Notice } from "../../mesh/control";
+import { refusalText } from "../../ui/change-password";
+import { NoticeLine, Panel } from "../../ui/parts";
+import { Select } from "../../ui/select";
 
 type Role = "monitor" | "operator" | "admin";
 const ROLES: readonly Role[] = ["monitor", "operator", "admin"];
@@ -72,7 +72,10 @@ function Row({ account, change }: { account: Account; change: Change }) {
   const [open, setOpen] = useState<"password" | "remove" | null>(null);
   const own = name === me.value?.account; // nobody locks themselves out by a slip
   const run = (action: string, values?: { role?: Role; password?: string }) =>
-    void change(action, name, values).then(() => setOpen(null), () => undefined);
+    void change(action, name, values).then(
+      () => setOpen(null),
+      () => undefined,
+    );
   return (
     <tr class={disabled ? "gone" : ""}>
       <th scope="row">{name}</th>
@@ -89,7 +92,9 @@ function Row({ account, change }: { account: Account; change: Change }) {
           />
         )}
       </td>
-      <td>{disabled ? s("disabled") : account.sessions ? s("sessions_of", { count: account.sessions }) : s("active")}</td>
+      <td>
+        {disabled ? s("disabled") : account.sessions ? s("sessions_of", { count: account.sessions }) : s("active")}
+      </td>
       <td>{fullTime(Date.parse(account.created))}</td>
       <td class="account-actions">
         {own ? null : open === "password" ? (

@@ -1,10 +1,10 @@
 // When the certificates of the mesh's processes end, as they tell it themselves; nothing where there are none.
 
 import { ageText } from "../../i18n/format";
-import { Panel } from "../../ui/parts";
-import { useMesh } from "../../mesh/site-health";
-import { Marked } from "./this-console";
 import { s } from "../../i18n/settings";
+import { useMesh } from "../../mesh/site-health";
+import { Panel } from "../../ui/parts";
+import { Marked } from "./this-console";
 
 /** As robomesh/session.py names it in a process's health. */
 const SECONDS = "certificate_seconds";

@@ -1,8 +1,8 @@
 // Where the time goes on the way from a publisher to the watch: a line a hop, all to one scale.
 
 import type { MeshState_Hop as Hop } from "../../gen/robomesh_pb";
-import { milliseconds } from "./seen-row";
 import { s } from "../../i18n/settings";
+import { milliseconds } from "./seen-row";
 
 export function Hops({ hops }: { hops: readonly Hop[] }) {
   const ways = [...Map.groupBy(hops, ({ key }) => key)];

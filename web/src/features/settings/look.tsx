@@ -1,11 +1,11 @@
 // How this browser shows it; kept in this browser only.
 
+import { s } from "../../i18n/settings";
+import { language, switchLanguage } from "../../i18n/texts";
 import { setSound, sound } from "../../ui/alarm-sound";
 import { Choice, Panel } from "../../ui/parts";
-import { language, switchLanguage } from "../../i18n/texts";
 import { switchTheme, theme } from "../../ui/theme";
 import { Facts } from "./facts";
-import { s } from "../../i18n/settings";
 
 const LANGUAGES = { en: "English", zh: "中文" } as const;
 

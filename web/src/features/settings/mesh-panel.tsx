@@ -1,17 +1,16 @@
 // Every service of every site, as the sites' watches see them.
 
-import type { MeshState_Seen as Seen } from "../../gen/robomesh_pb";
+import type { MeshState, MeshState_Seen as Seen } from "../../gen/robomesh_pb";
 import { ageText } from "../../i18n/format";
-import type { MeshState } from "../../gen/robomesh_pb";
+import { s } from "../../i18n/settings";
 import { presence } from "../../mesh/connection";
-import { Panel } from "../../ui/parts";
-import { Services } from "../../ui/alive-services";
 import { isMeshStale, useMesh } from "../../mesh/site-health";
-import { ageOf } from "../../mesh/topics";
 import type { Latest } from "../../mesh/topics";
+import { ageOf } from "../../mesh/topics";
+import { Services } from "../../ui/alive-services";
+import { Panel } from "../../ui/parts";
 import { Hops } from "./hops";
 import { COLUMNS, SeenRow } from "./seen-row";
-import { s } from "../../i18n/settings";
 
 const GONE_TOLD_MS = 900_000;
 

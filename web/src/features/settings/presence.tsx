@@ -1,11 +1,11 @@
 // Who is attached besides the services: monitors, consoles, and whoever is in control.
 
+import { s } from "../../i18n/settings";
 import { presence } from "../../mesh/connection";
 import { OPERATOR } from "../../mesh/known-robots";
-import { Panel } from "../../ui/parts";
 import { robotNow } from "../../mesh/robot-snapshots";
+import { Panel } from "../../ui/parts";
 import { robotLink } from "../../ui/route";
-import { s } from "../../i18n/settings";
 
 const WATCHERS = new Set(["monitor", "console", "foxglove", "ros2"]);
 
@@ -26,9 +26,7 @@ export function Presence() {
             <li key={token}>
               <span>{site}</span>
               {service === OPERATOR ? (
-                <a href={robotLink(site, robot)}>
-                  {`${holder(site, robot)} ${s("in_control_of", { robot })}`.trim()}
-                </a>
+                <a href={robotLink(site, robot)}>{`${holder(site, robot)} ${s("in_control_of", { robot })}`.trim()}</a>
               ) : (
                 <strong>{word(service)}</strong>
               )}

@@ -1,13 +1,13 @@
 // One process of the mesh: version, host, age, way, clock, losses, load.
 
 import { timestampMs } from "@bufbuild/protobuf/wkt";
-import { DASH, ageText, count, fixed, stampFull, timeOfDay } from "../../i18n/format";
 import type { MeshState, MeshState_Seen as Seen } from "../../gen/robomesh_pb";
+import { ageText, count, DASH, fixed, stampFull, timeOfDay } from "../../i18n/format";
+import { s } from "../../i18n/settings";
 import { hello } from "../../mesh/connection";
 import { isClockOff, isSilent, seenAge } from "../../mesh/site-health";
 import type { Latest } from "../../mesh/topics";
 import { Marked } from "./this-console";
-import { s } from "../../i18n/settings";
 
 export const COLUMNS = [
   "service",
@@ -40,7 +40,9 @@ export function SeenRow(props: { of: string; seen: Seen; latest: Latest<MeshStat
         {seen.robots.length > 0 && <span class="dim small seen-robots">{robotsText(seen.robots)}</span>}
         {values.length > 0 && (
           <details class="seen-values">
-            <summary aria-label={s("values", { name: seen.service })}>{s("values_count", { count: values.length })}</summary>
+            <summary aria-label={s("values", { name: seen.service })}>
+              {s("values_count", { count: values.length })}
+            </summary>
             <dl>
               {values.map(([name, value]) => (
                 <div key={name}>

@@ -1,12 +1,12 @@
 // The browsers that are signed in: one's own, to an administrator everybody's; any of them can be ended.
 
 import { useEffect, useState } from "preact/hooks";
-import { post } from "../../mesh/account";
-import { refusalText } from "../../ui/change-password";
 import { fullTime } from "../../i18n/format";
-import { NoticeLine, Panel } from "../../ui/parts";
-import type { Notice } from "../../mesh/control";
 import { s } from "../../i18n/settings";
+import { post } from "../../mesh/account";
+import type { Notice } from "../../mesh/control";
+import { refusalText } from "../../ui/change-password";
+import { NoticeLine, Panel } from "../../ui/parts";
 
 const LOOK_EACH_MS = 5000;
 

@@ -1,9 +1,9 @@
 // Which pictures the wall shows: a row a robot, a button a view.
 
-import { Toggle } from "../../ui/parts";
-import type { ViewName } from "../../ui/route";
 import { viewText } from "../../i18n/texts";
 import { w } from "../../i18n/wall";
+import { Toggle } from "../../ui/parts";
+import type { ViewName } from "../../ui/route";
 
 export interface RobotViews {
   site: string;

@@ -2,16 +2,16 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { ControllerState, Description } from "../../gen/robomesh_pb";
-import { useLive } from "../../video/live-video";
-import { Age, State, Tag } from "../../ui/parts";
-import { problemOf, stateWord } from "../../mesh/robot-state";
-import { isReplay } from "../../mesh/robot-name";
-import { robotLink } from "../../ui/route";
-import type { ViewName } from "../../ui/route";
 import { t, viewText } from "../../i18n/texts";
-import type { Latest } from "../../mesh/topics";
-import { wantedFor } from "./grid";
 import { w } from "../../i18n/wall";
+import { isReplay } from "../../mesh/robot-name";
+import { problemOf, stateWord } from "../../mesh/robot-state";
+import type { Latest } from "../../mesh/topics";
+import { Age, State, Tag } from "../../ui/parts";
+import type { ViewName } from "../../ui/route";
+import { robotLink } from "../../ui/route";
+import { useLive } from "../../video/live-video";
+import { wantedFor } from "./grid";
 
 export function WallTile(props: {
   shown: ViewName;
@@ -51,7 +51,13 @@ export function WallTile(props: {
   const live = useLive(robotKey, watched ? wantedFor(shown.view, width, height) : null, label);
   const state = stateWord(controller);
   const problem = state.level === "normal" ? "" : problemOf(controller?.message);
-  const word = !props.known ? w("gone") : !seen && live.any ? w("hidden") : live.any ? "" : live.problem || w("waiting");
+  const word = !props.known
+    ? w("gone")
+    : !seen && live.any
+      ? w("hidden")
+      : live.any
+        ? ""
+        : live.problem || w("waiting");
   return (
     <article
       ref={place}

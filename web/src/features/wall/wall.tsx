@@ -1,17 +1,17 @@
 // The Wall: any robots' views as video, as large as the screen allows.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { fleetRobots, seeRobots } from "../../mesh/known-robots";
-import { ControllerStateSchema, DescriptionSchema } from "../../gen/robomesh_pb";
 import type { Description } from "../../gen/robomesh_pb";
-import { robotLink, wallLink } from "../../ui/route";
-import type { ViewName } from "../../ui/route";
+import { ControllerStateSchema, DescriptionSchema } from "../../gen/robomesh_pb";
 import { t } from "../../i18n/texts";
-import { useTopics } from "../../mesh/topics";
-import { Choose } from "./choose";
-import type { RobotViews } from "./choose";
-import { columnsFor } from "./grid";
 import { w } from "../../i18n/wall";
+import { fleetRobots, seeRobots } from "../../mesh/known-robots";
+import { useTopics } from "../../mesh/topics";
+import type { ViewName } from "../../ui/route";
+import { robotLink, wallLink } from "../../ui/route";
+import type { RobotViews } from "./choose";
+import { Choose } from "./choose";
+import { columnsFor } from "./grid";
 import { WallTile } from "./tile";
 import "./wall.css";
 

@@ -1,20 +1,20 @@
 // Who controls the robot, and the commands of whoever does.
 
-import { onlyWatches } from "../../mesh/account";
-import { mayNotCommand } from "./no-control";
-import { Command, command } from "../../mesh/command";
-import type { CommandValues } from "../../mesh/command";
-import { controlNotice, holds } from "../../mesh/control";
-import { ControllerState_Activity as Activity, ControllerState_Known as Known } from "../../gen/robomesh_pb";
 import type { ControllerState, Description, Lease } from "../../gen/robomesh_pb";
-import { useNoticeEnd } from "../../mesh/notice-end";
+import { ControllerState_Activity as Activity, ControllerState_Known as Known } from "../../gen/robomesh_pb";
+import { t } from "../../i18n/texts";
+import { onlyWatches } from "../../mesh/account";
+import type { CommandValues } from "../../mesh/command";
+import { Command, command } from "../../mesh/command";
+import { controlNotice, holds } from "../../mesh/control";
 import type { Motion } from "../../mesh/notice-end";
-import { NoticeLine, Panel } from "../parts";
+import { useNoticeEnd } from "../../mesh/notice-end";
 import { stoppedByItself, whyNoMotion } from "../../mesh/robot-state";
+import type { Latest } from "../../mesh/topics";
+import { NoticeLine, Panel } from "../parts";
+import { mayNotCommand } from "./no-control";
 import { Speed } from "./speed";
 import { Stopped } from "./stopped";
-import { t } from "../../i18n/texts";
-import type { Latest } from "../../mesh/topics";
 import { Holder, WhoControls } from "./who-controls";
 
 export function ControlPanel(props: {
@@ -35,7 +35,13 @@ export function ControlPanel(props: {
   const canSend = mine && !state?.stop && !state?.readOnly;
   const send = (name: Command, what: string, values?: CommandValues, positions?: number[]) =>
     void command(robotKey, name, what, values, undefined, positions);
-  const home = () => send(Command.HOME, t("home"), {}, props.description?.joints.map((joint) => joint.home));
+  const home = () =>
+    send(
+      Command.HOME,
+      t("home"),
+      {},
+      props.description?.joints.map((joint) => joint.home),
+    );
   useNoticeEnd(controlNotice.value, (notice) => (controlNotice.value = notice), props.motion);
   const holding = state?.activity === Activity.HOLDING;
   const tracing = state?.trace === Known.YES;
@@ -64,9 +70,7 @@ export function ControlPanel(props: {
             class="action"
             disabled={!mine || state?.readOnly}
             aria-pressed={tracing}
-            onClick={() =>
-              tracing ? send(Command.TRACE_OFF, t("trace_off")) : send(Command.TRACE_ON, t("trace_on"))
-            }
+            onClick={() => (tracing ? send(Command.TRACE_OFF, t("trace_off")) : send(Command.TRACE_ON, t("trace_on")))}
           >
             {t(tracing ? "trace_off" : "trace_on")}
           </button>
@@ -85,7 +89,17 @@ export function ControlPanel(props: {
       )}
       <NoticeLine
         notice={controlNotice.value}
-        idle={state?.readOnly ? why : !mine ? (mayNotCommand() ? "" : t("take_first")) : state?.stop ? "" : why || t("taken")}
+        idle={
+          state?.readOnly
+            ? why
+            : !mine
+              ? mayNotCommand()
+                ? ""
+                : t("take_first")
+              : state?.stop
+                ? ""
+                : why || t("taken")
+        }
       />
     </Panel>
   );

@@ -1,11 +1,11 @@
 // In the place of taking control: why this account cannot, and what it can do about it.
 
 import { useState } from "preact/hooks";
-import { hello } from "../../mesh/connection";
+import { a } from "../../i18n/account";
 import { me, onlyWatches, rests, unlock } from "../../mesh/account";
+import { hello } from "../../mesh/connection";
 import { refusalText } from "../change-password";
 import { PasswordField } from "../password-field";
-import { a } from "../../i18n/account";
 import "../account.css";
 
 /** Whether whoever is signed in may not ask for control now. */

@@ -1,12 +1,12 @@
 // What keeps the robot from moving until it is reset: a latched stop, or the controller's own stop or fault.
 
-import { Command } from "../../mesh/command";
-import type { CommandValues } from "../../mesh/command";
-import { stampFull } from "../../i18n/format";
-import { ControllerState_Activity as Activity } from "../../gen/robomesh_pb";
 import type { ControllerState } from "../../gen/robomesh_pb";
-import { moves, stopText } from "../../mesh/robot-state";
+import { ControllerState_Activity as Activity } from "../../gen/robomesh_pb";
+import { stampFull } from "../../i18n/format";
 import { t } from "../../i18n/texts";
+import type { CommandValues } from "../../mesh/command";
+import { Command } from "../../mesh/command";
+import { moves, stopText } from "../../mesh/robot-state";
 
 export function Stopped(props: {
   state: ControllerState;

@@ -1,14 +1,26 @@
 // Who is in control, who asks for it, to whom it is offered; and how one gets it, from nobody or from somebody.
 
-import { useEffect, useState } from "preact/hooks";
 import type { ComponentChildren } from "preact";
-import { mayNotCommand, NoControl } from "./no-control";
-import { accept, askFor, holds, ms, offer, operator, ownName, release, setOperator, take, takeOver } from "../../mesh/control";
-import { ageText, stampFull, stampTime } from "../../i18n/format";
+import { useEffect, useState } from "preact/hooks";
 import type { Lease, Lease_Asker } from "../../gen/robomesh_pb";
-import { hello } from "../../mesh/connection";
-import { Reason } from "../ask-reason";
+import { ageText, stampFull, stampTime } from "../../i18n/format";
 import { t } from "../../i18n/texts";
+import { hello } from "../../mesh/connection";
+import {
+  accept,
+  askFor,
+  holds,
+  ms,
+  offer,
+  operator,
+  ownName,
+  release,
+  setOperator,
+  take,
+  takeOver,
+} from "../../mesh/control";
+import { Reason } from "../ask-reason";
+import { mayNotCommand, NoControl } from "./no-control";
 
 const MOST_ASKERS_SHOWN = 3;
 
@@ -139,7 +151,10 @@ function Wishes({ mine, robotKey, lease }: { mine: boolean; robotKey: string; le
   return (
     <div role="status">
       {offeredTo && !(toMe && declined.includes("offer")) && (
-        <Wish strong={toMe || mine} text={t(toMe ? "offers_you" : mine ? "offer_open" : "offers", { holder, name: offeredTo })}>
+        <Wish
+          strong={toMe || mine}
+          text={t(toMe ? "offers_you" : mine ? "offer_open" : "offers", { holder, name: offeredTo })}
+        >
           {toMe && (
             <>
               <button class="action primary" onClick={() => void accept(robotKey)}>
