@@ -1,6 +1,6 @@
 """Builds the page: types from the mesh's own schemas, then the type check, then Vite.
 
-Runs as a script (`python web/build_page.py [--check]`) and as hatchling's build
+Runs as a script (`python web/build_page.py [--check | --format]`) and as hatchling's build
 hook of the wheel. Needs the standard library, protobuf, Foxglove's modules and the Node that
 comes as a wheel; no protoc, no Node of the machine's, so that every build is the same build.
 """
@@ -18,6 +18,7 @@ PAGE = Path(__file__).resolve().parent
 DIST = ROOT / "services" / "console" / "page"  # as in vite.config.ts
 GENERATED = PAGE / "src" / "gen"
 MODULES = PAGE / "node_modules"
+BIOME = MODULES / "@biomejs" / "biome" / "bin" / "biome"
 
 # Schemas and the table that names them: a change there is a change of the page.
 _SCHEMAS = (ROOT / "robomesh" / "topics.py", ROOT / "robomesh" / "schemas" / "robomesh_pb2.py")
@@ -49,7 +50,7 @@ def build(*, check_only: bool = False) -> bool:
     """Builds the page where it is older than its sources.
 
     Args:
-        check_only: Types and type check, no bundle.
+        check_only: Write the types, check types, format and lint rules; no bundle.
 
     Returns:
         Whether there was anything to do.
@@ -65,12 +66,25 @@ def build(*, check_only: bool = False) -> bool:
     write_types()
     _say("type check")
     _node(MODULES / "typescript" / "bin" / "tsc", "--noEmit")
-    if not check_only:
+    if check_only:
+        _say("format and lint")
+        _node(BIOME, "ci", "--error-on-warnings", "--colors=off", ".")
+    else:
         _say("bundle")
         _node(MODULES / "vite" / "bin" / "vite.js", "build", "--logLevel", "warn")
         os.utime(DIST / "index.html")
     _say(f"done in {time.monotonic() - started:.1f} s")
     return True
+
+
+def format_sources() -> None:
+    """Format the page's source and apply the safe fixes of its lint rules.
+
+    Raises:
+        PageBuildError: If a problem is left that needs a person.
+    """
+    install()
+    _node(BIOME, "check", "--write", "--error-on-warnings", "--colors=off", ".")
 
 
 def install() -> None:
@@ -159,11 +173,14 @@ def _say(text: str) -> None:
 
 def main(arguments: list[str]) -> int:
     """The script: 0 when built or current, 2 when it could not be."""
-    if arguments not in ([], ["--check"]):
-        print("usage: build_page.py [--check]", file=sys.stderr)
+    if arguments not in ([], ["--check"], ["--format"]):
+        print("usage: build_page.py [--check | --format]", file=sys.stderr)
         return 2
     try:
-        build(check_only=bool(arguments))
+        if arguments == ["--format"]:
+            format_sources()
+        else:
+            build(check_only=bool(arguments))
     except PageBuildError as error:
         print(f"page: {error}", file=sys.stderr)
         return 2

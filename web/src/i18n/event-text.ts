@@ -87,11 +87,11 @@ function filled(sentence: string, values: Record<string, string>): string | null
 /** The page's own words for what people meet most; the event's for the rest. */
 export function eventText(event: Event): string {
   const { code, values } = event;
-  const by = values["by"] ?? "";
-  const reason = values["reason"];
+  const by = values.by ?? "";
+  const reason = values.reason;
   switch (code) {
     case "stop.latched": {
-      const said = t(values["sent"] === "True" ? "event_stop" : "event_stop_unsent", { by });
+      const said = t(values.sent === "True" ? "event_stop" : "event_stop_unsent", { by });
       return reason && reason !== "console" ? `${said} ${reason}` : said;
     }
     case "stop.sent":

@@ -37,12 +37,12 @@ const ANSWERED_WITHIN_MS = 10_000; // else a page on a dead line would wait for 
 export const me = signal<Me | null>(null);
 /** Why the last session of this page ended, in the server's word; empty: there was none. */
 export const endedBy = signal("");
-export const mustSignIn = computed(() => me.value !== null && me.value.accounts && !me.value.account);
+export const mustSignIn = computed(() => !!me.value?.accounts && !me.value.account);
 /** Whether this account may ask for control, were it not for what rests. */
 export const onlyWatches = computed(() => me.value?.role === "monitor");
 export const rests = computed(() => !!hello.value?.account && !hello.value.mayCommand && !onlyWatches.value);
 
-let connects = () => undefined as void;
+let connects: () => void = () => undefined;
 
 /** Asks the console who one is; null: it does not answer. */
 export async function whoAmI(): Promise<Me | null> {

@@ -39,7 +39,9 @@ export function useFleetNow(): void {
       follow("robomesh/*/*/controller", ControllerStateSchema, (now) => now.controller),
       follow("robomesh/*/*/lease", LeaseSchema, (now) => now.lease),
     ];
-    return () => ends.forEach((end) => end());
+    return () => {
+      for (const end of ends) end();
+    };
   }, []);
 }
 

@@ -136,7 +136,9 @@ function useList<M extends Dated>(
       list.value = merged.slice(0, LIST_LENGTH);
     };
     const stops = expressions.map((expression) => watch(expression, take));
-    return () => stops.forEach((stop) => stop());
+    return () => {
+      for (const stop of stops) stop();
+    };
   }, [list]);
   return list.value;
 }

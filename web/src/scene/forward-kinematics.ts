@@ -27,13 +27,13 @@ export function forwardOf(urdf: string, jointNames: readonly string[]): Forward 
   const index = new Map(jointNames.map((name, i) => [name, i]));
   const motion = new THREE.Matrix4();
   return (positions) => {
-    const valueOf = (name: string) => positions[index.get(name) ?? -1] ?? 0;
+    const positionOf = (name: string) => positions[index.get(name) ?? -1] ?? 0;
     for (const { name, type, parent, child, origin, axis, mimic } of joints) {
       const from = placements.get(parent);
       const to = placements.get(child);
       if (!from || !to) continue;
       if (!children.has(parent)) from.identity();
-      const value = mimic ? mimic.multiplier * valueOf(mimic.leader) + mimic.offset : valueOf(name);
+      const value = mimic ? mimic.multiplier * positionOf(mimic.leader) + mimic.offset : positionOf(name);
       to.multiplyMatrices(from, origin);
       if (type === "prismatic") to.multiply(motion.makeTranslation(axis.clone().multiplyScalar(value)));
       else if (type !== "fixed") to.multiply(motion.makeRotationAxis(axis, value));

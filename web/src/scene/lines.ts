@@ -123,7 +123,7 @@ export class Gap {
     this.label.hidden = !this.group.visible;
     if (this.label.hidden || !first || !second) return;
     this.label.textContent = this.words.text;
-    this.label.dataset["level"] = this.words.level;
+    this.label.dataset.level = this.words.level;
     const { x, y } = first.clone().lerp(second, 0.5).project(camera);
     this.label.style.translate = `${((x + 1) / 2) * width}px ${((1 - y) / 2) * height}px`;
   }

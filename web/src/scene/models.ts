@@ -77,7 +77,7 @@ export function dressed(model: THREE.Group, colour: string): THREE.Group {
       side: THREE.DoubleSide,
     });
     part.material = material;
-    part.userData["colour"] = material.color.clone();
+    part.userData.colour = material.color.clone();
   });
   const group = new THREE.Group();
   group.add(model);
@@ -93,7 +93,7 @@ export function dressedFixture(model: THREE.Group, colour: string): THREE.Group 
   for (const part of parts) {
     const { color, map } = part.material as THREE.MeshStandardMaterial;
     const geometry = part.geometry as THREE.BufferGeometry;
-    const own = part.userData["colour"] as THREE.Color;
+    const own = part.userData.colour as THREE.Color;
     if (!colour && !map && !geometry.hasAttribute("color") && color.getHex() === NO_COLOUR) own.set(FIXTURE_COLOUR);
     if (geometry.getAttribute("position").count > MOST_CORNERS) continue;
     const edges = new THREE.LineSegments(new THREE.EdgesGeometry(geometry, EDGE_ANGLE), new THREE.LineBasicMaterial());
@@ -115,7 +115,7 @@ export function paint(group: THREE.Group, { stale, red, kind }: Paint, alarm: st
   group.traverse((part) => {
     if (!(part instanceof THREE.Mesh)) return;
     const material = part.material as THREE.MeshStandardMaterial;
-    material.color.copy(part.userData["colour"] as THREE.Color);
+    material.color.copy(part.userData.colour as THREE.Color);
     if (kind === "neighbour") material.color.lerp(STALE_COLOUR, MUTED);
     if (stale) material.color.copy(STALE_COLOUR);
     if (red) material.color.set(alarm);

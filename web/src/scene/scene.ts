@@ -99,7 +99,7 @@ export class RobotScene {
       made.position.setFromMatrixPosition(this.base).setZ(this.floorAt);
       this.scene.add(made);
     }
-    this.canvas.dataset["floor"] = String(this.floorAt);
+    this.canvas.dataset.floor = String(this.floorAt);
     this.trail.line.material.color.set(colours.accent);
     this.path.line.material.color.set(colours.accent);
     this.setRed(this.red);
@@ -153,7 +153,7 @@ export class RobotScene {
         if (fixtureToSite.length === 16) group.matrix.fromArray(fixtureToSite).transpose();
         this.fixtures.set(name, group);
         this.scene.add(group);
-        this.canvas.dataset["fixtures"] = String(this.fixtures.size);
+        this.canvas.dataset.fixtures = String(this.fixtures.size);
         this.setRed(this.red);
       }),
     );
@@ -178,7 +178,7 @@ export class RobotScene {
   addNeighbour(prefix: string, description: Description): Arm {
     const neighbour = new Arm(this.scene, prefix, "neighbour", this.changed);
     this.neighbours.add(neighbour);
-    this.canvas.dataset["neighbours"] = String(this.neighbours.size);
+    this.canvas.dataset.neighbours = String(this.neighbours.size);
     neighbour.setRed(this.red);
     // A neighbour without its model is no trouble of this robot's: its own page says why.
     void neighbour.load(description, () => undefined);
@@ -199,19 +199,19 @@ export class RobotScene {
       paint(group, { stale: false, red: names.has(name), kind: "fixture" }, alarm);
       colourEdges(group, names.has(name) ? alarm : dim);
     }
-    this.canvas.dataset["red"] = [...names].sort().join(" ");
+    this.canvas.dataset.red = [...names].sort().join(" ");
     this.dirty = true;
   }
 
   /** Shows where the links would be, as placements in the base frame; null: not at all. */
   showGhost(placements: ReadonlyMap<string, THREE.Matrix4> | null): void {
-    this.canvas.dataset["ghost"] = String(this.arm.showGhost(placements));
+    this.canvas.dataset.ghost = String(this.arm.showGhost(placements));
   }
 
   /** Shows a path of the tool, in the base frame [m]; null: none. */
   showPath(points: readonly (readonly [number, number, number])[] | null): void {
     this.path.show(points);
-    this.canvas.dataset["path"] = String(points?.length ?? 0);
+    this.canvas.dataset.path = String(points?.length ?? 0);
     this.dirty = true;
   }
 
@@ -354,7 +354,7 @@ export class RobotScene {
     this.gap.placeLabel(this.camera, this.canvas.clientWidth, this.canvas.clientHeight);
     this.drawing = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.flush();
-    this.canvas.dataset["drawn"] = String(Number(this.canvas.dataset["drawn"] ?? 0) + 1);
+    this.canvas.dataset.drawn = String(Number(this.canvas.dataset.drawn ?? 0) + 1);
   };
 
   private place(placements: ReadonlyMap<string, THREE.Matrix4>): void {

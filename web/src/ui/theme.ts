@@ -14,7 +14,7 @@ function initial(): Theme {
 export const theme = signal<Theme>(initial());
 
 export function applyTheme(): void {
-  document.documentElement.dataset["theme"] = theme.value;
+  document.documentElement.dataset.theme = theme.value;
 }
 
 export function switchTheme(): void {

@@ -29,20 +29,24 @@ export function ToolPanel(props: {
     >
       <dl class={`numbers ${stale && state ? "stale" : ""}`}>
         {(["x", "y", "z"] as const).map((axis, i) => (
-          <Number key={axis} label={axis} text={fixed(at[i] === undefined ? undefined : at[i]! * 1000, 1)} unit="mm" />
+          <NumberRow key={axis} label={axis} text={fixed(millimetres(at[i]), 1)} unit="mm" />
         ))}
         {(["roll", "pitch", "yaw"] as const).map((axis, i) => (
-          <Number key={axis} label={t(axis)} text={fixed(angles[i], 2)} unit="°" />
+          <NumberRow key={axis} label={t(axis)} text={fixed(angles[i], 2)} unit="°" />
         ))}
-        <Number label={t("tool_speed")} text={fixed(speed, 1)} unit="mm/s" />
-        <Number label={t("manipulability")} text={fixed(state?.manipulability, 4)} unit="" />
+        <NumberRow label={t("tool_speed")} text={fixed(speed, 1)} unit="mm/s" />
+        <NumberRow label={t("manipulability")} text={fixed(state?.manipulability, 4)} unit="" />
       </dl>
       <Margins robotKey={props.robotKey} state={state} description={props.description} stale={stale} />
     </Panel>
   );
 }
 
-function Number(props: { label: string; text: string; unit: string }) {
+function millimetres(metres: number | undefined): number | undefined {
+  return metres === undefined ? undefined : metres * 1000;
+}
+
+function NumberRow(props: { label: string; text: string; unit: string }) {
   return (
     <div>
       <dt title={props.label}>{props.label}</dt>

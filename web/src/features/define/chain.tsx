@@ -189,7 +189,7 @@ function RowButton(props: {
 
 function ToolMark() {
   return (
-    <svg class="joint-sign" viewBox="0 0 20 20" width="18" height="18">
+    <svg class="joint-sign" viewBox="0 0 20 20" width="18" height="18" aria-hidden="true">
       <path d="M10 2v4M10 14v4M2 10h4M14 10h4" />
       <circle cx="10" cy="10" r="4" />
     </svg>

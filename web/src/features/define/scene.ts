@@ -145,7 +145,7 @@ export class DefineScene {
     this.skeleton.update(picture, tool, row);
     this.paintAll();
     this.attach();
-    this.canvas.dataset["tool"] = JSON.stringify(tool.clone().transpose().elements);
+    this.canvas.dataset.tool = JSON.stringify(tool.clone().transpose().elements);
     this.touch();
   }
 
@@ -208,7 +208,7 @@ export class DefineScene {
       }
     }
     if (link.model && shape) link.model.scale.setScalar(shape.scale);
-    this.canvas.dataset["shapes"] = String(this.links.filter(({ model }) => model).length);
+    this.canvas.dataset.shapes = String(this.links.filter(({ model }) => model).length);
   }
 
   private model(sha: string): Promise<THREE.Group> {
@@ -230,7 +230,7 @@ export class DefineScene {
             metalness: 0.1,
             side: THREE.DoubleSide,
           });
-          part.userData["colour"] = (own.color ?? new THREE.Color(BARE)).getHex(); // a copy keeps plain values
+          part.userData.colour = (own.color ?? new THREE.Color(BARE)).getHex(); // a copy keeps plain values
         });
         return scene;
       });
@@ -248,7 +248,7 @@ export class DefineScene {
       link.model?.traverse((part) => part instanceof THREE.Mesh && parts.push(part));
       const painted = parts.some((part) => part.material.name === PAINT);
       for (const part of parts) {
-        part.material.color.setHex(part.userData["colour"] as number);
+        part.material.color.setHex(part.userData.colour as number);
         const takes = /^#[0-9a-f]{6}$/i.test(color) && (!painted || part.material.name === PAINT);
         if (takes) part.material.color.set(color);
         if (isChosen) part.material.color.lerp(accent, CHOSEN_TINT);
@@ -263,7 +263,7 @@ export class DefineScene {
     this.gizmo.camera = this.view.camera;
     if (this.dragging === "off" || !object) this.gizmo.detach();
     else if (this.gizmo.object !== object) this.gizmo.attach(object);
-    this.canvas.dataset["gizmo"] = this.gizmo.object ? this.dragging : "";
+    this.canvas.dataset.gizmo = this.gizmo.object ? this.dragging : "";
     this.touch();
   }
 
@@ -334,7 +334,7 @@ export class DefineScene {
     this.gizmo.camera = this.view.camera;
     this.skeleton.scaleLetters(this.view.letterScale);
     this.renderer.render(this.scene, this.view.camera);
-    this.canvas.dataset["drawn"] = String(Number(this.canvas.dataset["drawn"] ?? 0) + 1);
+    this.canvas.dataset.drawn = String(Number(this.canvas.dataset.drawn ?? 0) + 1);
   };
 
   dispose(): void {

@@ -73,7 +73,7 @@ function focusNearest(path: readonly (string | number)[]): void {
   for (let length = path.length; length > 0; length--) {
     const place = path.slice(0, length).join("/");
     const found = [...document.querySelectorAll<HTMLElement>("[data-path]")].find(({ dataset }) => {
-      return dataset["path"] === place || dataset["path"]?.startsWith(`${place}/`);
+      return dataset.path === place || dataset.path?.startsWith(`${place}/`);
     });
     if (found) {
       found.scrollIntoView({ block: "nearest" });

@@ -9,7 +9,9 @@ import { PriorityMark, priorityWord } from "../../ui/priority";
 export function AlarmBadge() {
   useEffect(() => {
     const ends = [followAlarms(), followSound()];
-    return () => ends.forEach((end) => end());
+    return () => {
+      for (const end of ends) end();
+    };
   }, []);
   const told = counts.value;
   const silent = silentSites();

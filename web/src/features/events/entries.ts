@@ -65,7 +65,7 @@ export function useEntries(): void {
     }, TAKEN_EACH_MS);
     return () => {
       clearInterval(timer);
-      ends.forEach((end) => end());
+      for (const end of ends) end();
     };
   }, []);
 }

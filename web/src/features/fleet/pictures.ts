@@ -174,7 +174,7 @@ class Pictures {
       canvas
         .getContext("2d", { alpha: false })
         ?.drawImage(source, x, y, canvas.width, canvas.height, 0, 0, canvas.width, canvas.height);
-      canvas.dataset["drawn"] = String(Number(canvas.dataset["drawn"] ?? 0) + 1);
+      canvas.dataset.drawn = String(Number(canvas.dataset.drawn ?? 0) + 1);
     });
     const gl = renderer.getContext() as WebGL2RenderingContext;
     this.drawing = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);

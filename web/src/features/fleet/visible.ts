@@ -9,7 +9,9 @@ const GOES_AFTER_MS = 400;
 
 const hears = new WeakMap<Element, (visible: boolean) => void>();
 const observer = new IntersectionObserver(
-  (entries) => entries.forEach((entry) => hears.get(entry.target)?.(entry.isIntersecting)),
+  (entries) => {
+    for (const entry of entries) hears.get(entry.target)?.(entry.isIntersecting);
+  },
   { rootMargin: "160px 0px" },
 );
 

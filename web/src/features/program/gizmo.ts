@@ -59,7 +59,7 @@ export function addGizmo(stage: Stage): () => void {
       controls.setMode(mode);
       if (controls.object !== tool) controls.attach(tool);
     }
-    stage.canvas.dataset["gizmo"] = controls.object ? mode : "";
+    stage.canvas.dataset.gizmo = controls.object ? mode : "";
     stage.changed();
   });
   return () => {

@@ -29,7 +29,7 @@ export function savePicture(element: HTMLElement, name: string): void {
       context.fillText(text, x, y + (LINE_PX * scale) / 2);
       x += context.measureText(text).width + 12 * scale;
     };
-    write(chart.dataset["unit"] ?? "", colour("--dim"));
+    write(chart.dataset.unit ?? "", colour("--dim"));
     for (const each of chart.querySelectorAll<HTMLElement>(".legend > span:has(.curve)")) {
       const mark = each.querySelector(".curve");
       write(

@@ -58,7 +58,7 @@ export function History({ robotKey, description }: { robotKey: string; descripti
     });
     function append(time: number, value: (index: number) => number | null): void {
       rows.time.push(time);
-      rows.values.forEach((column, i) => column.push(value(i)));
+      for (const [i, column] of rows.values.entries()) column.push(value(i));
       while ((rows.time[0] ?? time) < time - SPAN_S - 2) {
         rows.time.shift();
         for (const column of rows.values) column.shift();

@@ -69,6 +69,7 @@ export function Wall({ chosen }: { chosen: readonly ViewName[] }) {
     }
   };
   return (
+    // biome-ignore lint/a11y/noStaticElementInteractions: it moves the focus between the tiles inside.
     <div class={`wall ${full.on ? "is-full" : ""}`} onKeyDown={onKey}>
       <div class="wall-head">
         <h1>{t("wall")}</h1>
