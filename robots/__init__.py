@@ -1,1 +1,1 @@
-"""What an arm is and can do: descriptions, D-H, meshes, kinematics, URDF and GLB."""
+"""Robot descriptions, D-H rows, meshes, kinematics, collision checks, URDF and GLB."""

@@ -1,8 +1,8 @@
-"""TOML text parsed within bounds on its length and depth.
+"""TOML parser with limits on length and nesting.
 
-Python's parser remembers every beginning of a dotted key: the memory for one of n parts grows with n
-squared (20,000 parts, a file of 40 KB, take 1.6 GB), and values that are nested deeply end in a
-RecursionError. So both are looked at before parsing.
+Python's parser stores every prefix of a dotted key, so the memory for a key of n parts grows with n squared:
+20,000 parts, a file of 40 KB, take 1.6 GB. Deeply nested values raise RecursionError. Both are checked before
+parsing.
 """
 
 import re
@@ -13,7 +13,7 @@ from typing import Any
 MOST_CHARACTERS = 4_000_000
 MOST_DEPTH = 32
 
-# Strings first: what looks like a key, a bracket or a comment inside them is none.
+# Match strings first, because they may contain text that looks like a key, a bracket or a comment.
 _STRING_OR_COMMENT = re.compile(
     r"""
       \"{3} (?: [^"\\]++ | \\. | "{1,2}(?!") )*+ "{3,5}
@@ -32,9 +32,9 @@ def read_toml(path: Path) -> dict[str, Any]:
     """Parse a TOML file.
 
     Raises:
-        OSError: If it cannot be read.
-        UnicodeDecodeError: If it is not UTF-8.
-        tomllib.TOMLDecodeError: As `parse_toml`.
+        OSError: If the file cannot be read.
+        UnicodeDecodeError: If the file is not UTF-8.
+        tomllib.TOMLDecodeError: See `parse_toml`.
     """
     with path.open(encoding="utf-8") as file:
         return parse_toml(file.read(MOST_CHARACTERS + 1))
@@ -44,8 +44,8 @@ def parse_toml(text: str) -> dict[str, Any]:
     """Parse TOML text.
 
     Raises:
-        tomllib.TOMLDecodeError: If it is not TOML, longer than MOST_CHARACTERS, nested deeper than
-            MOST_DEPTH, or holds a key of more parts or a number of more digits than Python reads.
+        tomllib.TOMLDecodeError: If the text is not TOML, is longer than MOST_CHARACTERS, is nested deeper
+            than MOST_DEPTH, has a key of more than MOST_DEPTH parts, or a number with too many digits.
     """
     check_bounds(text)
     try:
@@ -57,10 +57,10 @@ def parse_toml(text: str) -> dict[str, Any]:
 
 
 def check_bounds(text: str) -> None:
-    """Refuse TOML text that would cost its parser too much.
+    """Reject TOML text that is too expensive to parse.
 
     Raises:
-        tomllib.TOMLDecodeError: If it is longer than MOST_CHARACTERS or nested deeper than MOST_DEPTH.
+        tomllib.TOMLDecodeError: If the text is longer than MOST_CHARACTERS or nested deeper than MOST_DEPTH.
     """
     if len(text) > MOST_CHARACTERS:
         raise tomllib.TOMLDecodeError(f"the file is longer than {MOST_CHARACTERS:,} characters")

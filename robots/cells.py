@@ -1,6 +1,7 @@
-"""A cell in words and files: arms that can meet, and what stands around them. It can go to another process.
+"""Description of a cell: the arms that can collide, and the fixtures and the floor around them.
 
-Nothing heavier than NumPy is imported: who only passes it on needs no kinematics.
+A description can be pickled for another process. This module imports nothing heavier than NumPy, so a process
+that only forwards it needs no kinematics.
 """
 
 from dataclasses import dataclass
@@ -10,23 +11,23 @@ from robots.joints import FloatArray
 from robots.kinematic_tree import Shape
 from robots.meshes.mesh import Color
 
-# How near an arm may come to what stands around it, unless a site says otherwise.
+# Default clearances between an arm and the fixtures and other robots of its cell.
 WARNING_M = 0.05
 STOP_M = 0.01
-# The floor in a pair of two that touch; for its blank no fixture has that name.
+# Name of the floor in a pair of colliding bodies. It has a blank, so no fixture can have this name.
 FLOOR = "the floor"
 
 
 @dataclass(frozen=True, eq=False)
 class Fixture:
-    """Something that stands in a cell and does not move.
+    """An object in a cell that does not move.
 
     Attributes:
-        shapes: In its own frame [m].
+        shapes: In the fixture's frame [m].
         fixture_to_site: (4, 4) [m].
-        color: None: its shapes' own.
-        exact: Checked as its meshes, not as a hull about each piece: slower, and lets an arm reach into it.
-        ignore: Links that may touch it, as "<robot>/<link>".
+        color: None keeps the shapes' colours.
+        exact: Check the meshes, not a hull of each piece: slower, but an arm can reach into the fixture.
+        ignore: Links that may touch the fixture, as "<robot>/<link>".
     """
 
     name: str
@@ -42,10 +43,10 @@ class CellRobot:
     """An arm of a cell.
 
     Attributes:
-        model: As `robots.description.load` takes it.
+        model: Source for `robots.description.load`.
         base_to_site: (4, 4) [m].
-        confined: Nothing outside its own folder is read for it.
-        warning_m, stop_m: Distances to what stands around it.
+        confined: Read no file outside the robot's folder.
+        warning_m, stop_m: Clearances to the fixtures and other robots.
     """
 
     name: str
@@ -58,11 +59,12 @@ class CellRobot:
 
 @dataclass(frozen=True)
 class Floor:
-    """All that is below a height; what is fixed to the base of a robot may reach into it.
+    """The half-space below a height. Links that are fixed to a robot's base may reach into it.
 
     Attributes:
         height_m: In the site's frame; None: the height of the lowest base in the cell.
-        warning_m, stop_m: Distances to it. Without a warning distance only contact counts, only in checks.
+        warning_m, stop_m: Clearances to the floor. Without a warning distance, only motion checks consider
+            the floor, and only contact counts.
     """
 
     height_m: float | None = None
@@ -72,10 +74,10 @@ class Floor:
 
 @dataclass(frozen=True, eq=False)
 class CellDescription:
-    """What a cell is made of; it can be pickled.
+    """The robots, fixtures and floor of a cell; it can be pickled.
 
     Attributes:
-        floor: None: the cell has none.
+        floor: None if the cell has no floor.
     """
 
     robots: tuple[CellRobot, ...]
@@ -84,7 +86,7 @@ class CellDescription:
 
     @property
     def floor_m(self) -> float | None:
-        """Height of the floor in the site's frame; None: there is none."""
+        """Height of the floor in the site's frame; None without a floor."""
         if self.floor is None:
             return None
         if self.floor.height_m is not None:

@@ -1,6 +1,6 @@
-"""Reading robot descriptions: from the library, from a file, from text, from values.
+"""Reader of robot descriptions: from the library, a file, a text or values.
 
-Every file is checked whole: a wrong one tells all that is wrong with it.
+Every file is checked completely, so an error lists all problems of a file.
 """
 
 import json
@@ -39,13 +39,13 @@ __all__ = [
 LIBRARY = Path(__file__).parent / "library"
 DESCRIPTION_FILE = "robot.toml"
 _VRML = (".wrl", ".vrml", ".wrz")
-# What describes a robot without a robot.toml.
+# Formats that describe a robot without a robot.toml.
 ROBOT_FILES = (".urdf", ".xacro", *_VRML)
 
-# Each may be wrong in several ways, and each way is a sentence.
+# Each value may have several problems of a sentence each.
 _MOST_VALUES = 20_000
 
-# In place of what is wrong, so that all the rest can be checked too.
+# Valid values that replace wrong ones, so that the other values can be checked too.
 _STAND_INS: Mapping[str, Any] = {
     "name": "x", "a": 0.0, "alpha": 0.0, "d": 0.0, "limits": [-1.0, 1.0], "max_speed": 1.0,
     "max_acceleration": 1.0, "max_jerk": 1.0, "link": "base", "joints": {}, "joint": [], "color": "#000000",
@@ -54,12 +54,12 @@ _STAND_INS: Mapping[str, Any] = {
 
 
 def library_names() -> tuple[str, ...]:
-    """Names of the robots that come with the project, sorted."""
+    """Return the sorted names of the robots in the library."""
     return tuple(sorted(path.parent.name for path in LIBRARY.glob(f"*/{DESCRIPTION_FILE}")))
 
 
 def known_names() -> tuple[str, ...]:
-    """Names that `load` takes: the library's robots, then the example robots where they are installed."""
+    """Return the names that `load` accepts: the library's robots, then the installed example robots."""
     return (*library_names(), *example_names())
 
 
@@ -68,26 +68,26 @@ def load(source: str | Path, *, confined: bool = False) -> RobotDescription:
 
     Args:
         source: A library robot's name ("pt600"), an example robot's ("ur5"), or the path of a robot.toml,
-            of its folder, of a URDF, or of a robot in VRML as OpenHRP has it.
-        confined: Nothing outside the file's own folder is read for it, now or later: it is somebody else's.
+            its folder, a URDF, or an OpenHRP robot in VRML.
+        confined: Never read a file outside the description's folder; for a description that is not trusted.
 
     Raises:
-        DescriptionError: If there is no such file, or it cannot be used as it is; the text names
-            the file, the key, its value and what would be right.
+        DescriptionError: If the file does not exist or has a problem; the text names the file, the key,
+            its value and what would be right.
     """
     path = _find(source)
     if isinstance(path, ExampleRobot):
-        return described(example_values(path), path.urdf)
+        return describe_urdf(example_values(path), path.urdf)
     if path.suffix.lower() in ROBOT_FILES:
-        return described({"name": robot_name(path.stem), "urdf": path.name}, path, confined=confined)
+        return describe_urdf({"name": robot_name(path.stem), "urdf": path.name}, path, confined=confined)
     return parse(_text(path), path, confined=confined)
 
 
-def described(values: dict[str, Any], urdf: Path, *, confined: bool = False) -> RobotDescription:
-    """The description of a robot that has a URDF and no robot.toml, from a robot.toml's values.
+def describe_urdf(values: dict[str, Any], urdf: Path, *, confined: bool = False) -> RobotDescription:
+    """Return the description of a robot with a URDF and no robot.toml, from a robot.toml's values.
 
     Raises:
-        DescriptionError: As `load`.
+        DescriptionError: See `load`.
     """
     description, problems = from_values(values, folder=urdf.parent, confined=confined)
     if description is None:
@@ -97,15 +97,15 @@ def described(values: dict[str, Any], urdf: Path, *, confined: bool = False) -> 
 
 
 def robot_name(word: str) -> str:
-    """A file's name as a robot's name: small letters, digits, - and _."""
+    """Convert a file's name to a robot's name: small letters, digits, - and _."""
     return re.sub(r"[^a-z0-9_-]", "_", word.lower()).lstrip("_-") or "robot"
 
 
 def parse(text: str, source: Path, *, confined: bool = False) -> RobotDescription:
-    """The description in a robot.toml's text; mesh files are looked for beside `source`.
+    """Parse a robot.toml's text; mesh files are relative to the folder of `source`.
 
     Raises:
-        DescriptionError: As `load`.
+        DescriptionError: See `load`.
     """
     try:
         values = parse_toml(text)
@@ -126,17 +126,17 @@ def _refusal(source: Path, problems: tuple[Problem, ...]) -> DescriptionError:
 def from_values(
     values: dict[str, Any], *, folder: Path, confined: bool = False
 ) -> tuple[RobotDescription | None, tuple[Problem, ...]]:
-    """The description that a robot.toml's values give, and every problem with them.
+    """Make a description from a robot.toml's values, and return every problem in them.
 
     Args:
-        folder: Where its files are.
-        confined: Refuse every file outside the folder, now and later: for values that somebody sent.
+        folder: The folder of the description's files.
+        confined: Never read a file outside the folder; for values from the network.
 
     Returns:
-        A description, or None where there is a problem.
+        The description, or None if there is a problem; and the problems.
     """
     if _is_huge(values):
-        return None, (Problem((), f"holds more than {_MOST_VALUES} values; no robot needs so many"),)
+        return None, (Problem((), f"has more than {_MOST_VALUES} values"),)
     files = tuple(file_problems(values, folder, confined=confined))
     try:
         description = _model(values).read_from(folder / DESCRIPTION_FILE, "")
@@ -161,7 +161,7 @@ def from_values(
 
 
 def _is_huge(values: Any) -> bool:
-    """Return whether there are more values than are worth a problem each."""
+    """Return whether there are too many values to report a problem for each."""
     ahead, count = [values], 0
     while ahead and count <= _MOST_VALUES:
         inside = ahead.pop()
@@ -177,7 +177,7 @@ def _model(values: Mapping[str, Any]) -> DhDescription | UrdfDescription:
 
 
 def _urdf_robot(description: UrdfDescription, *, confined: bool) -> UrdfRobot:
-    """What the file holds that `urdf` names: a URDF, or OpenHRP's VRML, which says as much."""
+    """Read the file that `urdf` names: a URDF or an OpenHRP robot in VRML."""
     folder = description.source.parent
     urdf = folder / description.urdf
     if urdf.suffix.lower() in _VRML:
@@ -201,24 +201,24 @@ def _urdf_robot(description: UrdfDescription, *, confined: bool) -> UrdfRobot:
 def _text(path: Path, *, most: int = MOST_CHARACTERS) -> str:
     try:
         with path.open(encoding="utf-8") as file:
-            return file.read(most + 1)  # one more than its reader takes
+            return file.read(most + 1)  # one more than the limit, so that the parser can reject the text
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "is not UTF-8 text"
         raise DescriptionError(path, [f"cannot be read: {reason}"]) from error
 
 
 def _other_problems(values: dict[str, Any], wrong: list[tuple[Step, ...]]) -> Iterator[Problem]:
-    """What else is wrong than some values' types: found with something right in their places."""
-    mended = deepcopy(values)
+    """Yield the problems other than wrong types: check the values with valid ones in place of the wrong."""
+    repaired = deepcopy(values)
     for place in wrong:
-        _mend(mended, place)
+        _replace_wrong_value(repaired, place)
     try:
-        description = _model(mended)
+        description = _model(repaired)
     except ValidationError:
         return
     if isinstance(description, UrdfDescription):
         return
-    # A table with a wrong value is not judged further, nor is who refers to it by a name that is wrong.
+    # Skip tables with a wrong value, and references if a name is wrong: they may refer to this name.
     tables = {place[:2] for place in wrong}
     names_known = not any(place[-1] in ("name", "joint", "link") for place in wrong)
     for problem in row_problems(description):
@@ -227,15 +227,15 @@ def _other_problems(values: dict[str, Any], wrong: list[tuple[Step, ...]]) -> It
             yield problem
 
 
-def _mend(values: Any, place: tuple[Step, ...]) -> None:
-    """Put a stand-in where a value is wrong; take it out where nothing must stand."""
+def _replace_wrong_value(values: Any, place: tuple[Step, ...]) -> None:
+    """Replace a wrong value by a valid one; remove it if its key is optional."""
     *steps, last = place
     for step in steps:
         try:
             values = values[step]
         except (KeyError, IndexError, TypeError):
             return
-    # A number's place in a list (limits 0) is mended in the list's own.
+    # Replace a single number within a list (limits 0) by its index.
     if isinstance(values, dict) and isinstance(last, str):
         if last in _STAND_INS:
             values[last] = _STAND_INS[last]
@@ -247,7 +247,7 @@ def _mend(values: Any, place: tuple[Step, ...]) -> None:
 
 def _find(source: str | Path) -> Path | ExampleRobot:
     path = Path(source)
-    # A bare word is a library robot, whatever lies in the working folder.
+    # A word without a suffix is a library robot, even if the working folder has a file of this name.
     bare = len(path.parts) == 1 and not path.suffix
     library_file = LIBRARY / path / DESCRIPTION_FILE
     if bare and library_file.is_file():

@@ -1,4 +1,4 @@
-"""What a description must hold beyond its types, and how a problem is put in words."""
+"""Checks of a description beyond its types, and the texts of all problems."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -25,16 +25,16 @@ Step = str | int
 
 # Keys of a body that name a mesh file.
 _MESHES = ("mesh", "collision_mesh")
-# No arm is as long: such a number is a slip, or metres where the file says millimetres.
+# No arm is that long. Such a number is a typing error, or metres in a file of millimetres.
 _LONGEST_M = 100.0
 
 
 @dataclass(frozen=True)
 class Problem:
-    """Something wrong with a description.
+    """A problem in a description.
 
     Attributes:
-        path: Keys and numbers that lead to it: ("joint", 2, "limits"); empty for the whole file.
+        path: Keys and indices of the value: ("joint", 2, "limits"); empty for the whole file.
         text: A sentence: key, value and what would be right.
     """
 
@@ -43,7 +43,7 @@ class Problem:
 
 
 def type_problem(error: ErrorDetails, values: Mapping[str, Any]) -> Problem:
-    """One of pydantic's errors as a problem."""
+    """Convert one of pydantic's errors to a problem."""
     location = tuple(error["loc"])
     kind = error["type"]
     if kind == "unknown_key":
@@ -60,15 +60,15 @@ def type_problem(error: ErrorDetails, values: Mapping[str, Any]) -> Problem:
 def _short(value: Any) -> str:
     try:
         text = repr(value)
-    except ValueError:  # Python writes no number of over 4,300 digits
-        text = "(a number of too many digits)"
+    except ValueError:  # Python does not convert a number of over 4,300 digits to text
+        text = "(a number with too many digits)"
     except RecursionError:
         text = "(nested too deeply)"
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 def _key(location: tuple[Step, ...], values: Any) -> str:
-    """`joint 'elbow' limits` rather than `joint.2.limits`: people look for names."""
+    """Return a location as `joint 'elbow' limits`: easier to find in the file than `joint.2.limits`."""
     words: list[str] = []
     for step in location:
         try:
@@ -84,7 +84,7 @@ def _key(location: tuple[Step, ...], values: Any) -> str:
 
 
 def row_problems(description: DhDescription) -> Iterator[Problem]:
-    """Every contradiction inside a description by D-H rows; its files are `file_problems`'s."""
+    """Yield every contradiction in a description by D-H rows; `file_problems` checks its files."""
     if not description.joints:
         yield Problem(("joint",), "joint = []: an arm has at least one joint")
     for number, joint in enumerate(description.joints):
@@ -101,7 +101,7 @@ def row_problems(description: DhDescription) -> Iterator[Problem]:
 
 @dataclass(frozen=True)
 class JointFacts:
-    """What the checks of a whole robot ask of a joint; home in the file's units."""
+    """A joint's values that the checks of a whole robot need; home in the file's units."""
 
     type: JointType
     home: float
@@ -110,7 +110,7 @@ class JointFacts:
 def common_problems(
     description: RobotDescription, *, links: tuple[str, ...], joints: Mapping[str, JointFacts]
 ) -> Iterator[Problem]:
-    """Contradictions in what both forms of a description hold."""
+    """Yield the contradictions in the values that both forms of a description have."""
     yield from _name_problems(description, links)
     yield from _reference_problems(description, links)
     yield from _constraint_problems(description, joints)
@@ -127,14 +127,14 @@ def common_problems(
 
 
 def enumerated(key: str, rows: tuple[Any, ...]) -> Iterator[tuple[tuple[Step, ...], Any]]:
-    """Each row of a list of tables with its path."""
+    """Return each row of a list of tables with its path."""
     return (((key, number), row) for number, row in enumerate(rows))
 
 
 def limit_problems(
     place: tuple[Step, ...], name: str, limits: tuple[float, float], home: float | None, unit: str
 ) -> Iterator[Problem]:
-    """Limits the wrong way round, and a home outside them."""
+    """Yield a problem if the lower limit is not below the upper, or home is outside the limits."""
     lower, upper = limits
     if lower >= upper:
         text = f"joint {name!r} limits = [{lower:g}, {upper:g}]: the lower must be below the upper"
@@ -176,18 +176,18 @@ def _repeated(names: Any) -> Iterator[tuple[str, list[int]]]:
 
 
 def _name_problems(description: RobotDescription, links: tuple[str, ...]) -> Iterator[Problem]:
-    # Links and frames share one list of frames in the model, in URDF and on the network.
+    # Links and frames share one name space in the model, in URDF and on the network.
     frames = [frame.name for frame in description.frames]
     taken = (links[0], TOOL_FRAME)
     for name, count in Counter([*links, TOOL_FRAME, *frames]).items():
         if count > 1 and (isinstance(description, DhDescription) or name in frames):
-            reserved = f" ({name!r} is taken already)" if name in taken else ""
+            reserved = f" ({name!r} is reserved)" if name in taken else ""
             text = f"name {name!r}: {count} links or frames have it{reserved}; each needs its own"
             yield Problem(_named(name, frames, links), text)
 
 
 def _named(name: str, frames: list[str], links: tuple[str, ...]) -> tuple[Step, ...]:
-    """Where a name that is taken twice was given the last time."""
+    """Return the path of the last use of a name that is used more than once."""
     if name in frames:
         return ("frame", len(frames) - 1 - frames[::-1].index(name), "name")
     return ("joint", len(links) - 2 - links[::-1].index(name), "link", "name")
@@ -245,34 +245,36 @@ def _is_degenerate(view: View) -> bool:
 
 
 def file_problems(values: Mapping[str, Any], folder: Path, *, confined: bool) -> Iterator[Problem]:
-    """Every file or folder that the values name and that is not there, whatever else is wrong with them.
+    """Yield a problem for every file or folder that the values name and that does not exist.
 
     Args:
-        confined: What lies outside the folder is refused, and not looked for.
+        values: May have other problems too.
+        confined: Reject every path outside the folder without looking for it.
     """
     for place, name in named_files(values):
-        what = f"link {_link_name(values, place)!r} {place[-1]}" if place[-1] in _MESHES else str(place[0])
+        is_mesh = place[-1] in _MESHES
+        key = f"link {_link_name(values, place)!r} {place[-1]}" if is_mesh else str(place[0])
         path = folder / name
         if "\0" in name:
-            yield Problem(place, f"{what} = {_short(name)}: no file has such a name")
+            yield Problem(place, f"{key} = {_short(name)}: not a valid file name")
         elif confined and not path.resolve().is_relative_to(folder.resolve()):
-            yield Problem(place, f"{what} = {_short(name)}: must lie in the description's own folder")
+            yield Problem(place, f"{key} = {_short(name)}: must be in the description's folder")
         elif place[0] == "packages":
             if not path.is_dir():
-                yield Problem(place, f"packages {_short(name)}: no such folder beside the description")
+                yield Problem(place, f"packages {_short(name)}: no such folder in the description's folder")
         elif not _is_file(path):
-            yield Problem(place, f"{what} = {_short(name)}: no such file beside the description")
+            yield Problem(place, f"{key} = {_short(name)}: no such file in the description's folder")
 
 
 def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
-    except OSError:  # a name longer than any may be
+    except OSError:  # the name is too long
         return False
 
 
 def named_files(values: Mapping[str, Any]) -> Iterator[tuple[tuple[Step, ...], str]]:
-    """Every file or folder that the values name, with its path in them."""
+    """Yield every file or folder that the values name, with the path of its key."""
     joints = values.get("joint")
     rows = joints if isinstance(joints, list) else []
     bodies: list[tuple[tuple[Step, ...], Any]] = [(("base",), values.get("base"))]

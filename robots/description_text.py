@@ -1,6 +1,6 @@
-"""A description's values as robot.toml text: the order and form in which people write one.
+"""Writer of robot.toml text, in the order and form of a hand-written file.
 
-A table a thing, an inline table a pose, one line a value; what an existing file says in comments stays.
+One table per object, an inline table per pose, one line per value. Comments of the replaced file stay.
 """
 
 import tomllib
@@ -14,7 +14,7 @@ from tomlkit.items import AoT, Table
 from robots.bounded_toml import check_bounds
 
 _VALUES = ("name", "title", "provenance", "units", "urdf", "packages")
-# Tables of their own; every other table is written inline.
+# Written as [table]; every other table is written inline.
 _TABLES = ("base", "tool", "collision")
 _ARRAYS = ("joint", "link", "frame", "constraint")
 _ORDER = (*_VALUES, "base", "joint", "link", "tool", "frame", "constraint", "view", "collision")
@@ -22,11 +22,11 @@ _LONGEST_LINE = 110
 
 
 def description_text(values: Mapping[str, Any], before: str = "") -> str:
-    """The text of a robot.toml.
+    """Return the text of a robot.toml.
 
     Args:
-        values: By the file's own key names; what is None is left out, numbers become floats.
-        before: The text that it replaces: its comments and its order are kept where they still apply.
+        values: By the file's key names; None values are left out, numbers become floats.
+        before: The text to replace; its comments and order are kept where they still apply.
     """
     wanted = as_saved(values)
     fresh = _fresh(wanted)
@@ -37,16 +37,16 @@ def description_text(values: Mapping[str, Any], before: str = "") -> str:
         document = tomlkit.parse(before)
         _merge(document, tomlkit.parse(fresh))
         merged = tomlkit.dumps(document)
-        # Trust in comments has its limits: what is saved must be what was meant.
+        # If the merge with the old text changed a value, write the text without the old comments.
         return merged if tomllib.loads(merged) == wanted else fresh
     except (TOMLKitError, tomllib.TOMLDecodeError):
         return fresh
 
 
 def as_saved(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The values that a saved description gives back: without what is None, numbers as floats."""
+    """Return the values as a saved description gives them back: without None, numbers as floats."""
     known = [key for key in _ORDER if key in values]
-    # TOML has plain values before tables; a key that nobody knows is one until its check refuses it.
+    # TOML needs plain values before tables. Unknown keys come last; the description's check rejects them.
     return _floats({key: values[key] for key in [*known, *(set(values) - set(known))]})  # type: ignore[no-any-return]
 
 
@@ -94,7 +94,7 @@ def _key(name: str) -> str:
 
 
 def _merge(old: Any, new: Any) -> None:
-    """Bring a parsed table to what another holds, leaving untouched what is the same."""
+    """Update a parsed table to equal another; leave equal items untouched."""
     for key in [key for key in old if key not in new]:
         del old[key]
     for key, value in new.items():
@@ -110,7 +110,7 @@ def _merge(old: Any, new: Any) -> None:
 
 
 def _merge_rows(old: AoT, new: AoT) -> None:
-    """[[joint]] by name, [[constraint]] by place: a row keeps its comments wherever it moves."""
+    """Merge [[joint]] rows by name and [[constraint]] rows by index; a row that moves keeps its comments."""
     named = {row["name"]: row for row in old if "name" in row}
     rows = []
     for number, row in enumerate(new):

@@ -1,7 +1,7 @@
-"""D-H rows of a chain of joints: those that it was made of, else those that its axes give.
+"""D-H rows of a chain of joints: the rows that it was made from, else rows computed from its axes.
 
-A chain is what is known at position zero: each joint's frame in the base's, with z as its axis.
-Frames of row i stand as in `robots.kinematic_tree`: z of frame i is the axis of joint i + 1.
+A chain is given at position zero: each joint's frame in the base frame, with z as the joint's axis.
+Frames follow `robots.kinematic_tree`: z of frame i is the axis of joint i + 1.
 
 Source: Denavit, Hartenberg 1955; Paul 1981 for the standard form.
 """
@@ -15,10 +15,10 @@ from robots.kinematic_tree import Tree, TreeJoint, TreeLink
 from robots.poses import FloatArray, dh_fixed_part, inverse, rpy_rotation
 from robots.schema import JointType
 
-# Axes nearer to parallel than this count as parallel: people write 1.5708 for a right angle, and the
-# common normal of two such lines would be kilometres away [rad].
+# Axes within this angle count as parallel [rad]: people write 1.5708 for a right angle, and the common
+# normal of two such lines would be kilometres away.
 _PARALLEL = 1e-4
-# What double precision leaves of a length [m] or a sine that is meant to be zero.
+# Rounding error of a length [m] or a sine that should be zero.
 _ZERO = 1e-10
 
 
@@ -33,46 +33,46 @@ class Row:
 
 
 def row_placement(row: Row) -> FloatArray:
-    """(4, 4) of a row at position zero: Rot(z, theta) Trans(z, d) Trans(x, a) Rot(x, alpha)."""
+    """Return the (4, 4) of a row at position zero: Rot(z, theta) Trans(z, d) Trans(x, a) Rot(x, alpha)."""
     turn = np.eye(4)
     turn[:3, :3] = rpy_rotation(0.0, 0.0, row.theta)
     return turn @ dh_fixed_part(row.d, row.a, row.alpha)
 
 
 def axis_to_z(joint: TreeJoint) -> FloatArray:
-    """(4, 4) of a frame at the joint's origin whose z is the joint's axis; its own where that is z."""
+    """Return the (4, 4) of a frame at the joint's origin with the joint's axis as z; identity if it is z."""
     placement = np.eye(4)
     if joint.axis[2] != 1.0:
-        placement[:3, :3] = _turned(np.eye(3), joint.axis)
+        placement[:3, :3] = _frame_with_z(np.eye(3), joint.axis)
     return placement
 
 
-def _turned(frame: FloatArray, z: FloatArray) -> FloatArray:
-    """(3, 3) with that z, and an x as near to the frame's as can be."""
+def _frame_with_z(frame: FloatArray, z: FloatArray) -> FloatArray:
+    """Return the (3, 3) with this z, and an x as close as possible to the frame's x."""
     x = frame[:, 0] - (frame[:, 0] @ z) * z
-    if np.linalg.norm(x) < 0.1:  # x is about z: y says more
+    if np.linalg.norm(x) < 0.1:  # x is nearly parallel to z; use y
         x = np.cross(frame[:, 1], z)
     x = x / np.linalg.norm(x)
     return np.column_stack([x, np.cross(z, x), z])
 
 
 def base_frame(first: FloatArray) -> FloatArray:
-    """(4, 4) of frame 0 for a first joint (4, 4): the base's own, if that joint's axis is its z line."""
+    """Return the (4, 4) of frame 0 for a first joint (4, 4): the base frame if its z is the joint's axis."""
     point, z = first[:3, 3], first[:3, 2]
     if np.hypot(*point[:2]) < _ZERO and np.hypot(*z[:2]) < _ZERO and z[2] > 0:
         return np.eye(4)
     frame = np.eye(4)
-    frame[:3, :3] = _turned(np.eye(3), z)
+    frame[:3, :3] = _frame_with_z(np.eye(3), z)
     frame[:3, 3] = point - (point @ z) * z
     return frame
 
 
 def rows_of_axes(base: FloatArray, axes: Sequence[FloatArray]) -> tuple[Row, ...]:
-    """One row a joint, the last one without a, alpha, d and theta.
+    """Return one row per joint; a, alpha, d and theta of the last row are zero.
 
     Args:
         base: (4, 4) frame 0; its z is the first joint's axis.
-        axes: (4, 4) each joint's frame at position zero, z its axis.
+        axes: (4, 4) each joint's frame at position zero, with the joint's axis as z.
     """
     rows = []
     frame = base
@@ -84,37 +84,37 @@ def rows_of_axes(base: FloatArray, axes: Sequence[FloatArray]) -> tuple[Row, ...
 
 
 def _row(frame: FloatArray, point: FloatArray, axis: FloatArray) -> Row:
-    """The row from a frame to the one on the next joint's axis, a line through a point."""
-    # In the frame: our own line is the z axis, through its origin.
+    """Return the row from a frame to the frame on the next joint's axis, given by a point and a direction."""
+    # In the frame's coordinates, this joint's axis is the z axis through the origin.
     px, py, pz = frame[:3, :3].T @ (point - frame[:3, 3])
     ux, uy, uz = frame[:3, :3].T @ axis
     sine = float(np.hypot(ux, uy))
     if sine < _PARALLEL:
-        # The foot is free: at our own height.
+        # The common normal may be anywhere; take the one through the origin.
         alpha = 0.0 if uz > 0 else np.pi
         a = float(np.hypot(px, py))
         if a < _ZERO:
             return Row(0.0, alpha, 0.0, 0.0)
         return Row(a, alpha, 0.0, float(np.arctan2(py, px)))
-    # The common normal's direction, z x axis; its foot on z is nearest to the other line.
+    # The common normal's direction is z x axis; its foot on z is the point nearest to the other line.
     nx, ny = -uy / sine, ux / sine
     a = float(px * nx + py * ny)
     along = (px * ux + py * uy) / sine**2
     d = float(pz - along * uz)
     if abs(a) < _ZERO:
         a = 0.0
-        turned_over = nx < -_ZERO or (abs(nx) <= _ZERO and ny < 0)  # the smaller theta
+        flipped = nx < -_ZERO or (abs(nx) <= _ZERO and ny < 0)  # choose the smaller theta
     else:
-        turned_over = a < 0
-    if turned_over:
+        flipped = a < 0
+    if flipped:
         nx, ny, a, sine = -nx, -ny, -a, -sine
     return Row(a, float(np.arctan2(sine, uz)), d, float(np.arctan2(ny, nx)))
 
 
-def rows_as_made(
+def original_rows(
     tree: Tree, chain: Sequence[int], base: FloatArray
 ) -> tuple[tuple[Row, TreeLink], ...] | None:
-    """The rows and their links of a chain that D-H rows were made into; None: it is no such chain.
+    """Return the rows and links of a chain that was made from D-H rows; None for any other chain.
 
     Args:
         base: (4, 4) the frame in which the first row begins, in the base frame.
@@ -159,6 +159,6 @@ def _link_of_row(
 
 
 def _starts_on_z(link_to_joint: FloatArray, following: TreeJoint) -> bool:
-    """Whether the next joint is only turned about, and moved along, the link's z."""
+    """Return whether the next joint's frame is only rotated about and moved along the link's z."""
     step = inverse(link_to_joint) @ following.joint_to_parent
     return bool(np.abs([*step[:2, 3], *step[:2, 2], *step[2, :2]]).max() < 1e-14)

@@ -1,13 +1,13 @@
 """Errors of robots.
 
 RobotError
-├── DescriptionError    a description that cannot be used: file, key, value and what would be right
-├── MeshError           a mesh file that cannot be read: file, place and what is wrong there
-├── SaveError           a robot that cannot be written where it was to go
-│   └── RobotExistsError    there is one of that name
-├── JointCountError     joint positions of another robot: one value a joint is asked for
-├── ProgramError        a teach program that cannot be read: each line, word, value and what would be right
-└── PoseError           a tool's pose that is none
+├── DescriptionError    a description cannot be used: file, key, value and what would be right
+├── MeshError           a mesh file cannot be read: file, place and what is wrong there
+├── SaveError           a robot cannot be written to its folder
+│   └── RobotExistsError    a robot of that name exists
+├── JointCountError     joint positions do not have one value per joint
+├── ProgramError        a teach program cannot be read: each line, word, value and what would be right
+└── PoseError           a tool pose is not valid
 """
 
 from collections.abc import Sequence
@@ -15,14 +15,14 @@ from pathlib import Path
 
 
 class RobotError(Exception):
-    """Base of the errors of robots; its text is one line for people."""
+    """Base of the errors of robots; its text is one line for the user."""
 
 
 class DescriptionError(RobotError):
     """A robot description that cannot be used.
 
     Attributes:
-        source: The file, or the name that was asked for.
+        source: The file, or the requested name.
         problems: Every problem found, a sentence each: key, value and what would be right.
         paths: Keys and numbers that lead to each problem's value; empty where it has none.
     """
@@ -47,9 +47,9 @@ class MeshError(RobotError):
 
     Attributes:
         source: The file.
-        place: Where in it: "line 12", "byte 96"; empty for the whole file.
-        reason: What is wrong there.
-        missing: A file that it cannot be read without, as it names it.
+        place: "line 12", "byte 96"; empty for the whole file.
+        reason: The fault at this place.
+        missing: A required file that does not exist, as the mesh file names it.
     """
 
     def __init__(self, source: str | Path, reason: str, *, place: str = "", missing: str = "") -> None:
@@ -61,11 +61,11 @@ class MeshError(RobotError):
 
 
 class SaveError(RobotError):
-    """A robot that cannot be written; what was there is as it was.
+    """A robot that cannot be written; the folder is unchanged.
 
     Attributes:
-        target: Its folder.
-        reason: Why not.
+        target: The robot's folder.
+        reason: The cause, for the error text.
     """
 
     def __init__(self, target: Path, reason: str) -> None:
@@ -75,16 +75,16 @@ class SaveError(RobotError):
 
 
 class RobotExistsError(SaveError):
-    """There is a robot of that name.
+    """A robot of that name exists.
 
     Attributes:
-        changed: It is not the one any more that was to be replaced.
+        changed: The robot was to be replaced, but changed after the caller read it.
     """
 
     def __init__(self, target: Path, *, changed: bool = False) -> None:
         self.changed = changed
         super().__init__(
-            target, "the robot there was changed" if changed else "there is a robot of that name"
+            target, "the robot was changed since it was read" if changed else "a robot of that name exists"
         )
 
 
@@ -92,8 +92,8 @@ class ProgramError(RobotError):
     """A teach program that cannot be read.
 
     Attributes:
-        problems: Each problem's line, from 1, and a sentence; the first hundred or so.
-        found: How many there are.
+        problems: Each problem's line, from 1, and a sentence; only the first of many.
+        found: The number of all problems.
     """
 
     def __init__(self, problems: Sequence[tuple[int, str]], *, found: int | None = None) -> None:
@@ -106,19 +106,20 @@ class ProgramError(RobotError):
 
 
 class JointCountError(RobotError):
-    """Joint positions that do not have one value a joint."""
+    """Joint positions without one value per joint."""
 
     def __init__(self, expected: int, got: tuple[int, ...]) -> None:
         self.expected = expected
         self.got = got
-        super().__init__(f"joint positions of shape {got}: this robot takes ({expected},), one value a joint")
+        text = f"joint positions of shape {got}: this robot takes ({expected},), one value per joint"
+        super().__init__(text)
 
 
 class PoseError(RobotError):
-    """A tool's pose that is none.
+    """A tool pose that is not valid.
 
     Attributes:
-        reason: What is wrong with it, after "the pose".
+        reason: The fault, as the end of a sentence that begins with "the pose".
     """
 
     def __init__(self, reason: str) -> None:

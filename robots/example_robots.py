@@ -1,7 +1,7 @@
-"""Robots of the package example-robot-data by name, where it is installed: the extra `example-robots`.
+"""Robots of the package example-robot-data (the extra `example-robots`) by name.
 
-To add one: a line in EXAMPLES. Its home and the pairs of links that need no collision check come from
-the SRDF of its name beside it, where there is one.
+To add a robot, add a line to EXAMPLES. Its home and the link pairs without a collision check come from
+the package's SRDF with the robot's name, if it exists.
 """
 
 import importlib.metadata
@@ -58,10 +58,10 @@ EXAMPLES: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class ExampleRobot:
-    """A robot of the package.
+    """The files of a robot of the package.
 
     Attributes:
-        srdf: There or not.
+        srdf: The file may not exist.
     """
 
     name: str
@@ -70,12 +70,12 @@ class ExampleRobot:
 
 
 def example_names() -> tuple[str, ...]:
-    """Names of the example robots, sorted; none where the package is not installed."""
+    """Return the sorted names of the example robots; empty if the package is not installed."""
     return tuple(sorted(EXAMPLES)) if example_folder() is not None else ()
 
 
 def example_folder() -> Path | None:
-    """Where the package's robots are; None where it is not installed."""
+    """Return the folder of the package's robots, or None if the package is not installed."""
     try:
         folder = Path(str(importlib.metadata.distribution(_PACKAGE).locate_file(_FOLDER)))
     except importlib.metadata.PackageNotFoundError:
@@ -84,7 +84,7 @@ def example_folder() -> Path | None:
 
 
 def example_robot(name: str) -> ExampleRobot:
-    """An example robot's files.
+    """Return the files of an example robot.
 
     Raises:
         DescriptionError: If the package is not installed.
@@ -92,8 +92,8 @@ def example_robot(name: str) -> ExampleRobot:
     folder = example_folder()
     if folder is None:
         text = (
-            f"is one of the example robots, which are not installed (130 MB): ./dev example-robots "
-            f"brings them, or pip install {_PACKAGE}"
+            f"is one of the example robots, which are not installed (130 MB). Run ./dev example-robots "
+            f"or pip install {_PACKAGE}"
         )
         raise DescriptionError(name, [text])
     urdf = folder / EXAMPLES[name]
@@ -101,7 +101,7 @@ def example_robot(name: str) -> ExampleRobot:
 
 
 def example_values(robot: ExampleRobot) -> dict[str, Any]:
-    """A robot.toml's values of an example robot, for the folder of its URDF."""
+    """Return the robot.toml values of an example robot, relative to the folder of its URDF."""
     values: dict[str, Any] = {
         "name": robot.name,
         "provenance": f"{_PACKAGE} {importlib.metadata.version(_PACKAGE)}, {EXAMPLES[robot.name]}",

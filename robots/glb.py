@@ -1,8 +1,7 @@
-"""A robot's links as GLB: what goes over the network and into URDF.
+"""A robot's links as GLB, for the network and for URDF.
 
-Each link's mesh is brought into the link's frame, in metres and z upwards as the robot's own (not
-turned to glTF's y), painted as the description says, and kept in the user's cache by the content
-it was made from.
+Each link's mesh is in the link's frame [m], z up (not glTF's y up), in the description's colours. Finished
+files are in the user's cache, keyed by the content that they were made from.
 """
 
 import hashlib
@@ -36,17 +35,17 @@ __all__ = [
 
 logger = logging.getLogger(__name__)
 
-# Part of each cache name: counts up when the same mesh file is to give another GLB.
+# Part of each cache key. Increment it when the same mesh file should give another GLB.
 _VERSION = 4
-# A link goes over the network to phones too, and no screen shows more.
+# Links are sent to phones too, and no screen shows more.
 MOST_TRIANGLES = 200_000
 
 
 def link_meshes(description: RobotDescription, *, cache: Path | None = None) -> dict[str, bytes]:
-    """GLB of each link that has a shape, by link name, base first; in the link's frame, metres.
+    """Return the GLB of each link that has a shape, by link name, base first; in the link's frame [m].
 
     Args:
-        cache: Folder of finished GLB files; the user's cache folder unless given.
+        cache: Folder of finished GLB files; by default the user's cache folder.
 
     Raises:
         MeshError: If a mesh file cannot be read.
@@ -57,7 +56,7 @@ def link_meshes(description: RobotDescription, *, cache: Path | None = None) -> 
 
 
 def collision_meshes(description: RobotDescription, *, cache: Path | None = None) -> dict[str, bytes]:
-    """GLB of what is checked of each link that has collision geometry of its own, as `link_meshes`.
+    """Return the GLB of each link's separate collision shapes, if it has any; see `link_meshes`.
 
     Raises:
         MeshError: If a mesh file cannot be read.
@@ -68,7 +67,7 @@ def collision_meshes(description: RobotDescription, *, cache: Path | None = None
 
 
 def shapes_glb(shapes: tuple[Shape, ...], *, cache: Path | None = None) -> bytes:
-    """GLB of the shapes of a link, or of anything else, in its frame; metres.
+    """Return the GLB of the shapes of a link or another object, in its frame [m].
 
     Raises:
         MeshError: If a mesh file cannot be read.
@@ -77,7 +76,7 @@ def shapes_glb(shapes: tuple[Shape, ...], *, cache: Path | None = None) -> bytes
 
 
 def cache_folder() -> Path:
-    """Where GLB files are kept: below XDG_CACHE_HOME or ~/.cache; a temporary folder if that is read-only."""
+    """Return the cache folder, below XDG_CACHE_HOME or ~/.cache; a temporary folder if that is read-only."""
     home = os.environ.get("XDG_CACHE_HOME")
     roots = [Path(home)] if home else [Path.home() / ".cache"]
     for root in [*roots, Path(tempfile.gettempdir())]:
@@ -86,14 +85,14 @@ def cache_folder() -> Path:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError:
             continue
-        # In the temporary folder it may be another user's, who could put anything there.
+        # In the temporary folder, another user may own a folder of this name and could change its files.
         if os.access(folder, os.W_OK) and folder.stat().st_uid == os.getuid():
             return folder
     return Path(tempfile.mkdtemp(prefix="robomesh-meshes-"))
 
 
 def _cached_glb(shapes: tuple[Shape, ...], folder: Path) -> bytes:
-    files = [_files_then(shape, folder) for shape in shapes]
+    files = [_remembered_files(shape, folder) for shape in shapes]
     cached = folder / f"{_key(shapes, files)}.glb"
     if cached.is_file():
         return cached.read_bytes()
@@ -109,40 +108,40 @@ def _cached_glb(shapes: tuple[Shape, ...], folder: Path) -> bytes:
         if isinstance(shape.mesh, Path) and tuple(before) != found:
             home = shape.mesh.resolve().parent
             named = [os.path.relpath(file, home) for file in found]
-            _keep(_list_of_files(shape, folder), json.dumps(named).encode())
-    _keep(folder / f"{_key(shapes, now)}.glb", glb)
+            _store(_references_file(shape, folder), json.dumps(named).encode())
+    _store(folder / f"{_key(shapes, now)}.glb", glb)
     return glb
 
 
-def _files_then(shape: Shape, folder: Path) -> tuple[Path, ...]:
-    """The other files that a shape's file asked for when it was read last, with this content."""
+def _remembered_files(shape: Shape, folder: Path) -> tuple[Path, ...]:
+    """Return the files that a shape's file, with this content, referred to when it was last read."""
     if not isinstance(shape.mesh, Path):
         return ()
     try:
         home = shape.mesh.resolve().parent
-        named = json.loads(_list_of_files(shape, folder).read_bytes())
+        named = json.loads(_references_file(shape, folder).read_bytes())
         return tuple(Path(os.path.normpath(home / file)) for file in named)
     except (OSError, ValueError):
         return ()
 
 
-def _list_of_files(shape: Shape, folder: Path) -> Path:
+def _references_file(shape: Shape, folder: Path) -> Path:
     return folder / f"{_key([shape], [()])}.files"
 
 
 def _key(shapes: Sequence[Shape], files: Sequence[Sequence[Path]]) -> str:
-    """A name for what becomes of shapes, by all that it is made of.
+    """Return a cache key for the GLB of shapes: a hash of everything that it depends on.
 
     Args:
-        files: Of each shape, the other files that its own asks for, there or not.
+        files: For each shape, the files that its own file refers to, whether they exist or not.
     """
     digest = hashlib.sha256(str(_VERSION).encode())
     for shape, others in zip(shapes, files, strict=True):
-        how = f"{shape.shape_to_link.tolist()!r} {shape.color} {shape.opacity} {shape.in_stated_unit} "
-        # Who is confined to a folder has not read what lies outside.
+        options = f"{shape.shape_to_link.tolist()!r} {shape.color} {shape.opacity} {shape.in_stated_unit} "
+        # The folder limit decides which of the other files are read.
         if shape.within is not None and isinstance(shape.mesh, Path):
-            how += os.path.relpath(shape.within.resolve(), shape.mesh.resolve().parent)
-        digest.update(how.encode())
+            options += os.path.relpath(shape.within.resolve(), shape.mesh.resolve().parent)
+        digest.update(options.encode())
         for part in _content(shape.mesh, others):
             digest.update(hashlib.sha256(part).digest())
     return digest.hexdigest()
@@ -164,7 +163,7 @@ def _content(mesh: Path | Mesh, others: Sequence[Path]) -> Iterator[bytes]:
 
 
 def link_mesh(shapes: Sequence[Shape]) -> Mesh:
-    """A link's shapes as one mesh in its frame [m], in the description's colours.
+    """Join a link's shapes to one mesh in its frame [m], in the description's colours.
 
     Raises:
         MeshError: If a mesh file cannot be read.
@@ -207,10 +206,10 @@ def _painted(part: Part, shape: Shape) -> Part:
     return replace(part, material=material)
 
 
-def _keep(path: Path, content: bytes) -> None:
-    """Write atomically: another process may read the file at any time."""
+def _store(path: Path, content: bytes) -> None:
+    """Write a cache file atomically, because another process may read it at any time."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, content, fsync=False)
     except OSError as error:
-        logger.warning("mesh cache %s: %s; meshes are made again at each start", path.parent, error.strerror)
+        logger.warning("mesh cache %s: %s; each start converts the meshes again", path.parent, error.strerror)

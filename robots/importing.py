@@ -1,4 +1,4 @@
-"""Robots from elsewhere as a robot.toml and its files: what `robot import` writes."""
+"""Import of a robot from another format as a robot.toml and its files, for `robot import`."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -7,7 +7,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from robots.bounded_toml import parse_toml
-from robots.description import ROBOT_FILES, described, load, robot_name
+from robots.description import ROBOT_FILES, describe_urdf, load, robot_name
 from robots.errors import DescriptionError
 from robots.glb import collision_meshes, glb_of, link_mesh, link_meshes
 from robots.kinematic_tree import tree_of
@@ -18,13 +18,13 @@ from robots.urdf_to_dh import dh_form
 
 
 @dataclass(frozen=True, eq=False)
-class Imported:
-    """A robot ready to be saved.
+class ImportedRobot:
+    """An imported robot, ready to be saved.
 
     Attributes:
-        values: Of its robot.toml.
-        files: Content by path beside the robot.toml.
-        notes: What was odd or changed on the way, a sentence each.
+        values: The values of its robot.toml.
+        files: Content by path relative to the robot.toml.
+        notes: Oddities and changes, a sentence each.
         missing: Mesh files that were not found, as the source names them.
     """
 
@@ -34,37 +34,37 @@ class Imported:
     missing: tuple[str, ...]
 
 
-def imported(source: str, *, packages: Sequence[Path] = (), as_dh: bool = False) -> Imported:
-    """A robot from a URDF, an OpenHRP VRML file, a robot.toml, or by its library name.
+def import_robot(source: str, *, packages: Sequence[Path] = (), as_dh: bool = False) -> ImportedRobot:
+    """Import a robot from a URDF, an OpenHRP VRML file, a robot.toml, or by its library name.
 
     Args:
-        packages: Folders in which a URDF's `package://` is looked for.
-        as_dh: The chain to the tool as D-H rows, whatever it is described by.
+        packages: Folders to search for a URDF's `package://` addresses.
+        as_dh: Convert the chain to the tool to D-H rows.
 
     Raises:
-        DescriptionError: If the robot cannot be used as it is.
+        DescriptionError: If the robot has a problem.
         MeshError: If one of its meshes cannot be read.
     """
     path = Path(source)
     if path.suffix.lower() in ROBOT_FILES:
         values = {"name": robot_name(path.stem), "urdf": path.name}
         folders = [str(folder.absolute()) for folder in packages]
-        description = described(values | {"packages": folders}, path)
+        description = describe_urdf(values | {"packages": folders}, path)
     else:
         description = load(source)
     if isinstance(description, UrdfDescription):
-        return as_rows(description) if as_dh else _urdf(description)
+        return import_as_dh(description) if as_dh else _import_urdf(description)
     assert isinstance(description, DhDescription)
-    return _copied(description)
+    return _copy_description(description)
 
 
-def _urdf(description: UrdfDescription) -> Imported:
-    """The tree as URDF anew, its meshes as GLB; what a URDF cannot say stays in the robot.toml."""
+def _import_urdf(description: UrdfDescription) -> ImportedRobot:
+    """Write the tree as a new URDF with GLB meshes; values that URDF cannot hold stay in the robot.toml."""
     meshes = link_meshes(description)
     values = description.model_dump(mode="json", by_alias=True, exclude_unset=True)
     values |= {"urdf": f"{description.name}.urdf", "provenance": _provenance(description)}
-    for gone in ("packages", "link"):  # found, and painted into the GLB
-        values.pop(gone, None)
+    for key in ("packages", "link"):  # package addresses are resolved, link colours are in the GLB
+        values.pop(key, None)
     if description.robot.ignored:
         pairs = [*description.collision.ignore, *(pair for pair, _ in description.robot.ignored)]
         values["collision"] = {"ignore": [list(pair) for pair in dict.fromkeys(pairs)]}
@@ -72,14 +72,14 @@ def _urdf(description: UrdfDescription) -> Imported:
     files = {values["urdf"]: text.encode()} | {glb_beside(link): glb for link, glb in meshes.items()}
     files |= {collision_beside(link): glb for link, glb in collision_meshes(description).items()}
     robot = description.robot
-    return Imported(values, files, tuple(robot.notes), tuple(robot.missing))
+    return ImportedRobot(values, files, tuple(robot.notes), tuple(robot.missing))
 
 
-def as_rows(description: UrdfDescription) -> Imported:
-    """A robot's chain to its tool as D-H rows, each link's shapes as one GLB.
+def import_as_dh(description: UrdfDescription) -> ImportedRobot:
+    """Convert a robot's chain to its tool to D-H rows, and each link's shapes to one GLB.
 
     Raises:
-        DescriptionError: If rows cannot say it.
+        DescriptionError: If D-H rows cannot describe the chain.
         MeshError: If one of its meshes cannot be read.
     """
     form = dh_form(description)
@@ -95,15 +95,15 @@ def as_rows(description: UrdfDescription) -> Imported:
                 body |= {key: address(link), "mesh_scale": 1.0}
                 files[body[key]] = glb_of(link_mesh(shapes))
     robot = description.robot
-    return Imported(values, files, (*robot.notes, *form.notes), tuple(robot.missing))
+    return ImportedRobot(values, files, (*robot.notes, *form.notes), tuple(robot.missing))
 
 
 def _provenance(description: RobotDescription) -> str:
     return description.provenance or f"imported from {description.source.name}"
 
 
-def _copied(description: DhDescription) -> Imported:
-    """A description by D-H rows with its mesh files, and those that they name, all below its folder."""
+def _copy_description(description: DhDescription) -> ImportedRobot:
+    """Copy a D-H description, its mesh files and the files that these name, all below the robot's folder."""
     values = parse_toml(description.text)
     files: dict[str, bytes] = {}
     places: dict[Path, str] = {}
@@ -115,24 +115,30 @@ def _copied(description: DhDescription) -> Imported:
             if path is None:
                 continue
             if path not in places:
-                places[path] = _inside(str(table[key]), set(files))
+                places[path] = _path_in_robot(str(table[key]), set(files))
                 files[places[path]] = _bytes(path)
                 folder = description.folder_around(path)
                 mesh = read_mesh(path, within=folder)
-                notes += [_not_read(path, places[path], name, folder) for name in mesh.missing]
-                notes += _copied_beside(path, places[path], mesh.files, files)
+                notes += [_missing_file_note(path, places[path], name, folder) for name in mesh.missing]
+                notes += _copy_references(path, places[path], mesh.files, files)
             table[key] = places[path]
-    return Imported(values, files, tuple(notes), ())
+    return ImportedRobot(values, files, tuple(notes), ())
 
 
-def _not_read(path: Path, place: str, address: str, folder: Path) -> str:
+def _missing_file_note(path: Path, place: str, address: str, folder: Path) -> str:
     if Path(os.path.normpath(path.resolve().parent / address)).is_relative_to(folder.resolve()):
-        return f"{place} names {address!r}, which is not there"
+        return f"{place} names {address!r}, which does not exist"
     return f"{place} names {address!r}, which is outside of the robot's folder; it is not copied"
 
 
-def _copied_beside(path: Path, place: str, others: Sequence[Path], files: dict[str, bytes]) -> Iterator[str]:
-    """Add the files that a mesh file names, as far from its copy as they are from it; notes on others."""
+def _copy_references(
+    path: Path, place: str, others: Sequence[Path], files: dict[str, bytes]
+) -> Iterator[str]:
+    """Add the files that a mesh file names, with the same path relative to its copy.
+
+    Yields:
+        A note on each file that cannot be copied.
+    """
     for other in dict.fromkeys(others):
         if not other.is_file():
             continue
@@ -143,11 +149,11 @@ def _copied_beside(path: Path, place: str, others: Sequence[Path], files: dict[s
             continue
         content = _bytes(other)
         if files.setdefault(str(there), content) != content:
-            yield f"{place} names {address!r}, as another mesh names another file; one is copied"
+            yield f"{place} names {address!r}, and so does another mesh for another file; one is copied"
 
 
-def _inside(mesh: str, taken: set[str]) -> str:
-    """A mesh's path below the robot's folder: its own where it is one."""
+def _path_in_robot(mesh: str, taken: set[str]) -> str:
+    """Return an unused path for a mesh below the robot's folder; its own path if possible."""
     path = PurePosixPath(mesh)
     if path.is_absolute() or ".." in path.parts:
         path = PurePosixPath("meshes", path.name)

@@ -1,4 +1,4 @@
-"""A robot's joints in SI: limits, speeds, coupled limits. No kinematics, so nothing heavy is imported."""
+"""A robot's joints in SI: limits, speeds, coupled limits. Has no kinematics and imports nothing heavy."""
 
 from dataclasses import dataclass, replace
 from math import degrees, isfinite, radians
@@ -27,7 +27,7 @@ __all__ = [
     "violations",
 ]
 
-# What a URDF does not say, taken as the library's robots have it: a quarter of a second to full speed.
+# Defaults for a URDF, from the library's robots: 0.25 s to full speed.
 ACCELERATION_PER_SPEED = 4.0
 JERK_PER_ACCELERATION = 10.0
 
@@ -41,11 +41,11 @@ class Constraint:
     """A coupled limit: lower <= coefficients . positions <= upper.
 
     Attributes:
-        names: Joints that take part.
-        coefficients: (n,) one a joint of the robot, zero for those that do not.
+        names: Joints in the sum.
+        coefficients: (n,) one per joint of the robot, zero for joints that are not in the sum.
         lower: [rad] or [m].
         upper: [rad] or [m].
-        type: Of the joints that take part; they are all of one.
+        type: The type that all joints in the sum have.
     """
 
     names: tuple[str, ...]
@@ -74,7 +74,7 @@ class Joints:
 
 
 def joints_of(description: RobotDescription) -> Joints:
-    """The joints of a description, in SI."""
+    """Return the joints of a description, in SI."""
     if isinstance(description, UrdfDescription):
         joints = _urdf_joints(description)
     else:
@@ -103,7 +103,7 @@ def _row_joints(description: DhDescription) -> Joints:
 
 
 def _urdf_joints(description: UrdfDescription) -> Joints:
-    """What the URDF says, unless the description says it otherwise."""
+    """Return the URDF's joints, with the description's settings in place of the URDF's values."""
     tree = tree_of(description)
     settings = {row.name: row for row in description.joints}
     columns = []
@@ -160,10 +160,10 @@ def _constraints_of(description: RobotDescription, joints: Joints) -> tuple[Cons
 
 
 def as_positions(joints: Joints, positions: ArrayLike) -> FloatArray:
-    """The positions as (n,) float64 [rad] or [m].
+    """Return the positions as (n,) float64 [rad] or [m].
 
     Raises:
-        JointCountError: If there is not one value a joint.
+        JointCountError: If there is not one value per joint.
     """
     array = np.asarray(positions, dtype=np.float64)
     if array.shape != (len(joints),):
@@ -172,19 +172,19 @@ def as_positions(joints: Joints, positions: ArrayLike) -> FloatArray:
 
 
 def constraint_values(joints: Joints, positions: ArrayLike) -> FloatArray:
-    """The sum that each constraint limits: (number of constraints,) [rad] or [m]."""
+    """Return the sum that each constraint limits: (number of constraints,) [rad] or [m]."""
     array = as_positions(joints, positions)
     return np.array([constraint.coefficients @ array for constraint in joints.constraints], dtype=np.float64)
 
 
 def violations(joints: Joints, positions: ArrayLike) -> tuple[Reason, ...]:
-    """Return what forbids these positions, in degrees and millimetres; none: they are allowed.
+    """Return the limits that these positions violate, in degrees and millimetres; empty if allowed.
 
     Args:
         positions: (n,) joint positions [rad] or [m].
 
     Raises:
-        JointCountError: If there is not one value a joint.
+        JointCountError: If there is not one value per joint.
     """
     array = as_positions(joints, positions)
     found = []
@@ -219,7 +219,7 @@ def _limit_beyond(position: float, lower: float, upper: float, kind: JointType) 
 
 
 def _text(position: float, kind: JointType) -> str:
-    # From here on the places behind the point say nothing, and degrees may be more than a number holds.
+    # Decimals of such a large number mean nothing, and its degrees may overflow.
     if abs(position) >= 1e6:
         return f"{position:.3g} {'rad' if kind is JointType.ROTARY else 'm'}"
     return f"{degrees(position):.2f}°" if kind is JointType.ROTARY else f"{position * 1000:.2f} mm"

@@ -1,8 +1,8 @@
-"""An arm as a tree of joints and links, however it was described: what D-H rows, URDF and VRML come to.
+"""Tree of joints and links: the common form of D-H rows, URDF and VRML.
 
-All in SI. A joint turns about or moves along an axis through its own frame's origin; at position
-zero that frame stands at `joint_to_parent`. A link hangs on a joint, or on the base, at a fixed place.
-Nothing heavier than NumPy is imported.
+All in SI. A joint rotates about or moves along an axis through the origin of its frame, which is at
+`joint_to_parent` at position zero. A link is fixed to a joint or to the base. Imports nothing heavier than
+NumPy.
 """
 
 from collections.abc import Collection
@@ -29,7 +29,7 @@ FloatArray = NDArray[np.float64]
 
 BASE = -1
 
-# What people call the frame at the end of an arm, the best first.
+# Common names of the frame at the end of an arm, in order of preference.
 _TOOL_NAMES = (
     "tool",
     "tool0",
@@ -49,7 +49,7 @@ class Mimic:
     """A joint that follows another: position = multiplier x leader's position + offset [rad] or [m].
 
     Attributes:
-        leader: Number of the joint that it follows, one that follows none itself.
+        leader: Number of the followed joint, which is not a mimic joint itself.
     """
 
     leader: int
@@ -59,16 +59,16 @@ class Mimic:
 
 @dataclass(frozen=True, eq=False)
 class TreeJoint:
-    """A joint that moves.
+    """A movable joint.
 
     Attributes:
-        parent: Number of the joint that carries it, a lower one than its own; BASE for none.
-        joint_to_parent: (4, 4) its frame at position zero, in the parent joint's frame (or the base's).
-        axis: (3,) unit vector in its own frame.
+        parent: Number of the parent joint, lower than the joint's own number; BASE for none.
+        joint_to_parent: (4, 4) the joint's frame at position zero, in the parent joint's frame or the base's.
+        axis: (3,) unit vector in the joint's frame.
         lower, upper: [rad] or [m].
         max_speed: [rad/s] or [m/s].
-        mimic: The joint that it follows; such a joint is none of the robot's joints.
-        continuous: Nothing stops it; lower and upper are ours.
+        mimic: The followed joint; a mimic joint is not one of the robot's joints.
+        continuous: The source gives no limits; lower and upper are defaults.
     """
 
     name: str
@@ -85,15 +85,16 @@ class TreeJoint:
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Something that a link looks like: a mesh file, or a mesh made for it.
+    """A shape of a link: a mesh file or a generated mesh.
 
     Attributes:
-        mesh: A file, or what was made (a box, a cylinder, a sphere).
-        shape_to_link: (4, 4) from the file's units and axes to the link's frame [m]: scale and all.
-        color: Of its materials named "paint", or of all where none is; none: its own.
-        opacity: 0 to 1; none: its own.
-        in_stated_unit: The file counts in the unit that it states, if it does (a URDF's COLLADA).
-        within: Only files below this folder are read beside the mesh file; none: any place will do.
+        mesh: A file, or a generated mesh (a box, a cylinder, a sphere).
+        shape_to_link: (4, 4) from the file's units and axes to the link's frame [m], including the scale.
+        color: Colour of the materials named "paint", or of all materials if none has this name; None keeps
+            the mesh's colours.
+        opacity: 0 to 1; None keeps the mesh's opacity.
+        in_stated_unit: Apply the unit that the file states, if any (a URDF's COLLADA).
+        within: Read only files below this folder when the mesh file names them; None: any folder.
     """
 
     mesh: Path | Mesh
@@ -106,13 +107,13 @@ class Shape:
 
 @dataclass(frozen=True, eq=False)
 class TreeLink:
-    """A link, or a frame that stands on one.
+    """A link, or a frame without a shape.
 
     Attributes:
-        joint: Number of the joint that moves it; BASE: it does not move.
-        link_to_joint: (4, 4) its frame in that joint's frame (or the base's).
-        shapes: What it looks like; none for a bare frame.
-        collision: What is checked in place of `shapes`; none: `shapes` are checked.
+        joint: Number of the joint that moves the link; BASE: the link does not move.
+        link_to_joint: (4, 4) the link's frame in that joint's frame or the base's.
+        shapes: The drawn shapes; empty for a frame.
+        collision: The shapes to check for collisions; empty: check `shapes`.
     """
 
     name: str
@@ -129,21 +130,21 @@ class TreeLink:
 
 @dataclass(frozen=True, eq=False)
 class Tree:
-    """Joints from the base outwards, and links, the base's own first."""
+    """Joints from the base outwards, and links, the base first."""
 
     joints: tuple[TreeJoint, ...]
     links: tuple[TreeLink, ...]
 
     @property
     def free(self) -> tuple[int, ...]:
-        """Numbers of the joints that follow no other: the robot's joints."""
+        """Numbers of the robot's joints: all but the mimic joints."""
         return tuple(number for number, joint in enumerate(self.joints) if joint.mimic is None)
 
 
 def bare_links(tree: Tree, shaped: Collection[int]) -> tuple[int, ...]:
-    """Numbers of the links that no check covers.
+    """Return the numbers of the links that no collision check covers.
 
-    A bare frame (`tool0`, `flange`) that is fixed to a link with a shape is none of them.
+    A frame (`tool0`, `flange`) that is fixed to a link with a shape counts as covered.
 
     Args:
         shaped: Numbers of the links that have a shape.
@@ -153,7 +154,7 @@ def bare_links(tree: Tree, shaped: Collection[int]) -> tuple[int, ...]:
 
 
 def tree_of(description: RobotDescription) -> Tree:
-    """The joints and links of a description, whichever its form."""
+    """Return the joints and links of a description in either form."""
     if isinstance(description, UrdfDescription):
         tree: Tree = description.robot.tree
         colors = {row.name: rgb(row.color) for row in description.links}
@@ -165,7 +166,7 @@ def tree_of(description: RobotDescription) -> Tree:
 
 
 def _confined(tree: Tree, description: RobotDescription) -> Tree:
-    """The same tree; what its mesh files name is read from the robot's own folder only."""
+    """Return the tree with each mesh file's references limited to its `folder_around`."""
 
     def confined(shape: Shape) -> Shape:
         mesh = shape.mesh
@@ -185,13 +186,13 @@ def _confined(tree: Tree, description: RobotDescription) -> Tree:
 
 
 def _tree_of_rows(description: DhDescription) -> Tree:
-    """How a standard D-H row becomes a joint and a link's frame.
+    """Convert standard D-H rows to joints and link frames.
 
     Row 0 ends at the base's pose.
 
     joint i's placement = link frame of row i-1 (Trans(z, d) Trans(x, a) Rot(x, alpha)), then
-        rotary:     Rot(z, theta), and the variable turns about z
-        prismatic:  Rot(z, theta) Trans(z, d), and the variable moves along z
+        rotary:     Rot(z, theta), and the position rotates about z
+        prismatic:  Rot(z, theta) Trans(z, d), and the position moves along z
     link i's frame      = joint i, then Trans(z, d) Trans(x, a) Rot(x, alpha)  (prismatic: without d)
 
     Source: Chen, Zhang, Xue 2001, section 3.2.
@@ -225,7 +226,7 @@ def _tree_of_rows(description: DhDescription) -> Tree:
 
 
 def _shapes(description: DhDescription, body: Body) -> tuple[tuple[Shape, ...], tuple[Shape, ...]]:
-    """What a body looks like, and what is checked in its place."""
+    """Return a body's drawn shapes and its separate collision shapes."""
     scale = np.diag([body.mesh_scale, body.mesh_scale, body.mesh_scale, 1.0])
     placement = pose_matrix(body.mesh_pose, description.units) @ scale
     color = None if body.color is None else rgb(body.color)
@@ -243,18 +244,18 @@ def _painted(link: TreeLink, color: Color | None) -> TreeLink:
 
 
 def rgb(color: str) -> Color:
-    """Red, green and blue, 0 to 1, of "#rrggbb"."""
+    """Parse "#rrggbb" to red, green and blue, 0 to 1."""
     red, green, blue = (int(color[start : start + 2], 16) / 255 for start in (1, 3, 5))
     return red, green, blue
 
 
 def color_text(color: Color) -> str:
-    """A colour as "#rrggbb"."""
+    """Format a colour as "#rrggbb"."""
     return "#" + "".join(f"{round(255 * part):02x}" for part in color)
 
 
 def tool_frame(description: RobotDescription) -> tuple[str, FloatArray]:
-    """Which link carries the tool, and the tool's frame on it (4, 4) [m]."""
+    """Return the name of the link with the tool, and the tool's frame on it (4, 4) [m]."""
     if isinstance(description, UrdfDescription):
         link = description.tool.link or end_link(tree_of(description))
     else:
@@ -264,34 +265,34 @@ def tool_frame(description: RobotDescription) -> tuple[str, FloatArray]:
 
 
 def named_frames(description: RobotDescription) -> dict[str, tuple[str, FloatArray]]:
-    """The tool and the named frames: their link, and where they are on it (4, 4) [m]."""
+    """Return the link and the frame on it (4, 4) [m] of the tool and each named frame, by name."""
     return {TOOL_FRAME: tool_frame(description)} | {
         frame.name: (frame.link, pose_matrix(frame, description.units)) for frame in description.frames
     }
 
 
 def end_link(tree: Tree) -> str:
-    """The link that is an arm's end: one with such a name, else the last of the longest chain.
+    """Return an arm's end link: one with a common tool name, else the last link of the longest chain.
 
-    What joints move that follow others is a gripper's finger, not the end.
+    Links behind a mimic joint do not count: they are the fingers of a gripper.
     """
-    own = [
+    candidates = [
         link
         for link in tree.links
         if all(tree.joints[number].mimic is None for number in chain_to(tree, link.joint))
     ]
-    by_name = {link.name: link for link in own}
+    by_name = {link.name: link for link in candidates}
     for wanted in _TOOL_NAMES:
         found = [name for name in by_name if name == wanted or name.endswith(f"_{wanted}")]
         if found:
             return max(found, key=lambda name: len(chain_to(tree, by_name[name].joint)))
-    depths = [len(chain_to(tree, link.joint)) for link in own]
+    depths = [len(chain_to(tree, link.joint)) for link in candidates]
     deepest = max(depths)
-    return [link.name for link, depth in zip(own, depths, strict=True) if depth == deepest][-1]
+    return [link.name for link, depth in zip(candidates, depths, strict=True) if depth == deepest][-1]
 
 
 def position_factors(tree: Tree) -> tuple[FloatArray, FloatArray]:
-    """Positions of all joints from those of the robot's own: (all, n) factors and (all,) offsets."""
+    """Return (all, n) factors and (all,) offsets from the robot's joint positions to those of all joints."""
     factors, offsets = np.zeros((len(tree.joints), len(tree.free))), np.zeros(len(tree.joints))
     for number, joint in enumerate(tree.joints):
         leader = number if joint.mimic is None else joint.mimic.leader
@@ -301,7 +302,7 @@ def position_factors(tree: Tree) -> tuple[FloatArray, FloatArray]:
 
 
 def chain_to(tree: Tree, joint: int) -> tuple[int, ...]:
-    """Numbers of the joints between the base and what a joint moves, from the base on."""
+    """Return the numbers of the joints from the base to a joint, inclusive."""
     numbers: list[int] = []
     while joint != BASE:
         numbers.append(joint)
@@ -310,7 +311,7 @@ def chain_to(tree: Tree, joint: int) -> tuple[int, ...]:
 
 
 def are_neighbours(tree: Tree, one: int, other: int) -> bool:
-    """Return whether links on these joints are on the same one, or one joint apart."""
+    """Return whether links on these joints are on the same joint, or one joint apart."""
     return one == other or any(
         joint != BASE and tree.joints[joint].parent == parent
         for joint, parent in ((one, other), (other, one))

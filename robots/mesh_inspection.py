@@ -1,4 +1,4 @@
-"""Whether a robot's meshes can be drawn: each is opened and measured."""
+"""Inspection of a robot's meshes: opens and measures each file."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,20 +11,20 @@ from robots.kinematic_tree import Shape, tree_of
 from robots.meshes.mesh import bounds
 from robots.schema import RobotDescription, UrdfDescription
 
-# No part of an arm is larger, and none that is to be seen smaller [m].
+# Plausible size of a part of an arm [m].
 _LARGEST_M, _SMALLEST_M = 10.0, 1e-3
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Something about a file."""
+    """A problem or a warning, with its file."""
 
     file: str
     text: str
 
 
 def mesh_findings(description: RobotDescription) -> tuple[list[Finding], list[Finding]]:
-    """What is wrong with a robot's meshes, and what is only odd."""
+    """Return the problems of a robot's meshes and the warnings."""
     problems, warnings = [], []
     if isinstance(description, UrdfDescription):
         source = str(description.source)
@@ -34,7 +34,7 @@ def mesh_findings(description: RobotDescription) -> tuple[list[Finding], list[Fi
         for shape in (*link.shapes, *link.collision):
             if not isinstance(shape.mesh, Path):
                 continue
-            file, what = str(shape.mesh), f"link {link.name!r}"
+            file, subject = str(shape.mesh), f"link {link.name!r}"
             try:
                 mesh = link_mesh([shape])
             except MeshError as error:
@@ -44,12 +44,12 @@ def mesh_findings(description: RobotDescription) -> tuple[list[Finding], list[Fi
             warnings += [Finding(file, warning) for warning in mesh.warnings]
             if mesh.triangle_count == 0:
                 if not mesh.wires:
-                    problems.append(Finding(file, f"{what}: holds no triangles, so nothing would be seen"))
+                    problems.append(Finding(file, f"{subject}: has no triangles, so the link is invisible"))
                 continue
             size = float(np.ptp(bounds(mesh), axis=0).max())
             if not _SMALLEST_M <= size <= _LARGEST_M:
                 scale = _scale(shape)
-                text = f"{what}: is {size:.3g} m large at {scale:g} m a unit; is mesh_scale right?"
+                text = f"{subject}: is {size:.3g} m large at {scale:g} m per unit; check mesh_scale"
                 warnings.append(Finding(file, text))
     return problems, warnings
 

@@ -1,4 +1,4 @@
-"""The kinematic model: where every link is, and how the tool moves. Pinocchio stays behind this module."""
+"""The kinematic model: forward kinematics and the tool's Jacobian. Wraps Pinocchio."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -14,13 +14,14 @@ from robots.schema import JointType, RobotDescription
 
 @dataclass(frozen=True, eq=False)
 class RobotModel:
-    """A robot that can be asked where it is. One thread at a time: its workspace is reused by each call.
+    """A robot's kinematic model. Not thread-safe: every call uses the same workspace.
 
     Attributes:
-        joints: Its joints, SI.
-        link_names: Names of its links, base first.
-        frame_names: Names of its other frames: "tool" first, then the description's named frames.
-        _followers: How the positions of all joints follow from the robot's own; None: they are the same.
+        joints: The robot's joints, SI.
+        link_names: Names of the links, base first.
+        frame_names: Names of the other frames: "tool" first, then the description's named frames.
+        _followers: Factors and offsets from the robot's joint positions to those of all joints, including
+            mimic joints; None without a mimic joint.
     """
 
     joints: Joints
@@ -34,7 +35,7 @@ class RobotModel:
 
 
 def build_model(description: RobotDescription) -> RobotModel:
-    """The kinematic model of a description."""
+    """Build the kinematic model of a description."""
     tree = tree_of(description)
     model = pin.Model()
     model.name = description.name
@@ -56,7 +57,7 @@ def build_model(description: RobotDescription) -> RobotModel:
     frames = named_frames(description)
     for name, (on_link, frame_to_link) in frames.items():
         link = links[on_link]
-        # A URDF may have a link of the tool's name: in Pinocchio each frame needs its own.
+        # A URDF link may have the tool's name, but frame names in Pinocchio must be unique.
         label = f"{name} of the arm" if name in links else name
         frame_ids.append(_add_frame(model, label, link.joint + 1, link.link_to_joint @ frame_to_link))
     return RobotModel(
@@ -72,7 +73,7 @@ def build_model(description: RobotDescription) -> RobotModel:
 
 
 def joint_motion(joint: TreeJoint) -> Any:
-    """Pinocchio's kind of a joint; a continuous one too has one number for its position, as everywhere."""
+    """Return Pinocchio's model of a joint; a continuous joint has one position value too, as elsewhere."""
     rotary = joint.type is JointType.ROTARY
     if joint.axis[2] == 1.0:
         return pin.JointModelRZ() if rotary else pin.JointModelPZ()
@@ -88,7 +89,7 @@ def _add_frame(model: Any, name: str, joint: int, frame_to_joint: FloatArray) ->
 
 
 def link_placements(model: RobotModel, joint_positions: ArrayLike) -> FloatArray:
-    """Placement of every link in the base frame.
+    """Return the placement of every link in the base frame.
 
     Args:
         joint_positions: (n,) joint positions [rad] or [m].
@@ -97,7 +98,7 @@ def link_placements(model: RobotModel, joint_positions: ArrayLike) -> FloatArray
         (number of links, 4, 4) homogeneous transforms, link to base, base first.
 
     Raises:
-        JointCountError: If the array does not have one value a joint.
+        JointCountError: If the array does not have one value per joint.
 
     Source: Chen, Zhang, Xue 2001, section 3.2.
     """
@@ -106,10 +107,10 @@ def link_placements(model: RobotModel, joint_positions: ArrayLike) -> FloatArray
 
 
 def frame_placements(model: RobotModel, joint_positions: ArrayLike) -> dict[str, FloatArray]:
-    """Placement of the tool and of every named frame in the base frame: (4, 4), frame to base, by name.
+    """Return the placement of the tool and every named frame: (4, 4), frame to base, by name.
 
     Raises:
-        JointCountError: If there is not one value a joint.
+        JointCountError: If there is not one value per joint.
     """
     _forward(model, joint_positions)
     return {
@@ -119,17 +120,17 @@ def frame_placements(model: RobotModel, joint_positions: ArrayLike) -> dict[str,
 
 
 def tool_placement(model: RobotModel, joint_positions: ArrayLike) -> FloatArray:
-    """Placement of the tool: (4, 4), tool to base.
+    """Return the placement of the tool: (4, 4), tool to base.
 
     Raises:
-        JointCountError: If there is not one value a joint.
+        JointCountError: If there is not one value per joint.
     """
     _forward(model, joint_positions)
     return _placement(model, model._frame_ids[0])
 
 
 def tool_jacobian(model: RobotModel, joint_positions: ArrayLike) -> FloatArray:
-    """How the tool moves with the joints.
+    """Return the tool's Jacobian.
 
     Args:
         joint_positions: (n,) joint positions [rad] or [m].
@@ -139,7 +140,7 @@ def tool_jacobian(model: RobotModel, joint_positions: ArrayLike) -> FloatArray:
         per unit of joint velocity.
 
     Raises:
-        JointCountError: If there is not one value a joint.
+        JointCountError: If there is not one value per joint.
     """
     positions = all_positions(model, joint_positions)
     jacobian = pin.computeFrameJacobian(
@@ -149,13 +150,13 @@ def tool_jacobian(model: RobotModel, joint_positions: ArrayLike) -> FloatArray:
         model._frame_ids[0],
         pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
     )
-    # Pinocchio gives a 1-D array for a robot of one joint.
+    # Pinocchio returns a 1-D array for a robot of one joint.
     each = np.array(jacobian, dtype=np.float64).reshape(6, len(positions))
     return each if model._followers is None else each @ model._followers[0]
 
 
 def manipulability(model: RobotModel, joint_positions: ArrayLike) -> float:
-    """Yoshikawa's measure of the tool's Jacobian: 0 where the arm is singular, m and rad mixed.
+    """Return Yoshikawa's manipulability of the tool's Jacobian: 0 in a singular position, m and rad mixed.
 
     The product of the singular values: `sqrt(det(J J^T))` from six joints on, `sqrt(det(J^T J))` below.
     """
@@ -163,7 +164,7 @@ def manipulability(model: RobotModel, joint_positions: ArrayLike) -> float:
 
 
 def all_positions(model: RobotModel, joint_positions: ArrayLike) -> FloatArray:
-    """Positions of the joints that follow others too."""
+    """Return the positions of all joints, including mimic joints."""
     positions = as_positions(model.joints, joint_positions)
     if model._followers is None:
         return positions

@@ -1,10 +1,10 @@
 """Jerk-limited motion of all joints, as a function of time.
 
-A motion is planned once and then only sampled, so that a late tick makes no error. From rest to rest
-it is a straight line between the joint positions, always, and it stays on that line, which may have been
-checked, when its speed is changed, when it brakes and when it goes on. A new plan in mid-motion begins where
-the old one is at that moment, in position, speed and acceleration: no command makes the arm jump.
-Time is an argument: seconds on any clock that does not go back.
+A motion is planned once and then sampled, so a late tick causes no error. From rest to rest it is a straight
+line in joint space. It stays on this line, which may have been collision-checked, when its speed changes,
+when it brakes and when it resumes. A new plan during a motion starts from the old plan's current position,
+velocity and acceleration, so no command makes the arm jump.
+Time is an argument: seconds of any monotonic clock.
 """
 
 from dataclasses import dataclass
@@ -15,17 +15,17 @@ import ruckig
 
 from robots.joints import FloatArray, Joints
 
-# Homing is slow, because nothing is known yet; at its end the marks are looked for.
+# Homing is slow because the positions are not yet known. The rest is for the search of the joints' marks.
 HOMING_SPEED = 0.5
 HOMING_REST_S = 0.5
 
-# Of what moves along a line: place, velocity, acceleration; or the limits: velocity, acceleration, jerk.
+# State on a line (position, velocity, acceleration) or limits (velocity, acceleration, jerk).
 _Values: TypeAlias = tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
 class ArmState:
-    """Where the joints are, and how they move; each (n,) in rad or m, and seconds."""
+    """Positions, velocities and accelerations of the joints; each (n,) in rad or m, and seconds."""
 
     positions: FloatArray
     velocities: FloatArray
@@ -33,7 +33,7 @@ class ArmState:
 
 
 class _Trajectory(Protocol):
-    """A planned motion; time counts from its beginning."""
+    """A planned motion; time counts from its start."""
 
     @property
     def duration(self) -> float: ...
@@ -43,15 +43,15 @@ class _Trajectory(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class StraightMotion:
-    """Straight from one set of joint positions to another, or on that line until it has come to rest.
+    """Motion on a straight line in joint space, to its target or until it has braked.
 
-    One profile moves all joints, as fast as the limit allows that is met first. Ruckig's own motion in
-    phase leaves the straight line, without a word, where the joint that takes longest would ask another
-    for more than it may do; a line that is checked must be the line that is driven.
+    One profile moves all joints; the joint that reaches its limit first determines the speed. Ruckig's
+    phase-synchronized motion is not used: it silently leaves the straight line if the slowest joint's profile
+    exceeds another joint's limits, and the driven line must be the checked line.
 
     Attributes:
         start, target: (n,) the line's ends [rad] or [m].
-        end: (n,) where it comes to rest: at the target, unless it brakes.
+        end: (n,) where the motion ends: at the target unless it brakes.
         duration: [s]
     """
 
@@ -60,28 +60,28 @@ class StraightMotion:
     end: FloatArray
     duration: float
     _joints: Joints
-    # Of ruckig's phases: when each begins, and the share of the way, its rates and its jerk then.
+    # Ruckig's phases: start times [s], and (phases, 4) share of the way with its rate, acceleration and jerk.
     _times: FloatArray
     _shares: FloatArray
 
     def progress(self, times_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The share of the way that is done at times (m,), 0 to 1, and its rate [1/s]."""
+        """Return the completed share of the way at times (m,), 0 to 1, and its rate [1/s]."""
         share, rate, _ = self._at(times_s)
         return np.clip(share, 0.0, 1.0), rate
 
     def at_time(self, time_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(n,) positions, velocities and accelerations at a time from its beginning."""
+        """Return the (n,) positions, velocities and accelerations at a time since the start."""
         share, rate, curvature = self._at(np.float64(time_s))
         way = self.target - self.start
         return self.start + share * way, rate * way, curvature * way
 
     def at_speed(self, time_s: float, speed: float) -> "StraightMotion":
-        """On to the target from where it is at a time, at another speed."""
-        return _along(self._joints, self.start, self.target, self._at(np.float64(time_s)), speed=speed)
+        """Return the motion from its state at a time to the target, at another speed."""
+        return _plan_on_line(self._joints, self.start, self.target, self._at(np.float64(time_s)), speed=speed)
 
     def braked(self, time_s: float) -> "StraightMotion":
-        """To rest from where it is at a time, as fast as accelerations and jerks allow."""
-        return _along(self._joints, self.start, self.target, self._at(np.float64(time_s)), speed=None)
+        """Return the motion from its state at a time to rest, as fast as the limits allow."""
+        return _plan_on_line(self._joints, self.start, self.target, self._at(np.float64(time_s)), speed=None)
 
     def _at(self, times_s: Any) -> tuple[Any, Any, Any]:
         phase = np.clip(np.searchsorted(self._times, times_s, side="right") - 1, 0, len(self._times) - 1)
@@ -93,18 +93,18 @@ class StraightMotion:
 def straight_motion(
     joints: Joints, start: FloatArray, target: FloatArray, *, speed: float
 ) -> StraightMotion | None:
-    """The motion from rest at one place to rest at another; None where they are the same.
+    """Plan a straight motion from rest to rest; None if start and target are equal.
 
     Args:
         start, target: (n,) [rad] or [m].
-        speed: Fraction of the joints' greatest speeds, above 0 to 1.
+        speed: Fraction of the joints' maximum speeds, in (0, 1].
     """
     if np.array_equal(start, target):
         return None
-    return _along(joints, start, target, (0.0, 0.0, 0.0), speed=speed)
+    return _plan_on_line(joints, start, target, (0.0, 0.0, 0.0), speed=speed)
 
 
-def _along(
+def _plan_on_line(
     joints: Joints,
     start: FloatArray,
     target: FloatArray,
@@ -112,77 +112,81 @@ def _along(
     *,
     speed: float | None,
 ) -> StraightMotion:
-    """On a line to its target, or to rest.
+    """Plan a motion on a line to its target, or to rest.
 
     Args:
-        begin: The share of the way that is done, its rate [1/s] and the rate's rate [1/s²].
-        speed: Fraction of the joints' greatest speeds; None: it brakes.
+        begin: Completed share of the way, its rate [1/s] and its acceleration [1/s²].
+        speed: Fraction of the joints' maximum speeds; None to brake.
     """
     way = np.abs(target - start)
     moving = way > 0
-    # Counted in the way of the joint that goes farthest: numbers of the joints' own size.
+    # Scale by the way of the joint that moves farthest, so that ruckig sees values of a joint's magnitude.
     length = float(way.max())
     fastest, quickest, sharpest = (
         float((limit[moving] * (length / way[moving])).min())
         for limit in (joints.max_speed * (speed or 1.0), joints.max_acceleration, joints.max_jerk)
     )
     at, limits = (begin[0] * length, begin[1] * length, begin[2] * length), (fastest, quickest, sharpest)
-    parts = [_to_speed(at, 0.0, limits)] if speed is None else _to_place(at, length, limits)
-    end = target if speed is not None else start + min(_last(parts[0])[0] / length, 1.0) * (target - start)
+    parts = [_plan_to_speed(at, 0.0, limits)] if speed is None else _plan_to_position(at, length, limits)
+    end = (
+        target
+        if speed is not None
+        else start + min(_final_state(parts[0])[0] / length, 1.0) * (target - start)
+    )
     phases = np.concatenate([_phases(part) for part in parts])
     begins = np.concatenate([[0.0], np.cumsum(phases[:-1, 0])])
     duration = sum(part.duration for part in parts)
     return StraightMotion(start, target, end, duration, joints, begins, phases[:, 1:] / length)
 
 
-def _to_place(at: _Values, place: float, limits: _Values) -> list[Any]:
-    """Trajectories of one number, one after the other, to rest at a place ahead."""
+def _plan_to_position(at: _Values, place: float, limits: _Values) -> list[Any]:
+    """Return consecutive trajectories of one value, to rest at a position ahead."""
     _, velocity, acceleration = at
     fastest, quickest, sharpest = limits
     peak = velocity + max(acceleration, 0.0) ** 2 / (2 * sharpest)
     first = []
     if peak > fastest:
-        # Ruckig would slow it down until it goes back, for a moment.
-        slowed = _to_speed(at, fastest, limits)
-        if _last(_to_speed(_last(slowed), 0.0, limits))[0] <= place:
-            first, at = [slowed], _last(slowed)
+        # Above the speed limit, ruckig alone would brake so hard that the motion reverses for a moment.
+        slowed = _plan_to_speed(at, fastest, limits)
+        if _final_state(_plan_to_speed(_final_state(slowed), 0.0, limits))[0] <= place:
+            first, at = [slowed], _final_state(slowed)
         else:
-            # So near its target it is slowed down for that anyway.
+            # Near its target, the motion brakes anyway.
             fastest = peak
-    request = _from(at, (fastest, quickest, sharpest))
+    request = _request_from(at, (fastest, quickest, sharpest))
     request.target_position = [place]
-    return [*first, _planned(ruckig.Ruckig(1), request)]
+    return [*first, _calculate(ruckig.Ruckig(1), request)]
 
 
-def _to_speed(at: _Values, speed: float, limits: _Values) -> Any:
-    """A trajectory of one number to a speed."""
-    request = _from(at, limits)
+def _plan_to_speed(at: _Values, speed: float, limits: _Values) -> Any:
+    """Return a trajectory of one value to a speed."""
+    request = _request_from(at, limits)
     request.control_interface = ruckig.ControlInterface.Velocity
     request.target_velocity = [speed]
-    return _planned(ruckig.Ruckig(1), request)
+    return _calculate(ruckig.Ruckig(1), request)
 
 
-def _from(at: _Values, limits: _Values) -> ruckig.InputParameter:
+def _request_from(at: _Values, limits: _Values) -> ruckig.InputParameter:
     request = ruckig.InputParameter(1)
     request.current_position, request.current_velocity, request.current_acceleration = ([x] for x in at)
     request.max_velocity, request.max_acceleration, request.max_jerk = ([x] for x in limits)
     return request
 
 
-def _last(trajectory: Any) -> _Values:
+def _final_state(trajectory: Any) -> _Values:
     (place,), (velocity,), (acceleration,) = trajectory.at_time(trajectory.duration)
     return place, velocity, acceleration
 
 
 def _phases(trajectory: Any) -> FloatArray:
-    """(9, 5) of a trajectory's phases: how long each is, and place, velocity, acceleration and jerk there."""
+    """Return the (9, 5) of a trajectory's phases: duration, position, velocity, acceleration and jerk."""
     profile = trajectory.profiles[0][0]
-    # Two come before ruckig's seven, where something is beyond its limit at first.
+    # Ruckig has seven phases, after two that bring an initial state beyond a limit back within it.
     first = profile.brake
     return np.array([[*getattr(first, name), *getattr(profile, name)[:7]] for name in "tpvaj"]).T
 
 
-def _planned(planner: Any, request: Any) -> Any:
+def _calculate(planner: Any, request: Any) -> Any:
     trajectory = ruckig.Trajectory(planner.degrees_of_freedom)
     result = planner.calculate(request, trajectory)
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
@@ -191,10 +195,10 @@ def _planned(planner: Any, request: Any) -> Any:
 
 
 class Motion:
-    """Motion of one arm, at rest at first.
+    """Motion of one arm, initially at rest.
 
     Args:
-        positions: (n,) where it is [rad] or [m].
+        positions: (n,) initial positions [rad] or [m].
     """
 
     def __init__(self, joints: Joints, positions: FloatArray) -> None:
@@ -205,7 +209,7 @@ class Motion:
         self._end = self._at_rest(positions)
 
     def state(self, now_s: float) -> ArmState:
-        """Where the arm is at a time after the last plan's beginning."""
+        """Return the arm's state at a time after the last plan's start."""
         if self._trajectory is None or now_s >= self.end_s:
             return self._end
         sample = self._trajectory.at_time(max(now_s - self._begin_s, 0.0))
@@ -213,19 +217,19 @@ class Motion:
 
     @property
     def end_s(self) -> float:
-        """When the arm will be at rest."""
+        """Time at which the arm is at rest."""
         return self._begin_s + (self._trajectory.duration if self._trajectory is not None else 0.0)
 
     def moving(self, now_s: float) -> bool:
-        """Whether the plan is still running."""
+        """Return whether the arm is still moving."""
         return now_s < self.end_s
 
     def move(self, target: FloatArray, now_s: float, *, speed: float) -> None:
-        """Go to a target and rest there, all joints arriving together.
+        """Move to a target and stop there; all joints arrive at the same time.
 
         Args:
             target: (n,) [rad] or [m], within the limits.
-            speed: Fraction of the joints' greatest speeds, above 0 to 1.
+            speed: Fraction of the joints' maximum speeds, in (0, 1].
         """
         line = self._trajectory
         if not self.moving(now_s):
@@ -239,10 +243,10 @@ class Motion:
         request = self._request(now_s, speed)
         request.target_position = target.tolist()
         request.synchronization = ruckig.Synchronization.Phase
-        self._follow(_planned(self._planner, request), now_s, target)
+        self._follow(_calculate(self._planner, request), now_s, target)
 
     def brake(self, now_s: float) -> None:
-        """Come to rest as fast as accelerations and jerks allow; on the line, if it is on one."""
+        """Brake as fast as acceleration and jerk limits allow; a straight motion stays on its line."""
         line = self._trajectory
         if isinstance(line, StraightMotion) and self.moving(now_s):
             braked = line.braked(now_s - self._begin_s)
@@ -250,7 +254,7 @@ class Motion:
             return
         request = self._request(now_s, 1.0)
         request.control_interface = ruckig.ControlInterface.Velocity
-        trajectory = _planned(self._planner, request)
+        trajectory = _calculate(self._planner, request)
         end = trajectory.at_time(trajectory.duration)[0]
         self._follow(trajectory, now_s, np.array(end, dtype=np.float64))
 
@@ -266,7 +270,7 @@ class Motion:
         return request
 
     def _follow(self, trajectory: _Trajectory | None, now_s: float, end: FloatArray) -> None:
-        # A planner's sums end a few 1e-15 off: what was asked for is where it arrives.
+        # The planner's sums are off by a few 1e-15, so the requested end is the final state.
         self._trajectory, self._begin_s = trajectory, now_s
         self._end = self._at_rest(end)
 

@@ -1,4 +1,4 @@
-"""Placements as 4x4 matrices: translations, roll-pitch-yaw, D-H rows."""
+"""Homogeneous transforms from translations, roll-pitch-yaw and D-H rows."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ FloatArray = NDArray[np.float64]
 
 
 def pose_matrix(pose: Pose, units: Units) -> FloatArray:
-    """(4, 4) of a pose of the file, in metres: Trans(xyz) Rot(z, yaw) Rot(y, pitch) Rot(x, roll)."""
+    """Return the (4, 4) [m] of a pose in the file: Trans(xyz) Rot(z, yaw) Rot(y, pitch) Rot(x, roll)."""
     placement = np.eye(4)
     placement[:3, :3] = rpy_rotation(*(angle * angle_factor(units) for angle in pose.rpy))
     placement[:3, 3] = np.multiply(pose.xyz, length_factor(units))
@@ -18,7 +18,7 @@ def pose_matrix(pose: Pose, units: Units) -> FloatArray:
 
 
 def rpy_rotation(roll: float, pitch: float, yaw: float) -> FloatArray:
-    """(3, 3) of roll, pitch and yaw [rad] about the fixed x, y and z axes, in this order (as URDF)."""
+    """Return the (3, 3) of roll, pitch and yaw [rad] about fixed x, y and z, in this order (as URDF)."""
     cr, sr, cp, sp, cy, sy = (
         np.cos(roll),
         np.sin(roll),
@@ -37,9 +37,9 @@ def rpy_rotation(roll: float, pitch: float, yaw: float) -> FloatArray:
 
 
 def axis_rotation(axes: FloatArray, angles: FloatArray | float) -> FloatArray:
-    """(..., 3, 3) of turns about (..., 3) axes of any length by (...) angles [rad]: Rodrigues' formula.
+    """Return the (..., 3, 3) of rotations about (..., 3) axes of any length by (...) angles [rad].
 
-    An axis of 0 turns nothing.
+    An axis of length 0 gives the identity. Source: Rodrigues' formula.
     """
     lengths = np.linalg.norm(axes, axis=-1, keepdims=True)
     axes = np.divide(axes, lengths, out=np.zeros_like(axes), where=lengths > 0)
@@ -54,17 +54,17 @@ def axis_rotation(axes: FloatArray, angles: FloatArray | float) -> FloatArray:
 
 
 def rotation_rpy(rotation: FloatArray) -> tuple[float, float, float]:
-    """Roll, pitch and yaw [rad] of a (3, 3) rotation; at pitch ±90°, roll is zero."""
+    """Return roll, pitch and yaw [rad] of a (3, 3) rotation; roll is zero at pitch ±90°."""
     pitch = float(np.arctan2(-rotation[2, 0], np.hypot(rotation[0, 0], rotation[1, 0])))
     if np.hypot(rotation[0, 0], rotation[1, 0]) < 1e-12:
-        # Only roll ∓ yaw is determined: all of it goes to yaw.
+        # Only roll ∓ yaw is determined; assign all of it to yaw.
         return 0.0, pitch, float(np.arctan2(-rotation[0, 1], rotation[1, 1]))
     roll = float(np.arctan2(rotation[2, 1], rotation[2, 2]))
     return roll, pitch, float(np.arctan2(rotation[1, 0], rotation[0, 0]))
 
 
 def inverse(placement: FloatArray) -> FloatArray:
-    """(4, 4) of a placement's inverse."""
+    """Return the inverse of a (4, 4) placement."""
     back = np.eye(4)
     back[:3, :3] = placement[:3, :3].T
     back[:3, 3] = -placement[:3, :3].T @ placement[:3, 3]
@@ -72,7 +72,7 @@ def inverse(placement: FloatArray) -> FloatArray:
 
 
 def dh_fixed_part(d: float, a: float, alpha: float) -> FloatArray:
-    """(4, 4) of `Trans(0, 0, d) Trans(a, 0, 0) Rot(x, alpha)`: a D-H row behind its rotation about z."""
+    """Return the (4, 4) Trans(0, 0, d) Trans(a, 0, 0) Rot(x, alpha): a D-H row after its rotation about z."""
     placement = np.eye(4)
     placement[:3, :3] = rpy_rotation(alpha, 0.0, 0.0)
     placement[:3, 3] = (a, 0.0, d)

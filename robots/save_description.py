@@ -1,7 +1,7 @@
-"""Writing a robot: its robot.toml as people like to read it, and the folder that holds it and its meshes.
+"""Writer of a robot's folder: its robot.toml and mesh files.
 
-A folder is written whole beside the old one and the two change places in one step: whatever is
-killed or full meanwhile, there is the old robot or the new one, never a mixture.
+The new folder is written completely next to the old one, then the two are exchanged in one atomic step.
+If the process is killed or the disk is full, the folder holds the old robot or the new one, never a mixture.
 """
 
 import ctypes
@@ -32,7 +32,7 @@ from robots.schema import ROBOT_NAME
 
 _AT_FDCWD = -100
 _RENAME_EXCHANGE = 2
-# Archives of the same robot are the same bytes.
+# A fixed date, so that archives of the same robot are byte-identical.
 _ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 
 
@@ -42,7 +42,7 @@ class Saved:
 
     Attributes:
         path: Its robot.toml.
-        revision: Of its folder, as `revision_of`.
+        revision: The folder's `revision_of`.
     """
 
     path: Path
@@ -57,18 +57,18 @@ def write_description(
     overwrite: bool = False,
     replaces: str = "",
 ) -> Saved:
-    """Save a robot as `folder/<name>/robot.toml` with its files beside it.
+    """Save a robot as `folder/<name>/robot.toml` with its files in the same folder.
 
     Args:
-        values: What the robot.toml holds, by its own key names; its `name` names the folder.
+        values: The robot.toml's values by key name; its `name` names the folder.
         files: Content, or a file to copy, by path relative to the robot's folder.
-        overwrite: Replace the robot that has this name; its comments in robot.toml stay.
-        replaces: Replace it if that is still its revision.
+        overwrite: Replace an existing robot of this name; the comments of its robot.toml stay.
+        replaces: Replace an existing robot only if it still has this revision.
 
     Raises:
-        RobotExistsError: If there is a robot of that name that is not to be replaced.
-        SaveError: If it cannot be written; what was there is untouched.
-        DescriptionError: If the name or a file's path cannot be used.
+        RobotExistsError: If a robot of that name exists and may not be replaced.
+        SaveError: If the robot cannot be written; an existing folder is unchanged.
+        DescriptionError: If the name or a file's path is invalid.
     """
     target = folder / _checked_name(values.get("name"))
     return write_folder(values, files, target, overwrite=overwrite, replaces=replaces)
@@ -82,18 +82,18 @@ def write_folder(
     overwrite: bool = False,
     replaces: str = "",
 ) -> Saved:
-    """As `write_description`, in a folder of any name."""
+    """Save a robot like `write_description`, in a folder of any name."""
     if target.is_dir():
-        target = target.resolve()  # of a link it is the folder that changes
+        target = target.resolve()  # replace the folder, not a symbolic link to it
     folder = target.parent
     problems = [f"{path!r}: {reason}" for path in files if (reason := refused_path(path))]
     if problems:
         raise DescriptionError(target, problems)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with _alone(folder):
+        with _exclusive_lock(folder):
             for left in folder.glob(f".{glob.escape(target.name)}.*.saving"):
-                _remove(left)  # of a save that was killed
+                _remove(left)  # from a save that was killed
             before = _robot_there(target)
             if before is not None and not overwrite and (not replaces or revision_of(target) != replaces):
                 raise RobotExistsError(target, changed=bool(replaces))
@@ -103,7 +103,7 @@ def write_folder(
                 revision = revision_of(fresh)
                 _put_in_place(fresh, target, exchange=before is not None)
             finally:
-                # What lies there now is the old robot, or what could not be finished.
+                # After the exchange this is the old robot; after an error, the incomplete new one.
                 shutil.rmtree(fresh, ignore_errors=True)
     except OSError as error:
         raise SaveError(target, error.strerror or str(error)) from error
@@ -111,7 +111,7 @@ def write_folder(
 
 
 def revision_of(folder: Path) -> str:
-    """A hash of all that a folder holds, names and content, whoever put it there."""
+    """Return a hash of the names and contents of all files in a folder."""
     rows = []
     for path in sorted(folder.rglob("*")):
         if path.is_symlink():
@@ -126,10 +126,10 @@ def revision_of(folder: Path) -> str:
 
 
 def zip_description(values: Mapping[str, Any], files: Mapping[str, bytes | Path]) -> bytes:
-    """The same folder as a zip archive.
+    """Return a robot's folder as a zip archive.
 
     Raises:
-        DescriptionError: If the name or a file's path cannot be used.
+        DescriptionError: If the name or a file's path is invalid.
         SaveError: If a file cannot be read.
     """
     name = _checked_name(values.get("name"))
@@ -150,14 +150,14 @@ def zip_description(values: Mapping[str, Any], files: Mapping[str, bytes | Path]
 
 
 def refused_path(path: str) -> str | None:
-    """Why a path is not that of a file within a robot's own folder; None: it is."""
+    """Return why a path is not that of a file in a robot's folder; None if it is valid."""
     parts = path.split("/")
     if not path or path.startswith("/") or "\\" in path or not path.isprintable():
-        return "must be a path below the robot's own folder, as meshes/base.wrl"
+        return "must be a path below the robot's folder, like meshes/base.wrl"
     if any(part in ("", ".", "..") for part in parts) or re.match(r"[A-Za-z]:", path):
-        return "must be a path below the robot's own folder, as meshes/base.wrl"
+        return "must be a path below the robot's folder, like meshes/base.wrl"
     if len(path.encode()) > 400 or any(len(part.encode()) > 200 for part in parts):
-        return "is too long for a file's name"
+        return "is too long for a file name"
     return None
 
 
@@ -173,7 +173,7 @@ def _checked_name(name: object) -> str:
 def _content(
     values: Mapping[str, Any], files: Mapping[str, bytes | Path], before: str = ""
 ) -> dict[str, bytes | Path]:
-    """All files of a robot's folder, the robot.toml first; what else has that name does not count."""
+    """Return all files of a robot's folder, the robot.toml first; a given file of that name is ignored."""
     others = {path: each for path, each in files.items() if path != DESCRIPTION_FILE}
     return {DESCRIPTION_FILE: description_text(values, before).encode(), **others}
 
@@ -186,21 +186,21 @@ def _remove(path: Path) -> None:
 
 
 def _robot_there(target: Path) -> str | None:
-    """Text of the robot.toml that is there, None without one.
+    """Return the text of the existing robot.toml; None if the target does not exist.
 
     Raises:
-        SaveError: If there is something else, which is nobody's to replace.
+        SaveError: If the target exists and is not a robot's folder.
     """
     try:
         return (target / DESCRIPTION_FILE).read_text(encoding="utf-8", errors="replace")
     except (FileNotFoundError, NotADirectoryError):
         if target.exists() or target.is_symlink():
-            raise SaveError(target, "is there already and is no robot's folder; take another name") from None
+            raise SaveError(target, "exists and is not a robot's folder; choose another name") from None
         return None
 
 
 def _write_folder(fresh: Path, files: Mapping[str, bytes | Path]) -> None:
-    """Write all of it and wait for the disk."""
+    """Write all files and sync them to the disk."""
     fresh.mkdir()
     folders = {fresh}
     for path, content in files.items():
@@ -224,7 +224,7 @@ def _put_in_place(fresh: Path, target: Path, *, exchange: bool) -> None:
             number = ctypes.get_errno()
             if number in (errno.EINVAL, errno.ENOSYS):
                 raise SaveError(
-                    target, "this file system cannot replace a folder in one step; save under another name"
+                    target, "this file system cannot exchange folders atomically; save under another name"
                 )
             raise OSError(number, os.strerror(number))
     else:
@@ -241,8 +241,8 @@ def _sync(path: Path) -> None:
 
 
 @contextmanager
-def _alone(folder: Path) -> Iterator[None]:
-    """One save at a time in a folder; the lock ends with its process, however that ends."""
+def _exclusive_lock(folder: Path) -> Iterator[None]:
+    """Hold an exclusive lock on a folder; the kernel releases it if the process is killed."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX)
@@ -252,10 +252,11 @@ def _alone(folder: Path) -> Iterator[None]:
 
 
 def read_robot(folder: Path) -> tuple[dict[str, Any], dict[str, Path]]:
-    """What a saved robot's robot.toml holds, and the files beside it by relative path; unchecked.
+    """Return the values of a saved robot.toml, and the robot's other files by relative path; not validated.
 
     Raises:
-        DescriptionError: If the robot.toml cannot be read, or holds what no robot's does: a date, nan, inf.
+        DescriptionError: If the robot.toml cannot be read, or has a value that JSON cannot hold: a date, nan,
+            inf.
     """
     source = folder / DESCRIPTION_FILE
     try:
@@ -264,8 +265,8 @@ def read_robot(folder: Path) -> tuple[dict[str, Any], dict[str, Path]]:
         raise DescriptionError(source, [f"cannot be read: {error.strerror}"]) from error
     except ValueError as error:
         raise DescriptionError(source, [f"is not TOML: {error}"]) from error
-    if strange := list(_strange(values)):
-        raise DescriptionError(source, strange)
+    if problems_found := list(_unrepresentable(values)):
+        raise DescriptionError(source, problems_found)
     files = {
         path.relative_to(folder).as_posix(): path
         for path in sorted(folder.rglob("*"))
@@ -274,15 +275,15 @@ def read_robot(folder: Path) -> tuple[dict[str, Any], dict[str, Path]]:
     return values, {path: file for path, file in files.items() if refused_path(path) is None}
 
 
-def _strange(value: Any, place: str = "") -> Iterator[str]:
-    """Values of TOML that no robot has, and JSON cannot hold."""
+def _unrepresentable(value: Any, place: str = "") -> Iterator[str]:
+    """Yield a problem for each TOML value that JSON cannot hold."""
     if isinstance(value, dict):
         for key, each in value.items():
-            yield from _strange(each, f"{place} {key}".lstrip())
+            yield from _unrepresentable(each, f"{place} {key}".lstrip())
     elif isinstance(value, list):
         for number, each in enumerate(value):
-            yield from _strange(each, f"{place} {number + 1}")
+            yield from _unrepresentable(each, f"{place} {number + 1}")
     elif not isinstance(value, str | int | float) or (isinstance(value, float) and not isfinite(value)):
-        yield f"{place} = {value}: must be a text, a finite number, true or false"
+        yield f"{place} = {value}: must be a string, a finite number, true or false"
     elif isinstance(value, int) and abs(value) > sys.float_info.max:
-        yield f"{place}: is a number of more than 308 digits"
+        yield f"{place}: is a number with more than 308 digits"

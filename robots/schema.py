@@ -1,7 +1,7 @@
-"""What a robot.toml holds: its tables and keys, in the file's own units.
+"""Schema of a robot.toml: its tables and keys, in the file's units.
 
-Degrees and millimetres unless the file says otherwise: what people read off a data sheet.
-`robots.joints`, `robots.model` and `robots.views` turn it into SI.
+The default units are degrees and millimetres, as on data sheets. `robots.joints`, `robots.model` and
+`robots.views` convert to SI.
 
 Source: Chen, Zhang, Xue 2001, section 3.3 (the description file of the model definition program).
 """
@@ -28,7 +28,7 @@ TOOL_FRAME = "tool"
 
 ROBOT_NAME = r"^[a-z0-9][a-z0-9_-]*$"
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
-# Strict: "90" and true are no numbers.
+# Strict: "90" and true are not numbers.
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
 Triple = tuple[Number, Number, Number]
@@ -37,14 +37,14 @@ Color = Annotated[str, StringConstraints(pattern=r"^#[0-9a-fA-F]{6}$")]
 
 
 class JointType(StrEnum):
-    """Which D-H parameter varies: theta (rotary) or d (prismatic)."""
+    """The D-H parameter that varies: theta (rotary) or d (prismatic)."""
 
     ROTARY = "rotary"
     PRISMATIC = "prismatic"
 
 
 class _Table(BaseModel):
-    """A table of the file: frozen, and without a key that nobody reads."""
+    """A table of the file: frozen, without unknown keys."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=False)
 
@@ -63,7 +63,7 @@ class _Table(BaseModel):
 
 
 class Units(_Table):
-    """The file's units of length and angle; speeds are per second of them."""
+    """The file's units of length and angle; speeds are these per second."""
 
     length: Literal["mm", "m"] = "mm"
     angle: Literal["deg", "rad"] = "deg"
@@ -77,14 +77,15 @@ class Pose(_Table):
 
 
 class Body(_Table):
-    """How a link looks: a mesh file beside the description, and its colour.
+    """A link's mesh file and colour.
 
     Attributes:
-        mesh: File, relative to the description's folder; none: the link is not drawn.
+        mesh: File, relative to the description's folder; None: the link is not drawn.
         collision_mesh: File that collision checks use in place of `mesh`.
-        mesh_scale: The unit of both files in metres.
-        mesh_pose: Of both in the link's frame.
-        color: Of the mesh's materials named "paint", or of all where none is; none: the mesh's own.
+        mesh_scale: Metres per unit of both files.
+        mesh_pose: Pose of both meshes in the link's frame.
+        color: Colour of the materials named "paint", or of all materials if none has this name; None keeps
+            the mesh's colours.
     """
 
     mesh: str | None = None
@@ -95,27 +96,26 @@ class Body(_Table):
 
 
 class Base(Body):
-    """The base link, and where the D-H rows begin.
+    """The base link and the frame in which the D-H rows begin.
 
     Attributes:
-        pose: Of the frame in which the first row begins, whose z is the first joint's axis, in the
-            base link's frame.
+        pose: Pose of that frame in the base link's frame; its z is the first joint's axis.
     """
 
     pose: Pose = Pose()
 
 
 class Link(Body):
-    """The link that a joint moves; named as the joint unless it says otherwise."""
+    """The link that a joint moves; by default it has the joint's name."""
 
     name: Name | None = None
 
 
 class Joint(_Table):
-    """A joint, its standard D-H row, and the link that it moves.
+    """A joint, its standard D-H row and the link that it moves.
 
-    `link to previous link = Rot(z, theta) Trans(0, 0, d) Trans(a, 0, 0) Rot(x, alpha)`; the
-    variable adds to theta of a rotary joint and to d of a prismatic one.
+    `link to previous link = Rot(z, theta) Trans(0, 0, d) Trans(a, 0, 0) Rot(x, alpha)`. The joint's position
+    is added to theta of a rotary joint and to d of a prismatic one.
     """
 
     name: Name
@@ -138,7 +138,7 @@ class Joint(_Table):
 
 
 class Frame(Pose):
-    """A named frame on a link: a sensor, a mounting face."""
+    """A named frame on a link, for example of a sensor or a mounting face."""
 
     name: Name
     link: Name
@@ -167,7 +167,7 @@ class Collision(_Table):
 
 
 class JointSettings(_Table):
-    """What a URDF cannot say about one of its joints, and limits tighter than its own."""
+    """Values of a URDF's joint that URDF does not have, and limits tighter than the URDF's."""
 
     name: Name
     limits: Range | None = None
@@ -185,13 +185,13 @@ class LinkColor(_Table):
 
 
 class UrdfTool(Pose):
-    """The tool's frame, on a link of a URDF: the one at its end unless named."""
+    """The tool's frame on a link of a URDF, by default its end link."""
 
     link: Name | None = None
 
 
 class RobotDescription(_Table):
-    """A robot's description file, in the file's own units: what both of its forms hold."""
+    """A robot's description file, in the file's units: the values that both forms have."""
 
     name: Annotated[str, StringConstraints(pattern=ROBOT_NAME)]
     title: str = ""
@@ -209,48 +209,48 @@ class RobotDescription(_Table):
 
     @property
     def source(self) -> Path:
-        """The file that it was read from."""
+        """The file that the description was read from."""
         return self._source
 
     @property
     def text(self) -> str:
-        """The file's text as it stands there."""
+        """The file's text."""
         return self._text
 
     @property
     def within(self) -> Path | None:
-        """The only folder whose files may be read for it; None: any."""
+        """The only folder whose files may be read for the description; None: any folder."""
         return self._within
 
     def folder_around(self, file: Path) -> Path:
-        """The only folder whose files may be read when a file of the description names them.
+        """Return the only folder whose files may be read when a file of the description names them.
 
-        It is the least folder that holds the file and the description, or the description's ROS package.
+        It is the smallest folder that holds both the file and the description, or its ROS package.
         """
         if self._within is not None:
             return self._within
-        home, its = self._source.resolve().parent, file.resolve().parent
+        home, file_folder = self._source.resolve().parent, file.resolve().parent
         package = next((each for each in (home, *home.parents) if (each / "package.xml").is_file()), home)
-        around = Path(os.path.commonpath([package, its]))
-        # A mesh of a package that is installed elsewhere has nothing to do with the description's folder.
-        return its if around == Path(around.anchor) else around
+        around = Path(os.path.commonpath([package, file_folder]))
+        # A mesh of a package installed elsewhere shares only the root folder with the description.
+        return file_folder if around == Path(around.anchor) else around
 
     def confined_to(self, folder: Path) -> Self:
-        """The same description, for which only files below a folder are read."""
-        known = self.model_copy()
-        known._within = folder
-        return known
+        """Return a copy for which only files below a folder are read."""
+        copy = self.model_copy()
+        copy._within = folder
+        return copy
 
     def read_from(self, source: Path, text: str) -> Self:
-        """The same description, knowing its file."""
-        known = self.model_copy()
-        known._source = source
-        known._text = text
-        return known
+        """Return a copy with its source file and text."""
+        copy = self.model_copy()
+        copy._source = source
+        copy._text = text
+        return copy
 
 
 class DhDescription(RobotDescription):
-    """A serial arm by its D-H rows."""
+    """A serial arm, described by D-H rows."""
 
     base: Base = Base()
     joints: tuple[Joint, ...] = Field(alias="joint")
@@ -262,15 +262,15 @@ class DhDescription(RobotDescription):
 
     @property
     def bodies(self) -> dict[str, Body]:
-        """How each link looks, by link name, base first."""
+        """Each link's body by link name, base first."""
         return {BASE_LINK: self.base} | {joint.link_name: joint.link for joint in self.joints}
 
     def mesh_path(self, body: Body) -> Path | None:
-        """Where a body's mesh file is; None without one."""
+        """Return the path of a body's mesh file; None without one."""
         return self._beside(body.mesh)
 
     def collision_path(self, body: Body) -> Path | None:
-        """Where the file is that collision checks use in place of a body's mesh; None without one."""
+        """Return the path of a body's separate collision mesh; None without one."""
         return self._beside(body.collision_mesh)
 
     def _beside(self, name: str | None) -> Path | None:
@@ -278,11 +278,11 @@ class DhDescription(RobotDescription):
 
 
 class UrdfDescription(RobotDescription):
-    """A robot by its URDF, and what a URDF cannot say.
+    """A robot, described by a URDF and the values that URDF does not have.
 
     Attributes:
         urdf: The file, relative to the description's folder.
-        packages: Folders that hold what `package://` names, relative to the description's folder.
+        packages: Folders to search for `package://` addresses, relative to the description's folder.
     """
 
     urdf: str
@@ -294,19 +294,19 @@ class UrdfDescription(RobotDescription):
     _robot: Any = PrivateAttr(None)
 
     def with_robot(self, robot: Any) -> Self:
-        """The same description, knowing what its URDF holds (a `robots.urdf.read.UrdfRobot`)."""
-        known = self.model_copy()
-        known._robot = robot
-        return known
+        """Return a copy with its URDF's content (a `robots.urdf.read.UrdfRobot`)."""
+        copy = self.model_copy()
+        copy._robot = robot
+        return copy
 
     @property
     def robot(self) -> Any:
-        """What its URDF holds: a `robots.urdf.read.UrdfRobot`."""
+        """The URDF's content: a `robots.urdf.read.UrdfRobot`."""
         return self._robot
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """A hint to end a sentence with: the nearest right name, or all of them."""
+    """Return a hint for the end of an error text: the most similar known name, or all of them."""
     names = tuple(names)
     close = difflib.get_close_matches(name, names, n=1)
     return f"; did you mean {close[0]!r}?" if close else f"; there are {', '.join(names)}"

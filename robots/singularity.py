@@ -1,4 +1,4 @@
-"""How far an arm is from a singular position: one in which its tool cannot move, or turn, some way."""
+"""Distance of an arm from a singular position, in which its tool cannot move or turn in some direction."""
 
 from collections.abc import Sequence
 
@@ -12,14 +12,14 @@ from robots.schema import JointType, RobotDescription
 
 
 def reach_of(description: RobotDescription) -> float:
-    """The length of an arm stretched out, from its first joint to its tool [m]; 0: it has none."""
+    """Return the length of the stretched arm, from its first joint to its tool [m]; 0 without a joint."""
     tree = tree_of(description)
     on_link, tool_to_link = tool_frame(description)
     (link,) = (link for link in tree.links if link.name == on_link)
     numbers = chain_to(tree, link.joint)
     if link.joint == BASE:
         return 0.0
-    # The first joint's place on the base is no part of the arm.
+    # The offset of the first joint on the base is not part of the arm.
     steps = [tree.joints[number].joint_to_parent for number in numbers[1:]]
     lengths = [float(np.linalg.norm(step[:3, 3])) for step in (*steps, link.link_to_joint @ tool_to_link)]
     strokes = [
@@ -31,28 +31,29 @@ def reach_of(description: RobotDescription) -> float:
 
 
 def singularity_margin(model: RobotModel, joint_positions: ArrayLike, *, reach: float) -> float:
-    """The smallest singular value of the tool's Jacobian, lengths counted in reaches: 0 where it is singular.
+    """Return the smallest singular value of the tool's Jacobian, with lengths in units of the reach.
 
-    Of six values, or of as many as the arm has joints: an arm of five is not singular for having five.
+    It is 0 in a singular position. There are min(6, n) singular values, so an arm of five joints is not
+    singular everywhere.
 
     Args:
         joint_positions: (n,) [rad] or [m].
-        reach: As `reach_of` gives it [m].
+        reach: From `reach_of` [m].
 
     Raises:
-        JointCountError: If there is not one value a joint.
+        JointCountError: If there is not one value per joint.
     """
     jacobian = tool_jacobian(model, joint_positions)
     return float(singularity_margins(jacobian, model.joints.types, reach=reach))
 
 
 def singularity_margins(jacobians: FloatArray, types: Sequence[JointType], *, reach: float) -> FloatArray:
-    """As `singularity_margin`: (...,) of tools' Jacobians (..., 6, n).
+    """Return the `singularity_margin` of each Jacobian: (...,) for (..., 6, n).
 
     Args:
-        types: Of the joints.
+        types: The joints' types.
     """
-    # Without units: metres, of the tool and of prismatic joints, become reaches.
+    # Dimensionless: divide metres, of the tool and of prismatic joints, by the reach.
     length = reach or 1.0
     rows = np.array([1 / length] * 3 + [1.0] * 3)[:, None]
     columns = np.array([length if kind is JointType.PRISMATIC else 1.0 for kind in types])

@@ -1,4 +1,4 @@
-"""A description for people and programs: what it says and what follows from it, in SI."""
+"""Summaries of descriptions and meshes for users and programs, in SI."""
 
 from collections import Counter
 from pathlib import Path
@@ -17,7 +17,7 @@ from robots.views import reach, views_of
 
 
 def description_summary(description: RobotDescription) -> dict[str, Any]:
-    """Names, limits, links, views and reach; JSON types only, rad and m."""
+    """Return names, limits, links, views and reach; JSON types only, rad and m."""
     joints = joints_of(description)
     return {
         "name": description.name,
@@ -63,11 +63,12 @@ def description_summary(description: RobotDescription) -> dict[str, Any]:
 
 
 def dh_summary(description: RobotDescription) -> dict[str, Any] | None:
-    """D-H rows in m and rad, of a URDF its chain to the tool; None where rows cannot say it.
+    """Return the D-H rows in m and rad; of a URDF, of its chain to the tool.
 
     Returns:
         `rows` with joint, type, a, alpha, d, theta and link; `start`, the pose of the frame in which
-        the first row begins, in the base frame; and `notes` on how they were found.
+        the first row begins, in the base frame; and `notes` on the conversion. None if D-H rows cannot
+        describe the robot.
     """
     notes: tuple[str, ...] = ()
     if isinstance(description, UrdfDescription):
@@ -101,9 +102,9 @@ def _mesh_name(shape: Shape) -> str:
 
 
 def mesh_summary(mesh: Mesh) -> dict[str, Any]:
-    """Triangles, bounds, materials, colours and warnings of a mesh file, in its own units and axes.
+    """Return triangles, bounds, materials, colours and warnings of a mesh file, in its units and axes.
 
-    Colours are sRGB as #rrggbb, or #rrggbbaa where they are not opaque; those by vertex are counted.
+    Colours are sRGB as #rrggbb, or #rrggbbaa if not opaque; vertex colours are counted.
     """
     low, high = bounds(mesh)
     return {
@@ -117,7 +118,7 @@ def mesh_summary(mesh: Mesh) -> dict[str, Any]:
 
 
 def _colors(mesh: Mesh) -> list[str]:
-    """Every colour that the parts have, the one of most triangles first."""
+    """Return every colour of the parts, the one with the most triangles first."""
     triangles: Counter[str] = Counter()
     for part in mesh.parts:
         if part.colors is None:

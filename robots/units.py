@@ -1,4 +1,4 @@
-"""The units of a description file in SI. Nothing heavy is imported."""
+"""Factors from a description file's units to SI. Imports nothing heavy."""
 
 from math import radians
 
@@ -6,15 +6,15 @@ from robots.schema import JointType, Units
 
 
 def length_factor(units: Units) -> float:
-    """Metres in the file's unit of length."""
+    """Return the metres in one length unit of the file."""
     return 0.001 if units.length == "mm" else 1.0
 
 
 def angle_factor(units: Units) -> float:
-    """Radians in the file's unit of angle."""
+    """Return the radians in one angle unit of the file."""
     return radians(1.0) if units.angle == "deg" else 1.0
 
 
 def position_factor(kind: JointType, units: Units) -> float:
-    """Radians or metres in the unit of the position of a joint of that kind."""
+    """Return the radians or metres in one position unit of a joint of this type."""
     return angle_factor(units) if kind is JointType.ROTARY else length_factor(units)

@@ -1,8 +1,8 @@
-"""A robot by URDF as D-H rows: what the page of definitions edits, and `robot import --dh` writes.
+"""Conversion of a URDF robot to D-H rows, for the robot definition page and `robot import --dh`.
 
-The chain from the base to the tool becomes rows; what each joint moves becomes one link, its shapes
-placed anew in the row's frame. The tool, the named frames and every shape stand where they stood, at all
-joint positions. What D-H rows cannot say is told in notes.
+The chain from the base to the tool becomes rows. The links behind each joint become one link, with their
+shapes in the row's frame. The tool, the named frames and all shapes keep their places at all joint positions.
+Notes list everything that D-H rows cannot describe.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from robots.dh_rows import Row, axis_to_z, base_frame, row_placement, rows_as_made, rows_of_axes
+from robots.dh_rows import Row, axis_to_z, base_frame, original_rows, row_placement, rows_of_axes
 from robots.errors import DescriptionError
 from robots.joints import Joints, joints_of
 from robots.kinematic_tree import BASE, Shape, Tree, are_neighbours, chain_to, named_frames, tree_of
@@ -21,10 +21,10 @@ from robots.poses import FloatArray, inverse, rotation_rpy
 from robots.schema import BASE_LINK, TOOL_FRAME, JointType, UrdfDescription
 from robots.urdf.read import moved
 
-# Digits after the point that are kept of degrees and millimetres: 90 stays 90, and nothing moves by 1e-13 m.
+# Decimals of degrees and millimetres: 90 stays 90, and no frame moves by more than 1e-13 m.
 _DIGITS = 12
-# A tool that the rows put elsewhere by more than this is told [m], [rad].
-_TOLD = 1e-9
+# A larger deviation of the rows' tool gets a note [m], [rad].
+_NOTED_DEVIATION = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,10 +32,10 @@ class DhForm:
     """A robot as D-H rows.
 
     Attributes:
-        values: Of its robot.toml, in degrees and millimetres, without meshes.
-        shapes: Of each link by name, "base" first, in the link's frame [m].
-        collision: What is checked in their place, likewise; none where that is the same.
-        notes: What changed on the way, a sentence each.
+        values: The values of its robot.toml, in degrees and millimetres, without meshes.
+        shapes: Each link's shapes by name, "base" first, in the link's frame [m].
+        collision: Each link's separate collision shapes, likewise; empty without any.
+        notes: Changes of the conversion, a sentence each.
     """
 
     values: dict[str, Any]
@@ -46,14 +46,14 @@ class DhForm:
 
 @dataclass(frozen=True, eq=False)
 class _Chain:
-    """The chain to the tool at position zero: everything in the URDF's base frame.
+    """The chain to the tool at position zero, in the URDF's base frame.
 
     Attributes:
         numbers: Joints of the chain.
         joints: (4, 4) every joint's frame.
-        rows: One a joint of the chain.
-        frames: (4, 4) of the frame in which the rows begin, then of each row's end.
-        link_names: Of the rows' links.
+        rows: One per joint of the chain.
+        frames: (4, 4) the frame in which the rows begin, then each row's end.
+        link_names: The rows' links.
     """
 
     tree: Tree
@@ -64,21 +64,21 @@ class _Chain:
     link_names: tuple[str, ...]
 
     def place(self, joint: int) -> int:
-        """Which of the links carries what a joint moves: 0 for the base."""
+        """Return the index of the new link for what a joint moves: 0 for the base."""
         while joint != BASE and joint not in self.numbers:
             joint = self.tree.joints[joint].parent
         return 0 if joint == BASE else self.numbers.index(joint) + 1
 
     def link_to_base(self, place: int) -> FloatArray:
-        """(4, 4) of a link's frame. The base keeps its own, wherever the rows begin."""
+        """Return the (4, 4) of a new link's frame. The base keeps its frame, wherever the rows begin."""
         return np.eye(4) if place == 0 else self.frames[place]
 
 
 def dh_form(description: UrdfDescription) -> DhForm:
-    """The robot's chain to its tool as D-H rows.
+    """Convert the robot's chain to its tool to D-H rows.
 
     Raises:
-        DescriptionError: If a joint of the chain follows another, which rows cannot say.
+        DescriptionError: If the chain has a mimic joint, which D-H rows cannot describe, or no joint.
     """
     tree, joints = tree_of(description), joints_of(description)
     frames = named_frames(description)
@@ -103,7 +103,7 @@ def dh_form(description: UrdfDescription) -> DhForm:
     values |= _whole_robot_values(description, chain, names, places)
     shapes: dict[str, list[Shape]] = {name: [] for name in names}
     checked: dict[str, list[Shape]] = {name: [] for name in names}
-    own: set[str] = set()
+    with_collision: set[str] = set()
     for each in tree.links:
         place, placement = on_row(each.name, np.eye(4))
         for some, found in ((each.shapes, shapes), (each.checked, checked)):
@@ -111,11 +111,11 @@ def dh_form(description: UrdfDescription) -> DhForm:
                 replace(shape, shape_to_link=placement @ shape.shape_to_link) for shape in some
             ]
         if each.collision:
-            own.add(names[place])
+            with_collision.add(names[place])
     return DhForm(
         {key: value for key, value in values.items() if value not in ("", [], {})},
         {name: tuple(found) for name, found in shapes.items()},
-        {name: tuple(found) if name in own else () for name, found in checked.items()},
+        {name: tuple(found) if name in with_collision else () for name, found in checked.items()},
         tuple(_notes(chain, joints, tool_to_last)),
     )
 
@@ -126,10 +126,10 @@ def _frame_values(
     names: Sequence[str],
     on_row: Callable[[str, FloatArray], tuple[int, FloatArray]],
 ) -> Iterator[dict[str, Any]]:
-    """The named frames, and the links without a shape, each on the link of its row."""
+    """Yield the named frames and the links without a shape, each on the link of its row."""
     taken = {*names, TOOL_FRAME}
     bare = {link.name: (link.name, np.eye(4)) for link in tree.links if not link.shapes}
-    # Of our own writer, which needs them where a row's link does not stand on its joint's axis.
+    # robots.urdf.write adds these links where a row's link is not on its joint's axis.
     made_for_rows = {
         link.name
         for link in tree.links
@@ -140,7 +140,7 @@ def _frame_values(
     }
     for name, (link, frame_to_link) in {**bare, **frames}.items():
         place, placement = on_row(link, frame_to_link)
-        # A bare link that stands where its row's does is that row's own: nothing is lost without it.
+        # A link without a shape at its row's link frame adds nothing.
         at_row = np.allclose(placement, np.eye(4), rtol=0, atol=1e-12)
         if name == TOOL_FRAME or name in made_for_rows or (at_row and name in bare):
             continue
@@ -155,23 +155,23 @@ def _chain(description: UrdfDescription, tree: Tree, joints: Joints, tool_link: 
     for number in numbers:
         if tree.joints[number].mimic is not None:
             name = tree.joints[number].name
-            text = f"joint {name!r} follows another on the way to {tool_link!r}: D-H rows cannot say that"
+            text = f"joint {name!r} on the way to {tool_link!r} follows another: not possible in D-H rows"
             raise DescriptionError(description.source, [text])
     homes = dict(zip(joints.names, joints.home.tolist(), strict=True))
     placed: list[FloatArray] = []
     for number, joint in enumerate(tree.joints):
         parent = np.eye(4) if joint.parent == BASE else placed[joint.parent]
-        # What is beside the chain stands at home, for ever.
+        # Joints outside the chain are fixed at home.
         position = 0.0 if number in numbers else _home(tree, number, homes)
         placed.append(parent @ joint.joint_to_parent @ moved(joint.type, joint.axis, position))
     axes = [placed[number] @ axis_to_z(tree.joints[number]) for number in numbers]
     base = base_frame(axes[0])
     if not np.array_equal(base, np.eye(4)):
-        # Of our own writer, for rows that begin elsewhere: its first theta (or d) is in the pose now.
-        made = rows_as_made(tree, numbers, placed[numbers[0]])
+        # From robots.urdf.write, for rows that begin elsewhere: the pose includes the first theta or d.
+        made = original_rows(tree, numbers, placed[numbers[0]])
         base = placed[numbers[0]] if made else base
     else:
-        made = rows_as_made(tree, numbers, base)
+        made = original_rows(tree, numbers, base)
     rows = tuple(row for row, _ in made) if made else rows_of_axes(base, axes)
     frames = [base]
     for row in rows:
@@ -221,11 +221,11 @@ def _joint_values(chain: _Chain, joints: Joints) -> Iterator[dict[str, Any]]:
             "alpha": _deg(row.alpha),
             "d": _mm(row.d),
             "theta": _deg(row.theta),
-            "limits": [_said(joints.lower[index] * factor), _said(joints.upper[index] * factor)],
-            "max_speed": _said(joints.max_speed[index] * factor),
-            "max_acceleration": _said(joints.max_acceleration[index] * factor),
-            "max_jerk": _said(joints.max_jerk[index] * factor),
-            "home": _said(joints.home[index] * factor),
+            "limits": [_rounded(joints.lower[index] * factor), _rounded(joints.upper[index] * factor)],
+            "max_speed": _rounded(joints.max_speed[index] * factor),
+            "max_acceleration": _rounded(joints.max_acceleration[index] * factor),
+            "max_jerk": _rounded(joints.max_jerk[index] * factor),
+            "home": _rounded(joints.home[index] * factor),
             "link": {"name": link},
         }
 
@@ -233,14 +233,14 @@ def _joint_values(chain: _Chain, joints: Joints) -> Iterator[dict[str, Any]]:
 def _whole_robot_values(
     description: UrdfDescription, chain: _Chain, names: Sequence[str], places: Mapping[str, int]
 ) -> dict[str, Any]:
-    """Constraints, views and pairs of links, as far as they still mean something."""
+    """Return the constraints, views and ignored link pairs that are still valid for the rows."""
     on_chain = {chain.tree.joints[number].name for number in chain.numbers}
-    said = description.model_dump(mode="json", by_alias=True)
+    values = description.model_dump(mode="json", by_alias=True)
     if description.units.length != "mm" or description.units.angle != "deg":
-        said["constraint"], said["view"] = [], {}
+        values["constraint"], values["view"] = [], {}
     return {
-        "constraint": [each for each in said["constraint"] if set(each["joints"]) <= on_chain],
-        "view": said["view"],
+        "constraint": [each for each in values["constraint"] if set(each["joints"]) <= on_chain],
+        "view": values["view"],
         "collision": {"ignore": pairs} if (pairs := _ignored(description, chain.tree, names, places)) else {},
     }
 
@@ -248,40 +248,41 @@ def _whole_robot_values(
 def _ignored(
     description: UrdfDescription, tree: Tree, names: Sequence[str], places: Mapping[str, int]
 ) -> list[list[str]]:
-    """Pairs of rows' links that the robot.toml or an SRDF leaves out.
+    """Return the pairs of rows' links that the robot.toml or an SRDF excludes from collision checks.
 
-    A row's link may be made of several: then all pairs of these are left out, or one joint apart.
+    A row's link may be made of several links. A pair of such links is excluded only if every pair of their
+    parts is excluded or at most one joint apart.
     """
     shaped = [link for link in tree.links if link.checked]
-    said = {frozenset(pair) for pair in description.collision.ignore}
-    said |= {frozenset(pair) for pair, _ in description.robot.ignored}
+    excluded = {frozenset(pair) for pair in description.collision.ignore}
+    excluded |= {frozenset(pair) for pair, _ in description.robot.ignored}
     checked: set[tuple[int, int]] = set()
     ignored: set[tuple[int, int]] = set()
     for one, other in combinations(shaped, 2):
         low, high = sorted((places[one.name], places[other.name]))
-        if frozenset((one.name, other.name)) in said:
+        if frozenset((one.name, other.name)) in excluded:
             ignored.add((low, high))
         elif not are_neighbours(tree, one.joint, other.joint):
             checked.add((low, high))
-    # Rows that follow each other are ignored without a word.
+    # Consecutive rows need no entry: neighbours are always ignored.
     return [[names[low], names[high]] for low, high in sorted(ignored - checked) if high - low > 1]
 
 
 def _notes(chain: _Chain, joints: Joints, tool_to_last: FloatArray) -> Iterator[str]:
     if not np.array_equal(chain.frames[0], np.eye(4)):
-        yield "the first joint's axis is not the base's z: [base] pose says where the first row begins"
-    beside = [joint.name for number, joint in enumerate(chain.tree.joints) if number not in chain.numbers]
-    if beside:
-        named = ", ".join(beside[:6]) + (f" and {len(beside) - 6} more" if len(beside) > 6 else "")
-        yield f"not on the way to the tool, so no joints here, and still at home: {named}"
+        yield "the first joint's axis is not the base's z: [base] pose gives the start of the first row"
+    outside = [joint.name for number, joint in enumerate(chain.tree.joints) if number not in chain.numbers]
+    if outside:
+        named = ", ".join(outside[:6]) + (f" and {len(outside) - 6} more" if len(outside) > 6 else "")
+        yield f"not on the way to the tool, so fixed at home: {named}"
     distance, angle = _deviation(chain, joints, tool_to_last)
-    if distance > _TOLD or angle > _TOLD:
-        far = f"{distance * 1000:.2g} mm and {degrees(angle):.2g}°"
-        yield f"axes that are nearly parallel are taken as parallel: the tool is up to {far} elsewhere"
+    if distance > _NOTED_DEVIATION or angle > _NOTED_DEVIATION:
+        moved_by = f"{distance * 1000:.2g} mm and {degrees(angle):.2g}°"
+        yield f"axes that are nearly parallel are taken as parallel: this moves the tool by up to {moved_by}"
 
 
 def _deviation(chain: _Chain, joints: Joints, tool_to_last: FloatArray) -> tuple[float, float]:
-    """How far the rows' tool gets from where the tree has it [m] and [rad], over some positions."""
+    """Return the largest deviation of the rows' tool from the tree's, over random positions [m] and [rad]."""
     tree, random = chain.tree, np.random.default_rng(0)
     last_to_joint = inverse(chain.joints[chain.numbers[-1]]) @ chain.frames[-1]
     distance = angle = 0.0
@@ -294,7 +295,7 @@ def _deviation(chain: _Chain, joints: Joints, tool_to_last: FloatArray) -> tuple
             by_rows = by_rows @ moved(joint.type, np.array([0.0, 0.0, 1.0]), position) @ row_placement(row)
         apart = (by_tree @ last_to_joint - by_rows) @ tool_to_last
         distance = max(distance, float(np.linalg.norm(apart[:3, 3])))
-        # The chord of a small turn is the turn.
+        # For a small rotation, the chord equals the angle.
         angle = max(angle, float(np.linalg.norm(apart[:3, :3])) / np.sqrt(2.0))
     return distance, angle
 
@@ -316,6 +317,6 @@ def _clean(number: float) -> float:
     return round(float(number), _DIGITS) + 0.0  # no minus zero
 
 
-def _said(number: float) -> float:
-    """A limit without what the URDF's own rounding left on it: 360, not 360.000000000024."""
+def _rounded(number: float) -> float:
+    """Round a limit, to remove the URDF's rounding error: 360, not 360.000000000024."""
     return round(float(number), 9) + 0.0

@@ -1,4 +1,4 @@
-"""The cameras of a description, in SI: those that it names, and top, front and left where it does not."""
+"""Cameras of a description, in SI, with default top, front and left views."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from robots.kinematic_tree import chain_to, tool_frame, tree_of
 from robots.schema import JointType, RobotDescription
 from robots.units import length_factor
 
-# A robot whose rows are all still zero reaches nowhere, and is looked at all the same.
+# A robot that is being defined has a reach of zero while all its rows are zero.
 _LEAST_M = 0.25
 
 
@@ -25,9 +25,9 @@ class View:
 
 
 def views_of(description: RobotDescription) -> tuple[View, ...]:
-    """Top, front and left first, then the description's others.
+    """Return the top, front and left views, then the description's other views.
 
-    The front looks back along x at the base; the left looks from positive y; up in the top view is y.
+    The front view looks along -x at the base; the left view looks from positive y; up in the top view is y.
     """
     metres = length_factor(description.units)
     given = {
@@ -44,7 +44,7 @@ def views_of(description: RobotDescription) -> tuple[View, ...]:
 
 
 def default_views(description: RobotDescription) -> dict[str, View]:
-    """Orthographic top, front and left at a distance from which the whole arm's reach is in front."""
+    """Return orthographic top, front and left views, far enough away to have the whole reach in front."""
     size = max(reach(description), _LEAST_M)
     target = np.array([0.0, 0.0, 0.45 * size])
     directions = {
@@ -61,7 +61,7 @@ def default_views(description: RobotDescription) -> dict[str, View]:
 
 
 def reach(description: RobotDescription) -> float:
-    """How far from the base's origin any link's frame, or the tool's, can come [m]: an upper bound."""
+    """Return an upper bound of the distance of any link frame or the tool from the base's origin [m]."""
     tree = tree_of(description)
     joints = joints_of(description)
     strokes = [0.0] * len(tree.joints)

@@ -1,11 +1,11 @@
-"""Robots in VRML: the Humanoid, Joint and Segment PROTOs of OpenHRP (and Choreonoid), after H-Anim.
+"""Reader of robots in VRML: the Humanoid, Joint and Segment PROTOs of OpenHRP and Choreonoid, after H-Anim.
 
     Humanoid    humanoidBody [ Joint ]
     Joint       translation, rotation: its frame in its parent's; jointType, jointAxis, jointId,
                 llimit, ulimit, lvlimit, uvlimit, children [ Joint or Segment ]
-    Segment     children: what the link looks like
+    Segment     children: the link's shapes
 
-In SI, as OpenHRP has it. What stands where all joints are at zero is read by `robots.meshes.vrml.drawing`.
+In SI, as OpenHRP. `robots.meshes.vrml.drawing` reads such a file as a mesh with all joints at zero.
 """
 
 import re
@@ -35,18 +35,18 @@ _TYPES = {
 _CHAIN = ("Humanoid", "Joint", "Segment")
 _AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 _FARTHEST = 1e9  # [m]
-# Where a file gives none: [rad] or [m], and [rad/s] or [m/s].
+# Defaults for a file without limits: [rad] or [m], and [rad/s] or [m/s].
 _REACH = {JointType.ROTARY: 2 * pi, JointType.PRISMATIC: 1.0}
 _SPEED = {JointType.ROTARY: pi / 2, JointType.PRISMATIC: 0.25}
 
 
 @dataclass(frozen=True, eq=False)
 class VrmlRobot:
-    """What a file holds.
+    """The robot in a file.
 
     Attributes:
-        name: Of its Humanoid, as the file has it.
-        notes: What was odd and how it was taken, a sentence each.
+        name: The name of its Humanoid in the file.
+        notes: Oddities and how they were read, a sentence each.
     """
 
     name: str
@@ -55,13 +55,13 @@ class VrmlRobot:
 
 
 def read_vrml_robot(path: Path, *, within: Path | None = None) -> VrmlRobot:
-    """The robot in a VRML file: joints by jointId, and the meshes of its links.
+    """Read the robot in a VRML file: joints in the order of jointId, and the meshes of its links.
 
     Args:
-        within: Only files below this folder are read; others count as missing.
+        within: Read only files below this folder; others count as missing.
 
     Raises:
-        MeshError: If the file cannot be read, holds no joint that moves, or one that cannot be.
+        MeshError: If the file cannot be read, or has no movable joint or an invalid one.
     """
     files = Files(within)
     reading = _Reading(Drawing(files), path if within is None else path.resolve())
@@ -87,12 +87,12 @@ class _Reading:
     known: dict[Node, bool] = field(default_factory=dict)
 
     def node(self, node: Node, joint: int, placement: FloatArray, depth: int) -> None:
-        """Read a node that stands at a (4, 4) placement on a joint."""
+        """Read a node at a (4, 4) placement on a joint."""
         if depth > MAX_DEPTH:
             raise node.error(f"nested deeper than {MAX_DEPTH}")
         if np.abs(placement).max() > _FARTHEST:
-            raise node.error(f"stands more than {_FARTHEST:g} m away")
-        found = _own(node)
+            raise node.error(f"is more than {_FARTHEST:g} m away")
+        found = _expand_protos(node)
         if found is None:
             return
         if found.type == "Humanoid":
@@ -113,11 +113,11 @@ class _Reading:
             self.link(f"{name}_shape", [node], joint, placement)
 
     def holds_joint(self, node: Node, depth: int) -> bool:
-        """Whether a part of the robot's chain stands below a node."""
+        """Return whether a Humanoid, Joint or Segment is below a node."""
         if node not in self.known:
             self.known[node] = depth <= MAX_DEPTH and any(
                 found is not None and (found.type in _CHAIN or self.holds_joint(found, depth + 1))
-                for found in map(_own, nodes_of(node, "children"))
+                for found in map(_expand_protos, nodes_of(node, "children"))
             )
         return self.known[node]
 
@@ -125,7 +125,7 @@ class _Reading:
         kind = (strings(node, "jointType") or [""])[0]
         placed = placement @ transform_matrix(node)
         if np.abs(placed).max() > _FARTHEST or not np.allclose(placed[:3, :3] @ placed[:3, :3].T, np.eye(3)):
-            raise node.error("is scaled or far away; a joint's frame can only be moved and turned")
+            raise node.error("is scaled or far away; a joint's frame can only be moved and rotated")
         if kind in _TYPES:
             limits = self.limits(node, _TYPES[kind])
             if limits is not None:
@@ -135,7 +135,7 @@ class _Reading:
         elif kind == "free" and parent != BASE:
             raise node.error("jointType 'free' on another joint; only a robot's root can be free")
         elif kind not in ("fixed", "free"):
-            node.warn(f"jointType {kind[:40]!r} is none of {', '.join(_TYPES)}, fixed, free; it stands still")
+            node.warn(f"jointType {kind[:40]!r} is not {', '.join(_TYPES)}, fixed or free; taken as fixed")
         count = len(self.links)
         for child in nodes_of(node, "children"):
             self.node(child, parent, placed, depth + 1)
@@ -163,16 +163,16 @@ class _Reading:
         )
 
     def limits(self, node: Node, kind: JointType) -> tuple[float, float] | None:
-        """Lower and upper; none for a joint that they hold still."""
+        """Return the lower and upper limit; None if they are equal, so that the joint cannot move."""
         lower, upper = numbers(node, "llimit", []), numbers(node, "ulimit", [])
         if not len(lower) or not len(upper):
             node.warn(f"no llimit and ulimit; {-_REACH[kind]:.4g} to {_REACH[kind]:.4g} is taken")
             return -_REACH[kind], _REACH[kind]
         low, high = float(lower[0]), float(upper[0])
         if low > high:
-            raise node.error(f"llimit {low:g} is above ulimit {high:g}; they are the other way round")
+            raise node.error(f"llimit {low:g} is above ulimit {high:g}; swap them")
         if low == high:
-            node.warn(f"llimit and ulimit are both {low:g}; the joint stands still at zero")
+            node.warn(f"llimit and ulimit are both {low:g}; the joint is fixed at zero")
             return None
         return low, high
 
@@ -189,7 +189,7 @@ class _Reading:
         self.links.append(TreeLink(self.unique(name), joint, placement, shapes))
 
     def unique(self, name: str) -> str:
-        """A name that may stand in keys and files, and that nobody has."""
+        """Return an unused name that is valid in keys and file names."""
         safe = re.sub(r"[^A-Za-z0-9_.-]", "_", name)
         safe = safe if safe[0].isalnum() else f"n{safe}"
         number, found = 2, safe
@@ -199,7 +199,7 @@ class _Reading:
         return found
 
     def tree(self) -> Tree:
-        """Joints in the order of their jointId, the base's link first."""
+        """Return the tree with the joints in the order of their jointId, the base's link first."""
         order = sorted(range(len(self.joints)), key=lambda joint: (self.ids[joint] < 0, self.ids[joint]))
         rank = {joint: place for place, joint in enumerate(order)} | {BASE: BASE}
         if any(rank[joint.parent] > rank[number] for number, joint in enumerate(self.joints)):
@@ -214,8 +214,8 @@ class _Reading:
         return Tree(tuple(joints), tuple(links))
 
 
-def _own(node: Node) -> Node | None:
-    """The Humanoid, Joint or Segment that a node is, with its PROTO's defaults; or what it stands for."""
+def _expand_protos(node: Node) -> Node | None:
+    """Expand a node's PROTOs, down to a Humanoid, Joint or Segment with its defaults if it is one."""
     step: Node | None = node
     for _ in range(MAX_DEPTH):
         if step is None or step.proto is None:

@@ -91,7 +91,7 @@ def arm_obstacles(arm: Arm, positions: FloatArray) -> Obstacles:
     """The bodies of an arm in their places.
 
     Raises:
-        JointCountError: If there is not one value a joint.
+        JointCountError: If there is not one value per joint.
     """
     placements = arm.base_to_site @ link_placements(arm.model, positions)
     return Obstacles(arm.names, arm.bodies, placements[arm.links], arm.moving)
@@ -112,7 +112,7 @@ def own_contacts(cell: Cell, robot: str, positions: FloatArray) -> tuple[Nearest
         positions: (n,) joint positions [rad] or [m].
 
     Raises:
-        JointCountError: If there is not one value a joint.
+        JointCountError: If there is not one value per joint.
     """
     arm = cell.arms[robot]
     touching = touching_pairs(arm.own, arm.model, positions)
@@ -126,7 +126,7 @@ def own_nearest(cell: Cell, robot: str, positions: FloatArray) -> Nearest | None
         positions: (n,) joint positions [rad] or [m].
 
     Raises:
-        JointCountError: If there is not one value a joint.
+        JointCountError: If there is not one value per joint.
     """
     arm = cell.arms[robot]
     found = nearest_pair(arm.own, arm.model, positions)
@@ -164,7 +164,7 @@ def outside_nearest(
         within_m: Pairs that are farther apart are left out: they cost nothing.
 
     Raises:
-        JointCountError: If there is not one value a joint.
+        JointCountError: If there is not one value per joint.
     """
     at, around, least = _surveyed(cell, robot, positions, others)
     gauge = Gauge()
@@ -181,7 +181,7 @@ def outside_clearance(
     """The nearest pair of `outside_nearest`, sooner than all of them; None: nothing is around.
 
     Raises:
-        JointCountError: If there is not one value a joint.
+        JointCountError: If there is not one value per joint.
     """
     at, around, least = _surveyed(cell, robot, positions, others)
     gauge = Gauge()

@@ -80,7 +80,7 @@ def touching_pairs(own: OwnPairs, model: RobotModel, positions: FloatArray) -> d
     """Numbers of the pairs that touch, and where: (3,) on each, in the base frame [m].
 
     Raises:
-        JointCountError: If there is not one value a joint.
+        JointCountError: If there is not one value per joint.
     """
     everywhere = all_positions(model, positions)
     if not pin.computeCollisions(
@@ -98,7 +98,7 @@ def nearest_pair(own: OwnPairs, model: RobotModel, positions: FloatArray) -> tup
     """Number of the pair that is nearest, its distance [m], and where, as `touching_pairs`; None: no pairs.
 
     Raises:
-        JointCountError: If there is not one value a joint.
+        JointCountError: If there is not one value per joint.
     """
     if not own.pairs:
         return None

@@ -92,7 +92,7 @@ def solve(
 
     Raises:
         PoseError: If the pose is none, or `near` holds a number that is not finite.
-        JointCountError: If `near` does not have one value a joint.
+        JointCountError: If `near` does not have one value per joint.
     """
     chain, closed = solver.chain, solver.closed
     pose = tool_pose(tool_to_base)

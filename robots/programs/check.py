@@ -53,7 +53,7 @@ def check_program(
         solver: Of this arm; built unless given.
 
     Raises:
-        JointCountError: If some positions do not have one value a joint.
+        JointCountError: If some positions do not have one value per joint.
     """
     arm = cell.arms[robot]
     start = as_positions(arm.joints, start)
@@ -89,7 +89,7 @@ def check_plan(
             sooner done.
 
     Raises:
-        JointCountError: If some positions do not have one value a joint.
+        JointCountError: If some positions do not have one value per joint.
     """
     arm = cell.arms[robot]
     start = as_positions(arm.joints, start)

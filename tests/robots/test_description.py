@@ -97,7 +97,7 @@ def test_robots_without_published_dimensions_say_so(name: str) -> None:
         (
             'name = "column"',
             'name = "base"',
-            "name 'base': 2 links or frames have it ('base' is taken already)",
+            "name 'base': 2 links or frames have it ('base' is reserved)",
         ),
         (
             'link = { name = "column" }',
@@ -107,7 +107,7 @@ def test_robots_without_published_dimensions_say_so(name: str) -> None:
         (
             'link = { name = "column" }',
             'link = { name = "column", mesh = "meshes/none.wrl" }',
-            "link 'column' mesh = 'meshes/none.wrl': no such file beside the description",
+            "link 'column' mesh = 'meshes/none.wrl': no such file in the description's folder",
         ),
         ('title = "Small"', 'name2 = "Small"', "name2: unknown key; did you mean 'name'?"),
         ('title = "Small"', 'units = { length = "inch" }', "units length = 'inch': must be 'mm' or 'm'"),
@@ -190,7 +190,9 @@ def test_missing_file_is_told(tmp_path: Path) -> None:
 
 
 def test_urdf_that_is_not_there_is_told() -> None:
-    with pytest.raises(DescriptionError, match=r"urdf = 'arm\.urdf': no such file beside the description"):
+    with pytest.raises(
+        DescriptionError, match=r"urdf = 'arm\.urdf': no such file in the description's folder"
+    ):
         parse('name = "arm"\nurdf = "arm.urdf"', FOLDER)
 
 

@@ -58,9 +58,9 @@ def test_right_values_give_a_description_without_problems() -> None:
         (("tool", "xyz"), [0.0, 0.0, -1e6],
          "tool xyz = [0.0, 0.0, -1000000.0]: more than 100 m; is it in mm?"),
         (("joint", 1, "link"), {"mesh": "m.stl"},
-         "link 'elbow' mesh = 'm.stl': no such file beside the description"),
+         "link 'elbow' mesh = 'm.stl': no such file in the description's folder"),
         (("joint", 1, "lim"), 1.0, "joint 'elbow' lim: unknown key; did you mean 'limits'?"),
-        (("base", "mesh"), "a\0b", "link 'base' mesh = 'a\\x00b': no file has such a name"),
+        (("base", "mesh"), "a\0b", "link 'base' mesh = 'a\\x00b': not a valid file name"),
     ],
 )  # fmt: skip
 def test_problem_has_the_path_of_its_value(path: tuple[str | int, ...], value: object, text: str) -> None:
@@ -93,7 +93,7 @@ def test_values_that_somebody_sent_reach_no_file_outside_the_folder(tmp_path: Pa
         (problem,) = problems(values, inside, confined=True)
         # A long path is cut in the middle of its sentence.
         assert problem.text.startswith(f"link 'base' mesh = {mesh!r}"[:60])
-        assert problem.text.endswith(": must lie in the description's own folder")
+        assert problem.text.endswith(": must be in the description's folder")
     assert problems(changed(("base", "mesh"), "in.stl"), inside, confined=True) == []
     # Who has the files on his own disk may lay them where he likes.
     assert problems(changed(("base", "mesh"), "../out.stl"), inside) == []
@@ -152,8 +152,9 @@ def test_home_that_nobody_gives_is_zero_or_the_middle_where_zero_is_not_allowed(
          "collision ignore = ['l0', 'l9']"),
         ("constraint", [{"joints": {"j1": 1.0, "j2": 1.0}, "limits": [-1, 1]}], ("constraint", 0, "joints"),
          "constraint on j1 and j2: adds degrees to millimetres"),
-        ("urdf", "none.urdf", ("urdf",), "urdf = 'none.urdf': no such file beside the description"),
-        ("packages", ["none"], ("packages", 0), "packages 'none': no such folder beside the description"),
+        ("urdf", "none.urdf", ("urdf",), "urdf = 'none.urdf': no such file in the description's folder"),
+        ("packages", ["none"], ("packages", 0),
+         "packages 'none': no such folder in the description's folder"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_the_urdf_is_told(

@@ -129,7 +129,7 @@ def test_base_frame_stays_where_the_first_axis_is_not_its_z(text: str, tmp_path:
     after = rebuilt(form, tmp_path)
     assert after.base.pose != Pose()
     assert form.notes == (
-        "the first joint's axis is not the base's z: [base] pose says where the first row begins",
+        "the first joint's axis is not the base's z: [base] pose gives the start of the first row",
     )
     # By Pinocchio's own reader of URDF, not by ours.
     model = pin.buildModelFromXML(text)
@@ -213,7 +213,9 @@ def test_nearly_parallel_axes_count_as_parallel_and_the_note_says_by_how_much(tm
     assert form.values["joint"][0]["a"] == pytest.approx(1000)
     # A metre beyond an axis that leans by 1e-5: at most 0.01 mm and a little.
     (note,) = form.notes
-    assert note.startswith("axes that are nearly parallel are taken as parallel: the tool is up to ")
+    assert note.startswith(
+        "axes that are nearly parallel are taken as parallel: this moves the tool by up to "
+    )
     assert 0.0 < float(note.split("up to ")[1].split(" mm")[0]) < 0.02
 
 
@@ -251,7 +253,7 @@ def test_joints_beside_the_chain_stand_at_home_and_their_shapes_ride_on_it(tmp_p
     text = CHAINS["parallel"].replace("</robot>", side)
     form = dh_form(described(tmp_path, text, '[[joint]]\nname = "flap"\nhome = 500\n'))
     assert [row["name"] for row in form.values["joint"]] == ["j1", "j2"]
-    assert form.notes == ("not on the way to the tool, so no joints here, and still at home: flap",)
+    assert form.notes == ("not on the way to the tool, so fixed at home: flap",)
     # Row 1 lies with its x along (0.3, 0.1), its origin on joint 2's axis.
     wing = form.shapes["l1"][-1].shape_to_link
     turn = np.arctan2(0.1, 0.3)
@@ -266,5 +268,5 @@ def test_chain_with_a_joint_that_follows_is_refused(tmp_path: Path) -> None:
         '<joint name="j2" type="revolute">', '<joint name="j2" type="revolute"><mimic joint="j1"/>'
     )
     description = described(tmp_path, text, '[tool]\nlink = "tool0"\n')
-    with pytest.raises(DescriptionError, match="joint 'j2' follows another on the way to 'tool0'"):
+    with pytest.raises(DescriptionError, match="joint 'j2' on the way to 'tool0' follows another"):
         dh_form(description)

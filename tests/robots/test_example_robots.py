@@ -33,7 +33,7 @@ REFUSED = {
 def test_without_the_package_a_robot_of_it_is_told_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robots.example_robots.example_folder", lambda: None)
     with pytest.raises(
-        DescriptionError, match=r"ur5: .* not installed .*: \./dev example-robots brings them"
+        DescriptionError, match=r"ur5: .* not installed .* Run \./dev example-robots or pip install"
     ):
         load("ur5")
     assert known_names() == library_names()

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from robots.importing import imported
+from robots.importing import import_robot
 
 ROBOT = """
 name = "one"
@@ -43,7 +43,7 @@ def test_files_that_a_mesh_names_are_copied_beside_it(tmp_path: Path) -> None:
         "arm/wood.png": "a picture",
     }
     write(tmp_path, files | {"robot.toml": ROBOT.format(base="meshes/base.wrl", link="arm/a.obj")})
-    robot = imported(str(tmp_path / "robot.toml"))
+    robot = import_robot(str(tmp_path / "robot.toml"))
     assert robot.files == {name: content.encode() for name, content in files.items()}
     assert robot.notes == ()
 
@@ -59,12 +59,12 @@ def test_files_that_cannot_come_along_are_told(tmp_path: Path) -> None:
             "robot/robot.toml": ROBOT.format(base="../out/base.wrl", link="a.wrl"),
         },
     )
-    robot = imported(str(tmp_path / "robot" / "robot.toml"))
+    robot = import_robot(str(tmp_path / "robot" / "robot.toml"))
     # A mesh outside of the folder moves into it, and what is beside it with it.
     assert sorted(robot.files) == ["a.wrl", "meshes/base.wrl", "meshes/part.wrl"]
     assert robot.values["base"]["mesh"] == "meshes/base.wrl"
     assert robot.notes == (
-        "meshes/base.wrl names 'none.wrl', which is not there",
+        "meshes/base.wrl names 'none.wrl', which does not exist",
         "a.wrl names '../out/part.wrl', which is outside of the robot's folder; it is not copied",
     )
 
@@ -81,5 +81,5 @@ def test_two_files_of_one_name_are_told(tmp_path: Path) -> None:
             "robot/robot.toml": ROBOT.format(base="../one/base.wrl", link="../two/arm.wrl"),
         },
     )
-    (note,) = imported(str(tmp_path / "robot" / "robot.toml")).notes
-    assert note == "meshes/arm.wrl names 'part.wrl', as another mesh names another file; one is copied"
+    (note,) = import_robot(str(tmp_path / "robot" / "robot.toml")).notes
+    assert note == "meshes/arm.wrl names 'part.wrl', and so does another mesh for another file; one is copied"

@@ -18,7 +18,7 @@ from robots.collision.link_pairs import plan_of
 from robots.collision.surfaces import turns_around
 from robots.collision.verdicts import Kind
 from robots.description import load
-from robots.importing import imported
+from robots.importing import import_robot
 from robots.meshes.solids import ball
 from robots.save_description import write_folder
 from services.command_line.main import run
@@ -382,7 +382,7 @@ def test_an_imported_robot_keeps_the_pairs_that_its_srdf_leaves_out(tmp_path: Pa
     model = hollow(tmp_path, base=solid(0.05, "0.02 0.4 0.4"))
     disabled = '<disable_collisions link1="hand" link2="base" reason="User"/>'
     (tmp_path / "hollow.srdf").write_text(f'<robot name="hollow">{disabled}</robot>')
-    robot = imported(str(model), as_dh=as_dh)
+    robot = import_robot(str(model), as_dh=as_dh)
     saved = write_folder(robot.values, robot.files, tmp_path / "imported").path
     assert ("base", "hand") in dict(cell_of(saved).arms["arm"].plan.ignored)
 
@@ -399,7 +399,7 @@ def test_a_rows_link_of_several_is_ignored_where_all_of_them_are(
     model.write_text(model.read_text().replace("</robot>", cap))
     disabled = '<disable_collisions link1="hand" link2="base" reason="User"/>'
     (tmp_path / "hollow.srdf").write_text(f'<robot name="hollow">{disabled}{others}</robot>')
-    values = imported(str(model), as_dh=True).values
+    values = import_robot(str(model), as_dh=True).values
     assert values.get("collision", {}).get("ignore", []) == ([["base", "hand"]] if ignored else [])
 
 

@@ -196,7 +196,7 @@ def test_a_file_called_robot_toml_is_neither_saved_nor_zipped_in_place_of_the_dr
 def test_what_is_no_robot_is_not_replaced(tmp_path):
     (tmp_path / "arm").mkdir()
     (tmp_path / "arm" / "thesis.txt").write_text("years of work")
-    with pytest.raises(SaveError, match="is no robot's folder"):
+    with pytest.raises(SaveError, match="is not a robot's folder"):
         save(tmp_path, 1, overwrite=True)
     assert (tmp_path / "arm" / "thesis.txt").read_text() == "years of work"
 
@@ -367,7 +367,7 @@ def test_a_confined_description_names_no_file_of_another_folder(tmp_path):
     (tmp_path / "arm" / "robot.toml").write_text(text)
     with pytest.raises(DescriptionError) as error:
         load(tmp_path / "arm", confined=True)
-    assert any("must lie in the description's own folder" in text for text in error.value.problems)
+    assert any("must be in the description's folder" in text for text in error.value.problems)
 
 
 @pytest.mark.parametrize(

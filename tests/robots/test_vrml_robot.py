@@ -168,7 +168,7 @@ def test_missing_mesh_of_a_link_is_a_note(tmp_path: Path) -> None:
         (joint("A", 'jointType "rotate" jointAxis 0 0 0'), "jointAxis is 0 0 0; it takes a direction"),
         (joint("A", 'jointType "rotate" jointAxis "W"'), "jointAxis 'W'; it takes X, Y, Z or three numbers"),
         (joint("A", 'jointType "rotate" jointAxis 0 1'), "jointAxis has 2 numbers; it takes 3"),
-        (joint("A", 'jointType "rotate" scale 2 2 2'), "a joint's frame can only be moved and turned"),
+        (joint("A", 'jointType "rotate" scale 2 2 2'), "a joint's frame can only be moved and rotated"),
         (
             joint("A", TURNS, joint("B", 'jointType "free"')),
             "jointType 'free' on another joint; only a robot's root can be free",

@@ -110,7 +110,7 @@ def test_import_leaves_what_is_there_alone(
     out.mkdir()
     (out / "thesis.txt").write_text("mine")
     assert run(["robot", "import", str(arm), str(out)]) == 2
-    assert "is there already" in capsys.readouterr().err
+    assert "exists and is not a robot's folder" in capsys.readouterr().err
     assert [path.name for path in out.iterdir()] == ["thesis.txt"]
 
 
@@ -157,7 +157,7 @@ def test_check_opens_every_mesh_and_tells_file_and_problem(
     assert "none.stl: " in capsys.readouterr().out
     (tmp_path / "packages" / "two" / "none.stl").write_bytes(STL.replace(b"vertex 1", b"vertex 500"))
     assert run(["robot", "check", str(robot)]) == 0
-    assert "link 'hand': is 500 m large at 1 m a unit; is mesh_scale right?" in capsys.readouterr().out
+    assert "link 'hand': is 500 m large at 1 m per unit; check mesh_scale" in capsys.readouterr().out
 
 
 def test_check_tells_the_path_of_a_wrong_value(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

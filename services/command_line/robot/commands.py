@@ -163,10 +163,10 @@ def export(robot: str, folder: Path) -> None:
 
 def import_(source: str, folder: Path, packages: list[Path], as_dh: bool) -> None:
     """Write a robot from elsewhere as robot.toml and meshes: the whole folder, or nothing."""
-    from robots.importing import imported
+    from robots.importing import import_robot
     from robots.save_description import write_folder
 
-    robot = imported(source, packages=packages, as_dh=as_dh)
+    robot = import_robot(source, packages=packages, as_dh=as_dh)
     for note in robot.notes:
         print(f"note: {note}", file=sys.stderr)
     for name in robot.missing:

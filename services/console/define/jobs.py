@@ -16,7 +16,7 @@ from robots.description import DESCRIPTION_FILE, Problem, RobotDescription, from
 from robots.description_checks import named_files
 from robots.description_text import as_saved
 from robots.errors import DescriptionError, MeshError
-from robots.importing import as_rows
+from robots.importing import import_as_dh
 from robots.joints import joints_of
 from robots.mesh_inspection import mesh_findings
 from robots.meshes.mesh import Mesh
@@ -153,7 +153,7 @@ def import_robot(store: Store, folder: Path, request: Json) -> Json:
     description = _description(folder, values)
     if not isinstance(description, UrdfDescription):
         raise RefusedRequest(422, f"{file} is no robot's URDF")
-    found = as_rows(description)
+    found = import_as_dh(description)
     return {
         "description": found.values,
         "files": {path: put(store, content) for path, content in found.files.items()},
