@@ -1,1 +1,1 @@
-"""What everything on the mesh shares: topics, keys, messages, sessions, requests, presence, services."""
+"""The library that all programs of the mesh share: topics, keys, messages, sessions, requests, services."""

@@ -1,10 +1,11 @@
-"""Who may do what on the mesh: the table of topics as rules that a router keeps.
+"""Access control: the rights in the topic table as rules that a router enforces.
 
-A right is judged where a session attaches, by the common name of its certificate: what comes in is
-refused unless a rule allows it. The same rules tell a client in words what it may not do.
+The router to which a session connects checks each incoming message against the rules for the common name
+of the session's certificate, and rejects it unless a rule allows it. A client uses the same rules to
+explain a refusal in words, because a router rejects silently.
 
-The rules name what Zenoh itself needs too: keys with `@adv` are the caches and heartbeats of recovered
-topics, and the key that nobody has is asked to wait for a router (`endpoints.settle`).
+Some rules are for Zenoh itself: keys with `@adv` are the caches and heartbeats of recovered topics, and
+`endpoints.settle` queries a key without an owner to wait for a router.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -33,9 +34,9 @@ Act = Literal[
 ACTS: tuple[Act, ...] = get_args(Act)
 Border = Literal["open", "slow"]
 
-# Every gateway may speak for a robot of this name, and a player for its replay: there is none, so that
-# rights can be tried on a live mesh.
-NOBODYS_ROBOT = "matrix-probe"
+# A robot that does not exist, so that rights can be tested on a live mesh. Every gateway may publish for
+# it, and every player for its replay.
+PROBE_ROBOT = "matrix-probe"
 _ROS_DOMAINS = 233
 _REPLAYS = ("replay-$*",)
 _PUBLISH: tuple[Act, ...] = ("put", "declare_queryable", "reply")
@@ -52,12 +53,12 @@ _LARGEST = (("put", _LARGEST_PUT), ("query", _LARGEST_QUERY), ("reply", _LARGEST
 
 @dataclass(frozen=True, kw_only=True)
 class Principal:
-    """Somebody with a certificate.
+    """The owner of a certificate.
 
     Attributes:
-        name: Its common name, <name>.<site>.
-        robots: A gateway's; None: its own file does not say, and the routers' rules do.
-        sites: Another site's router: the sites that it speaks for; `*`: any but our own (a hub).
+        name: The certificate's common name, <name>.<site>.
+        robots: The robots of a gateway; None: only the routers' rules name them.
+        sites: For another site's router: the sites that it represents; `*`: all sites but ours (a hub).
     """
 
     name: str
@@ -67,13 +68,17 @@ class Principal:
 
     @property
     def site(self) -> str:
-        """The site that it belongs to."""
+        """Site of the principal."""
         return self.name.rpartition(".")[2]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Rule:
-    """Acts on keys that are allowed, or forbidden whatever else allows them."""
+    """Acts allowed on keys, or forbidden on them even if another rule allows them.
+
+    Attributes:
+        outwards: The rule applies to messages from the router to the principal.
+    """
 
     acts: tuple[Act, ...]
     keys: tuple[str, ...]
@@ -82,24 +87,24 @@ class Rule:
 
 
 def principal_of(identity: Identity) -> Principal:
-    """Who an own certificate is, as far as its file says."""
+    """Return the principal that a certificate's file describes."""
     return Principal(name=identity.name, role=identity.role, robots=identity.robots)
 
 
 @lru_cache(1024)
 def rights(principal: Principal, site: str, border: Border = "open") -> tuple[Rule, ...]:
-    """What a site's router lets somebody do."""
+    """Return the rules of a site's router for a principal."""
     if principal.role is Role.ROUTER and principal.site == site:
-        # Another router of this site brings whatever it has let in.
+        # Another router of this site has already checked what it forwards.
         return (_everything(outwards=False), _everything(outwards=True))
     if principal.sites:
-        return tuple(_guest(principal, site, border))
+        return tuple(_linked_site(principal, site, border))
     return (*_own(principal, site), _everything(outwards=True))
 
 
 @lru_cache(4096)
 def may(principal: Principal, site: str, act: Act, key: str) -> bool:
-    """Whether a router lets somebody do something on a key, or on all that a wildcard means."""
+    """Return whether a router allows an act on a key, or on every key that a wildcard matches."""
     asked = zenoh.KeyExpr(key)
     of_act = [rule for rule in rights(principal, site) if act in rule.acts and not rule.outwards]
     hits = [rule.allow for rule in of_act if any(zenoh.KeyExpr(each).includes(asked) for each in rule.keys)]
@@ -107,9 +112,9 @@ def may(principal: Principal, site: str, act: Act, key: str) -> bool:
 
 
 def access_sections(site: str, principals: Iterable[Principal], border: Border = "open") -> dict[str, Any]:
-    """The sections of a router's configuration that keep the rules, for ours and for zenohd.
+    """Return the sections of a router's configuration with the rules, for our router and for zenohd.
 
-    A name that stands in none of them may do nothing.
+    A name without rules has no rights.
     """
     rules: dict[Rule, str] = {}
     subjects, policies = [], []
@@ -137,7 +142,7 @@ def access_sections(site: str, principals: Iterable[Principal], border: Border =
             "subjects": subjects,
             "policies": policies,
         },
-        # Nobody's message fills a router's memory.
+        # A large message must not fill a router's memory.
         "low_pass_filter": [
             {
                 "flows": ["ingress"],
@@ -151,13 +156,13 @@ def access_sections(site: str, principals: Iterable[Principal], border: Border =
 
 
 def _common_names(principal: Principal) -> list[str]:
-    """Another site may have several routers, which it names router, router-2, router-3."""
+    """Return the names to match: another site may have the routers router, router-2 and router-3."""
     if not principal.sites:
         return [principal.name]
     return [principal.name, *(f"{Role.ROUTER.value}-{n}.{principal.site}" for n in (2, 3))]
 
 
-# ------------------------------------------------------------------- our own
+# ----------------------------------------------------------------- this site
 
 
 def _own(principal: Principal, site: str) -> Iterator[Rule]:
@@ -186,50 +191,53 @@ def _own(principal: Principal, site: str) -> Iterator[Rule]:
 
 
 def _ros() -> Iterator[Rule]:
-    """What ROS 2 nodes with rmw_zenoh say to each other, in every domain; no key of the mesh's own."""
+    """Allow the traffic between ROS 2 nodes with rmw_zenoh, in every domain; it uses no key of the mesh."""
     domains = tuple(f"{domain}/**" for domain in range(_ROS_DOMAINS))
     yield Rule(acts=ACTS, keys=(*domains, *(f"{each}/@adv/**" for each in domains), "@ros2_lv/**"))
 
 
 def _robots_of(principal: Principal) -> tuple[str, ...]:
-    """Whose keys a service may have, as chunks.
+    """Return the robots below whose keys a service may publish, as chunks.
 
-    A gateway's are exact names, never a wildcard less some: what forbids one name does not hold for a
-    wildcard that means that name too.
+    A gateway gets exact names. A wildcard with exceptions would not do: a rule that forbids one name does
+    not apply to a wildcard that matches the name.
     """
     if principal.role is Role.PLAYER:
         return (*_REPLAYS, keys.WHOLE_SITE)
     if principal.role is Role.GATEWAY and principal.robots is not None:
-        return (*sorted(principal.robots), NOBODYS_ROBOT, keys.WHOLE_SITE)
+        return (*sorted(principal.robots), PROBE_ROBOT, keys.WHOLE_SITE)
     return ("*",)
 
 
 def _published_as(row: Topic, role: Role) -> str:
-    """A topic's name as a role may publish it: what is a key for each service has the service's name."""
+    """Return a topic's name as a role may publish it; topics with a key for each service name the service."""
     if role is Role.PLAYER and row.name.startswith("events/"):
-        return row.name  # it plays what all of them said
+        return row.name  # a player replays the events of every service
     return row.name.replace("events/*", f"events/{role.value}").replace("health/*", f"health/{role.value}.$*")
 
 
 def _names_of(principal: Principal, site: str) -> str:
-    """In whose names somebody may ask, as a chunk: a console answers for those who signed in."""
+    """Return the names that a principal may use in requests, as a chunk; a console uses its site's."""
     return f"$*.{site}" if principal.role is Role.CONSOLE else principal.name
 
 
 def _heard(role: Role) -> tuple[str, ...]:
-    """Row by row: who might listen to `robomesh/**` could make everybody send everything."""
+    """Return the topics that a role may subscribe to, row by row.
+
+    A subscriber of `robomesh/**` would make every publisher send everything.
+    """
     return tuple(f"{keys.ROOT}/*/*/{row.name}" for row in TOPICS.values() if role in row.subscribers)
 
 
 def _asked(role: Role, names: str) -> Iterator[str]:
-    """What a role may get or ask, everywhere."""
+    """Return the keys that a role may query, at every site."""
     yield f"{keys.ROOT}/-/-/-"
     for row in TOPICS.values():
         if role in row.subscribers:
             yield f"{keys.ROOT}/*/*/{row.name}"
     for request in REQUESTS.values():
         if role in request.askers:
-            # Never `**`: it would hold whatever somebody calls an operator.
+            # Never `**`: it would match any operator's name.
             yield f"{keys.ROOT}/*/*/{_asked_as(request, names)}"
 
 
@@ -238,11 +246,11 @@ def _asked_as(row: Request, names: str) -> str:
 
 
 def _held(role: Role, names: str) -> Iterator[str]:
-    """Tokens of sessions: an operator's at the robot, for its lease; anybody's at a site, for a replay.
+    """Return the session tokens that a role may declare: at a robot for a lease, at a site for a replay.
 
     Args:
-        names: In whose names, as a chunk: a token's id is <name>.<id>, and its owner alone may declare it.
-            Held up by another, a lease would outlive its holder's session.
+        names: The names that the tokens may carry, as a chunk. A token's id is <name>.<id>, and only its
+            owner may declare it: another program's token would keep a lease after its holder's session.
     """
     owned = names if names == "*" else f"{names}.$*"
     yield f"{keys.ROOT}/*/{keys.WHOLE_SITE}/alive/operator/{owned}"
@@ -258,13 +266,13 @@ def _everything(*, outwards: bool) -> Rule:
 # --------------------------------------------------------------- other sites
 
 
-def _guest(principal: Principal, site: str, border: Border) -> Iterator[Rule]:
-    """What another site's router may bring in, and what is let out to it."""
+def _linked_site(principal: Principal, site: str, border: Border) -> Iterator[Rule]:
+    """Return the rules for another site's router: what it may send to us, and what we send to it."""
     hub = "*" in principal.sites
     theirs = tuple(f"{keys.ROOT}/{each}" for each in (("*",) if hub else principal.sites))
     brought = tuple(f"{each}/*/**{more}" for each in theirs for more in ("", "/@adv/**"))
     yield Rule(acts=(*_PUBLISH, "liveliness_token"), keys=brought)
-    # Its people may ask and command here, in their own names, as our own roles may.
+    # Its users may send requests and commands here, in their own names, like our users.
     names = ("*",) if hub else tuple(f"$*.{each}" for each in principal.sites)
     asked = dict.fromkeys(key for name in names for key in _asked(Role.CONSOLE, name))
     yield Rule(acts=("query",), keys=tuple(asked))
@@ -275,7 +283,7 @@ def _guest(principal: Principal, site: str, border: Border) -> Iterator[Rule]:
     yield Rule(acts=_LISTEN, keys=(f"{keys.ROOT}/**",) if border == "open" else tuple(_let_out(site)))
     ours = f"{keys.ROOT}/{site}"
     if hub:
-        # It speaks for everybody else, never for us; and what is asked of us is not asked of it.
+        # A hub represents all other sites, never ours; our site's requests do not go to it.
         yield Rule(acts=_PUBLISH, keys=(f"{ours}/**", f"{ours}/**/@adv/**"), allow=False)
         present = tuple(f"{ours}/*/alive/{role.value}/*" for role in Role if role in SERVICES)
         own_people = f"{keys.ROOT}/*/*/alive/operator/$*.{site}.$*"
@@ -300,7 +308,7 @@ def _in_names() -> tuple[Request, ...]:
 
 
 def _let_out(site: str) -> Iterator[str]:
-    """What a slow border lets through: what has no rate of its own, thinned joints, the far view."""
+    """Return what a slow border sends: topics without a rate, `joints/slow`, and the view `far`."""
     for row in TOPICS.values():
         if row.rate_hz is None or row.name == "joints/slow":
             yield f"{keys.ROOT}/*/*/{row.name}"
@@ -315,7 +323,7 @@ def _let_out(site: str) -> Iterator[str]:
 
 
 def refusal(principal: Principal, act: Act, key: str) -> str:
-    """Why somebody may not do something on a key of the table, for people."""
+    """Return why a principal may not do an act on a key, as a sentence for people."""
     who = f"{principal.name} is {_a(principal.role)}"
     try:
         site, robot, name = keys.parse_expression(key)
@@ -329,7 +337,7 @@ def refusal(principal: Principal, act: Act, key: str) -> str:
         return f"{who}: it may not {verb} {name}; {_listed(roles)} may"
     if isinstance(row, Request) and row.in_name and act == "query":
         own = _asked_as(row, _names_of(principal, principal.site).replace("$*", "NAME"))
-        return f"{who}: it may not {verb} {name}, which is another's name; {own} would be its own"
+        return f"{who}: it may not {verb} {name}, which carries another name; it may {verb} {own}"
     if site != principal.site:
         return f"{who}: it may not {verb} {name} at site {site}, which is another site"
     own = ", ".join(sorted(principal.robots or ()))

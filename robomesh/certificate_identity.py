@@ -1,14 +1,14 @@
-"""Who a certificate speaks for: the lines that stand above it in its file.
+"""Identity lines at the head of a certificate's file.
 
-A certificate of the mesh comes as one file, a bundle: these lines, its private key, the certificate and
-the authority's. The lines say for people, and for refusals in words, what the certificate itself says;
-a router believes the certificate only.
+A certificate of the mesh comes as one file, a bundle: these lines, the private key, the certificate and
+the authority's certificate. The lines repeat the certificate's contents for people and for error texts;
+a router trusts only the certificate.
 
     Name: li.shanghai
     Role: operator
     Expires: 2026-12-21T08:00:00Z
-    Robots: pt600-1, pt600-2            a gateway's, and only those; without the line only the routers know
-    Routers: tls/10.0.0.1:7447          where the site's routers are
+    Robots: pt600-1, pt600-2            of a gateway; without this line only the routers know them
+    Routers: tls/10.0.0.1:7447          addresses of the site's routers
 """
 
 from dataclasses import dataclass
@@ -24,13 +24,13 @@ _MOST_BYTES = 1 << 18
 
 @dataclass(frozen=True, kw_only=True)
 class Identity:
-    """Who a certificate speaks for.
+    """The owner of a certificate, as the lines in its file describe it.
 
     Attributes:
         name: The certificate's common name, <name>.<site>.
-        expires: In UTC; None: the file does not say.
-        robots: Those that a gateway speaks for; None: the file does not say.
-        routers: Where the site's routers are.
+        expires: In UTC; None: not in the file.
+        robots: The robots of a gateway; None: not in the file.
+        routers: Addresses of the site's routers.
     """
 
     name: str
@@ -41,12 +41,12 @@ class Identity:
 
     @property
     def site(self) -> str:
-        """The site whose authority issued it."""
+        """Site of the authority that issued the certificate."""
         return self.name.rpartition(".")[2]
 
 
 def header(identity: Identity) -> str:
-    """The lines for the head of a bundle."""
+    """Return the lines for the head of a bundle."""
     lines = [f"Name: {identity.name}", f"Role: {identity.role.value}"]
     if identity.expires is not None:
         lines.append(f"Expires: {identity.expires.astimezone(UTC):%Y-%m-%dT%H:%M:%SZ}")
@@ -58,10 +58,10 @@ def header(identity: Identity) -> str:
 
 
 def read_identity(path: Path) -> Identity | None:
-    """Who a file's certificate speaks for; None: it has no such lines, as certificates made elsewhere.
+    """Return the identity in a certificate's file; None: a file without these lines, from other tools.
 
     Raises:
-        SessionError: If it cannot be read.
+        SessionError: If the file cannot be read, or holds no certificate and no key.
     """
     try:
         with path.open("rb") as file:
@@ -69,9 +69,7 @@ def read_identity(path: Path) -> Identity | None:
     except OSError as error:
         raise SessionError(f"{path}: cannot be read: {error.strerror}") from None
     if _BEGIN not in text:
-        raise SessionError(
-            f"{path} holds no certificate and no key: a bundle that robomesh keys wrote is right"
-        )
+        raise SessionError(f"{path} holds no certificate and no key: name a bundle that robomesh keys wrote")
     lines = dict(line.partition(": ")[::2] for line in text.split(_BEGIN, 1)[0].splitlines())
     try:
         return Identity(

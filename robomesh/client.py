@@ -1,4 +1,4 @@
-"""Asking: a question to a request's owner with a time-out, its answer or why it was refused."""
+"""Client side of requests: send a request to its owner, wait with a timeout, return its answer."""
 
 import asyncio
 import math
@@ -44,16 +44,16 @@ async def ask_all(
     timeout_s: float,
     silent_s: float | None = None,
 ) -> list[tuple[str, bytes | None, RefusedError | BrokenAnswerError | None]]:
-    """Every owner's (key, answer bytes, error); exactly one of the two is there.
+    """Send a request and return (key, answer bytes, error) of each owner; either bytes or error is None.
 
     Args:
-        timeout_s: How long owners may take to answer [s].
-        silent_s: How long nothing more of a long answer may come [s]; None: as long.
+        timeout_s: Time for the owners to answer [s].
+        silent_s: Longest gap between the pieces of a long answer [s]; None: `timeout_s`.
     """
     loop = asyncio.get_running_loop()
     row = topics.request(keys.parse_expression(key).topic)
     if row.priority in ON_THE_SECOND_LINK:
-        # In a thread, which keeps no order: never before a command.
+        # A thread does not keep the order of requests. No command has such a priority.
         await asyncio.to_thread(settle, session, row.priority)
     priorities = (row.priority, ON_THE_SECOND_LINK[0]) if row.both_links else (row.priority,)
     mark = secrets.token_bytes(MARK_BYTES) if row.both_links else None
@@ -94,13 +94,13 @@ def _get(
     timeout_s: float,
     done: asyncio.Future[_Answers],
 ) -> None:
-    """Ask, and hand every owner's answer over when the last is there, or the time is over."""
+    """Send a request; set `done` to the owners' answers after the last one or the timeout."""
     loop = done.get_loop()
     answers: _Answers = []
 
     def on_reply(reply: zenoh.Reply) -> None:
         if reply.ok is not None:
-            # Zenoh sees to it that it is a key that was asked.
+            # Zenoh checks that the key matches the request's.
             if not keys.has_wildcard(str(reply.ok.key_expr)):
                 answer = pieces.first_of(reply.ok) or reply.ok.payload.to_bytes()
                 answers.append((str(reply.ok.key_expr), answer, None))
@@ -121,7 +121,7 @@ def _get(
         payload=payload,
         encoding=PROTOBUF,
         attachment=mark,
-        # Else one who calls himself complete would be asked in the owner's place.
+        # By default Zenoh would send the request only to a queryable that declares itself complete.
         target=zenoh.QueryTarget.ALL,
         consolidation=zenoh.ConsolidationMode.NONE,
         # The default, BLOCK, would stall joint states on a full link.
@@ -137,7 +137,7 @@ def _zenoh(priority: topics.Priority) -> zenoh.Priority:
 
 
 def _refused(words: bytes, encoding: str) -> RefusedError:
-    """Return an owner's refusal; without a code it is an older owner's, or a stranger's."""
+    """Return an owner's refusal. Older owners and other programs send no code."""
     text = words.decode(errors="replace")
     parameters = pairs_of(encoding.partition(";")[2])
     reason: Reason | str = reason_of(parameters, text) or text
@@ -152,23 +152,25 @@ def _refused(words: bytes, encoding: str) -> RefusedError:
 
 
 async def ask_bytes(session: zenoh.Session, key: str, payload: bytes, *, timeout_s: float) -> bytes:
-    """The one answer to a request, as bytes.
+    """Send a request to its one owner and return the answer as bytes.
 
-    An owner who is busy or starting, or has forgotten a long answer before it was taken, is asked again, and
-    so is one whose quota gives something in time. A long answer that has begun may take longer.
+    Repeats the request while the owner is starting or busy, if it dropped a long answer before the transfer
+    ended, and if the quota allows a repetition before the deadline. A long answer that has begun may take
+    longer than `timeout_s`.
 
     Raises:
-        RefusedError: With the owner's words.
-        BusyError: If the owner had no place for it, until the end.
-        QuotaError: If the quota gives nothing before the end.
-        NoAnswerError: If nobody answered in time.
-        BrokenAnswerError: If nothing more of a long answer came for the whole of that time.
+        RefusedError: If the owner refused; with its sentence.
+        BusyError: If the owner was busy until the deadline.
+        QuotaError: If the quota is used up until after the deadline.
+        NoAnswerError: If no answer arrived in time.
+        BrokenAnswerError: If a long answer began and no further piece arrived for `timeout_s`.
     """
     loop = asyncio.get_running_loop()
     deadline = loop.time() + timeout_s
     again: BusyError | QuotaError | BrokenAnswerError | None = None
     while (left_s := deadline - loop.time()) > 0:
-        # Zenoh answers at once that there is no owner. One that was busy before is not said to be missing.
+        # Zenoh reports a missing owner immediately. If an earlier attempt reached a busy owner, raise that
+        # attempt's error instead.
         again_s = _AGAIN_S
         for _, answer, error in await ask_all(session, key, payload, timeout_s=left_s, silent_s=timeout_s):
             if isinstance(error, BusyError | BrokenAnswerError):
@@ -182,24 +184,24 @@ async def ask_bytes(session: zenoh.Session, key: str, payload: bytes, *, timeout
         await asyncio.sleep(min(again_s, left_s))
     if again is not None:
         raise again
-    raise NoAnswerError(f"nobody answered {key} within {timeout_s:g} s: is its service running?")
+    raise NoAnswerError(f"no answer to {key} within {timeout_s:g} s: is its service running?")
 
 
 def answer_of(owner: str, answer: bytes | None, refused: BusError | None) -> Answer:
-    """One of many owners' answers; of one whose bytes are none, what is wrong with them."""
+    """Return one owner's decoded answer, or its error; bytes that cannot be decoded are an error too."""
     if answer is None:
         return Answer(owner, None, None if refused is None else str(refused))
     try:
         return Answer(owner, decode_answer(owner, answer), None)
-    except BusError as error:  # another's nonsense must not hide what the others say
+    except BusError as error:  # one invalid answer must not hide the others
         return Answer(owner, None, str(error))
 
 
 def decode_answer(key: str, payload: bytes) -> Message:
-    """An answer by the request table.
+    """Decode an answer by the request table.
 
     Raises:
-        MessageError: If the bytes are not that message.
+        MessageError: If the bytes are not the table's message.
     """
     schema = topics.request(keys.parse_expression(key).topic).answer
     if schema is None:

@@ -1,11 +1,11 @@
-"""How far another process's clock is from ours, how long the way to it is, and where on it time goes.
+"""Clock offset and round trip between this process and another, and the time on each hop.
 
-NTP's four times: asked (our clock), received and answered (its clock), came back (ours). What the owner
-does between the middle two is no part of the way. Each node that the question and its answer pass stamps
-them too (Zenoh's instrumentation): of two neighbours the way there and the way back are halved, so that
-clocks that differ cancel out.
+Uses NTP's four times: asked (our clock), received and answered (the other clock), arrived (our clock). The
+round trip excludes the owner's time between receiving and answering. With Zenoh's instrumentation each node
+on the way stamps the request and its answer; half the sum of the time there and back is the time between
+two neighbours, so the difference of their clocks cancels out.
 
-Source: RFC 5905, sections 8 (offset and delay) and 10 (of several samples the quickest is the truest).
+Source: RFC 5905, sections 8 (offset and delay) and 10 (the sample with the least delay is the best).
 """
 
 import asyncio
@@ -25,18 +25,17 @@ from robomesh.server import Answerer, Request
 from robomesh.session import Session
 
 _KEPT = 8
-# Everything but what it was asked for stays out of the way.
 _PRIORITY = zenoh.Priority.INTERACTIVE_HIGH
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One question and its answer.
+    """The result of one clock request.
 
     Attributes:
-        offset_s: Its clock minus ours [s], give or take half the round trip.
-        round_trip_s: There and back, without what its owner took [s].
-        hops: Zenoh ids of neighbours on the way, and the time from one to the other [s].
+        offset_s: The other clock minus ours [s], within half the round trip.
+        round_trip_s: Time there and back, without the owner's processing [s].
+        hops: Zenoh ids of two neighbours on the way, and the time from one to the other [s].
     """
 
     offset_s: float
@@ -52,19 +51,19 @@ class Clock:
 
     @property
     def best(self) -> Reading | None:
-        """The quickest of them, which waited least; None: there is none."""
+        """The reading with the shortest round trip, which is the most exact; None: no reading."""
         return min(self.readings, key=lambda reading: reading.round_trip_s, default=None)
 
 
 def answer_clock(session: Session, site: str, *, wall_ns: Callable[[], int] = time.time_ns) -> Answerer:
-    """Tell the time to whoever asks for it at this process's own key.
+    """Answer clock requests on this process's key.
 
     Args:
-        wall_ns: The clock that is told [ns since the Unix epoch].
+        wall_ns: The clock to report [ns since the Unix epoch].
     """
 
     async def answer(request: Request) -> ClockAnswer:
-        # Answered by the loop, where a service that hangs shows; its wait is between the two times.
+        # Answered on the event loop, so that a hanging service shows; `received` is before the wait for it.
         waited_ns = time.time_ns() - request.received_ns
         answered = ClockAnswer()
         now_ns = wall_ns()
@@ -78,14 +77,14 @@ def answer_clock(session: Session, site: str, *, wall_ns: Callable[[], int] = ti
 async def read_clock(
     session: Session, site: str, identity: str, *, timeout_s: float = 1.0, hops: bool = False
 ) -> Reading:
-    """Ask a process for its time, once.
+    """Read another process's clock once.
 
     Args:
-        identity: As in its presence.
-        hops: Have every node on the way stamp it.
+        identity: The process's id, as in its presence key.
+        hops: Let each node on the way stamp the request.
 
     Raises:
-        NoAnswerError: If no answer came in time.
+        NoAnswerError: If no answer arrived in time.
     """
     loop = asyncio.get_running_loop()
     done: asyncio.Future[None] = loop.create_future()
@@ -130,26 +129,26 @@ async def read_clock(
         received_ns, answered_ns = answer.received.ToNanoseconds(), answer.answered.ToNanoseconds()
         reading = reading_of(asked_ns, received_ns, answered_ns, came_ns)
         return Reading(reading.offset_s, reading.round_trip_s, hops_of(_stamps(sample)))
-    raise NoAnswerError(f"nobody answered {key} within {timeout_s:g} s: is that process running?")
+    raise NoAnswerError(f"no answer to {key} within {timeout_s:g} s: is that process running?")
 
 
-def reading_of(asked_ns: int, received_ns: int, answered_ns: int, came_ns: int) -> Reading:
-    """Offset and round trip from the four times; a round trip is never negative."""
-    offset_ns = ((received_ns - asked_ns) + (answered_ns - came_ns)) / 2
-    round_trip_ns = (came_ns - asked_ns) - (answered_ns - received_ns)
+def reading_of(asked_ns: int, received_ns: int, answered_ns: int, arrived_ns: int) -> Reading:
+    """Return offset and round trip from the four times; a round trip is never negative."""
+    offset_ns = ((received_ns - asked_ns) + (answered_ns - arrived_ns)) / 2
+    round_trip_ns = (arrived_ns - asked_ns) - (answered_ns - received_ns)
     return Reading(offset_ns * 1e-9, max(round_trip_ns, 0) * 1e-9)
 
 
 def hops_of(stamps: list[tuple[str, float]]) -> tuple[tuple[str, str, float], ...]:
-    """Neighbours and the time between them, from the stamps on the way there and back.
+    """Return pairs of neighbours and the time between them [s], from the stamps there and back.
 
     Args:
-        stamps: Node and its clock's time [s], in the order of the way; nodes stamp several times.
+        stamps: Node and its clock's time [s], in the order of the route; nodes stamp several times.
 
     Returns:
-        From the asker outwards; empty where the way back is not the way there.
+        The hops, from the caller outwards; empty if the answer took another route.
     """
-    visits: list[tuple[str, float, float]] = []  # node, when it came there, when it left
+    visits: list[tuple[str, float, float]] = []  # node, time of arrival, time of departure
     for node, at_s in stamps:
         if visits and visits[-1][0] == node:
             visits[-1] = (node, visits[-1][1], at_s)

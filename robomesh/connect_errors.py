@@ -1,7 +1,7 @@
-"""Why a router does not let us in, where that can be found out; and how long our certificate lasts.
+"""Reasons why a router refuses our connection, and the remaining validity of our certificate.
 
-Zenoh says only that it could not connect. So, once that has happened, the same handshake is tried again
-by Python's own TLS, which says what the other end has against it.
+Zenoh reports only that it could not connect. After a failure this module repeats the handshake with
+Python's TLS, which reports the reason.
 """
 
 import socket
@@ -15,15 +15,15 @@ from robomesh.errors import SessionError
 
 _TIMEOUT_S = 2.0
 _SOON = timedelta(days=5)
-# What follows the handshake: the other end's word on our certificate, or nothing.
+# Time to wait after the handshake for an alert about our certificate [s].
 _VERDICT_S = 0.5
 
 
 def own_certificate(tls: Tls | None, now: datetime | None = None) -> tuple[Identity | None, str | None]:
-    """Whose certificate it is, as far as its file says, and a warning that it ends soon.
+    """Return the identity of our certificate, and a warning if it expires soon.
 
     Raises:
-        SessionError: If it cannot be read, or has expired.
+        SessionError: If a file cannot be read, or the certificate has expired.
     """
     if tls is None:
         return None, None
@@ -34,17 +34,20 @@ def own_certificate(tls: Tls | None, now: datetime | None = None) -> tuple[Ident
         return identity, None
     left = identity.expires - (now or datetime.now(UTC))
     when = f"{identity.expires:%Y-%m-%d %H:%M} UTC"
-    mend = f"robomesh keys renew {identity.name.partition('.')[0]} at site {identity.site}"
+    advice = f"robomesh keys renew {identity.name.partition('.')[0]} at site {identity.site}"
+    about = f"the certificate of {identity.name}"
     if left <= timedelta(0):
-        raise SessionError(f"{tls.certificate}: the certificate of {identity.name} expired on {when}: {mend}")
-    return identity, f"the certificate of {identity.name} expires on {when}: {mend}" if left < _SOON else None
+        raise SessionError(f"{tls.certificate}: {about} expired on {when}: {advice}")
+    return identity, f"{about} expires on {when}: {advice}" if left < _SOON else None
 
 
 def left_s(file: Path, at_first: datetime) -> float:
-    """Until a file's certificate expires [s]: it may have been renewed, and the next link is opened with it.
+    """Return the time until a file's certificate expires [s].
+
+    Reads the file again, because the next link is opened with a certificate renewed in the meantime.
 
     Args:
-        at_first: When the one expires that was there at first; it counts where the file cannot be read now.
+        at_first: Expiry of the certificate at the start; used if the file cannot be read now.
     """
     try:
         identity = read_identity(file)
@@ -55,7 +58,7 @@ def left_s(file: Path, at_first: datetime) -> float:
 
 
 def why(endpoint: str, tls: Tls | None) -> str | None:
-    """What a router has against our certificate, or we against its; None: it does not listen, or nothing."""
+    """Return why the TLS handshake with a router fails; None: it does not listen, or it accepts us."""
     protocol, _, rest = endpoint.partition("/")
     host, _, port = rest.partition("?")[0].partition("#")[0].rpartition(":")
     if protocol not in ("tcp", "tls") or not port.isdigit():
@@ -70,19 +73,19 @@ def why(endpoint: str, tls: Tls | None) -> str | None:
             context.load_cert_chain(tls.certificate, tls.key)
             context.verify_mode = ssl.CERT_REQUIRED
         with (
-            # What takes no TLS may wait for ever for the rest of what it takes for a message.
+            # A server without TLS may wait forever for the rest of what it takes for a message.
             socket.create_connection(
                 (host.strip("[]"), int(port)), _VERDICT_S if plain else _TIMEOUT_S
             ) as raw,
             context.wrap_socket(raw) as link,
         ):
             if plain:
-                return f"{endpoint} takes TLS only: a certificate is needed, with --keys FILE"
+                return f"{endpoint} accepts only TLS: name a certificate with --keys FILE"
             link.settimeout(_VERDICT_S)
             link.recv(1)
     except ssl.SSLCertVerificationError as error:
         assert tls is not None
-        return f"{endpoint} shows a certificate that {tls.ca} does not vouch for: {error.verify_message}"
+        return f"{endpoint} has a certificate that {tls.ca} did not sign: {error.verify_message}"
     except ssl.SSLError as error:
         return None if plain else _verdict(endpoint, tls, error)
     except (OSError, OverflowError, UnicodeError):  # no such port, no such name
@@ -94,14 +97,14 @@ def _verdict(endpoint: str, tls: Tls | None, error: ssl.SSLError) -> str | None:
     reason = (error.reason or "").lower()
     if "alert" not in reason:
         return (
-            f"{endpoint} does not speak TLS: tcp/HOST:PORT is for that" if "wrong_version" in reason else None
+            f"{endpoint} does not speak TLS: use tcp/HOST:PORT instead" if "wrong_version" in reason else None
         )
     alert = reason.rpartition("alert_")[2].replace("_", " ")
-    whose = "no certificate" if tls is None else f"the certificate in {tls.certificate}"
+    shown = "no certificate" if tls is None else f"the certificate in {tls.certificate}"
     known = {
         "certificate required": "it needs one: --keys FILE",
         "unknown ca": "another site's authority signed it",
         "certificate expired": "it has expired: robomesh keys renew",
         "certificate revoked": "it was revoked",
     }
-    return f"refused by {endpoint}: {whose}: {known.get(alert, alert)}"
+    return f"refused by {endpoint}: {shown}: {known.get(alert, alert)}"

@@ -1,7 +1,7 @@
-"""What a session has sent, received and answered since it was opened, by row of the topic table.
+"""Counters of a session by row of the topic table: sent, received and answered since it was opened.
 
-Nobody counts for it: it adds up the numbers that publishers, subscriptions and answerers have anyway,
-when somebody asks.
+They cost nothing until they are read: reading adds up the numbers that publishers, subscriptions and
+answerers keep anyway.
 """
 
 from collections import Counter, defaultdict
@@ -16,12 +16,12 @@ from robomesh.subscription import Subscription
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """A number of a service's own.
+    """A metric that a service defines.
 
     Attributes:
-        name: As Prometheus has it, without `robomesh_`: "browsers"; one that only grows ends in "_total".
-        text: What it is, for people.
-        read: Its value now, or one for each robot; called on any thread.
+        name: Prometheus name without `robomesh_`: "browsers"; a counter's name ends in "_total".
+        text: Help text for people.
+        read: Returns the current value, or one for each robot; called on any thread.
     """
 
     name: str
@@ -30,7 +30,7 @@ class Measure:
 
 
 @dataclass
-class Tally:
+class Counters:
     """Numbers by topic or request."""
 
     published: Counter[str] = field(default_factory=Counter)
@@ -43,14 +43,14 @@ class Tally:
     latencies: defaultdict[str, Latencies] = field(default_factory=lambda: defaultdict(Latencies))
 
     def add(self, declared: object) -> None:
-        """What one publisher, subscription or answerer has done."""
+        """Add the numbers of one publisher, subscription or answerer."""
         match declared:
             case Publisher():
                 self.published[declared.topic.name] += declared.published
             case Subscription():
                 name = declared.topic.name
                 self.received[name] += declared.received
-                self.lost[name] += declared.lost_in_all
+                self.lost[name] += declared.total_lost
                 self.skipped[name] += declared.skipped
                 self.malformed[name] += declared.malformed
             case Answerer():
@@ -58,11 +58,11 @@ class Tally:
                 self.over_quota[declared.name] += declared.over_quota
                 self.latencies[declared.name].add_all(declared.latencies)
 
-    def copy(self) -> "Tally":
-        """One of its own."""
-        tally = Tally()
+    def copy(self) -> "Counters":
+        """Return an independent copy."""
+        counters = Counters()
         for name in ("published", "received", "lost", "skipped", "malformed", "turned_away", "over_quota"):
-            getattr(tally, name).update(getattr(self, name))
+            getattr(counters, name).update(getattr(self, name))
         for request, latencies in self.latencies.items():
-            tally.latencies[request].add_all(latencies)
-        return tally
+            counters.latencies[request].add_all(latencies)
+        return counters

@@ -17,24 +17,25 @@ DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
 
 _LINKS = ("1-4", "5-7")
 ON_THE_SECOND_LINK = (Priority.DATA, Priority.DATA_LOW, Priority.BACKGROUND)
-_NOBODYS_KEY = "robomesh/-/-/-"
+# A key without an owner.
+_PROBE_KEY = "robomesh/-/-/-"
 _SETTLE_S = 0.25
-# Of bulk, a connection over a line whose rate is told holds what the line carries in this long [s]: enough
-# to fill it over 80 ms there and back, and so little that what is urgent never waits for much.
-_HELD_S = 0.065
-# Linux counts each packet's own bookkeeping too.
-_LEAST_HELD_BYTES = 16_384
-# What Linux grants by default (net.core.wmem_max): a line too quick to be kept busy by so little has the
-# buffers that the system sizes by itself.
-_MOST_HELD_BYTES = 212_992
-# What a connection for requests, and the router's end of it on the same machine, hold: when the service reads
-# slowly, a flood then waits at its sender and not in front of the requests of others. Linux by itself gives a
-# connection on loopback megabytes.
-_HELD_LOCALLY_BYTES = 32_768
-# When a machine goes without a word, closing its connections holds the thread that does it for up to 10 s
-# (Zenoh sets SO_LINGER), and by default a process receives with two: a cut line silenced a site's own
-# services for as long. So there are more than can be held at once; a client has four connections. A router's
-# thread also waits where a connection takes no more: a flood over as many sessions would hold all of them.
+# A bulk connection over a line of known rate buffers what the line carries in this time [s]: enough to fill
+# a line with a round trip of 80 ms, and little enough that urgent messages do not wait long behind it.
+_BUFFERED_S = 0.065
+# The buffer size of Linux includes its bookkeeping for each packet.
+_LEAST_BUFFER_BYTES = 16_384
+# Linux's default limit (net.core.wmem_max). It cannot fill a faster line, which keeps the buffers that the
+# system sizes automatically.
+_MOST_BUFFER_BYTES = 212_992
+# Buffer of a connection for requests, and of the router's end on the same machine. While the service reads
+# slowly, a flood then waits at its sender and not in front of other callers' requests. By default Linux
+# gives a loopback connection megabytes.
+_LOCAL_BUFFER_BYTES = 32_768
+# When a machine disappears, closing its connections blocks the closing thread for up to 10 s (Zenoh sets
+# SO_LINGER). By default a process receives with two threads, so a cut line stopped a site's own services
+# for that time. Here are more threads than can block together; a client has four connections. A router's
+# thread also blocks while a connection accepts no data: a flood over that many sessions would block all.
 _THREADS = {
     "router": "(rx: (worker_threads: 64), tx: (worker_threads: 4), net: (worker_threads: 4), "
     "acc: (worker_threads: 2))",
@@ -47,8 +48,8 @@ class Tls:
     """Certificates of one end of a mutual TLS link (PEM files; one file may hold them all).
 
     Attributes:
-        any_address: A router may have any address: its certificate says that it is one, not where. So do
-            those of `robomesh keys`, where only routers may serve.
+        any_address: Do not compare a router's address with its certificate. The certificates of `robomesh
+            keys` name no address; they let only routers act as servers.
     """
 
     ca: Path
@@ -58,16 +59,17 @@ class Tls:
 
 
 def bundle(file: Path, authority: Path | None = None) -> Tls:
-    """What one file of `robomesh keys` holds, as certificates of this end."""
+    """Return the certificates of this end from one file of `robomesh keys`."""
     return Tls(ca=authority or file, certificate=file, key=file, any_address=True)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Link:
-    """Another router to link to, and the certificates for it; None: the router's own.
+    """Another router to link to.
 
     Attributes:
-        site: The other site, whose authority signed them.
+        tls: Certificates for this link; None: those of our router.
+        site: The other site, whose authority signed the certificates.
     """
 
     endpoint: str
@@ -76,27 +78,27 @@ class Link:
 
 
 def client_config(
-    routers: tuple[str, ...], tls: Tls | None = None, *, holds_little: bool = False
+    routers: tuple[str, ...], tls: Tls | None = None, *, small_buffers: bool = False
 ) -> zenoh.Config:
-    """The configuration of a client of the first router that answers.
+    """Return the configuration of a client that connects to the first router that answers.
 
-    Joint states and requests travel on one link of the session, video and other bulk on another:
-    on a slow network that keeps the former at 10 ms where one shared link took 350 ms.
+    Joint states and requests travel on one link of the session, video and other bulk on another. On a slow
+    network joint states then take 10 ms; on one shared link they took 350 ms.
 
     Args:
-        holds_little: Little waits on its connections: who sends more than it reads is held up.
+        small_buffers: Limit the buffers of the connections, so that a fast sender is slowed down early.
 
     Raises:
-        SessionError: If an endpoint is not one of Zenoh's.
+        SessionError: If Zenoh rejects an endpoint.
     """
-    held_bytes = _HELD_LOCALLY_BYTES if holds_little else None
+    buffer_bytes = _LOCAL_BUFFER_BYTES if small_buffers else None
     return _config(
         {
             "mode": "client",
             "connect/endpoints": [
-                _two_links(router, held_bytes=(held_bytes, held_bytes)) for router in routers
+                _two_links(router, buffer_bytes=(buffer_bytes, buffer_bytes)) for router in routers
             ],
-            # A router's restart must be over before a lease ends: its clients wait no longer than this.
+            # Clients must reconnect to a restarted router before a lease expires.
             "connect/retry": {"period_init_ms": 50, "period_max_ms": 200, "period_increase_factor": 1.5},
             **_shared(tls),
         }
@@ -110,14 +112,14 @@ def router_config(
     access: Mapping[str, Any] = MappingProxyType({}),
     line_bps: float | None = None,
 ) -> zenoh.Config:
-    """The configuration of a router that listens, and links to other sites' routers.
+    """Return the configuration of a router that listens and links to other sites' routers.
 
     Args:
-        access: Sections of Zenoh's configuration that say who may do what (`robomesh/access.py`).
-        line_bps: What the lines to the others carry [bit/s]; None: nobody knows.
+        access: Sections of Zenoh's configuration with the access rules (`robomesh/access.py`).
+        line_bps: Rate of the lines to other sites [bit/s]; None: unknown.
 
     Raises:
-        SessionError: If an endpoint is not one of Zenoh's.
+        SessionError: If Zenoh rejects an endpoint.
     """
     return _config(router_values(listen, connect, tls, access, line_bps))
 
@@ -129,25 +131,25 @@ def router_values(
     access: Mapping[str, Any] = MappingProxyType({}),
     line_bps: float | None = None,
 ) -> dict[str, Any]:
-    """As `router_config`, as keys of Zenoh's configuration and their values."""
-    held_bytes = None if line_bps is None else max(round(line_bps / 8 * _HELD_S), _LEAST_HELD_BYTES)
-    if held_bytes is not None and held_bytes > _MOST_HELD_BYTES:
-        held_bytes = None
+    """Return the values of `router_config` by their keys in Zenoh's configuration."""
+    buffer_bytes = None if line_bps is None else max(round(line_bps / 8 * _BUFFERED_S), _LEAST_BUFFER_BYTES)
+    if buffer_bytes is not None and buffer_bytes > _MOST_BUFFER_BYTES:
+        buffer_bytes = None
     return {
         "mode": "router",
         "listen/endpoints": [_listener(each) for each in listen],
         "connect/endpoints": [
-            _two_links(each, held_bytes=(None, held_bytes))
+            _two_links(each, buffer_bytes=(None, buffer_bytes))
             if isinstance(each, str)
-            else _two_links(each.endpoint, each.tls, held_bytes=(None, held_bytes))
+            else _two_links(each.endpoint, each.tls, buffer_bytes=(None, buffer_bytes))
             for each in connect
         ],
-        # Nobody is scouted for; the default waits half a second for nobody.
+        # Scouting is off; by default the router would still wait half a second for it.
         "scouting/delay": 1,
-        # Another site may be away for days: this site starts without it.
+        # Another site may be offline for days; this site starts without it.
         "connect/exit_on_failure": False,
         "connect/timeout_ms": -1,
-        # The most that a healed line waits for; what hangs is given up after `open_timeout`.
+        # `period_max_ms` is the longest wait after a line is repaired; `open_timeout` ends a hanging attempt.
         "connect/retry": {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 1.5},
         **_shared(tls),
         **access,
@@ -155,15 +157,15 @@ def router_values(
 
 
 def settle(session: zenoh.Session, priority: Priority) -> None:
-    """Wait until the router knows what was declared, where what follows may overtake it.
+    """Wait until the router has received all declarations, if messages of this priority could overtake them.
 
-    Declarations travel on the session's first link, and Zenoh shortens keys to numbers that they
-    declare: what follows at once on the second link is dropped in silence when it comes first
-    (a fifth of the first puts and gets on a busy machine). Returns at once without a router.
+    Declarations travel on the session's first link, and Zenoh shortens keys to numbers that they declare. A
+    message on the second link that arrives before its declaration is silently dropped (a fifth of the first
+    puts and gets on a busy machine). Returns immediately without a router.
     """
     if priority in ON_THE_SECOND_LINK:
         for _ in session.get(
-            _NOBODYS_KEY,
+            _PROBE_KEY,
             priority=zenoh.Priority.REAL_TIME,
             congestion_control=zenoh.CongestionControl.DROP,
             timeout=_SETTLE_S,
@@ -172,22 +174,22 @@ def settle(session: zenoh.Session, priority: Priority) -> None:
 
 
 def _listener(endpoint: str) -> str:
-    """An endpoint to listen on, whose connections keep little that waits to be sent."""
+    """Return an endpoint to listen on, with small send buffers unless it sets its own."""
     address, _, options = endpoint.partition("#")
     if "so_sndbuf" in options:
         return endpoint
     is_local = "/127." in address or "/[::1]" in address or "/localhost" in address
-    sent = f"so_sndbuf={_HELD_LOCALLY_BYTES if is_local else _MOST_HELD_BYTES}"
-    return f"{address}#{options};{sent}" if options else f"{address}#{sent}"
+    size = f"so_sndbuf={_LOCAL_BUFFER_BYTES if is_local else _MOST_BUFFER_BYTES}"
+    return f"{address}#{options};{size}" if options else f"{address}#{size}"
 
 
 def _two_links(
-    endpoint: str, tls: Tls | None = None, held_bytes: tuple[int | None, int | None] = (None, None)
+    endpoint: str, tls: Tls | None = None, buffer_bytes: tuple[int | None, int | None] = (None, None)
 ) -> dict[str, Any]:
-    """Both links to a router; certificates that are for it alone stand in the endpoint itself.
+    """Return both links to a router; certificates for this router only are options of the endpoint.
 
     Args:
-        held_bytes: How much the buffers of each hold, either way; None: what the system likes.
+        buffer_bytes: Size of each link's send and receive buffers; None: the system's choice.
     """
     address, _, own = endpoint.partition("#")
     separator = "&" if "?" in address else "?"
@@ -198,11 +200,11 @@ def _two_links(
             f"connect_certificate_file={tls.certificate}",
             f"connect_private_key_file={tls.key}",
         ]
-    # Its own sending, and by the window that it offers the other end's.
+    # The receive buffer sets the window that the other end may send.
     locators = []
-    for priorities, held in zip(_LINKS, held_bytes, strict=True):
-        short = [] if held is None else [f"so_sndbuf={held}", f"so_rcvbuf={held}"]
-        tail = "#" + ";".join(options + short) if options + short else ""
+    for priorities, size in zip(_LINKS, buffer_bytes, strict=True):
+        sizes = [] if size is None else [f"so_sndbuf={size}", f"so_rcvbuf={size}"]
+        tail = "#" + ";".join(options + sizes) if options + sizes else ""
         locators.append(f"{address}{separator}prio={priorities}{tail}")
     return {"strategy": "allOf", "locators": locators}
 
@@ -211,11 +213,11 @@ def _shared(tls: Tls | None) -> dict[str, Any]:
     values: dict[str, Any] = {
         "scouting/multicast/enabled": False,
         "transport/unicast/max_links": 4,
-        # Something that listens and is no router is given up after this, not after 10 s a link.
+        # Limits the wait for a listener that is not a router; the default is 10 s a link.
         "transport/unicast/open_timeout": 3000,
-        # A frozen host is noticed after 1.7 s instead of 10.
+        # Detects a frozen host after 1.7 s; with the default after 10 s.
         "transport/link/tx/lease": 2000,
-        # No gain at the sizes of this mesh, and not there in containers.
+        # No gain at the message sizes of this mesh, and not available in containers.
         "transport/shared_memory/enabled": False,
     }
     if tls is not None:
@@ -227,14 +229,15 @@ def _shared(tls: Tls | None) -> dict[str, Any]:
             "transport/link/tls/connect_certificate": str(tls.certificate),
             "transport/link/tls/connect_private_key": str(tls.key),
             "transport/link/tls/verify_name_on_connect": not tls.any_address,
-            # Who stays must not stay longer than the certificate says.
+            # An open connection must not outlive its certificate.
             "transport/link/tls/close_link_on_expiration": True,
         }
     return values
 
 
 def _config(values: dict[str, Any]) -> zenoh.Config:
-    # Read once, at a process's first session. Who set it knows better, unless it was a parent of ours.
+    # Zenoh reads it once, at a process's first session. Keep the user's value, but not one that our parent
+    # process set for itself.
     if os.environ.get("ZENOH_RUNTIME") in (None, *_THREADS.values()):
         os.environ["ZENOH_RUNTIME"] = _THREADS[values["mode"]]
     config = zenoh.Config()
@@ -244,8 +247,8 @@ def _config(values: dict[str, Any]) -> zenoh.Config:
         except zenoh.ZError as error:
             if key.endswith("/endpoints"):
                 given = ", ".join(_endpoint(each) for each in value) or "nothing"
-                raise SessionError(f"{given!r} is no endpoint: tcp/127.0.0.1:7447 is one") from None
-            raise SessionError(f"{key} = {json.dumps(value)} is not taken: {first_line(error)}") from None
+                raise SessionError(f"{given!r} is not an endpoint: one is tcp/127.0.0.1:7447") from None
+            raise SessionError(f"Zenoh rejects {key} = {json.dumps(value)}: {first_line(error)}") from None
     return config
 
 
@@ -256,6 +259,6 @@ def _endpoint(value: str | dict[str, Any]) -> str:
 
 
 def first_line(error: Exception) -> str:
-    """A Zenoh error without the place in its source."""
+    """Return a Zenoh error's text without the position in Zenoh's source."""
     text = (str(error).splitlines() or [type(error).__name__])[0]
     return text.split(" at /", 1)[0].split(" at zenoh", 1)[0].strip()

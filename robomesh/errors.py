@@ -1,16 +1,16 @@
 """Errors of the library.
 
 BusError
-├── KeyNameError            a site, robot, topic or operator name that no key can hold
-├── UnknownTopicError       a topic that the table does not have
-├── MessageError            bytes or JSON that are not the message they should be
-├── SessionError            a session that cannot be opened as it is configured
+├── KeyNameError            a site, robot, topic or operator name that is invalid in a key
+├── UnknownTopicError       a topic that is not in the table
+├── MessageError            bytes or JSON that are not the expected message
+├── SessionError            a session that cannot be opened with its settings
 ├── RefusedError            a request that its owner refused, with the reason
-│   ├── BusyError           a request that its owner has not begun or finished: it is busy
-│   ├── QuotaError          more than one name may ask for; it may be asked again later
-│   └── NoRightError        what this end's certificate may not do: it was not even asked
-└── NoAnswerError           a request that nobody answered in time
-    └── BrokenAnswerError   a long answer that began, and whose rest did not come
+│   ├── BusyError           a request that its owner is too busy to do
+│   ├── QuotaError          a request over the caller's quota; it may be repeated later
+│   └── NoRightError        a request that our certificate does not allow; it was not sent
+└── NoAnswerError           a request without an answer in time
+    └── BrokenAnswerError   a long answer that ended early
 """
 
 from robomesh import reason_codes as codes
@@ -18,11 +18,11 @@ from robomesh.reasons import Reason
 
 
 class BusError(Exception):
-    """Base of the library's errors; its text is one line for people."""
+    """Base of the library's errors; the text is one line for people."""
 
 
 class KeyNameError(BusError):
-    """A name that cannot stand in a key."""
+    """A name that is invalid in a key."""
 
 
 class UnknownTopicError(BusError):
@@ -30,21 +30,21 @@ class UnknownTopicError(BusError):
 
 
 class MessageError(BusError):
-    """A payload that is not the message that it should be."""
+    """A payload that is not the expected message."""
 
 
 class SessionError(BusError):
-    """A session that cannot be opened as it is configured."""
+    """A session that cannot be opened with its settings."""
 
 
 class RefusedError(BusError):
-    """A request that was refused; the text says what was wrong and what would be right.
+    """A refused request; the text says what was wrong and what to do.
 
-    Raised by a request's handler to refuse it, and by `ask` at the other end.
+    A request's handler raises it to refuse the request; `ask` raises it at the caller.
 
     Args:
-        reason: Of the table; a bare text is a refusal without a code of its own.
-        text: What people read; the reason's sentence, unless given.
+        reason: A reason from the table; a plain text has the code `other`.
+        text: Sentence for people; by default the reason's.
 
     Attributes:
         reason: The code and its parameters.
@@ -56,14 +56,14 @@ class RefusedError(BusError):
 
 
 class BusyError(RefusedError):
-    """A request that its owner has not begun, or not finished, because it is busy; it may be asked again."""
+    """A request that its owner did not begin or finish because it is busy; it may be repeated."""
 
 
 class QuotaError(RefusedError):
-    """More than one name may ask for; the text names the quota and when to ask again.
+    """A request over the caller's quota; the text names the quota and when to repeat it.
 
     Attributes:
-        again_s: When there is something left again, as far as its owner knows [s].
+        again_s: Time until the quota allows the request again, as the owner estimates it [s].
     """
 
     def __init__(self, reason: Reason | str, *, again_s: float) -> None:
@@ -72,12 +72,12 @@ class QuotaError(RefusedError):
 
 
 class NoRightError(RefusedError):
-    """What the certificate of this end may not do; the text says who may."""
+    """A request that our certificate does not allow; the text says which roles may send it."""
 
 
 class NoAnswerError(BusError):
-    """Nobody answered a request in time: no owner, no route, or too slow."""
+    """A request without an answer in time: no owner, no route, or too slow."""
 
 
 class BrokenAnswerError(NoAnswerError):
-    """A long answer that began, and whose rest did not come; the text says how much did."""
+    """A long answer that ended early; the text says how many bytes arrived."""

@@ -1,4 +1,4 @@
-"""The attachment of every publication: who published it, its number, its source time.
+"""The attachment of every publication: publisher id, sequence number, source time.
 
 24 bytes, little-endian: publisher (uint64, new at each start), sequence (uint64, from 1),
 source time (int64, ns since the Unix epoch).
@@ -13,7 +13,7 @@ _LAYOUT = struct.Struct("<QQq")
 
 
 class Header(NamedTuple):
-    """An attachment, decoded."""
+    """A decoded attachment."""
 
     publisher: int
     sequence: int
@@ -21,16 +21,16 @@ class Header(NamedTuple):
 
 
 def pack(header: Header) -> bytes:
-    """The attachment's 24 bytes."""
+    """Return the 24 bytes of an attachment."""
     return _LAYOUT.pack(*header)
 
 
 def unpack(attachment: bytes) -> Header:
-    """A header from an attachment.
+    """Decode an attachment.
 
     Raises:
         MessageError: If it does not have 24 bytes.
     """
     if len(attachment) != _LAYOUT.size:
-        raise MessageError(f"an attachment of {len(attachment)} bytes: {_LAYOUT.size} are right")
+        raise MessageError(f"the attachment has {len(attachment)} bytes instead of {_LAYOUT.size}")
     return Header(*_LAYOUT.unpack(attachment))

@@ -1,4 +1,4 @@
-"""What every process of the mesh tells of itself: that it is there, how it is, and what its clock says."""
+"""Presence, health, clock and metrics of a process of the mesh."""
 
 import asyncio
 import functools
@@ -23,12 +23,12 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, kw_only=True)
 class Served:
-    """Which service a process is, and for whom.
+    """The service that a process runs, and the robots that it serves.
 
     Attributes:
-        service: Its name in keys.
+        service: Name in keys.
         present_for: The (site, robot) pairs that it serves, of one site; `-` as the robot for the whole site.
-        metrics: Host and port at which Prometheus may ask; None: nowhere.
+        metrics: Host and port of the Prometheus endpoint; None: no endpoint.
     """
 
     service: str
@@ -40,13 +40,14 @@ class Served:
 async def present(
     session: Session, served: Served, *, zenoh_id: Callable[[], str] | None = None
 ) -> AsyncIterator[None]:
-    """Be there for everybody while the block runs: presence, health, clock, metrics.
+    """Announce the process while the block runs: presence, health, clock, metrics.
 
     Args:
-        zenoh_id: Tells the router's, where a router's own session tells of it; else it is the session's.
+        zenoh_id: Returns the Zenoh id to report; a router's process reports its router. By default the
+            session's id.
 
     Raises:
-        SessionError: If the metrics cannot be served where they should be.
+        SessionError: If the metrics cannot be served at their address.
     """
     health = _Health(session, served, zenoh_id)
     if served.metrics is not None:
@@ -58,23 +59,23 @@ async def present(
     sites = {site for site, _ in served.present_for}
     for site in sites:
         answer_clock(session, site)
-    telling = [asyncio.create_task(health.tell(site)) for site in sites]
+    tasks = [asyncio.create_task(health.publish(site)) for site in sites]
     try:
         yield
     finally:
-        for task in telling:
+        for task in tasks:
             task.cancel()
-        await asyncio.gather(*telling, return_exceptions=True)
+        await asyncio.gather(*tasks, return_exceptions=True)
 
 
 def health_of(session: Session, served: Served) -> Callable[[], ServiceHealth]:
-    """Looks at this process, each time it is called."""
-    return _Health(session, served, None).look
+    """Return a function that measures this process at each call."""
+    return _Health(session, served, None).measure
 
 
 @functools.cache
 def own_version() -> str:
-    """Of robomesh, as it is installed."""
+    """Return the installed version of robomesh."""
     try:
         return version("robomesh")
     except PackageNotFoundError:
@@ -82,18 +83,18 @@ def own_version() -> str:
 
 
 class _Health:
-    """Looks at its own process."""
+    """The health of this process."""
 
     def __init__(self, session: Session, served: Served, zenoh_id: Callable[[], str] | None) -> None:
         self._session, self._served = session, served
         self._zenoh_id = zenoh_id or (lambda: str(session.zenoh_session.info.zid()))
         self._process = psutil.Process()
         self._host = socket.gethostname()
-        self._looked = (time.monotonic(), 0.0)
+        self._last_cpu = (time.monotonic(), 0.0)
 
     @property
     def about(self) -> dict[str, str]:
-        """Which process this is."""
+        """Labels that identify this process."""
         return {
             "service": self._served.service,
             "site": ",".join(sorted({site for site, _ in self._served.present_for})),
@@ -102,8 +103,8 @@ class _Health:
             "host": self._host,
         }
 
-    async def tell(self, site: str) -> None:
-        """Publish it again and again."""
+    async def publish(self, site: str) -> None:
+        """Publish the health at the topic's heartbeat until cancelled."""
         topic = f"health/{self._served.service}.{self._session.identity}"
         publisher = self._session.declare_publisher(site, WHOLE_SITE, topic)
         while True:
@@ -112,20 +113,20 @@ class _Health:
 
     def _put(self, publisher: Publisher) -> None:
         try:
-            publisher.put(self.look())
-        except Exception:  # a service is not ended by its looking glass
-            log.exception("this process cannot be looked at")
+            publisher.put(self.measure())
+        except Exception:  # a failed measurement must not end the service
+            log.exception("cannot measure this process's health")
 
-    def look(self) -> ServiceHealth:
-        """How this process is now; CPU since the last look."""
+    def measure(self) -> ServiceHealth:
+        """Measure this process now; CPU since the last call."""
         with self._process.oneshot():
             times, memory = self._process.cpu_times(), self._process.memory_info()
             started_s = self._process.create_time()
             open_files = self._process.num_fds()
         now_s, used_s = time.monotonic(), times.user + times.system
-        before_s, used_before_s = self._looked
-        self._looked = now_s, used_s
-        tally = self._session.tally()
+        before_s, used_before_s = self._last_cpu
+        self._last_cpu = now_s, used_s
+        counters = self._session.counters()
         health = ServiceHealth(
             service=self._served.service,
             id=self._session.identity,
@@ -135,10 +136,10 @@ class _Health:
             cpu=(used_s - used_before_s) / max(now_s - before_s, 1e-3) if used_before_s else 0.0,
             memory_bytes=memory.rss,
             open_files=open_files,
-            published=tally.published.total(),
-            received=tally.received.total(),
-            lost=tally.lost.total(),
-            turned_away=tally.turned_away.total(),
+            published=counters.published.total(),
+            received=counters.received.total(),
+            lost=counters.lost.total(),
+            turned_away=counters.turned_away.total(),
             robots=sorted({robot for _, robot in self._served.present_for} - {WHOLE_SITE}),
             zenoh_id=self._zenoh_id(),
             ignored=self._session.ignored.count,
@@ -148,6 +149,6 @@ class _Health:
         health.started.FromNanoseconds(round(started_s * 1e9))
         for measure in self._session.measures:
             value = measure.read()
-            if isinstance(value, float | int):  # of each robot: its topics tell, and the metrics
+            if isinstance(value, float | int):  # values by robot are in the robot's topics and the metrics
                 health.values[measure.name] = value
         return health

@@ -1,8 +1,9 @@
-"""What others send on keys that fit no key of the contract: ignored here, counted, and kept as examples.
+"""Messages on keys that fit no key of the contract: ignored, counted, and kept as examples.
 
-Without certificates any program can put to, answer on, ask and be present on any key that Zenoh takes. One
-odd name must not end a service or hide the others, so every key that comes from the mesh is checked here
-and nowhere else. A process's health tells the count and the examples; the watch makes each an event.
+Without certificates any program can publish, answer, query and declare presence on any key that Zenoh
+accepts. One malformed name must not end a service or hide other names, so every key received from the mesh
+is checked here and only here. A process's health reports the count and the examples; the watch makes an
+event of each example.
 """
 
 import threading
@@ -11,7 +12,7 @@ from robomesh import keys
 from robomesh.errors import KeyNameError
 from robomesh.texts import one_line
 
-# Examples that a process keeps, and how much of a key each shows.
+# Examples that a process keeps, and the longest part of a key that each shows.
 MOST_EXAMPLES = 16
 LONGEST_EXAMPLE = 160
 
@@ -22,8 +23,8 @@ class Ignored:
     """The keys that a session has ignored. Safe to use from any thread.
 
     Attributes:
-        count: How many tokens, publications, replies and requests were ignored.
-        examples: The first different ones, as people may read them: kind and key.
+        count: Number of ignored tokens, publications, replies and requests.
+        examples: The first distinct ones as text for people: kind and key.
     """
 
     def __init__(self) -> None:
@@ -32,7 +33,7 @@ class Ignored:
         self._lock = threading.Lock()
 
     def key(self, kind: str, text: str) -> keys.Key | None:
-        """Return the parts of a key that came; None: it fits no key of the contract, and is ignored."""
+        """Return the parts of a received key; None: the key is invalid and is ignored."""
         try:
             return keys.parse_key(text)
         except KeyNameError:
@@ -40,7 +41,7 @@ class Ignored:
             return None
 
     def presence(self, text: str) -> keys.PresenceKey | None:
-        """Return the parts of a liveliness token's key; None: it is none of the contract, and is ignored."""
+        """Return the parts of a liveliness token's key; None: the key is invalid and is ignored."""
         try:
             return keys.parse_presence_key(text)
         except KeyNameError:
@@ -48,7 +49,7 @@ class Ignored:
             return None
 
     def note(self, kind: str, text: str) -> None:
-        """Count something that is ignored."""
+        """Count an ignored message."""
         with self._lock:
             self.count += 1
             if len(self.examples) < MOST_EXAMPLES:

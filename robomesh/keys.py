@@ -1,8 +1,8 @@
 """Key expressions of the mesh.
 
 robomesh/<site>/<robot>/<topic>                 a robot's topic: robomesh/shanghai/pt600-1/joints
-robomesh/<site>/-/<topic>                       what belongs to a whole site
-robomesh/<site>/<robot>/<request>/<asker>       a request made in somebody's name: .../command/li
+robomesh/<site>/-/<topic>                       a topic of a whole site
+robomesh/<site>/<robot>/<request>/<caller>      a request in its caller's name: .../command/li
 robomesh/<site>/<robot>/alive/<service>/<id>    presence: a liveliness token
 """
 
@@ -21,12 +21,12 @@ REPLAY = "replay-"
 LONGEST_NAME, LONGEST_CHUNK = 64, 200
 
 _NAME = re.compile(r"[a-z0-9][a-z0-9_-]*")
-# Operators and views come from people and certificates: what a key chunk can hold.
+# Names of operators and views come from people and certificates, so more characters are allowed.
 _CHUNK = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 
 
 class Key(NamedTuple):
-    """A key taken apart."""
+    """A parsed key."""
 
     site: str
     robot: str
@@ -37,7 +37,7 @@ class Key(NamedTuple):
 
 
 class PresenceKey(NamedTuple):
-    """A liveliness token's key taken apart."""
+    """A parsed key of a liveliness token."""
 
     site: str
     robot: str
@@ -46,7 +46,7 @@ class PresenceKey(NamedTuple):
 
 
 def check_name(name: str, what: str = "name") -> str:
-    """The name itself, when a site or robot may have it.
+    """Return the name if it is valid for a site or robot.
 
     Raises:
         KeyNameError: If it is not at most 64 lower-case letters, digits, `_` and `-`, beginning with a
@@ -61,10 +61,10 @@ def check_name(name: str, what: str = "name") -> str:
 
 
 def check_chunk(name: str, what: str = "operator") -> str:
-    """The name itself, when it can be one chunk of a key (an operator, a view).
+    """Return the name if it is valid as one chunk of a key (an operator, a view).
 
     Raises:
-        KeyNameError: If it cannot.
+        KeyNameError: If it is not.
     """
     if len(name) > LONGEST_CHUNK or not _CHUNK.fullmatch(name):
         raise KeyNameError(
@@ -75,10 +75,10 @@ def check_chunk(name: str, what: str = "operator") -> str:
 
 
 def robot_key(site: str, robot: str, topic: str) -> str:
-    """The key of a robot's topic; `-` as the robot for what belongs to the whole site.
+    """Return the key of a robot's topic; `-` as the robot for a topic of the whole site.
 
     Raises:
-        KeyNameError: If site or robot cannot stand in a key.
+        KeyNameError: If the site's or robot's name is invalid.
     """
     check_name(site, "site")
     if robot != WHOLE_SITE:
@@ -87,15 +87,15 @@ def robot_key(site: str, robot: str, topic: str) -> str:
 
 
 def every_robot(topic: str) -> str:
-    """The key expression of a topic on every robot of every site."""
+    """Return the key expression of a topic on every robot of every site."""
     return f"{ROOT}/*/*/{topic}"
 
 
 def parse_key(key: str) -> Key:
-    """Return site, robot and topic of a key that fits the contract; no key expression does.
+    """Return site, robot and topic of a key; rejects key expressions with wildcards.
 
     Raises:
-        KeyNameError: If it is not a key of the mesh, or a chunk of it cannot be used.
+        KeyNameError: If it is not a key of the mesh, or a chunk is invalid.
     """
     parsed = parse_expression(key)
     robot_key(*parsed)
@@ -105,9 +105,9 @@ def parse_key(key: str) -> Key:
 
 
 def parse_expression(key_expr: str) -> Key:
-    """Return site, robot and topic of a key or key expression of our own; each may have a wildcard.
+    """Return site, robot and topic of a key or key expression; each may have a wildcard.
 
-    What others send goes through `parse_key`, which checks every chunk.
+    Does not check the chunks: use `parse_key` for keys received from the mesh.
 
     Raises:
         KeyNameError: If it does not have these three parts.
@@ -120,15 +120,16 @@ def parse_expression(key_expr: str) -> Key:
 
 
 def has_wildcard(key: str) -> bool:
-    """Whether a key stands for many: what is asked and listened to may, what is told may not.
+    """Return whether a key has a wildcard.
 
-    Zenoh lets somebody put to, answer on and be present on such a key: it would count for every robot.
+    Queries and subscriptions may have one. Zenoh also accepts it in publications, replies and tokens, which
+    would then count for every robot.
     """
-    return "*" in key  # `$` comes before one only
+    return "*" in key  # Zenoh's `$` is valid only in front of `*`
 
 
 def is_replay(key: str) -> bool:
-    """Whether a key belongs to a recording that is played back, with the times of then."""
+    """Return whether a key belongs to a replay, whose source times are those of the recording."""
     return f"/{REPLAY}" in key
 
 
@@ -136,7 +137,7 @@ def presence_key(site: str, robot: str, service: str, identity: str) -> str:
     """Return the key of a liveliness token; `*` as the identity for every token of the service.
 
     Raises:
-        KeyNameError: If a part of it cannot be used.
+        KeyNameError: If a part of it is invalid.
     """
     if identity != "*":
         check_chunk(identity, "id")
@@ -144,10 +145,10 @@ def presence_key(site: str, robot: str, service: str, identity: str) -> str:
 
 
 def parse_presence_key(key: str) -> PresenceKey:
-    """Site, robot, service and id of a liveliness token's key.
+    """Return site, robot, service and id of a liveliness token's key.
 
     Raises:
-        KeyNameError: If it is not one, a chunk of it cannot be used, or it stands for many.
+        KeyNameError: If it is not the key of a token, a chunk is invalid, or it has a wildcard.
     """
     site, robot, topic = parse_key(key)
     match topic.split("/"):

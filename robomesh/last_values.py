@@ -1,4 +1,4 @@
-"""The last values of a topic everywhere: one question, an answer from each publisher."""
+"""Last values of a topic across the mesh: one query, a reply from each publisher."""
 
 import asyncio
 
@@ -15,11 +15,11 @@ from robomesh.topics import topic
 
 
 async def last_values(session: Session, key_expr: str, *, timeout_s: float = 1.5) -> dict[str, Message]:
-    """By key, the last value of every publisher that answers: its history message where it has one.
+    """Return the last value of every publisher that answers, by key; the history message if there is one.
 
     Args:
-        key_expr: Of one topic, as in `robomesh/*/-/alarms`.
-        timeout_s: For those who are announced and do not answer; else it returns with the last answer.
+        key_expr: Key expression of one topic, as in `robomesh/*/-/alarms`.
+        timeout_s: Time to wait for publishers that do not answer; returns early when all have answered.
     """
     row = topic(keys.parse_expression(key_expr).topic)
     schema = row.history_schema or row.schema
@@ -55,5 +55,5 @@ async def last_values(session: Session, key_expr: str, *, timeout_s: float = 1.5
         try:
             values[key] = decode(schema, payload)
         except MessageError:
-            continue  # somebody else's nonsense
+            continue  # another program's invalid payload
     return values

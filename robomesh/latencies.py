@@ -1,4 +1,4 @@
-"""How long something takes, each time: counts in a few steps, as Prometheus takes histograms."""
+"""Latency histograms in Prometheus's form: counts in a few steps."""
 
 from bisect import bisect_left
 from dataclasses import dataclass, field
@@ -11,24 +11,24 @@ class Latencies:
     """A histogram.
 
     Attributes:
-        counts: Of those that took at most each of `STEPS_S`, and longer than the step before; then the rest.
-        sum_s: Of all.
+        counts: Number of values up to each of `STEPS_S` and above the step before; last, those above all.
+        sum_s: Sum of all values.
     """
 
     counts: list[int] = field(default_factory=lambda: [0] * (len(STEPS_S) + 1))
     sum_s: float = 0.0
 
     def add(self, seconds: float) -> None:
-        """One more; a clock that was set back makes it 0."""
+        """Add a value; a negative one, after the clock was set back, adds 0 to the sum."""
         self.counts[bisect_left(STEPS_S, seconds)] += 1
         self.sum_s += max(seconds, 0.0)
 
     def add_all(self, other: "Latencies") -> None:
-        """All of another."""
+        """Add all values of another histogram."""
         self.counts = [mine + more for mine, more in zip(self.counts, other.counts, strict=True)]
         self.sum_s += other.sum_s
 
     @property
     def count(self) -> int:
-        """How many."""
+        """Number of values."""
         return sum(self.counts)

@@ -1,4 +1,4 @@
-"""Control of a robot, for a program that acts for somebody: taken, renewed, given back."""
+"""Control of a robot for a program: acquire a lease, renew it, release it."""
 
 import asyncio
 import contextlib
@@ -17,12 +17,12 @@ _TTL_S = 2.0
 
 @dataclass(frozen=True)
 class Control:
-    """Control that somebody has.
+    """A lease that the program holds.
 
     Attributes:
         lease: The holder's secret, for commands.
-        now_ns: The gateway's clock when it was given [ns since the Unix epoch].
-        renewing: Ends when it can be renewed no more; its result is why.
+        now_ns: The gateway's clock when it granted the lease [ns since the Unix epoch].
+        renewing: Task that renews the lease; ends when the gateway refuses, with the reason as its result.
     """
 
     lease: str
@@ -32,11 +32,11 @@ class Control:
 
 @asynccontextmanager
 async def control(session: Session, site: str, robot: str, operator: str) -> AsyncIterator[Control]:
-    """Have control while the block runs. Killed, we lose it with our session.
+    """Hold control of a robot while the block runs; a killed program loses it with its session.
 
     Raises:
-        RefusedError: If somebody else has it.
-        NoAnswerError: If there is no gateway.
+        RefusedError: If another operator has control.
+        NoAnswerError: If no gateway answers.
     """
     key = robot_key(site, robot, f"lease/request/{operator}")
     identity = session_of(operator)
@@ -63,7 +63,7 @@ async def _renew(session: Session, key: str, lease: str) -> str:
     renewal = LeaseRequest(action=LeaseRequest.RENEW, lease=lease, ttl_s=_TTL_S)
     while True:
         await asyncio.sleep(_TTL_S / 4)
-        # One late answer is no reason to let go; the lease outlives three of them.
+        # Keep trying after a late answer: the lease outlives three of them.
         try:
             await session.ask(key, renewal, timeout_s=0.5)
         except (NoAnswerError, BusyError):

@@ -1,4 +1,4 @@
-"""The presence of a program that belongs to no site: at the one it was told, or the first it sees."""
+"""Presence of a program that belongs to no site: at a configured site, or at the first one that it finds."""
 
 import asyncio
 
@@ -13,18 +13,18 @@ from robomesh.topic_schema import PEOPLE
 async def be_present(
     session: Session, service: str, *, site: str = "", metrics: tuple[str, int] | None = None
 ) -> None:
-    """Be there for everybody, until cancelled.
+    """Announce the program until cancelled.
 
     Args:
-        site: Empty: the first that is seen.
-        metrics: Host and port at which Prometheus may ask; None: nowhere.
+        site: The site to be present at; empty: the first one found.
+        metrics: Host and port of the Prometheus endpoint; None: no endpoint.
 
     Raises:
-        SessionError: If the metrics cannot be served where they should be.
+        SessionError: If the metrics cannot be served at their address.
     """
     at = site or await _first_site(session)
     if session.principal is not None and session.principal.role in PEOPLE:
-        # People watch; health is a service's.
+        # An operator's or monitor's certificate may not publish health.
         session.declare_presence(at, WHOLE_SITE, MONITOR)
         if metrics is not None:
             serve_metrics(session, *metrics, {"service": service, "site": at, "id": session.identity})

@@ -1,7 +1,7 @@
-"""Messages as bytes: protobuf, or protobuf's JSON form with the proto's own field names.
+"""Messages as bytes: protobuf, or protobuf's JSON form with the field names of the proto file.
 
-Requests are checked more strictly than protobuf does: NaN, infinities and unspecified
-enums are refused by name.
+Requests are checked more strictly than by protobuf: NaN, infinities and unspecified enums are refused, and
+the error names the field.
 """
 
 import json
@@ -26,19 +26,19 @@ TEXT = "text/plain"
 _FLOATS = (FieldDescriptor.TYPE_DOUBLE, FieldDescriptor.TYPE_FLOAT)
 _OWN = "robomesh"
 _TIME = Timestamp.DESCRIPTOR.full_name
-# Years 1 to 9999, as its proto has it: to make a number of any other raises ValueError.
+# Years 1 to 9999, the range in timestamp.proto; converting another one raises ValueError.
 _FIRST_S, _LAST_S = -62_135_596_800, 253_402_300_799
 
 AnyMessage = TypeVar("AnyMessage", bound=Message)
 
 
 def is_json(encoding: str) -> bool:
-    """Whether a request with this encoding is JSON: said so, or nothing said."""
+    """Return whether a request with this encoding is JSON, which is also the default."""
     return not encoding.startswith(PROTOBUF)
 
 
 def to_json(message: Message, *, indent: int | None = None) -> str:
-    """A message as JSON: proto field names, defaults printed, times RFC 3339."""
+    """Return a message as JSON: proto field names, defaults printed, times in RFC 3339."""
     return json_format.MessageToJson(
         message,
         preserving_proto_field_name=True,
@@ -48,22 +48,22 @@ def to_json(message: Message, *, indent: int | None = None) -> str:
 
 
 def encode(message: Message, *, as_json: bool) -> bytes:
-    """A message as protobuf or JSON bytes."""
+    """Return a message as protobuf or JSON bytes."""
     return to_json(message).encode() if as_json else message.SerializeToString()
 
 
 def reason_message(reason: Reason) -> schema.Reason:
-    """Return a reason as it is in answers, audit entries and events."""
+    """Return a reason as the message in answers, audit entries and events."""
     message = schema.Reason(code=reason.code, values=reason.values, text=reason.text)
     message.causes.extend(map(reason_message, reason.causes))
     return message
 
 
 def decode(schema: type[AnyMessage], payload: bytes) -> AnyMessage:
-    """A message from protobuf bytes.
+    """Decode a message from protobuf bytes.
 
     Raises:
-        MessageError: If the bytes are not that message, or hold a time that is none.
+        MessageError: If the bytes are not that message, or contain an invalid time.
     """
     try:
         message = schema.FromString(payload)
@@ -74,10 +74,11 @@ def decode(schema: type[AnyMessage], payload: bytes) -> AnyMessage:
 
 
 def decode_request(schema: type[AnyMessage], payload: bytes, encoding: str) -> AnyMessage:
-    """A request from its payload, checked.
+    """Decode and check a request.
 
     Raises:
-        MessageError: If it is no such message, or holds a NaN, an infinity or an unspecified enum.
+        MessageError: If the payload is not that message, or contains a NaN, an infinity or an unspecified
+            enum.
     """
     message = decode(schema, payload) if not is_json(encoding) else _from_json(schema, payload)
     for problem in _problems(message):
@@ -91,20 +92,20 @@ def _from_json(schema: type[AnyMessage], payload: bytes) -> AnyMessage:
         text = payload.decode() or "{}"
         values = json.loads(text)
         if not isinstance(values, dict):
-            raise MessageError(f"not {_a(name)}: a JSON object is right, as in {{}}")
+            raise MessageError(f"not {_a(name)}: send a JSON object, as in {{}}")
         for key, value in values.items():
             _check_key(schema, key, value)
         json_format.Parse(text, message)
-    except (ValueError, RecursionError) as error:  # UnicodeDecodeError and JSON's own among them
+    except (ValueError, RecursionError) as error:  # includes UnicodeDecodeError and JSONDecodeError
         raise MessageError(f"not JSON: {error}") from None
     except json_format.ParseError as error:
-        # Behind " at " it repeats its own names.
+        # After " at " protobuf repeats the path in its own names.
         raise MessageError(f"not {_a(name)}: {str(error).splitlines()[0].partition(' at ')[0]}") from None
     return message
 
 
 def _check_key(schema: type[Message], key: str, value: object) -> None:
-    """What protobuf would say in its own names."""
+    """Check a field's name and enum value, with a clearer error text than protobuf's."""
     descriptor = schema.DESCRIPTOR
     fields = {name: field for field in descriptor.fields for name in (field.name, field.json_name)}
     field = fields.get(key)
@@ -113,7 +114,7 @@ def _check_key(schema: type[Message], key: str, value: object) -> None:
         raise MessageError(f"not {_a(descriptor.name)}: it has no field {key!r}; its fields are: {names}")
     if field.enum_type is not None and isinstance(value, str) and value not in field.enum_type.values_by_name:
         names = ", ".join(each.name for each in field.enum_type.values if each.number)
-        raise MessageError(f"{key}: {value!r} is none of {names}")
+        raise MessageError(f"{key}: {value!r} is not one of {names}")
 
 
 def _a(name: str) -> str:
@@ -129,7 +130,7 @@ def _problems(message: Message, path: str = "") -> Iterator[str]:
             number = getattr(message, field.name)
             names = [value.name for value in enum.values if value.number]
             if number == 0 or number not in enum.values_by_number:
-                yield f"{name}: one of {', '.join(names)} is needed"
+                yield f"{name}: set one of {', '.join(names)}"
     for field, value in message.ListFields():
         name = path + field.name
         values = value if field.is_repeated and not _is_map(field) else (value,)
@@ -144,8 +145,8 @@ def _is_map(field: FieldDescriptor) -> bool:
     return field.message_type is not None and field.message_type.GetOptions().map_entry
 
 
-# Of each field that is a time or holds some: its name, whether it is repeated, and its own such fields; None:
-# it is a time itself.
+# The fields that are times or contain times: name, whether it is repeated, and its own such fields; None: the
+# field is a time.
 _Dated = tuple[tuple[str, bool, "_Dated | None"], ...]
 
 
@@ -156,19 +157,19 @@ def _check_times(message: Message, dated: _Dated) -> None:
             if within is not None:
                 _check_times(each, within)
             elif not (_FIRST_S <= each.seconds <= _LAST_S and 0 <= each.nanos < 1_000_000_000):
-                raise MessageError(f"{name}: {each.seconds} s and {each.nanos} ns are no time")
+                raise MessageError(f"{name}: {each.seconds} s and {each.nanos} ns is not a valid time")
 
 
 @cache
 def _dated(schema: Descriptor) -> _Dated:
-    if schema.file.package != _OWN:  # Foxglove's come by the thousand, and nobody reckons with their times
+    if schema.file.package != _OWN:  # Foxglove's are frequent, and no code computes with their times
         return ()
     found: list[tuple[str, bool, _Dated | None]] = []
     for field in schema.fields:
         if field.message_type is None or _is_map(field):
             continue
         if field.message_type is schema:
-            continue  # of a message that contains itself, only the outermost is searched
+            continue  # of a recursive message only the outermost level is checked
         within = None if field.message_type.full_name == _TIME else _dated(field.message_type)
         if within != ():
             found.append((field.name, bool(field.is_repeated), within))

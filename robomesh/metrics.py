@@ -1,6 +1,6 @@
-"""Prometheus metrics of one process: read when they are asked for, so that they cost nothing else.
+"""Prometheus metrics of one process, collected only when Prometheus reads them.
 
-What is told: docs/monitoring.md.
+List of metrics: docs/monitoring.md.
 """
 
 from collections.abc import Iterator, Mapping
@@ -29,28 +29,28 @@ _COUNTS = {
     "skipped": "Messages that arrived and that the service was too slow to take",
     "malformed": "Messages without a right attachment, left out",
 }
-# Of what has gone for good, such as an ended replay, nothing is told any more.
+# An age above this is not reported: the publisher, for example an ended replay, has gone.
 _LONGEST_AGE_S = 3600.0
 
 
 class SessionMetrics(Collector):
-    """What a session counts, and its service's own measures."""
+    """The counters of a session and the measures of its service."""
 
     def __init__(self, session: Session, about: Mapping[str, str]) -> None:
         self._session, self._about = session, dict(about)
 
     def collect(self) -> Iterator[Metric]:
-        """Everything, as it is now."""
+        """Yield all metrics with their current values."""
         info = InfoMetricFamily("robomesh_process", "Which process this is")
         info.add_metric([], self._about)
         yield info
         yield GaugeMetricFamily(
             "robomesh_connected", "Whether a router is there", value=float(self._session.connected)
         )
-        tally = self._session.tally()
+        counters = self._session.counters()
         for name, text in _COUNTS.items():
             counter = CounterMetricFamily(f"robomesh_{name}", f"{text}, by topic", labels=["topic"])
-            for topic, count in sorted(getattr(tally, name).items()):
+            for topic, count in sorted(getattr(counters, name).items()):
                 counter.add_metric([topic], count)
             yield counter
         yield CounterMetricFamily(
@@ -68,10 +68,10 @@ class SessionMetrics(Collector):
         took = HistogramMetricFamily(
             "robomesh_request_seconds", "From a request's coming to its answer", labels=["request"]
         )
-        for request, count in sorted(tally.turned_away.items()):
+        for request, count in sorted(counters.turned_away.items()):
             away.add_metric([request], count)
-            over.add_metric([request], tally.over_quota[request])
-            latencies = tally.latencies[request]
+            over.add_metric([request], counters.over_quota[request])
+            latencies = counters.latencies[request]
             took.add_metric([request], _buckets(latencies), latencies.sum_s)
         yield away
         yield over
@@ -91,7 +91,7 @@ class SessionMetrics(Collector):
                 continue
             for key in subscription.keys:
                 age_s, parsed = subscription.age_s(key), parse_key(key)
-                # The row's name: each process that ever was would leave series of its own.
+                # The row's name, because a full name would leave a series for each former process.
                 labels = parsed.site, parsed.robot, subscription.topic.name
                 if age_s is not None and age_s < min(newest.get(labels, _LONGEST_AGE_S), _LONGEST_AGE_S):
                     newest[labels] = age_s
@@ -101,10 +101,10 @@ class SessionMetrics(Collector):
 
 
 def serve_metrics(session: Session, host: str, port: int, about: Mapping[str, str]) -> str:
-    """Serve them until the process ends; the address, with the port that was taken.
+    """Serve the metrics until the process ends; return the address with the actual port.
 
     Raises:
-        SessionError: If it cannot listen there.
+        SessionError: If it cannot listen at that address.
     """
     registry = CollectorRegistry()
     registry.register(SessionMetrics(session, about))
@@ -131,6 +131,6 @@ def _own(measure: Measure) -> Metric:
 
 
 def _buckets(latencies: Latencies) -> list[tuple[str, float]]:
-    """Prometheus's own: each counts what was quicker too."""
+    """Return Prometheus's cumulative buckets."""
     steps = [*map(str, STEPS_S), "+Inf"]
     return [(step, float(sum(latencies.counts[: number + 1]))) for number, step in enumerate(steps)]

@@ -1,12 +1,12 @@
-"""Long answers, in pieces: whoever asks takes them at the pace of the line between.
+"""Long answers in pieces, which the caller fetches at the rate of the line.
 
-A message longer than one of Zenoh's batches is dropped when its fragments wait longer than 51 ms for places
-in a link's queue: an answer of megabytes would never pass a slow line. To wait there (`BLOCK`) would hold up
-what comes behind it at every router on the way, and close the link after 5 s. A piece finds its place or is
-lost alone, and what was lost is asked for again.
+Zenoh drops a message longer than one batch if its fragments wait more than 51 ms for space in a link's
+queue, so an answer of megabytes would never pass a slow line. Waiting there (`BLOCK`) would delay all
+following messages at every router on the way, and close the link after 5 s. A piece fits into a batch; a
+lost piece is requested again.
 
-    get KEY?pieces                the answer, or its first piece; attached: a token, and how long the whole is
-    get KEY?piece=TOKEN:OFFSET    the piece that begins there
+    get KEY?pieces                the answer, or its first piece; attachment: a token and the answer's length
+    get KEY?piece=TOKEN:OFFSET    the piece at an offset
 """
 
 import asyncio
@@ -22,32 +22,33 @@ from robomesh.endpoints import first_line
 from robomesh.errors import BrokenAnswerError, NoAnswerError
 from robomesh.messages import TEXT
 
-# Two of them fit into one of Zenoh's batches.
+# Two pieces fit into one of Zenoh's batches.
 PIECE_BYTES = 30_000
 _ASKING = "pieces"
 _PIECE = "piece"
 _TOKEN_BYTES = 8
 _OF_WHOLE = struct.Struct(f"<{_TOKEN_BYTES}sQ")
-# What an owner keeps for those who are still taking it: this much, for so long after it was last asked for.
+# Answers that an owner keeps while callers fetch them: total size, and time since the last request [s].
 _KEPT_BYTES = 64 << 20
 _KEPT_S = 60.0
-# An answer of one name's gives out its pieces so many times: some are lost, but its quota counts it once.
+# Times that a caller may fetch each piece of its answer: pieces get lost, but the quota counts them once.
 _TIMES = 4
 _OFFSET_DIGITS = 12
-# At once, as TCP does it: twice as many a round until something is lost; then half, and one more a round.
+# Most requests in parallel. Like TCP, each round doubles them until a piece is lost; a loss halves them, and
+# each further round adds one.
 _MOST_AT_ONCE = 16
-# What has not come by then counts as lost, while nobody knows how long a round takes.
+# Timeout of a piece while the duration of a round is unknown [s].
 _LOST_AFTER_S = 2.0
 _SLACK_S = 0.5
-# Zenoh says at once that there is no owner.
+# Wait after a loss [s], because Zenoh reports a missing owner immediately.
 _AGAIN_S = 0.05
-# No answer of the mesh is longer; whoever says so must not fill the asker's memory.
+# No answer of the mesh is longer; a false length must not fill the caller's memory.
 _LONGEST_BYTES = 256 << 20
 
 
 @dataclass(frozen=True, slots=True)
 class First:
-    """The first piece of a long answer, and what names the others."""
+    """The first piece of a long answer, with the token for the other pieces."""
 
     key: str
     data: bytes
@@ -57,11 +58,11 @@ class First:
 
 @dataclass(slots=True)
 class _Kept:
-    """An answer that is being taken.
+    """An answer that callers are fetching.
 
     Attributes:
-        due: Pieces that those who asked have yet to take; below zero: so many were given out beyond that.
-        used: When it was last asked for [s].
+        due: Pieces that the callers have not fetched yet; below zero: pieces sent beyond that.
+        used: Time of the last request [s].
     """
 
     answer: bytes
@@ -70,16 +71,16 @@ class _Kept:
 
     @property
     def pieces(self) -> int:
-        """How many there are behind the first."""
+        """Number of pieces after the first."""
         return (len(self.answer) - 1) // PIECE_BYTES
 
 
 class LongAnswers:
-    """An owner's answers that somebody is taking in pieces.
+    """An owner's answers that callers are fetching in pieces.
 
     Args:
-        in_name: They are asked for in a name: each belongs to whoever asked, and is given out a few times.
-            Otherwise the same answer is kept once for all who ask.
+        in_name: Requests carry the caller's name: an answer belongs to its caller and is sent a few times.
+            Otherwise all callers share one copy of equal answers.
     """
 
     def __init__(self, *, in_name: bool) -> None:
@@ -89,7 +90,7 @@ class LongAnswers:
         self._timer: asyncio.TimerHandle | None = None
 
     def reply(self, query: zenoh.Query, key: str, answer: bytes, encoding: str) -> None:
-        """Answer a request, by a first piece where the whole is long and who asks takes pieces.
+        """Answer a request; with a first piece if the answer is long and the caller accepts pieces.
 
         Called on the event loop.
         """
@@ -100,7 +101,7 @@ class LongAnswers:
         query.reply(key, answer[:PIECE_BYTES], encoding=encoding, attachment=whole)
 
     def reply_piece(self, query: zenoh.Query) -> bool:
-        """Answer a question for a piece; False: it is none."""
+        """Answer a request for a piece; False: it is another request."""
         asked = query.parameters.get(_PIECE)
         if asked is None:
             return False
@@ -111,11 +112,11 @@ class LongAnswers:
             if piece:
                 query.reply(str(query.key_expr), piece)
             else:
-                query.reply_err(b"no such piece of an answer is here: ask anew", encoding=TEXT)
+                query.reply_err(b"this answer is no longer kept: repeat the request", encoding=TEXT)
         return True
 
     def _keep(self, answer: bytes) -> str:
-        """Keep an answer for one who asked; its token."""
+        """Keep an answer for its caller and return its token."""
         with self._lock:
             token = self._token_of(answer)
             kept = self._kept.setdefault(token, _Kept(answer))
@@ -143,9 +144,9 @@ class LongAnswers:
             return kept.answer[offset : offset + PIECE_BYTES]
 
     def _forget(self, asked_now: str = "") -> None:
-        """What is unused; and where it is too much, first what was taken, then what waits longest."""
+        """Drop unused answers; above the size limit, first the fetched ones, then the least recently used."""
         now, length = time.monotonic(), sum(len(each.answer) for each in self._kept.values())
-        # Whoever took all of it may have lost a piece, but who is still taking has lost all without it.
+        # A caller that fetched all pieces may still miss a lost one, but an unfinished transfer would fail.
         order = sorted(self._kept, key=lambda each: (self._kept[each].due > 0, self._kept[each].used))
         for token in order:
             kept = self._kept[token]
@@ -154,7 +155,7 @@ class LongAnswers:
                 length -= len(kept.answer)
 
     def _forget_later(self) -> None:
-        """An owner that nobody asks any more keeps nothing."""
+        """Drop unused answers now and periodically, until none is left."""
         with self._lock:
             self._forget()
             waits = bool(self._kept)
@@ -163,12 +164,12 @@ class LongAnswers:
 
 
 def selector(key: str) -> str:
-    """What asks for a key and takes a long answer in pieces."""
+    """Return the selector for a key that accepts a long answer in pieces."""
     return f"{key}?{_ASKING}"
 
 
 def first_of(sample: zenoh.Sample) -> First | None:
-    """What a reply is the first piece of; None: it is whole."""
+    """Return the first piece in a reply; None: the reply is a complete answer."""
     attached = b"" if sample.attachment is None else sample.attachment.to_bytes()
     if len(attached) != _OF_WHOLE.size:
         return None
@@ -180,21 +181,21 @@ def first_of(sample: zenoh.Sample) -> First | None:
 
 
 async def whole(session: zenoh.Session, first: First, priority: zenoh.Priority, *, timeout_s: float) -> bytes:
-    """Take the rest of a long answer, however long that takes, as long as pieces come.
+    """Fetch the rest of a long answer and return the whole, however long that takes while pieces arrive.
 
     Args:
-        timeout_s: How long none may come [s].
+        timeout_s: Longest time without a piece [s].
 
     Raises:
-        BrokenAnswerError: If its owner has it no more, or no piece came for so long.
+        BrokenAnswerError: If the owner no longer keeps the answer, or no piece arrived for `timeout_s`.
     """
     missing = list(range(PIECE_BYTES, first.length, PIECE_BYTES))
     taken = {0: first.data}
     at_once, patience_s, lossless = 1, _LOST_AFTER_S, True
-    came = time.monotonic()
+    last_arrival = time.monotonic()
     while missing:
         began = time.monotonic()
-        left_s = came + timeout_s - began
+        left_s = last_arrival + timeout_s - began
         if left_s <= 0:
             raise _broken(first, taken, f"then none for {timeout_s:g} s")
         now, later = missing[:at_once], missing[at_once:]
@@ -205,10 +206,10 @@ async def whole(session: zenoh.Session, first: First, priority: zenoh.Priority, 
             if piece is None:
                 lost.append(offset)
             elif len(piece) != min(PIECE_BYTES, first.length - offset):
-                # Refused, or another's nonsense.
-                raise _broken(first, taken, "then its owner had it no more: ask again")
+                # Refused, or an invalid answer of another program.
+                raise _broken(first, taken, "then its owner no longer kept it: repeat the request")
             else:
-                taken[offset], came = piece, time.monotonic()
+                taken[offset], last_arrival = piece, time.monotonic()
         missing = lost + later
         if lost:
             lossless, at_once = False, max(at_once // 2, 1)
@@ -221,14 +222,14 @@ async def whole(session: zenoh.Session, first: First, priority: zenoh.Priority, 
 
 
 def _broken(first: First, taken: dict[int, bytes], why: str) -> BrokenAnswerError:
-    came = sum(map(len, taken.values()))
-    return BrokenAnswerError(f"{first.key}: {came} of {first.length} bytes came, {why}")
+    length = sum(map(len, taken.values()))
+    return BrokenAnswerError(f"{first.key}: {length} of {first.length} bytes arrived, {why}")
 
 
 async def _ask(
     session: zenoh.Session, asked: str, priority: zenoh.Priority, timeout_s: float
 ) -> bytes | None:
-    """A piece; None: nothing came; empty: it was refused."""
+    """Request a piece; return None if no reply arrived, and no bytes if the owner refused."""
     loop = asyncio.get_running_loop()
     done: asyncio.Future[bytes | None] = loop.create_future()
     answers: list[bytes] = []
@@ -236,7 +237,7 @@ async def _ask(
     def on_reply(reply: zenoh.Reply) -> None:
         if reply.ok is not None:
             answers.append(reply.ok.payload.to_bytes())
-        # Zenoh's own, that the time is over, has another encoding.
+        # Zenoh's timeout error has another encoding.
         elif reply.err is not None and str(reply.err.encoding) == TEXT:
             answers.append(b"")
 

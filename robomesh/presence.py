@@ -1,4 +1,4 @@
-"""Presence: who is alive, told by Zenoh's liveliness."""
+"""Presence of services, operators and monitors, as Zenoh liveliness tokens."""
 
 import asyncio
 import secrets
@@ -13,51 +13,51 @@ from robomesh.ignored import Ignored
 
 _TIMEOUT_S = 2.0
 _RETRY_S = 0.05
-EVERYBODY = f"{keys.ROOT}/*/*/alive/*/*"
-# In the service's place: a program or page through which somebody has control of the robot.
+EVERYTHING = f"{keys.ROOT}/*/*/alive/*/*"
+# In place of a service's name: a program or page through which an operator has control of the robot.
 OPERATOR = "operator"
-# A program that only watches.
+# A program that only subscribes.
 MONITOR = "monitor"
-# Who publishes nothing.
+# Present, but without a topic to publish.
 SILENT = (OPERATOR, MONITOR)
 
 
 def session_of(name: str) -> str:
-    """Return a new id for the presence of a session; with certificates its owner alone may declare it.
+    """Return a new id for the presence of a session; with certificates only `name` may declare it.
 
     Args:
-        name: In whose name the session asks.
+        name: Name in the session's requests.
     """
     return f"{name}.{secrets.token_hex(8)}"
 
 
 async def present(
-    session: zenoh.Session, key_expr: str = EVERYBODY, *, ignored: Ignored | None = None
+    session: zenoh.Session, key_expr: str = EVERYTHING, *, ignored: Ignored | None = None
 ) -> list[keys.PresenceKey]:
-    """Return who is alive now, sorted; while the link to the router is lost, wait for it.
+    """Return all presence keys alive now, sorted; while the link to the router is lost, wait for it.
 
     Args:
-        ignored: Counts tokens that fit no presence key; None: they are left out uncounted.
+        ignored: Counts tokens with invalid keys; None: they are not counted.
 
     Raises:
-        NoAnswerError: If the router did not tell all in time: a part of it would say that others are gone.
+        NoAnswerError: If the router did not list all tokens in time; a partial list would hide live services.
     """
     seen = Ignored() if ignored is None else ignored
     deadline = time.monotonic() + _TIMEOUT_S
     while (left_s := deadline - time.monotonic()) > 0.0:
-        found = await _told(session, key_expr, seen, left_s)
+        found = await _tokens(session, key_expr, seen, left_s)
         if not found:
-            # A lost link ends the answer early, as if it were whole; Zenoh tells of it a moment later.
+            # A lost link ends the reply early without an error; Zenoh reports the loss a moment later.
             await asyncio.sleep(min(left_s, _RETRY_S))
         if found is not None and session.info.routers_zid():
             return sorted(found)
-    raise NoAnswerError(f"the router did not say within {_TIMEOUT_S:g} s who is alive: ask again")
+    raise NoAnswerError(f"the router did not list the live services within {_TIMEOUT_S:g} s: try again")
 
 
-async def _told(
+async def _tokens(
     session: zenoh.Session, key_expr: str, seen: Ignored, timeout_s: float
 ) -> set[keys.PresenceKey] | None:
-    """Return who is alive as the router tells it; None: it did not tell all in time."""
+    """Return the keys of all tokens; None: the router did not list all in time."""
     loop = asyncio.get_running_loop()
     done = asyncio.Event()
     found: set[keys.PresenceKey] = set()
@@ -80,7 +80,7 @@ async def _told(
 
 
 class PresenceWatch:
-    """Who comes alive and who goes, as an asynchronous iterator; who is there already comes first."""
+    """Changes of presence as an asynchronous iterator of (key, alive); begins with the tokens alive now."""
 
     def __init__(self, session: zenoh.Session, key_expr: str, ignored: Ignored) -> None:
         loop = asyncio.get_running_loop()
@@ -94,7 +94,7 @@ class PresenceWatch:
                 return
             alive = sample.kind == zenoh.SampleKind.PUT
             if alive == (key in present):
-                return  # who comes in the moment of asking is told twice: as there already, and as coming
+                return  # a token declared during the subscription is reported twice
             (present.add if alive else present.discard)(key)
             if not loop.is_closed():
                 loop.call_soon_threadsafe(self._changes.put_nowait, (key, alive))
@@ -112,11 +112,11 @@ class PresenceWatch:
 
     @property
     def closed(self) -> bool:
-        """Whether it was closed."""
+        """True after `close`."""
         return self._closed
 
     def close(self) -> None:
-        """Watch no more; the iterator ends."""
+        """Stop watching; the iterator ends."""
         if not self._closed:
             self._closed = True
             self._subscriber.undeclare()

@@ -1,4 +1,4 @@
-"""Publishers: they number and date what they publish, and answer late joiners."""
+"""Publishers: number and timestamp messages, and answer late joiners."""
 
 import asyncio
 import secrets
@@ -30,7 +30,7 @@ OnGet = Callable[[], Awaitable[Message | None]]
 class Publisher:
     """The publisher of one topic of one robot.
 
-    Safe to use from any one thread at a time; late joiners are answered on Zenoh's.
+    Safe to use from any one thread at a time; late joiners are answered on Zenoh's thread.
     """
 
     def __init__(
@@ -38,8 +38,8 @@ class Publisher:
     ) -> None:
         self.key = keys.robot_key(site, robot, name)
         self.topic: Topic = topic(name)
-        # New at each start, so that a number that begins again is not taken for an old one; and whenever
-        # another clock dates what follows: receivers compare the lags of one identity (`lateness.py`).
+        # New at each start, so that restarted sequence numbers do not look old; and new when another clock
+        # provides the source times, because receivers compare the lags of one identity (`delay.py`).
         self._identity = secrets.randbits(64)
         self._wall_clock = WallClock()
         self._dated_by: int | None = None
@@ -65,16 +65,16 @@ class Publisher:
         dated_by: int | None = None,
         key_frame: bool = False,
     ) -> Header:
-        """Publish a message of the topic's schema, as it is now.
+        """Publish a message of the topic's schema.
 
         Args:
-            source_time_ns: When what it tells was so, ns since the Unix epoch; now, unless given.
-            dated_by: Which clock says that time, by any number: the publisher in whose message it stood, or
-                a clock of a controller's; None: this machine's. Another one begins another identity.
-            key_frame: Of a video topic: the joiner's frames begin here.
+            source_time_ns: Time of the message's contents, ns since the Unix epoch; by default now.
+            dated_by: Number of the clock of that time: a publisher whose message contained it, or a
+                controller's clock; None: this machine's clock. Another number starts another identity.
+            key_frame: For a video topic: late joiners get the frames from this one on.
 
         Returns:
-            The header that it was published with.
+            The published header.
         """
         if source_time_ns is None:
             source_time_ns = time.time_ns()
@@ -88,7 +88,7 @@ class Publisher:
     def put_bytes(
         self, payload: bytes, *, source_time_ns: int, dated_by: int | None = None, key_frame: bool = False
     ) -> Header:
-        """As `put`, of a message that is bytes already."""
+        """Publish a serialized message; see `put`."""
         with self._lock:
             if self._clock_is_another(dated_by):
                 self._identity = secrets.randbits(64)
@@ -104,43 +104,43 @@ class Publisher:
         return header
 
     def _clock_is_another(self, dated_by: int | None) -> bool:
-        """Whether what follows is dated by another clock than what went before, or by one that was set."""
+        """Return whether the clock of the source times differs from the last message's, or was set."""
         before, self._dated_by = self._dated_by, dated_by
         was_set = dated_by is None and self._wall_clock.was_set()
         return self._sequence > 0 and (dated_by != before or was_set)
 
     def remember(self, message: Message, *, source_time_ns: int) -> None:
-        """Answer late joiners with it, and publish nothing: what is old gets no new number."""
+        """Answer late joiners with a message without publishing it: an old value gets no new number."""
         self.remember_bytes(message.SerializeToString(), source_time_ns=source_time_ns)
 
     def remember_bytes(self, payload: bytes, *, source_time_ns: int) -> None:
-        """As `remember`, of a message that is bytes already."""
+        """Answer late joiners with a serialized message; see `remember`."""
         with self._lock:
             self._history.append((Header(self._identity, self._sequence, source_time_ns), payload))
 
     def forget(self) -> None:
-        """Answer late joiners with nothing until something is put or remembered again."""
+        """Answer late joiners with nothing until the next `put` or `remember`."""
         with self._lock:
             self._history.clear()
 
     @property
     def published(self) -> int:
-        """How many were put."""
+        """Number of published messages."""
         return self._sequence
 
     @property
     def watched(self) -> bool:
-        """Whether anybody subscribes to it now; recovered topics always are, they are rare and small."""
+        """True while the topic has subscribers; always for recovered topics, which are rare and small."""
         if self._closed:
             return False
         if not isinstance(self._publisher, zenoh.Publisher):
             return True
-        # Typed as bool, but it is an object that is always true.
+        # Annotated as bool, but an object that is always true.
         status: Any = self._publisher.matching_status
         return bool(status.matching)
 
     def on_watched(self, changed: Callable[[], None]) -> None:
-        """Call something, on the event loop, whenever the first subscriber comes or the last one goes."""
+        """Call `changed` on the event loop when the first subscriber appears or the last one disappears."""
         loop = asyncio.get_running_loop()
 
         def hand_over(status: object) -> None:
@@ -151,11 +151,11 @@ class Publisher:
 
     @property
     def closed(self) -> bool:
-        """Whether it was closed."""
+        """True after `close`."""
         return self._closed
 
     def close(self) -> None:
-        """Publish and answer no more."""
+        """Stop publishing and answering."""
         if self._closed:
             return
         self._closed = True
@@ -198,7 +198,7 @@ def _history_length(row: Topic) -> int:
 
 
 def _history_payload(row: Topic, history: list[tuple[Header, bytes]]) -> bytes:
-    """What a late joiner gets, as one message's bytes."""
+    """Return the answer for a late joiner as the bytes of one message."""
     if row.history_schema is None:
         return history[-1][1]
     if row.history is History.KEY_FRAME:

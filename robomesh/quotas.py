@@ -1,7 +1,7 @@
-"""Quotas: what one name may ask for of what costs others, so that nobody takes it all.
+"""Quotas: limits for each caller on requests that cost shared resources.
 
-They go by the asker's name in the key, which the router vouches for; on a mesh without certificates by
-whatever name somebody gives.
+They count by the caller's name in the key. With certificates the router checks that name; without them a
+program may use any name.
 """
 
 import math
@@ -15,23 +15,23 @@ from robomesh import reason_codes as codes
 from robomesh.errors import QuotaError
 
 _MINUTE_S = 60.0
-# When somebody who has as much as may be at once is to ask again [s].
+# Wait after a request over the parallel limit [s].
 _AGAIN_S = 0.5
 _ROUNDING_S = 1e-6
-# Askers that are remembered: who is forgotten has its whole minute's worth again.
+# Callers that are remembered; a forgotten one has its full quota again.
 _MOST_ASKERS = 4096
 
 
 @dataclass(frozen=True, kw_only=True)
 class Quotas:
-    """What each name may ask for: `[quotas]` of the site file.
+    """Limits for each name: `[quotas]` of the site file.
 
     Attributes:
-        views: Of one's own, at once at one renderer; and as large a share of what is drawn for all.
-        key_frames_a_minute: That one renderer makes because of it.
-        checks: Of programs, at once at one kinematics service.
-        checks_a_minute: Of one kinematics service.
-        recordings_mib_a_minute: Of answers from one recorder: files, messages, values.
+        views: Requested views in parallel at one renderer; also limits the caller's share of its pixels.
+        key_frames_a_minute: Key frames that a caller requests from one renderer.
+        checks: Program checks in parallel at one kinematics service.
+        checks_a_minute: Program checks at one kinematics service.
+        recordings_mib_a_minute: Answers from one recorder [MiB]: files, messages, values.
     """
 
     views: int = 16
@@ -45,15 +45,15 @@ DEFAULT_QUOTAS = Quotas()
 
 
 class Quota:
-    """One of them, counted by asker; for one event loop.
+    """One quota, counted for each caller; for one event loop.
 
-    A minute's worth may come at once, and then as much as time gives back: a leaky bucket as a meter, in
-    its form of one number an asker (GCRA, ITU-T I.371, annex A).
+    A caller may use a minute's amount in a burst; it then refills with time. This is a leaky bucket as a
+    meter, with one number for each caller (GCRA, ITU-T I.371, annex A).
 
     Args:
-        name: Of its keys in the site file.
-        at_once: How many may be under way.
-        a_minute: How much may be asked for.
+        name: Name of its keys in the site file.
+        at_once: Most requests in parallel.
+        a_minute: Amount a minute.
     """
 
     def __init__(
@@ -66,15 +66,15 @@ class Quota:
     ) -> None:
         self._name, self._a_minute, self._at_once, self._clock = name, a_minute, at_once, clock
         self._under_way = Counter[str]()
-        # When everything that somebody had is given back by time, on the clock [s].
+        # Time at which a caller's quota is full again, on the clock [s].
         self._even_at: dict[str, float] = {}
 
     @contextmanager
     def one(self, asker: str) -> Iterator[None]:
-        """One is under way for as long as the block lasts.
+        """Count one request, in progress until the block ends.
 
         Raises:
-            QuotaError: If that is more than the asker may have.
+            QuotaError: If the caller's quota does not allow it.
         """
         if self._under_way[asker] >= self._at_once:
             reason = codes.QUOTA_AT_ONCE(
@@ -92,13 +92,13 @@ class Quota:
             yield
         finally:
             self._under_way[asker] -= 1
-            self._under_way += Counter()  # forgets who has none
+            self._under_way += Counter()  # removes callers at zero
 
     def check(self, asker: str, amount: float = 0.0) -> None:
-        """Whether so much is left for somebody; anything at all, where how much it is shows afterwards.
+        """Check that a caller's quota covers an amount; 0 checks that any is left, if the amount is unknown.
 
         Raises:
-            QuotaError: If not; says when there will be.
+            QuotaError: If it does not; says when it will.
         """
         now = self._clock()
         owed_s = max(self._even_at.get(asker, now) - now, 0.0)
@@ -113,14 +113,14 @@ class Quota:
             raise QuotaError(reason, again_s=again_s)
 
     def count(self, asker: str, amount: float) -> None:
-        """Count what somebody was given."""
+        """Charge an amount to a caller."""
         now = self._clock()
         if asker not in self._even_at and len(self._even_at) >= _MOST_ASKERS:
             self._forget(now)
         self._even_at[asker] = max(self._even_at.get(asker, now), now) + amount * _MINUTE_S / self._a_minute
 
     def _forget(self, now: float) -> None:
-        """Forget who is even; if nobody is, whoever had least."""
+        """Forget the callers with a full quota; if there is none, the one that used least."""
         owing = {asker: at for asker, at in self._even_at.items() if at > now}
         if len(owing) >= _MOST_ASKERS:
             del owing[min(owing, key=owing.__getitem__)]

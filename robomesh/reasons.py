@@ -1,7 +1,7 @@
-"""Reasons: why a request is refused, why control ended, why a motion is not checked.
+"""Reasons for refused requests, ended leases and unchecked motions.
 
-A reason is a code with parameters, for programs and translations, beside one English sentence for people. The
-codes and their sentences are in `robomesh.reason_codes`, and nowhere else.
+A reason is a code with parameters for programs and translations, and one English sentence for people. All
+codes and sentences are in `robomesh.reason_codes`.
 
 A refusal is an error reply: its payload is the sentence, its encoding is `text/plain;<parameters>`. The
 parameters are a query string (`code=lease.held&holder=li`). A cause follows with the prefix `cause.`
@@ -17,10 +17,10 @@ from urllib.parse import parse_qsl, quote
 from robomesh.texts import one_line
 
 MOST_PARAMETER_BYTES = 255
-"""Bytes of an encoding's parameters."""
+"""Most bytes of an encoding's parameters."""
 
 RETRY = ("busy", "again_s")
-"""Parameters before the code: the request may be repeated, at once or after so long [s]."""
+"""Parameters before the code: the request may be repeated, immediately or after a time [s]."""
 
 _CODE = "code"
 _CAUSE = "cause"
@@ -34,10 +34,10 @@ class Reason:
     """A code with its parameters.
 
     Attributes:
-        code: From the table, or a newer peer's: "lease.held".
+        code: Code from the table, or of a newer peer: "lease.held".
         values: The parameters, as text.
-        causes: Reasons of this reason. They stand in its sentence in the place of `{cause}`.
-        text: The sentence in English, without a full stop; of a received refusal its payload.
+        causes: Reasons for this reason; their sentences replace `{cause}` in its sentence.
+        text: The sentence in English, without a full stop; for a received refusal its payload.
     """
 
     code: str
@@ -51,11 +51,11 @@ class Reason:
 
 @dataclass(frozen=True, slots=True)
 class Code:
-    """A row of the table; called with its parameters it makes a reason.
+    """A row of the table; calling it with parameters returns a reason.
 
     Attributes:
-        name: "lease.held".
-        problem: What happened, with `{parameters}`; a format specification applies: `{seconds:g}`.
+        name: The code: "lease.held".
+        problem: Description of the problem with `{parameters}`, which may have a format: `{seconds:g}`.
         advice: What to do about it.
     """
 
@@ -70,7 +70,7 @@ class Code:
 
     @property
     def parameters(self) -> frozenset[str]:
-        """Names in the sentence, `cause` among them where it has one."""
+        """Names in the sentence, including `cause`."""
         return frozenset(name for _, name, _, _ in _FORMATTER.parse(self.sentence) if name)
 
     def __call__(self, *causes: Reason, **values: object) -> Reason:
@@ -97,7 +97,7 @@ def to_parameters(reason: Reason, when: str = "") -> str:
     """Return the parameters of a refusal's encoding, at most 255 bytes of ASCII.
 
     Args:
-        when: Parameter before the code that says whether, or when, the request may be repeated.
+        when: Parameter before the code: the request may be repeated, and when.
     """
     written = f"{when}&" if when else ""
     written += f"{_CODE}={quote(reason.code, safe='')[: MOST_PARAMETER_BYTES // 3]}"
@@ -110,14 +110,14 @@ def to_parameters(reason: Reason, when: str = "") -> str:
 
 def _flat(reason: Reason, prefix: str = "") -> list[tuple[str, str]]:
     pairs = [(f"{prefix}{name}", value) for name, value in reason.values.items()]
-    # One of several would say less than the sentence, which has them all.
+    # One of several causes would say less than the sentence, which has all of them.
     for cause in reason.causes if len(reason.causes) == 1 else ():
         pairs += [(f"{prefix}{_CAUSE}.{_CODE}", cause.code), *_flat(cause, f"{prefix}{_CAUSE}.")]
     return pairs
 
 
 def pairs_of(parameters: str) -> dict[str, str]:
-    """Return the parameters of a refusal's encoding; none of what is no query string."""
+    """Return the parameters of a refusal's encoding; empty if it is not a query string."""
     try:
         return dict(parse_qsl(parameters[:MOST_PARAMETER_BYTES], keep_blank_values=True))
     except ValueError:
@@ -125,11 +125,11 @@ def pairs_of(parameters: str) -> dict[str, str]:
 
 
 def reason_of(pairs: Mapping[str, str], text: str) -> Reason | None:
-    """Return the reason of a refusal; None: its encoding names none.
+    """Return the reason of a refusal; None: the encoding has no code.
 
     Args:
-        pairs: The parameters of its encoding.
-        text: Its payload.
+        pairs: Parameters of the refusal's encoding.
+        text: The refusal's payload.
     """
     if not pairs.get(_CODE):
         return None

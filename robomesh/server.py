@@ -1,4 +1,4 @@
-"""Answering: a request's owner hears it on the event loop, answers it or refuses it in words."""
+"""Server side of requests: the owner handles a request on the event loop, and answers or refuses it."""
 
 import asyncio
 import logging
@@ -21,43 +21,43 @@ from robomesh.ignored import REQUEST, Ignored
 from robomesh.latencies import Latencies
 from robomesh.messages import JSON, PROTOBUF, TEXT, decode_request, encode, is_json
 from robomesh.reasons import RETRY, to_parameters
-from robomesh.request_queue import HELD, RING, Queue, RateLimit, Turns, begin_now, read
+from robomesh.request_queue import QUEUE, RING, Queue, RateLimit, RoundRobin, begin_now, read
 
 log = logging.getLogger(__name__)
 
-# How a refusal that may be asked again is encoded for clients that do not ask for codes; behind the second:
-# when to ask again [s].
+# Encodings of refusals that may be repeated, for clients that do not ask for codes. The wait [s] follows
+# the second.
 OLD_AGAIN_S = "quota"
 BUSY_TEXT = f"{TEXT};busy"
 QUOTA_TEXT = f"{TEXT};{OLD_AGAIN_S}="
-# A parameter of the question: for how many seconds its asker waits. Zenoh does not tell the owner.
+# Parameter of a request: how long the caller waits [s]. Zenoh does not send a query's timeout to the owner.
 WITHIN = "within"
-# A parameter of the question: its asker reads a refusal's code from the encoding, those two among them.
+# Parameter of a request: the caller reads a refusal's code from the encoding, also for the two above.
 CODES = "codes"
 BUSY, AGAIN_S = RETRY
 _LONGEST_AGAIN_S = 86_400.0
-# Of a request that is asked over both links: what marks its two copies, and how many marks are known.
+# Length of the mark on the two copies of a request sent over both links, and marks that are remembered.
 MARK_BYTES = 8
 _MOST_MARKS = 256
-# Of one owner's row so many have no answer yet, and so many of them are one asker's.
+# Most unanswered requests of one row at one owner: in all, and of one caller.
 _MOST = 256
 _MOST_OF_ONE = 16
-# Limits of the "too many requests wait" answers: at once, and a second.
+# Limits of the "too many requests" answers: burst, and rate [1/s].
 _BUSY_BURST = 1024
 _BUSY_PER_S = 250.0
-_ANYBODY = "*"
+_ANY_CALLER = "*"
 _OCTETS = "application/octet-stream"
 
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A request as its handler sees it.
+    """A received request for a handler.
 
     Attributes:
-        message: Of the request's schema; None where it has none.
-        chunk: What stood in the place of the row's first `*`: the operator, the view, the mesh.
-        received_ns: When it came, before it waited for anything; ns since the Unix epoch.
-        within_s: For how long from then on its asker waits [s]; None: the question does not say.
+        message: Message of the request's schema; None if the request has no schema.
+        chunk: The chunk in place of the row's first `*`: the operator, the view, the mesh.
+        received_ns: Time of arrival, before any wait; ns since the Unix epoch.
+        within_s: How long the caller waits from then on [s]; None: unknown.
     """
 
     key: keys.Key
@@ -68,29 +68,29 @@ class Request:
 
     @property
     def asker(self) -> str:
-        """In whose name it is asked, where its row is `in_name`."""
+        """Name of the caller, for a request whose row is `in_name`."""
         return self.key.topic.rpartition("/")[2]
 
 
 Handler = Callable[[Request], Awaitable[Message | bytes]]
-# What stood in the place of the row's `*`, and why no handler has seen the request.
+# Called with the chunk in place of the row's `*`, and the reason why the handler was not called.
 OnRefused = Callable[[str, str], None]
 
 
 class Answerer:
-    """Answers a request's key by a coroutine, none on Zenoh's thread.
+    """The owner of one request: answers it with a coroutine on the event loop.
 
-    Some at a time, and so many of one asker: who floods an owner is told so, takes no other's place and
-    delays no stop.
+    Limits the waiting requests in all and for each caller: a flooding caller gets an error, takes no other
+    caller's place and delays no stop.
 
     Args:
-        on_refused: Told of what cannot be read, or meant: no handler sees it.
-        ignored: Counts requests on keys that fit no key of the contract.
+        on_refused: Called for an invalid request, which no handler sees.
+        ignored: Counts requests on invalid keys.
 
     Attributes:
-        turned_away: How many were told that too many wait.
-        over_quota: How many were told that their asker has had its quota.
-        latencies: How long the others took, from coming to their answer.
+        turned_away: Number of requests refused because too many were waiting.
+        over_quota: Number of requests refused because of the caller's quota.
+        latencies: Time from arrival to answer of the other requests.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class Answerer:
         name: str,
         handler: Handler,
         *,
-        turns: Turns,
+        scheduler: RoundRobin,
         on_refused: OnRefused = lambda chunk, text: None,
         ignored: Ignored,
     ) -> None:
@@ -114,41 +114,41 @@ class Answerer:
         self._tasks: set[asyncio.Task[None]] = set()
         self._begun: dict[bytes, asyncio.Future[Message | bytes]] = {}
         self._long = pieces.LongAnswers(in_name=self._row.in_name)
-        # By the last chunk that was asked, so by asker where the row has a place for one.
+        # By the last chunk of the key, which is the caller if the row names one.
         self._unanswered: dict[str, int] = {}
         self._waiting = 0
         self._most_of_one = _MOST_OF_ONE if "*" in name else _MOST
         self._counting = Lock()  # the reading thread counts up, the loop's down
-        self._turns = turns
+        self._scheduler = scheduler
         self._queue = Queue(limited=bool(self._row.own_link))
         self._busy_answers = RateLimit(per_s=_BUSY_PER_S, burst=_BUSY_BURST)
         self.turned_away = self.over_quota = 0
         self.latencies = Latencies()
         self._closed = False
-        # `*` in the row is the asker's: one chunk.
+        # `*` in the row stays a wildcard for the caller's chunk.
         key = keys.robot_key(site, robot, name)
         self._queryable: zenoh.Queryable[Any]
         if self._row.unread:
-            # Straight from Zenoh's thread: a stop changes threads once.
+            # Directly from Zenoh's thread, so that a stop changes threads only once.
             at_once = zenoh.handlers.Callback(self._hand_over_at_once, indirect=False)
             self._queryable = session.declare_queryable(key, at_once)
         else:
             self._queryable = session.declare_queryable(
                 key,
-                # Alone on its connection it may hold up who asks too much; else the newest count.
-                zenoh.handlers.FifoChannel(HELD) if self._row.own_link else zenoh.handlers.RingChannel(RING),
+                # A queue on a separate connection may block a flooding sender; a shared one must not block.
+                zenoh.handlers.FifoChannel(QUEUE) if self._row.own_link else zenoh.handlers.RingChannel(RING),
             )
             reading = (self._queryable.handler, self._hand_over)
-            # No daemon, as in `Subscription`.
+            # Not a daemon, as in `Subscription`.
             threading.Thread(target=read, args=reading, name=f"read {key}").start()
 
     @property
     def closed(self) -> bool:
-        """Whether it was closed."""
+        """True after `close`."""
         return self._closed
 
     def close(self) -> None:
-        """Answer no more."""
+        """Stop answering and cancel the running handlers."""
         if self._closed:
             return
         self._closed = True
@@ -158,22 +158,22 @@ class Answerer:
 
     @property
     def waiting(self) -> int:
-        """How many requests have no answer yet."""
+        """Number of requests without an answer yet."""
         return self._waiting
 
     @property
     def name(self) -> str:
-        """Of its row."""
+        """Name of the request's row."""
         return self._row.name
 
     def _hand_over_at_once(self, query: zenoh.Query) -> None:
-        """Start on the event loop, whatever waits: a stop is a stop."""
+        """Start a stop on the event loop before all waiting requests."""
         if not self._loop.is_closed():
-            self._count(_ANYBODY, 1)
-            self._loop.call_soon_threadsafe(self._start, query, _ANYBODY, time.time_ns())
+            self._count(_ANY_CALLER, 1)
+            self._loop.call_soon_threadsafe(self._start, query, _ANY_CALLER, time.time_ns())
 
     def _hand_over(self, query: zenoh.Query) -> None:
-        """Start on the event loop in its turn, or say that too many wait."""
+        """Queue a request for the event loop, or refuse it if too many are waiting."""
         if self._long.reply_piece(query):
             return
         received_ns = time.time_ns()
@@ -182,12 +182,12 @@ class Answerer:
             self._turn_away(query)
         else:
             self._count(asker, 1)
-            self._turns.add(self._queue, partial(self._start, query, asker, received_ns))
+            self._scheduler.add(self._queue, partial(self._start, query, asker, received_ns))
 
     def _turn_away(self, query: zenoh.Query) -> None:
         self.turned_away += 1
         with query:
-            # To answer costs more than to read; Zenoh says to those who are left out that nothing came.
+            # Answering costs more than reading. Without an answer Zenoh ends the query empty.
             if self._busy_answers.take(time.monotonic()):
                 _refuse(query, BusyError(codes.BUSY()))
 
@@ -201,7 +201,7 @@ class Answerer:
                 del self._unanswered[asker]
 
     def _start(self, query: zenoh.Query, asker: str, received_ns: int) -> None:
-        if self._closed:  # it came in the last moment: nothing is done for it any more
+        if self._closed:  # arrived during `close`
             query.drop()
             return
         work = self._answer(query, received_ns)
@@ -249,7 +249,7 @@ class Answerer:
                 self._long.reply(query, str(key), payload, JSON if as_json else PROTOBUF)
 
     async def _handled(self, request: Request, query: zenoh.Query) -> Message | bytes:
-        """The handler's answer; of two copies of one request, which came over two links, the same."""
+        """Return the handler's answer; both copies of a request sent over two links get the same one."""
         mark = query.attachment.to_bytes() if query.attachment is not None else b""
         if not self._row.both_links or len(mark) != MARK_BYTES:
             return await self._handler(request)
@@ -277,7 +277,7 @@ class Answerer:
                 if not self._row.wildcard:
                     raise RefusedError(codes.WILDCARD(key=asked, request=self._row.name))
             elif self._ignored.key(REQUEST, asked) is None:
-                keys.parse_key(asked)  # says why
+                keys.parse_key(asked)  # raises the error with the reason
             payload = query.payload.to_bytes() if query.payload is not None else b""
             message = self._message(payload, encoding)
             return Request(key, message, chunk, received_ns, _within_s(query))
@@ -297,9 +297,9 @@ class Answerer:
             raise
 
     def _own_key(self, asked: str) -> keys.Key | None:
-        """The own key that was asked; None: a wildcard that does not name the request `stop`.
+        """Return the key of a request at this owner; None: a wildcard that does not end in `stop`.
 
-        `robomesh/**` asks for everybody's last values: it must not stop a robot.
+        `robomesh/**` queries all last values; it must not stop a robot.
         """
         if not keys.has_wildcard(asked):
             return keys.parse_expression(asked)
@@ -308,7 +308,7 @@ class Answerer:
 
 
 def _refuse(query: zenoh.Query, error: RefusedError) -> None:
-    """Answer with the reason of a refusal."""
+    """Reply with the reason of a refusal."""
     if isinstance(error, BusyError):
         when, old = BUSY, BUSY_TEXT
     elif isinstance(error, QuotaError):
@@ -317,7 +317,7 @@ def _refuse(query: zenoh.Query, error: RefusedError) -> None:
     else:
         when, old = "", ""
     if old and query.parameters.get(CODES) is None:
-        encoding = old  # an older client knows nothing else
+        encoding = old  # older clients compare the whole encoding
     else:
         encoding = f"{TEXT};{to_parameters(error.reason, when)}"
     query.reply_err(str(error).encode(), encoding=encoding)
@@ -332,7 +332,7 @@ def _within_s(query: zenoh.Query) -> float | None:
 
 
 def _last_chunk(asked: str) -> str:
-    """Whose place a request takes; all wildcards share one, however they are spelt."""
+    """Return the last chunk of a key, by which requests are limited; `*` for any key with a wildcard."""
     return "*" if keys.has_wildcard(asked) else asked.rpartition("/")[2]
 
 

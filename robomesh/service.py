@@ -1,4 +1,4 @@
-"""The running of a service: logs, signals, session, presence, and an end that comes in time."""
+"""Run a service: logs, signals, session, presence, and an exit within a time limit."""
 
 import asyncio
 import atexit
@@ -19,12 +19,12 @@ from robomesh.texts import for_terminal
 
 AnySettings = TypeVar("AnySettings")
 
-# A site is down within 2 s of Ctrl-C, whatever hangs.
-_LAST_MOMENT_S = 1.7
-# A service that must finish what it writes has longer: half a recording or audit log is a fault.
+# A site ends within 2 s of Ctrl-C, even if a service hangs.
+_EXIT_WITHIN_S = 1.7
+# A service that writes files has more time, because half a recording or audit log is a fault.
 WRITES_WITHIN_S = 10.0
 _MOST_LINES = 2000
-_LAST_WORDS_S = 0.2
+_FLUSH_WITHIN_S = 0.2
 
 
 def run(
@@ -35,16 +35,16 @@ def run(
     session_settings: SessionSettings,
     present_for: Iterable[tuple[str, str]],
     metrics: tuple[str, int] | None = None,
-    ends_within_s: float = _LAST_MOMENT_S,
+    ends_within_s: float = _EXIT_WITHIN_S,
 ) -> None:
-    """Run a service of the mesh until it is told to end.
+    """Run a service of the mesh until SIGINT or SIGTERM.
 
     Args:
-        serve: Its coroutine; cancelled by SIGINT and SIGTERM.
-        service: Its name in presence keys.
+        serve: The service's coroutine; cancelled by the signal.
+        service: Name in presence keys.
         present_for: The (site, robot) pairs that it serves; `-` as the robot for a whole site.
-        metrics: Host and port at which Prometheus may ask; None: nowhere.
-        ends_within_s: From the first signal on; the process exits then, whatever it does.
+        metrics: Host and port of the Prometheus endpoint; None: no endpoint.
+        ends_within_s: Time after the first signal at which the process exits in any case [s].
     """
     served = Served(service=service, present_for=tuple(present_for), metrics=metrics)
 
@@ -55,14 +55,14 @@ def run(
     run_until_signalled(serve_present(), ends_within_s=ends_within_s)
 
 
-def run_until_signalled(main: Coroutine[Any, Any, None], *, ends_within_s: float = _LAST_MOMENT_S) -> None:
+def run_until_signalled(main: Coroutine[Any, Any, None], *, ends_within_s: float = _EXIT_WITHIN_S) -> None:
     """Run a coroutine; SIGINT and SIGTERM cancel it, and the process exits when it has ended.
 
-    A second SIGINT cancels its clean-up too. A second SIGTERM does not: systemd signals every process of a
-    site, and then its supervisor does.
+    A second SIGINT also cancels the coroutine's clean-up. A second SIGTERM is ignored, because both systemd
+    and the supervisor send one to every process of a site.
 
     Args:
-        ends_within_s: From the first signal on; the process exits then with status 1.
+        ends_within_s: Time after the first signal at which the process exits with status 1 [s].
     """
 
     async def guarded() -> None:
@@ -86,8 +86,8 @@ def run_until_signalled(main: Coroutine[Any, Any, None], *, ends_within_s: float
         try:
             await task
         except asyncio.CancelledError:
-            # Threads and modules have nothing to clean up any more: tearing them down costs a busy machine
-            # a second a site.
+            # Skip the interpreter's shutdown of threads and modules: it takes a second for each site on a
+            # busy machine.
             _exit_now()
 
     asyncio.run(guarded())
@@ -96,15 +96,15 @@ def run_until_signalled(main: Coroutine[Any, Any, None], *, ends_within_s: float
 def _exit_now() -> None:
     for handler in logging.getLogger().handlers:
         if isinstance(handler, _Stderr):
-            handler.last_words()
+            handler.flush_lines()
     sys.stdout.flush()
     os._exit(0)
 
 
 class _Stderr(logging.Handler):
-    """Hands lines to a writing thread, and drops them when that is held up.
+    """A handler that passes lines to a writing thread, and drops lines while that thread is blocked.
 
-    A terminal that is held (Ctrl-S, a full pipe) must hold neither a gateway nor its end.
+    A blocked terminal (Ctrl-S, a full pipe) must not block a gateway or its exit.
     """
 
     def __init__(self) -> None:
@@ -117,9 +117,9 @@ class _Stderr(logging.Handler):
         with contextlib.suppress(queue.Full):
             self.lines.put_nowait(for_terminal(self.format(record)))
 
-    def last_words(self) -> None:
-        """Wait, briefly, until the lines are written."""
-        deadline = time.monotonic() + _LAST_WORDS_S
+    def flush_lines(self) -> None:
+        """Wait briefly until all lines are written."""
+        deadline = time.monotonic() + _FLUSH_WITHIN_S
         while self.lines.unfinished_tasks and time.monotonic() < deadline:
             time.sleep(0.005)
 
@@ -132,9 +132,9 @@ class _Stderr(logging.Handler):
 
 
 def log_to_stderr(level: int = logging.INFO) -> None:
-    """One line a record on standard error, in words, written by a thread of its own."""
+    """Log to standard error, one line for each record, written by a separate thread."""
     for number, name in ((logging.INFO, "info"), (logging.WARNING, "warning"), (logging.ERROR, "error")):
         logging.addLevelName(number, name)
     handler = _Stderr()
     logging.basicConfig(level=level, handlers=[handler], force=True)
-    atexit.register(handler.last_words)
+    atexit.register(handler.flush_lines)

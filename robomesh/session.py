@@ -1,4 +1,4 @@
-"""A session on the mesh: a client of a router, with everything declared on it."""
+"""A session on the mesh: a client of a router, with its publishers, subscriptions and answerers."""
 
 import asyncio
 import logging
@@ -14,18 +14,18 @@ from google.protobuf.message import Message
 
 from robomesh import access, client, connect_errors, keys, presence, server, topics
 from robomesh import reason_codes as codes
-from robomesh.counters import Measure, Tally
+from robomesh.counters import Counters, Measure
 from robomesh.endpoints import DEFAULT_ROUTER, Tls, client_config, first_line
 from robomesh.errors import BrokenAnswerError, NoAnswerError, NoRightError, SessionError
 from robomesh.ignored import REPLY, Ignored
 from robomesh.publisher import OnGet, Publisher
-from robomesh.request_queue import Turns
+from robomesh.request_queue import RoundRobin
 from robomesh.subscription import Subscription
 
 log = logging.getLogger(__name__)
 
 _RETRY_S = 0.25
-# A measure of whoever has one [s].
+# Name of a measure: remaining validity of the certificate, if there is one [s].
 CERTIFICATE = "certificate_seconds"
 
 _Declared = Publisher | Subscription | server.Answerer | presence.PresenceWatch
@@ -33,10 +33,10 @@ _Declared = Publisher | Subscription | server.Answerer | presence.PresenceWatch
 
 @dataclass(frozen=True, kw_only=True)
 class SessionSettings:
-    """Which routers to try, in order, and the certificates to show them.
+    """Routers to try, in order, and the certificates for them.
 
     Attributes:
-        wait_s: How long to wait for a router at the start; None: for ever, saying so.
+        wait_s: How long to wait for a router at the start [s]; None: forever, with a log line.
     """
 
     connect: tuple[str, ...] = (DEFAULT_ROUTER,)
@@ -46,47 +46,50 @@ class SessionSettings:
 
 @dataclass
 class Session:
-    """An open session. What is declared on it ends with it."""
+    """An open session. Closing it closes everything declared on it."""
 
     zenoh_session: zenoh.Session
-    # Of its further connections.
-    config_apart: zenoh.Config
-    # Who it is by its certificate; None: it has none, or one that does not say.
+    # Of the additional connections.
+    extra_config: zenoh.Config
+    # From the certificate; None: no certificate, or one without identity lines.
     principal: access.Principal | None = None
-    # This process, in presence keys.
+    # Id of this process in presence keys.
     identity: str = field(default_factory=lambda: secrets.token_hex(4))
-    # Numbers of the service's own, for who looks after it.
+    # Metrics that the service defines.
     measures: list[Measure] = field(default_factory=list)
-    # Keys that fit no key of the contract.
+    # Messages on invalid keys.
     ignored: Ignored = field(default_factory=Ignored)
     _declared: list[_Declared] = field(default_factory=list)
-    _ended: Tally = field(default_factory=Tally)
-    _keeping: threading.Lock = field(default_factory=threading.Lock)
+    _closed_counters: Counters = field(default_factory=Counters)
+    _declared_lock: threading.Lock = field(default_factory=threading.Lock)
     _tokens: list[zenoh.LivelinessToken] = field(default_factory=list)
     _refresher: asyncio.Task[None] | None = None
-    # In which all that it answers begins.
-    _turns: Turns | None = None
-    # Further connections, by the names that rows of the table give them.
-    _apart: dict[str, zenoh.Session] = field(default_factory=dict)
-    _opening: threading.Lock = field(default_factory=threading.Lock)
+    # Starts the handlers of all answerers.
+    _scheduler: RoundRobin | None = None
+    # Additional connections by their names in the topic table.
+    _extra: dict[str, zenoh.Session] = field(default_factory=dict)
+    _extra_lock: threading.Lock = field(default_factory=threading.Lock)
 
     @property
     def connected(self) -> bool:
-        """Whether a router is there now."""
+        """True while a router is connected."""
         return bool(self.zenoh_session.info.routers_zid())
 
     @property
     def own_name(self) -> str:
-        """In whose name it asks: its certificate's; without one any name goes, and it is this process's."""
+        """Name for requests: the certificate's; without a certificate this process's id."""
         return self.identity if self.principal is None else self.principal.name
 
     def declare_publisher(
         self, site: str, robot: str, topic: str, *, on_get: OnGet | None = None
     ) -> Publisher:
-        """Publish a topic of the table; `on_get` answers late joiners instead of the last value.
+        """Declare the publisher of a topic of the table.
+
+        Args:
+            on_get: Returns the answer for late joiners instead of the last value.
 
         Raises:
-            NoRightError: If this session's certificate may not.
+            NoRightError: If the certificate does not allow it.
         """
         self._check("put", keys.robot_key(site, robot, topic))
         publisher = Publisher(self.zenoh_session, site, robot, topic, on_get=on_get)
@@ -94,11 +97,11 @@ class Session:
         return publisher
 
     def subscribe(self, key_expr: str, *, newest: int = 1, history: bool = True) -> Subscription:
-        """Listen to a topic, of one robot or by wildcard of many.
+        """Subscribe to a topic of one robot, or of many with a wildcard.
 
         Args:
-            newest: How many samples wait for a slow consumer, in all; older ones are dropped.
-            history: Begin with the last value, and ask for it again when a service comes back.
+            newest: Number of samples kept for a slow consumer, over all keys; older ones are dropped.
+            history: Begin with the last value, and query it again when a service comes back.
         """
         subscription = Subscription(
             self.zenoh_session, key_expr, newest=newest, history=history, ignored=self.ignored
@@ -109,46 +112,46 @@ class Session:
         return subscription
 
     async def ask(self, key: str, request: Message | None = None, *, timeout_s: float = 2.0) -> Message:
-        """The answer to a request.
+        """Send a request and return its answer.
 
         Raises:
-            NoRightError: If this session's certificate may not ask it.
-            RefusedError: With the owner's words.
-            NoAnswerError: If nobody answered in time.
+            NoRightError: If the certificate does not allow it.
+            RefusedError: If the owner refused; with its sentence.
+            NoAnswerError: If no answer arrived in time.
         """
         payload = b"" if request is None else request.SerializeToString()
         return client.decode_answer(key, await self.ask_bytes(key, payload, timeout_s=timeout_s))
 
     async def ask_bytes(self, key: str, payload: bytes = b"", *, timeout_s: float = 2.0) -> bytes:
-        """As `ask`, with bytes both ways."""
+        """Send a request as bytes and return the answer's bytes; see `ask`."""
         self._check("query", key)
         try:
             return await client.ask_bytes(self.zenoh_session, key, payload, timeout_s=timeout_s)
         except NoAnswerError as error:
             if self.principal is None or isinstance(error, BrokenAnswerError):
                 raise
-            # A router refuses in silence.
+            # A router rejects silently.
             raise NoAnswerError(f"{error} Or was the certificate of {self.principal.name} revoked?") from None
 
     async def ask_all(
         self, key: str, request: Message | None = None, *, timeout_s: float = 2.0
     ) -> list[client.Answer]:
-        """Every owner's answer to a request on a key with a wildcard."""
+        """Send a request on a key with a wildcard and return every owner's answer."""
         self._check("query", key)
         payload = b"" if request is None else request.SerializeToString()
         answers = await client.ask_all(self.zenoh_session, key, payload, timeout_s=timeout_s)
-        # Of a refusal the key that was asked is known, and no owner's.
+        # A refusal has the request's key instead of its owner's.
         fits = (each for each in answers if each[0] == key or self.ignored.key(REPLY, each[0]) is not None)
         return [client.answer_of(*each) for each in fits]
 
     async def last(self, key: str, *, timeout_s: float = 2.0) -> Message | None:
-        """The last value of a topic (its history message where it has one); None: nobody has one."""
+        """Return the last value of a topic, or its history message; None: no publisher has one."""
         subscription = Subscription(self.zenoh_session, key, newest=1, history=True, ignored=self.ignored)
         try:
             async with asyncio.timeout(timeout_s):
                 while True:
                     sample = await anext(subscription)
-                    # Of a list topic the list is asked for, not what comes meanwhile.
+                    # For a list topic return the list, not a message published in the meantime.
                     if not sample.live or subscription.topic.history_schema is None:
                         return sample.message()
         except (TimeoutError, StopAsyncIteration):
@@ -165,23 +168,26 @@ class Session:
         *,
         on_refused: server.OnRefused = lambda chunk, text: None,
     ) -> server.Answerer:
-        """Answer a request of the table: `stop`, `command/*`; `on_refused` is told of what cannot be read.
+        """Answer a request of the table: `stop`, `command/*`.
+
+        Args:
+            on_refused: Called for an invalid request, which the handler does not see.
 
         Raises:
-            NoRightError: If this session's certificate may not.
-            SessionError: If it is answered over a link of its own, and the router has just gone.
+            NoRightError: If the certificate does not allow it.
+            SessionError: If the request needs an additional connection and the router has just gone.
         """
         self._check("declare_queryable", keys.robot_key(site, robot, name))
-        over = self.connection(topics.request(name).own_link)
-        if self._turns is None:
-            self._turns = Turns()
+        connection = self.connection(topics.request(name).own_link)
+        if self._scheduler is None:
+            self._scheduler = RoundRobin()
         answerer = server.Answerer(
-            over,
+            connection,
             site,
             robot,
             name,
             handler,
-            turns=self._turns,
+            scheduler=self._scheduler,
             on_refused=on_refused,
             ignored=self.ignored,
         )
@@ -189,30 +195,30 @@ class Session:
         return answerer
 
     def declare_presence(self, site: str, robot: str, service: str) -> None:
-        """Say that a service is alive for a robot (`-`: for the whole site)."""
+        """Declare that a service is alive for a robot (`-`: for the whole site)."""
         key = keys.presence_key(site, robot, service, self.identity)
         self._tokens.append(self.zenoh_session.liveliness().declare_token(key))
 
     def declare_presence_of(
         self, site: str, robot: str, service: str, identity: str
     ) -> zenoh.LivelinessToken:
-        """As `declare_presence`, for somebody whom this process speaks for, until it is undeclared."""
+        """Declare the presence of a session that this process represents; undeclare the returned token."""
         key = keys.presence_key(site, robot, service, identity)
         return self.zenoh_session.liveliness().declare_token(key)
 
-    def watch_presence(self, key_expr: str = presence.EVERYBODY) -> presence.PresenceWatch:
-        """Who comes alive and who goes; who is there already comes first."""
+    def watch_presence(self, key_expr: str = presence.EVERYTHING) -> presence.PresenceWatch:
+        """Watch changes of presence; the tokens alive now come first."""
         watch = presence.PresenceWatch(self.zenoh_session, key_expr, self.ignored)
         self._keep(watch)
         return watch
 
     async def present(self) -> list[keys.PresenceKey]:
-        """Who is alive now, everywhere, sorted.
+        """Return all presence keys of the mesh, sorted.
 
         Raises:
-            NoAnswerError: If the router did not tell all in time.
+            NoAnswerError: If the router did not list all tokens in time.
         """
-        # To a session that watches presence too, Zenoh leaves out tokens in 1 to 5 of 100 answers.
+        # If the session also watches presence, Zenoh omits tokens in 1 % to 5 % of the replies.
         watches = any(isinstance(each, presence.PresenceWatch) for each in self._declared)
         try:
             client = await asyncio.to_thread(self.connection, "presence" if watches else "")
@@ -221,52 +227,52 @@ class Session:
         return await presence.present(client, ignored=self.ignored)
 
     def _check(self, act: access.Act, key: str) -> None:
-        """Say at once, and in words, what the router would refuse in silence."""
+        """Raise an error with the reason if the router would silently reject the act."""
         who = self.principal
         if who is not None and not access.may(who, who.site, act, key):
             raise NoRightError(codes.NO_RIGHT(detail=access.refusal(who, act, key)))
 
     def measure(self, name: str, text: str, read: Callable[[], float | Mapping[str, float]]) -> None:
-        """Tell a number of the service's own in its health and its metrics; see `Measure`."""
+        """Add a number to the health and the metrics of this process; see `Measure`."""
         self.measures.append(Measure(name, text, read))
 
-    def tally(self) -> Tally:
-        """What was sent, received and answered until now; on any thread."""
-        with self._keeping:
-            tally = self._ended.copy()
+    def counters(self) -> Counters:
+        """Return the counters of everything sent, received and answered so far; on any thread."""
+        with self._declared_lock:
+            counters = self._closed_counters.copy()
             for each in self._declared:
-                tally.add(each)
-        return tally
+                counters.add(each)
+        return counters
 
     @property
     def subscriptions(self) -> tuple[Subscription, ...]:
-        """Those that are open."""
+        """The open subscriptions."""
         return tuple(each for each in self._declared if isinstance(each, Subscription) and not each.closed)
 
     def _keep(self, declared: _Declared) -> None:
-        with self._keeping:
+        with self._declared_lock:
             for each in self._declared:
                 if each.closed:
-                    self._ended.add(each)
+                    self._closed_counters.add(each)
             self._declared = [each for each in self._declared if not each.closed] + [declared]
 
     def connection(self, name: str) -> zenoh.Session:
-        """The connection of a name (`own_link` of the table); empty: the one for everything. On any thread.
+        """Return the connection with a name (`own_link` in the table); empty: the main one. On any thread.
 
-        What comes over one waits behind nothing that floods another.
+        A flood on one connection does not delay messages on another.
 
         Raises:
-            SessionError: If it has to be opened, and the router has just gone.
+            SessionError: If the connection must be opened and the router has just gone.
         """
         if not name:
             return self.zenoh_session
-        with self._opening:
-            if name not in self._apart:
+        with self._extra_lock:
+            if name not in self._extra:
                 try:
-                    self._apart[name] = zenoh.open(self.config_apart)
+                    self._extra[name] = zenoh.open(self.extra_config)
                 except zenoh.ZError as error:
                     raise SessionError(f"the router has gone: {first_line(error)}") from None
-            return self._apart[name]
+            return self._extra[name]
 
     async def _refresh(self) -> None:
         async for who, alive in self.watch_presence():
@@ -275,59 +281,59 @@ class Session:
                     subscription.refresh(who.site, who.robot)
 
     async def close(self) -> None:
-        """End everything declared, then the session."""
+        """Close everything declared, then the session."""
         if self._refresher is not None:
             self._refresher.cancel()
         for token in self._tokens:
             token.undeclare()
         for declared in self._declared:
             declared.close()
-        # Closing waits for Zenoh's threads, which may wait for the loop.
+        # Closing waits for Zenoh's threads, which may wait for the event loop.
         await asyncio.to_thread(self.zenoh_session.close)
-        for apart in self._apart.values():
-            await asyncio.to_thread(apart.close)
+        for connection in self._extra.values():
+            await asyncio.to_thread(connection.close)
 
 
 @asynccontextmanager
 async def open_session(settings: SessionSettings) -> AsyncIterator[Session]:
-    """A session with a router, waiting for one as long as the settings say.
+    """Open a session with a router; wait for one as long as the settings say.
 
     Raises:
-        SessionError: If an endpoint is wrong, the certificate is not good, or no router came in time.
+        SessionError: If an endpoint or the certificate is invalid, or no router answered in time.
     """
     identity, warning = connect_errors.own_certificate(settings.tls)
     if warning:
         log.warning("%s", warning)
     principal = None if identity is None else access.principal_of(identity)
     config = client_config(settings.connect, settings.tls)
-    config_apart = client_config(settings.connect, settings.tls, holds_little=True)
+    extra_config = client_config(settings.connect, settings.tls, small_buffers=True)
     loop = asyncio.get_running_loop()
     deadline = None if settings.wait_s is None else loop.time() + settings.wait_s
     routers = ", ".join(settings.connect)
-    told = False
+    logged = False
     while True:
         try:
-            session = Session(await asyncio.to_thread(zenoh.open, config), config_apart, principal)
+            session = Session(await asyncio.to_thread(zenoh.open, config), extra_config, principal)
             break
         except zenoh.ZError:
-            last = deadline is not None and loop.time() >= deadline
-            looked = last or (settings.tls is not None and not told)
-            reason = await asyncio.to_thread(_refusal, settings) if looked else None
-            if last:
+            timed_out = deadline is not None and loop.time() >= deadline
+            diagnose = timed_out or (settings.tls is not None and not logged)
+            reason = await asyncio.to_thread(_refusal, settings) if diagnose else None
+            if timed_out:
                 raise SessionError(
                     reason
                     or f"no router at {routers}: start one (robomesh up, robomesh router) or name another "
                     "with --connect"
                 ) from None
-            if not told:
+            if not logged:
                 log.warning("%s", reason or f"no router at {routers} yet: waiting for one")
-                told = True
+                logged = True
             await asyncio.sleep(_RETRY_S)
-    if told:
+    if logged:
         log.info("router found at %s", routers)
     if settings.tls is not None and identity is not None and identity.expires is not None:
         left_s = partial(connect_errors.left_s, settings.tls.certificate, identity.expires)
-        session.measure(CERTIFICATE, "Until the own certificate expires", left_s)
+        session.measure(CERTIFICATE, "Until this process's certificate expires", left_s)
     try:
         yield session
     finally:
@@ -335,7 +341,7 @@ async def open_session(settings: SessionSettings) -> AsyncIterator[Session]:
 
 
 def _refusal(settings: SessionSettings) -> str | None:
-    """Why the first router that is there does not let us in."""
+    """Return why the first reachable router refuses the connection; None: unknown."""
     return next(
         (reason for each in settings.connect if (reason := connect_errors.why(each, settings.tls))), None
     )

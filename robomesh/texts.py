@@ -1,33 +1,32 @@
-"""Texts of others, as they are shown to people: on one line, with nothing in them that hides or reorders."""
+"""Untrusted texts for display: on one line, without characters that hide or reorder text."""
 
-# Characters that set the direction of what stands around them (Unicode UAX #9, section 2): a text that
-# holds them can be shown in another order than it is read by a program (CVE-2021-42574).
+# Characters that set the direction of the text around them (Unicode UAX #9, section 2): people may see such a
+# text in another order than a program reads it (CVE-2021-42574).
 DIRECTION = "\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
 _SHOWN = {ord(each): f"<U+{ord(each):04X}>" for each in DIRECTION}
 
 
 def one_line(text: str, longest: int = 200) -> str:
-    """Return a text on one line, at most so many characters long.
+    """Return a text on one line, at most `longest` characters long.
 
-    Control characters of direction are shown by their numbers; what else moves a cursor, colours or hides
-    becomes a blank.
+    Shows direction characters by their numbers; replaces other control characters by blanks.
     """
-    # Cut before anything else is done: who sends megabytes is not to be worked for.
+    # Cut first: a text of megabytes must not cost time.
     cut = show_direction(text[: longest + 1])
     plain = "".join(c if c.isprintable() else " " for c in cut[: longest + 1])
     return plain if len(plain) <= longest else plain[: longest - 1] + "…"
 
 
 def show_direction(text: str) -> str:
-    """Return a text whose control characters of direction are shown by their numbers: `<U+202E>`."""
+    """Return a text with its direction characters replaced by their numbers: `<U+202E>`."""
     return text if text.isascii() else text.translate(_SHOWN)
 
 
 def for_terminal(text: str) -> str:
-    """Return lines for a terminal: only line ends, tabs and printable characters are left as they are.
+    """Return lines for a terminal; only line ends, tabs and printable characters stay unchanged.
 
     Escape sequences, which can move the cursor, colour, or answer as the keyboard, lose their first
-    character; control characters of direction are shown by their numbers.
+    character; direction characters are shown by their numbers.
     """
     if text.isprintable():
         return text

@@ -1,4 +1,4 @@
-"""What a row of the table of topics and requests (`topics.py`) says."""
+"""Types of the rows in the table of topics and requests (`topics.py`)."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -7,7 +7,7 @@ from google.protobuf.message import Message
 
 
 class Priority(Enum):
-    """Zenoh's priorities, by their own names; everything is dropped, never queued."""
+    """Zenoh's priorities by their names; on a full link every message is dropped, never queued."""
 
     REAL_TIME = "REAL_TIME"
     INTERACTIVE_HIGH = "INTERACTIVE_HIGH"
@@ -19,7 +19,7 @@ class Priority(Enum):
 
 
 class History(Enum):
-    """What a plain `get` on a topic's key answers with, always as one reply."""
+    """The reply to a plain `get` on a topic's key; always one reply."""
 
     NONE = "none"
     LAST = "the last value"
@@ -28,7 +28,7 @@ class History(Enum):
 
 
 class Role(Enum):
-    """Who takes part in the mesh. Each right below names the roles that have it."""
+    """Kinds of participants in the mesh; rights are sets of roles."""
 
     GATEWAY = "gateway"
     KINEMATICS = "kinematics"
@@ -51,14 +51,14 @@ SERVICES = EVERYONE - PEOPLE
 
 @dataclass(frozen=True, kw_only=True)
 class Topic:
-    """A row: something published.
+    """A row of the table: a published topic.
 
     Attributes:
-        name: Topic below the robot's key; `*` stands for one chunk.
-        rate_hz: Highest rate; None: on change or as it comes.
-        heartbeat_s: Published at least this often while its publisher lives; None: no such promise.
-        stale_after_s: Age from which it must not look live; None: it does not age.
-        recovered: Lost samples are asked for again (Zenoh's advanced publisher and subscriber).
+        name: Topic below the robot's key; `*` is a placeholder for one chunk.
+        rate_hz: Highest rate [Hz]; None: on change, or as it occurs.
+        heartbeat_s: Longest interval between messages while the publisher runs [s]; None: no limit.
+        stale_after_s: Age from which it must not be shown as live [s]; None: it does not age.
+        recovered: Lost samples are requested again (Zenoh's advanced publisher and subscriber).
     """
 
     name: str
@@ -77,17 +77,17 @@ class Topic:
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """A row: something asked, below the robot's key; `*` stands for one chunk.
+    """A row of the table: a request below the robot's key; `*` is a placeholder for one chunk.
 
     Attributes:
         answer: Schema of the answer; None: plain bytes.
-        wildcard: May be asked on a key with a wildcard.
-        unread: A payload that cannot be read counts as an empty one: a stop is a stop.
-        own_link: Its owner takes it over the connection of this name, where nothing else can be before it,
-            and begins it at a limited rate; empty: over the one for everything.
-        both_links: Asked over both links of each session at once: what one of them loses or keeps, the other
-            does not. Its owner does it once.
-        in_name: The last chunk is the name of who asks: the router lets a certificate use its own only.
+        wildcard: The key may have a wildcard.
+        unread: An invalid payload counts as an empty one, so that every stop request stops.
+        own_link: Name of the separate connection over which the owner receives it, so that other messages
+            do not delay it; its handlers begin at a limited rate. Empty: the main connection.
+        both_links: Sent over both links of a session in parallel, in case one loses or delays it. The owner
+            handles it once.
+        in_name: The last chunk is the caller's name; the router checks it against the certificate.
     """
 
     name: str

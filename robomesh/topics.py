@@ -1,7 +1,7 @@
-"""The one table of topics and requests.
+"""The table of topics and requests.
 
-Publishers, recorder, monitors, access control, documentation and tests read it; nobody else
-knows a rate, a priority, a schema or a right.
+The only place for rates, priorities, schemas and rights; publishers, recorder, monitors, access control,
+documentation and tests read it.
 """
 
 from collections.abc import Mapping
@@ -35,7 +35,7 @@ __all__ = [
 
 
 _GATEWAY = frozenset({Role.GATEWAY})
-# A player publishes robots named replay-<id>, and no other.
+# A player publishes only robots named replay-<id>.
 _GATEWAY_OR_REPLAY = frozenset({Role.GATEWAY, Role.PLAYER})
 _KINEMATICS_OR_REPLAY = frozenset({Role.KINEMATICS, Role.PLAYER})
 _COMMANDERS = frozenset({Role.OPERATOR, Role.CONSOLE})
@@ -101,8 +101,8 @@ _TOPICS = (
         priority=Priority.INTERACTIVE_LOW,
         publishers=_GATEWAY_OR_REPLAY,
     ),
-    # What services other than the gateway notice: a key each, because two publishers of one key would
-    # answer a `get` twice.
+    # Events of services other than the gateway. Each service has a key, because two publishers of one key
+    # would send two replies to a `get`.
     Topic(
         name="events/*",
         schema=schema.Event,
@@ -139,7 +139,7 @@ _TOPICS = (
         name="recording",
         schema=schema.Recording,
         heartbeat_s=1.0,
-        recorded=False,  # it tells of the recording itself
+        recorded=False,  # state of the recording itself
         priority=Priority.DATA,
         stale_after_s=3.0,
         publishers=frozenset({Role.RECORDER}),
@@ -161,17 +161,17 @@ _TOPICS = (
         history_schema=schema.VideoFrames,
         priority=Priority.DATA_LOW,
         stale_after_s=1.0,
-        publishers=frozenset({Role.RENDERER, Role.PLAYER}),  # a player's are named recorded-<view>
+        publishers=frozenset({Role.RENDERER, Role.PLAYER}),  # a player's views are named recorded-<view>
     ),
     Topic(
         name="image/*",
         schema=CompressedImage,
         rate_hz=5.0,
-        recorded=False,  # pictures of what the recording holds already
+        recorded=False,  # can be drawn from the recorded states
         priority=Priority.BACKGROUND,
         publishers=frozenset({Role.RENDERER}),
     ),
-    # Below a site's `-`, as what follows. The chunk is <service>.<id>: one key a process.
+    # This and the following topics are below a site's `-`. The chunk is <service>.<id>: one key a process.
     Topic(
         name="health/*",
         schema=schema.ServiceHealth,
@@ -306,7 +306,7 @@ _REQUESTS = (
         request=schema.RecorderRequest,
         answer=schema.Recording,
         priority=Priority.BACKGROUND,
-        owners=frozenset({Role.RECORDER, Role.PLAYER}),  # which refuses: a replay is recorded already
+        owners=frozenset({Role.RECORDER, Role.PLAYER}),  # a player refuses: a replay is already recorded
         askers=_COMMANDERS,
     ),
     Request(
@@ -361,7 +361,7 @@ _REQUESTS = (
         owners=frozenset({Role.PLAYER}),
         askers=EVERYONE,
     ),
-    # Below a site's `-`; the chunk is the process's id.
+    # Below a site's `-`; the chunk is the id of a process.
     Request(
         name="clock/*",
         request=schema.ClockRequest,
@@ -370,7 +370,7 @@ _REQUESTS = (
         owners=SERVICES,
         askers=EVERYONE,
     ),
-    # Below a site's `-`, in an operator's name.
+    # Below a site's `-`, with an operator's name.
     Request(
         name="alarms/request/*",
         request=schema.AlarmRequest,
@@ -407,10 +407,10 @@ def _row_name(name: str, rows: Mapping[str, object]) -> str | None:
 
 
 def topic(name: str) -> Topic:
-    """The row of a topic: `joints`, `video/top`.
+    """Return the row of a topic: `joints`, `video/top`.
 
     Raises:
-        UnknownTopicError: If the table has none.
+        UnknownTopicError: If the topic is not in the table.
     """
     row = _row_name(name, TOPICS)
     if row is None:
@@ -419,10 +419,10 @@ def topic(name: str) -> Topic:
 
 
 def request(name: str) -> Request:
-    """The row of a request: `stop`, `command/li`.
+    """Return the row of a request: `stop`, `command/li`.
 
     Raises:
-        UnknownTopicError: If the table has none.
+        UnknownTopicError: If the request is not in the table.
     """
     row = _row_name(name, REQUESTS)
     if row is None:
@@ -431,12 +431,12 @@ def request(name: str) -> Request:
 
 
 def check_operator(name: str) -> str:
-    """The name itself, when somebody may ask in it.
+    """Return the name if it is valid for an operator.
 
     Raises:
-        KeyNameError: If it cannot stand in a key, or is what a request is called: no rule on a request's
-            key may ever mean somebody's.
+        KeyNameError: If it is invalid in a key, or equals a request's name: an access rule for that request
+            would match the operator's keys.
     """
     if name in REQUESTS:
-        raise KeyNameError(f"operator {name!r} cannot be used: a request is called so")
+        raise KeyNameError(f"operator {name!r} cannot be used: it is the name of a request")
     return check_chunk(name)

@@ -1,8 +1,7 @@
-"""A process of one's own for work that takes long: asked one thing at a time, ended when it takes too long.
+"""A worker process for long computations: one question at a time, killed on timeout.
 
-The process runs a module that calls `answer_all`; both ends speak pickles over its standard input and
-output, so nobody else can ask it anything. One that hangs or dies is ended, and the next question starts
-another.
+The process runs a module that calls `answer_all`. Both ends exchange pickles over its standard input and
+output, so no other process can reach it. A worker that hangs is killed; the next question starts a new one.
 """
 
 import asyncio
@@ -26,16 +25,16 @@ _PR_SET_PDEATHSIG = 1
 
 
 class WorkerError(BusError):
-    """No answer: it took too long, or the process ended over it."""
+    """No answer: timeout, or the process crashed while handling the question."""
 
 
 class Worker:
-    """One worker process; one question at a time, the others wait for their turn.
+    """One worker process; answers one question at a time, other callers wait.
 
     Args:
-        module: Run by `python -m`; calls `answer_all`.
-        settings: What its `begin` gets; pickled.
-        nice: How far it steps back on a busy machine.
+        module: Module for `python -m`; calls `answer_all`.
+        settings: Argument of the module's `begin`; pickled.
+        nice: Niceness of the process.
     """
 
     def __init__(self, module: str, settings: object, *, nice: int = 0) -> None:
@@ -47,26 +46,27 @@ class Worker:
 
     @property
     def pid(self) -> int | None:
-        """Of its process, while it has one."""
+        """Process id; None: no process is running."""
         return None if self._process is None else self._process.pid
 
     async def start(self) -> None:
-        """Start the process, so that the first question need not wait for its imports.
+        """Start the process, so that the first question does not wait for its imports.
 
         Raises:
-            WorkerError: If it cannot begin; the text is what `begin` raised.
+            WorkerError: If it cannot start; the text is that of the error in `begin`.
         """
         async with self._turn:
             await self._started()
 
     async def ask(self, question: object, *, timeout_s: float) -> Any:
-        """The answer to a question; what its handler raises is raised here.
+        """Return the answer to a question; raise the handler's exception.
 
         Args:
-            timeout_s: For the answer; waiting for one's turn counts, starting the process does not.
+            timeout_s: Time for the answer [s]; includes the wait for other callers, but not the start of
+                the process.
 
         Raises:
-            WorkerError: If there is none.
+            WorkerError: If no answer arrived in time, or the process crashed.
         """
         try:
             async with asyncio.timeout(timeout_s) as deadline:
@@ -86,7 +86,7 @@ class Worker:
             return
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
-        # Kept until it has ended: the wait may be cancelled, and then another caller of `close` waits.
+        # Keep the process until it has ended: if this wait is cancelled, another call of `close` can wait.
         await process.wait()
         if self._process is process:
             self._process = None
@@ -102,7 +102,7 @@ class Worker:
                 str(self._nice),
                 stdin=asyncio.subprocess.PIPE,
                 stdout=asyncio.subprocess.PIPE,
-                start_new_session=True,  # Ctrl-C is for its owner, who ends it
+                start_new_session=True,  # Ctrl-C must reach only the parent, which then ends the worker
             )
         except OSError as error:
             raise WorkerError(f"{self._module} could not be started: {error.strerror}") from None
@@ -111,7 +111,7 @@ class Worker:
                 await self._answer(process, self._settings)
         except TimeoutError:
             await self.close()
-            raise WorkerError(f"{self._module} did not begin within {_START_S:g} s") from None
+            raise WorkerError(f"{self._module} did not start within {_START_S:g} s") from None
         except WorkerError:
             raise
         except Exception as error:
@@ -130,9 +130,9 @@ class Worker:
             raised, value = pickle.loads(await process.stdout.readexactly(length))
         except (asyncio.IncompleteReadError, ConnectionError):
             await self.close()
-            raise WorkerError(f"{self._module} ended over it (status {process.returncode})") from None
+            raise WorkerError(f"{self._module} crashed (status {process.returncode})") from None
         except BaseException:
-            # Whoever asked is gone; the answer must not be taken for the next one's.
+            # The caller was cancelled; the next caller must not receive this answer.
             await self.close()
             raise
         if raised:
@@ -141,17 +141,17 @@ class Worker:
 
 
 def answer_all(begin: Callable[[Any], Callable[[Any], Any]]) -> None:
-    """The worker's end: answer each question until nobody asks any more, or its owner is killed.
+    """Run the worker's side: answer questions until the input is closed or the parent dies.
 
     Args:
-        begin: Gets the settings, gives what answers a question; exceptions of both go to who asks.
+        begin: Takes the settings and returns the handler of questions; exceptions of both go to the caller.
     """
-    # In the middle of a question too: it holds its owner's log open, which tells that its owner has ended.
+    # Also in the middle of a question: an open copy of the parent's log would hide that the parent ended.
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     os.nice(int(sys.argv[1]))
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, _MEMORY_BYTES))
     questions, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    # What a library prints is no answer.
+    # Redirect the output of libraries, which is not an answer.
     os.dup2(2, 1)
     handler: Callable[[Any], Any] | None = None
     for question in iter(lambda: _read(questions), None):
@@ -166,7 +166,7 @@ def answer_all(begin: Callable[[Any], Callable[[Any], Any]]) -> None:
 
 
 def _read(questions: BinaryIO) -> Any:
-    """The next question; None: nobody asks any more."""
+    """Return the next question; None: the input is closed."""
     head = questions.read(_LENGTH.size)
     if len(head) < _LENGTH.size:
         return None
@@ -176,7 +176,7 @@ def _read(questions: BinaryIO) -> Any:
 def _write(answers: BinaryIO, raised: bool, value: object) -> None:
     try:
         body = pickle.dumps((raised, value))
-        pickle.loads(body)  # an exception of several arguments may not come out of its pickle
+        pickle.loads(body)  # an exception with several arguments may fail to unpickle
     except Exception:
         body = pickle.dumps((True, RuntimeError(str(value))))
     answers.write(_LENGTH.pack(len(body)) + body)

@@ -23,7 +23,7 @@ from protocol_gateway.core.codes import code_table
 from protocol_gateway.drivers.registry import DRIVERS
 from protocol_gateway.errors import CodeTableError
 from robomesh import keys
-from robomesh.access import NOBODYS_ROBOT
+from robomesh.access import PROBE_ROBOT
 from robomesh.errors import KeyNameError
 from robots import description
 from robots.bounded_toml import read_toml
@@ -83,7 +83,7 @@ class Robot(BaseModel):
             raise ValueError(
                 "replay-... is what recordings are played back as: call the robot something else"
             )
-        if name == NOBODYS_ROBOT:
+        if name == PROBE_ROBOT:
             raise ValueError("rights are tried on this name: call the robot something else")
         return _checked_name(name, "robot")
 

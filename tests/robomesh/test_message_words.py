@@ -11,7 +11,7 @@ from robomesh.schemas.robomesh_pb2 import CheckRequest, Event, EventList, Invers
     ("schema", "payload", "words"),
     [
         (InverseRequest, b'{"posse": []}', "not an InverseRequest: it has no field 'posse'"),
-        (InverseRequest, b"[]", "not an InverseRequest: a JSON object is right"),
+        (InverseRequest, b"[]", "not an InverseRequest: send a JSON object"),
         (CheckRequest, b'{"program": 1}', "not a CheckRequest: "),
     ],
 )
@@ -30,7 +30,7 @@ def dated(seconds=0, nanos=0):
 def test_a_message_with_a_time_that_is_none_is_none(seconds, nanos):
     event = dated(seconds, nanos)
     for message in (event, EventList(events=[dated(), event])):
-        with pytest.raises(MessageError, match=f"timestamp: {seconds} s and {nanos} ns are no time"):
+        with pytest.raises(MessageError, match=f"timestamp: {seconds} s and {nanos} ns is not a valid time"):
             decode(type(message), message.SerializeToString())
 
 

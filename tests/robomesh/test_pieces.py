@@ -100,7 +100,7 @@ def test_an_answer_that_breaks_off_is_told_as_such(mesh, monkeypatch):
     async def main():
         async with hall(mesh) as (asker, *_):
             between(monkeypatch, lambda answers, number: number > 1)
-            told = rf"mesh/base: [36]0000 of {LENGTH} bytes came, then none for 2 s"
+            told = rf"mesh/base: [36]0000 of {LENGTH} bytes arrived, then none for 2 s"
             with pytest.raises(BrokenAnswerError, match=told):
                 await asker.ask_bytes(KEY.format("base"), timeout_s=2.0)
 

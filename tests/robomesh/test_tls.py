@@ -39,7 +39,7 @@ def test_with_certificates_of_one_authority_data_flows_and_without_one_nobody_ge
                 message = await last_value(other, "robomesh/site/arm/description")
                 assert message.name == "pt600"
             stranger = certificates(trustme.CA(), strangers, "stranger")
-            for tls, why in ((None, "it needs one"), (stranger, "does not vouch for")):
+            for tls, why in ((None, "it needs one"), (stranger, "did not sign")):
                 with pytest.raises(SessionError, match=why):
                     async with open_session(SessionSettings(connect=(endpoint,), tls=tls, wait_s=0.0)):
                         pass

@@ -11,7 +11,7 @@ from itertools import chain
 import pytest
 import zenoh
 
-from robomesh.access import NOBODYS_ROBOT
+from robomesh.access import PROBE_ROBOT
 from robomesh.certificate_identity import read_identity
 from robomesh.endpoints import router_config
 from robomesh.topics import Role
@@ -133,7 +133,7 @@ def test_no_router_opens_anew_for_the_first_start_of_a_robot_that_was_there_befo
     saved.parent.mkdir(parents=True)
     saved.write_text("")
     # What a robot of the site file may not be called, one that is started may not either.
-    for other in ("replay-x", NOBODYS_ROBOT, "No"):
+    for other in ("replay-x", PROBE_ROBOT, "No"):
         (saved.parent.parent / other).mkdir()
         (saved.parent.parent / other / "robot.toml").write_text("")
     assert may_start(load(site)) == tuple(sorted(("mine", *library_names())))

@@ -212,7 +212,7 @@ def test_another_authoritys_certificate_and_none_at_all_open_no_session(tmp_path
 
         async def main():
             for file, why in (
-                (stranger.person("mo"), "does not vouch for"),
+                (stranger.person("mo"), "did not sign"),
                 (tmp_path / "forged.pem", "another site's authority signed it"),
             ):
                 with pytest.raises(SessionError, match=why):
@@ -233,7 +233,7 @@ def test_no_certificate_but_a_routers_passes_for_a_router(tmp_path):
     with zenoh.open(imposter):
 
         async def main():
-            with pytest.raises(SessionError, match="does not vouch for"):
+            with pytest.raises(SessionError, match="did not sign"):
                 async with attached(endpoint, folder.service("gateway"), wait_s=0.0):
                     pass
 
@@ -256,7 +256,7 @@ def test_what_a_certificate_may_not_do_is_said_in_words_before_anybody_is_asked(
                     NoRightError, match=r"mo\.here is a monitor: it may not ask command/mo\.here"
                 ):
                     await mo.ask(robot_key(SITE, "arm", "command/mo.here"))
-                with pytest.raises(NoRightError, match=r"which is another's name; command/li\.here"):
+                with pytest.raises(NoRightError, match=r"it may ask command/li\.here"):
                     await li.ask(robot_key(SITE, "arm", "command/wang.here"))
                 with pytest.raises(
                     NoRightError, match="an operator: it may not publish joints; a gateway or"

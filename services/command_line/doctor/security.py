@@ -17,7 +17,7 @@ from itertools import chain, product
 
 import zenoh
 
-from robomesh.access import NOBODYS_ROBOT, Act, Principal
+from robomesh.access import PROBE_ROBOT, Act, Principal
 from robomesh.keys import has_wildcard
 from robomesh.topics import Role, Topic
 from services.command_line.doctor.security_probes import probe
@@ -120,7 +120,7 @@ def _trials(people: list[Person], site: str, robots: Iterable[str]) -> set[Trial
         for robot in ROBOTS:
             for name, act in product(names(row, who), tried(row, robot)):
                 trials.add(Trial(who.name, act, f"robomesh/{site}/{robot}/{name}"))
-        for where in (*real, f"{site}x/{NOBODYS_ROBOT}"):
+        for where in (*real, f"{site}x/{PROBE_ROBOT}"):
             for name, act in product(names(row, who), tried_on_real(row)):
                 trials.add(Trial(who.name, act, f"robomesh/{where}/{name}"))
     return trials

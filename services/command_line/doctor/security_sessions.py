@@ -9,7 +9,7 @@ from threading import Condition
 
 import zenoh
 
-from robomesh.access import NOBODYS_ROBOT, Act, Principal
+from robomesh.access import PROBE_ROBOT, Act, Principal
 from robomesh.endpoints import bundle, client_config, first_line
 from robomesh.messages import PROTOBUF
 from services.pki import Folder, authority
@@ -67,7 +67,7 @@ def settle(person: Person, site: str) -> None:
 
     A question that everybody may ask comes back behind it.
     """
-    list(person.session.get(f"robomesh/{site}/{NOBODYS_ROBOT}/recordings/list", timeout=TIMEOUT_S))
+    list(person.session.get(f"robomesh/{site}/{PROBE_ROBOT}/recordings/list", timeout=TIMEOUT_S))
 
 
 def ask_all(

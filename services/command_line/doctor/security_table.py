@@ -6,30 +6,30 @@ Written apart from the rules' generator (`robomesh/access.py`), which it judges.
 from collections.abc import Iterable
 
 from robomesh import topics
-from robomesh.access import NOBODYS_ROBOT, Act, Principal
+from robomesh.access import PROBE_ROBOT, Act, Principal
 from robomesh.errors import UnknownTopicError
 from robomesh.keys import REPLAY, has_wildcard, parse_expression
 from robomesh.topics import REQUESTS, TOPICS, Request, Role, Topic
 
 ROWS: tuple[Topic | Request, ...] = (*TOPICS.values(), *REQUESTS.values())
 # Means the robot that nobody has, and would mean another's whose name begins so.
-VAGUE = f"{NOBODYS_ROBOT}$*"
+VAGUE = f"{PROBE_ROBOT}$*"
 # Of routers themselves: no rule gives it to anybody.
 ROUTERS_OWN = "@/**"
-ROBOTS = (NOBODYS_ROBOT, f"{REPLAY}{NOBODYS_ROBOT}", VAGUE)
+ROBOTS = (PROBE_ROBOT, f"{REPLAY}{PROBE_ROBOT}", VAGUE)
 
 
 def names(row: Topic | Request, who: Principal) -> list[str]:
     """A row's names as somebody might use them: in the own name, in another's, in a request's."""
     if isinstance(row, Request) and row.in_name:
-        stem = row.name.rpartition("/")[0].replace("*", NOBODYS_ROBOT)
+        stem = row.name.rpartition("/")[0].replace("*", PROBE_ROBOT)
         called = [each.name for each in REQUESTS.values() if each.wildcard]
         return [f"{stem}/{each}" for each in (who.name, f"nobody.{who.site}x", *called)]
     if row.name == "events/*":
         return [f"events/{who.role.value}"]
     if row.name == "health/*":
-        return [f"health/{who.role.value}.{NOBODYS_ROBOT}"]
-    return [row.name.replace("*", NOBODYS_ROBOT)]
+        return [f"health/{who.role.value}.{PROBE_ROBOT}"]
+    return [row.name.replace("*", PROBE_ROBOT)]
 
 
 def names_of_operators(people: Iterable[Principal]) -> set[str]:
@@ -72,7 +72,7 @@ def should(who: Principal, act: Act, key: str) -> bool:
         return who.role in topics.topic(name).subscribers
     speak = who.role in _speakers(name)
     if who.role is Role.GATEWAY:
-        return speak and robot in (NOBODYS_ROBOT, *(who.robots or ()))
+        return speak and robot in (PROBE_ROBOT, *(who.robots or ()))
     if who.role is Role.PLAYER:
         return speak and robot.startswith(REPLAY)
     return speak

@@ -69,7 +69,7 @@ class Feed:
                 return
 
     async def _run(self) -> None:
-        while samples := await self._subscription.all_that_came():
+        while samples := await self._subscription.next_batch():
             came = [each for each in samples if self._hold(each)]
             newest = thinned(self.topic, came)
             for moment in moments(newest, len(came) - len(newest)):

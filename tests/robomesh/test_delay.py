@@ -6,7 +6,7 @@ import time
 import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from robomesh.delay import Lateness
+from robomesh.delay import Delay
 from robomesh.header import Header
 from robomesh.session import open_session
 from tests.conftest import run
@@ -21,64 +21,64 @@ def header(sequence: int, source_s: float, publisher: int = 1) -> Header:
 
 @pytest.mark.parametrize("offset_s", [0.0, 86_400.0, -3_600.5])
 def test_a_sample_is_late_by_what_it_took_longer_than_the_quickest_whatever_the_clocks_say(offset_s):
-    lateness = Lateness()
+    delay = Delay()
     came = [(0.00, 0.04), (0.01, 0.05), (0.02, 1.54), (0.03, 1.55), (1.60, 1.64)]
-    late = [lateness.of(header(n, at), got + offset_s) for n, (at, got) in enumerate(came, 1)]
+    late = [delay.of(header(n, at), got + offset_s) for n, (at, got) in enumerate(came, 1)]
     assert late == pytest.approx([0.0, 0.0, 1.48, 1.48, 0.0], abs=0.01)
 
 
 def test_two_quicker_ones_show_that_those_before_were_late():
-    lateness = Lateness()
+    delay = Delay()
     came = [(0.0, 3.0), (3.0, 3.1), (3.1, 3.2), (0.2, 3.3)]
-    late = [lateness.of(header(n, at), got) for n, (at, got) in enumerate(came, 1)]
+    late = [delay.of(header(n, at), got) for n, (at, got) in enumerate(came, 1)]
     assert late == pytest.approx([0.0, 0.0, 0.0, 3.0], abs=0.01)
 
 
 def test_a_sample_dated_an_hour_ahead_makes_no_other_late_and_hides_no_late_one():
-    lateness = Lateness()
+    delay = Delay()
     came = [(0.0, 0.1), (3600.0, 0.2), (0.3, 0.4), (0.4, 0.5), (0.5, 2.6), (3605.0, 2.7), (0.6, 2.7)]
-    late = [lateness.of(header(n, at), got) for n, (at, got) in enumerate(came, 1)]
+    late = [delay.of(header(n, at), got) for n, (at, got) in enumerate(came, 1)]
     assert late == pytest.approx([0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 2.0], abs=0.01)
 
 
 def test_a_first_sample_dated_an_hour_ahead_makes_no_other_late_and_hides_no_late_one():
-    lateness = Lateness()
+    delay = Delay()
     came = [(3600.0, 0.1), (0.1, 0.2), (0.2, 0.3), (0.3, 2.4)]
-    late = [lateness.of(header(n, at), got) for n, (at, got) in enumerate(came, 1)]
+    late = [delay.of(header(n, at), got) for n, (at, got) in enumerate(came, 1)]
     assert late == pytest.approx([0.0, 0.0, 0.0, 2.0], abs=0.01)
 
 
 @pytest.mark.parametrize("clock_s", [-5.0, 0.0, 5.0])
 def test_a_burst_after_the_first_sample_is_as_old_as_it_is_by_whatever_clock(clock_s):
-    lateness = Lateness()
+    delay = Delay()
     came = [(0.0, 0.1), *((n * 0.01, 3.0) for n in range(1, 300))]
-    late = [lateness.of(header(n, at + clock_s), got) for n, (at, got) in enumerate(came, 1)]
+    late = [delay.of(header(n, at + clock_s), got) for n, (at, got) in enumerate(came, 1)]
     assert late[1] == pytest.approx(2.89, abs=0.01)
     assert late[-1] == pytest.approx(0.0, abs=0.02)
 
 
 def test_clocks_that_part_slowly_make_nothing_late():
-    lateness = Lateness()
+    delay = Delay()
     # The publisher's clock loses 0.5 ms in each second, for an hour.
-    late = [lateness.of(header(n, n * 0.1 * 0.9995), n * 0.1) for n in range(36_000)]
+    late = [delay.of(header(n, n * 0.1 * 0.9995), n * 0.1) for n in range(36_000)]
     assert max(late) < 0.001
 
 
 def test_after_an_hour_of_silence_what_waited_is_late_still():
-    lateness = Lateness()
-    lateness.of(header(1, 0.0), 0.0)
-    assert lateness.of(header(2, 3600.0), 3602.0) == pytest.approx(2.0, abs=0.01)
+    delay = Delay()
+    delay.of(header(1, 0.0), 0.0)
+    assert delay.of(header(2, 3600.0), 3602.0) == pytest.approx(2.0, abs=0.01)
 
 
 def test_a_publisher_that_starts_anew_begins_anew():
-    lateness = Lateness()
-    lateness.of(header(1, 0.0), 0.0)
-    assert lateness.of(header(1, 5.0, publisher=2), 15.0) == 0.0
+    delay = Delay()
+    delay.of(header(1, 0.0), 0.0)
+    assert delay.of(header(1, 5.0, publisher=2), 15.0) == 0.0
 
 
 def test_a_publisher_that_tells_no_time_is_never_late():
-    lateness = Lateness()
-    assert [lateness.of(Header(1, n, 0), n * 10.0) for n in range(1, 4)] == [0.0, 0.0, 0.0]
+    delay = Delay()
+    assert [delay.of(Header(1, n, 0), n * 10.0) for n in range(1, 4)] == [0.0, 0.0, 0.0]
 
 
 def ages_of(mesh, robot: str) -> tuple[float, float, float]:
