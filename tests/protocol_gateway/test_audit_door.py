@@ -21,11 +21,11 @@ def asked(plant, topic, payload, encoding=JSON):
 
 CASES = [
     ("command/li", json.dumps({**MOVE, "joint_positions": [0, "NaN"]}), "joint_positions: [0.0, nan] is not"),
-    ("command/li", '{"lease": "x"}', "command: one of HOME,"),
+    ("command/li", '{"lease": "x"}', "command: set one of HOME,"),
     ("command/li", '{"command": "DANCE"}', "DANCE"),
     ("command/li", '{"command"', "not JSON"),
     ("lease/request/li", '{"action": "ACQUIRE", "ttl_s": "NaN"}', "ttl_s: nan is not finite"),
-    ("lease/request/li", "{}", "action: one of ACQUIRE,"),
+    ("lease/request/li", "{}", "action: set one of ACQUIRE,"),
     ("command/*", json.dumps(MOVE), "has a wildcard"),
     ("lease/request/*", '{"action": "ACQUIRE"}', "has a wildcard"),
     ("command/stop", json.dumps(MOVE), "operator 'stop' cannot be used: a request is called so"),

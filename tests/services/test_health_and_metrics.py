@@ -11,7 +11,7 @@ import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from prometheus_client.parser import text_string_to_metric_families
 
-import robomesh.subscription
+from robomesh import subscription as subscription_module
 from robomesh.clock import Clock, Reading, hops_of, read_clock, reading_of
 from robomesh.errors import NoAnswerError, SessionError
 from robomesh.health import Served, own_version, present
@@ -114,8 +114,8 @@ def test_prometheus_reads_counts_ages_latencies_and_the_services_own(mesh):
 
 
 def test_processes_that_come_and_go_leave_neither_series_nor_keys(mesh, monkeypatch):
-    monkeypatch.setattr(robomesh.subscription, "_FORGET_EACH_S", 0.0)
-    monkeypatch.setattr(robomesh.subscription, "_FORGOTTEN_AFTER_S", 0.0)
+    monkeypatch.setattr(subscription_module, "_FORGET_EACH_S", 0.0)
+    monkeypatch.setattr(subscription_module, "_FORGOTTEN_AFTER_S", 0.0)
 
     async def main():
         async with open_session(mesh) as service, open_session(mesh) as monitor:
