@@ -7,15 +7,13 @@ from pathlib import Path
 
 import pytest
 from ruamel.yaml import YAML
-from typer.main import get_command
 
-from services.command_line.main import app
+from services.command_line.commands import COMMANDS, load
 from services.site_file import site as site_file
 
 ROOT = Path(__file__).parents[1]
 COMPOSE = (ROOT / "compose.yaml", *sorted((ROOT / "deploy").glob("*/*.yaml")))
 UNITS = sorted((ROOT / "deploy" / "systemd").glob("*.service"))
-COMMANDS = get_command(app).commands
 EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
 
 
@@ -33,12 +31,10 @@ CONTAINERS = [
 def check_words(words):
     name, *rest = words
     assert name in COMMANDS, f"robomesh {name} is no command"
-    command = COMMANDS[name]
+    command = load(name)
     while getattr(command, "commands", None):
         command = command.commands[rest.pop(0)]
     known = {option for each in command.params for option in (*each.opts, *each.secondary_opts)}
-    # Where there is --connect, there is --keys.
-    known |= {"--keys"} if "--connect" in known else set()
     for word in rest:
         if word.startswith("--"):
             assert word in known, f"robomesh {name} has no {word}"

@@ -12,7 +12,7 @@ from robomesh.errors import SessionError
 from robomesh.keys import WHOLE_SITE
 from robomesh.session import Session, open_session
 from robomesh.texts import DIRECTION
-from services.command_line.alarms.lists import gone_sites, lists
+from services.command_line.alarm_lists import gone_sites, lists
 from services.command_line.connection_options import attachment, own_identity
 from services.errors import ServiceError
 

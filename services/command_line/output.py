@@ -1,4 +1,4 @@
-"""Standard output and error of a command: texts of others cannot reorder what is printed beside them."""
+"""Standard output and error of a command, with direction characters of foreign texts made visible."""
 
 import io
 import sys
@@ -6,8 +6,8 @@ import sys
 from robomesh.texts import show_direction
 
 
-class _Shown(io.TextIOWrapper):
-    """A stream that shows control characters of direction by their numbers."""
+class _VisibleDirections(io.TextIOWrapper):
+    """A stream that prints direction characters (U+202E, ...) as their code points."""
 
     def write(self, text: str, /) -> int:
         super().write(show_direction(text))
@@ -15,17 +15,20 @@ class _Shown(io.TextIOWrapper):
 
 
 def show_directions() -> None:
-    """Let everything that is printed from now on go through it; bytes are left as they are."""
+    """Replace standard output and error, so that foreign text cannot reorder what is printed near it.
+
+    Bytes that are written to the underlying buffer are not changed.
+    """
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
-        # A test's own stream is another kind, and stays.
+        # Keep a stream of another type: a test's own.
         if type(stream) is io.TextIOWrapper:
             line_buffering, encoding, errors = stream.line_buffering, stream.encoding, stream.errors
-            shown = _Shown(
+            visible = _VisibleDirections(
                 stream.detach(),
                 encoding=encoding,
                 errors=errors,
                 line_buffering=line_buffering,
                 write_through=stream.write_through,
             )
-            setattr(sys, name, shown)
+            setattr(sys, name, visible)

@@ -1,6 +1,6 @@
-"""The entry of `robomesh`: it can be interrupted from its first moment.
+"""The entry point of `robomesh`, which Ctrl-C can end from its first moment.
 
-Loading takes up to seconds. Ctrl-C meanwhile would show the place in an import where it happened to come.
+Imports take up to seconds; without this module, Ctrl-C during an import would print a traceback.
 """
 
 import os
@@ -11,16 +11,16 @@ _INTERRUPTED = 130
 
 
 def main() -> None:
-    """Load the commands and run the one that is asked for; Ctrl-C while they load ends with status 130."""
-    before = signal.signal(signal.SIGINT, _end)
+    """Import the program and run it; Ctrl-C during the import ends with status 130."""
+    before = signal.signal(signal.SIGINT, _exit)
     from services.command_line import main as program
 
-    # Nothing is to be tidied up before; from here on the commands do it themselves.
+    # Before this point there is nothing to clean up; from here on the commands handle Ctrl-C.
     signal.signal(signal.SIGINT, before)
     program.main()
 
 
-def _end(_: int, __: FrameType | None) -> None:
+def _exit(_: int, __: FrameType | None) -> None:
     os._exit(_INTERRUPTED)
 
 

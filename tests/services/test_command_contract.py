@@ -10,10 +10,10 @@ from pathlib import Path
 
 import click
 import pytest
-from typer.main import get_command
 
 from services.command_line import main
-from services.command_line.main import app, run
+from services.command_line.commands import COMMANDS, load
+from services.command_line.main import run
 from tests.conftest import SHARED, free_port
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -50,10 +50,44 @@ CONTRACT = {
 
 
 def command(words: str) -> click.Command:
-    found = get_command(app)
-    for word in words.split():
+    name, *rest = words.split()
+    found = load(name)
+    for word in rest:
         found = found.commands[word]
     return found
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_table_has_the_short_help_of_the_command(name: str) -> None:
+    assert load(name).get_short_help_str(limit=1000) == COMMANDS[name].help
+
+
+def imported_by(*words: str) -> set[str]:
+    """Return the modules that a command imports."""
+    script = (
+        "import sys; from services.command_line.main import run\n"
+        f"status = run({list(words)!r})\n"
+        "sys.exit(' '.join(sys.modules))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False, cwd=ROOT
+    )
+    return set(done.stderr.split())
+
+
+def test_help_imports_no_command_and_nothing_heavy() -> None:
+    imported = imported_by("--help")
+    rows = {f"services.command_line.{row.module}" for row in COMMANDS.values()}
+    assert "services.command_line.commands" in imported
+    assert not imported & {*rows, "zenoh", "numpy", "pydantic", "google"}
+
+
+@pytest.mark.parametrize("name", ["robot", "mesh", "program", "recordings", "audit", "keys"])
+def test_help_of_a_group_imports_that_group_alone(name: str) -> None:
+    imported = imported_by(name, "--help")
+    rows = {f"services.command_line.{row.module}" for row in COMMANDS.values()}
+    assert imported & rows == {f"services.command_line.{COMMANDS[name].module}"}
+    assert not imported & {"numpy", "pinocchio", "cryptography"}
 
 
 @pytest.mark.parametrize("words", CONTRACT)

@@ -62,7 +62,7 @@ def records(capsys):
 def test_init_makes_a_certificate_for_each_service_switches_the_site_to_tls_and_does_it_once(site, capsys):
     before = site.read_text()
     assert keys("init", str(site)) == 0
-    assert "is written into it" in capsys.readouterr().out
+    assert 'folder = "keys" is added' in capsys.readouterr().out
     assert site.read_text() == before + '\n[keys]\nfolder = "keys"\n'
     read = load(site)
     assert read.listened[0].startswith("tls/127.0.0.1:")
@@ -233,13 +233,13 @@ def test_a_name_that_has_a_certificate_is_told_so_and_nobodys_motion_is_spoken_o
     capsys.readouterr()
     keys("issue", "li", "--role", "operator")
     first = capsys.readouterr().out
-    assert "sees it stop" in first
-    assert "already" not in first
+    assert "moves under a lease stops" in first
+    assert "had a certificate" not in first
     keys("issue", "li", "--role", "operator")
     again = capsys.readouterr().out
-    assert "li.hall had a certificate already, good until" in again
+    assert "li.hall had a certificate, until" in again
     assert "robomesh keys renew li.hall" in again
-    assert "sees it stop" not in again
+    assert "moves under a lease stops" not in again
 
 
 def test_keys_are_found_where_a_site_file_says_or_beside_or_around_ones_own_and_named(
@@ -252,7 +252,7 @@ def test_keys_are_found_where_a_site_file_says_or_beside_or_around_ones_own_and_
     monkeypatch.chdir(work)
     monkeypatch.delenv("ROBOMESH_KEYS", raising=False)
     assert keys("list") == 2
-    assert "no keys are found" in capsys.readouterr().err
+    assert "no keys found" in capsys.readouterr().err
     monkeypatch.setenv("ROBOMESH_KEYS", str(tmp_path / "third" / "people" / "li.pem"))
     assert keys("list") == 0
     assert f"keys in {tmp_path / 'third'}\n" in capsys.readouterr().out
@@ -264,7 +264,7 @@ def test_keys_are_found_where_a_site_file_says_or_beside_or_around_ones_own_and_
     assert "keys in ../other\n" in capsys.readouterr().out
     (work / "b.toml").write_text('site = "b"\n[keys]\nfolder = "../third"\n')
     assert keys("revoke", "recorder") == 2
-    assert "site files here name ../third and ../other: --folder says" in capsys.readouterr().err
+    assert "site files here name ../third and ../other: choose one with --folder" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -278,7 +278,7 @@ def test_keys_are_found_where_a_site_file_says_or_beside_or_around_ones_own_and_
         (("issue", "li", "--role", "operator", "--robots", "a"), "--robots is for gateways"),
         (("issue", "--guest", "hall"), "hall is this site"),
         (("issue", "--guest", "Hall"), "site 'Hall' cannot be used"),
-        (("issue", "li", "--guest", "there"), "--guest goes alone"),
+        (("issue", "li", "--guest", "there"), "--guest takes no name, --role or --robots"),
         (("revoke", "nobody"), "nobody has no certificate of this site"),
         (("renew", "nobody"), "nobody has no certificate of this site"),
         (("accept", "site.toml"), "site.toml: no bundle of a private key"),

@@ -7,9 +7,8 @@ import pytest
 from robomesh.keys import PresenceKey
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
-from services.command_line import discovery
-from services.command_line.alarms import commands
-from services.command_line.alarms.lists import gone_sites, lists
+from services.command_line import alarms, discovery
+from services.command_line.alarm_lists import gone_sites, lists
 from services.command_line.live import listing, listing_text
 from tests.conftest import run
 
@@ -71,22 +70,22 @@ def test_who_asks_for_a_robot_of_a_site_that_is_gone_is_told_so(mesh):
     ["arm:link", "shanghai/arm:link", "link.down", "gateway · link.down", "arm:link.down"],
 )
 def test_an_alarm_is_known_by_its_id_and_by_what_the_page_calls_it(name):
-    assert commands._by_site([name], [SHANGHAI]) == {"shanghai": ["arm:link"]}
+    assert alarms._by_site([name], [SHANGHAI]) == {"shanghai": ["arm:link"]}
 
 
 def test_a_name_that_several_alarms_have_is_refused_with_theirs():
     both = schema.AlarmList(site="shanghai", alarms=[alarm(), alarm("arm-2:link", robot="arm-2")])
-    with pytest.raises(commands.NoSuchAlarmError, match=r"shanghai/arm:link, shanghai/arm-2:link"):
-        commands._by_site(["link.down"], [both])
-    with pytest.raises(commands.NoSuchAlarmError, match=r"there are: arm:link \(gateway · link\.down\)"):
-        commands._by_site(["nothing"], [both])
+    with pytest.raises(alarms.NoSuchAlarmError, match=r"shanghai/arm:link, shanghai/arm-2:link"):
+        alarms._by_site(["link.down"], [both])
+    with pytest.raises(alarms.NoSuchAlarmError, match=r"there are: arm:link \(gateway · link\.down\)"):
+        alarms._by_site(["nothing"], [both])
 
 
 def test_an_alarms_name_is_never_broken_and_its_text_takes_the_whole_width(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "80")
     text = "word " * 30
     told = alarm(f"-:{LONG}", "service.silent", text=text, advice="Look at it.", count=3, by="li")
-    commands._print([schema.AlarmList(site="a-site-with-a-name-that-is-long", alarms=[told])])
+    alarms._print([schema.AlarmList(site="a-site-with-a-name-that-is-long", alarms=[told])])
     lines = capsys.readouterr().out.splitlines()
     assert f"  a-site-with-a-name-that-is-long/-:{LONG}" in lines
     assert lines[0].startswith("HIGH  unacknowledged  2001-09-")

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from services.command_line.mesh import commands
+from services.command_line import mesh
 
 BOX = "#VRML V2.0 utf8\nShape { geometry Box { } }\n"
 
@@ -26,11 +26,11 @@ def test_file_outside_of_the_folder_counts_as_missing(folder, address, capsys):
     named = address.format(outside=folder.parent)
     path = folder / "a.wrl"
     path.write_text(f'{BOX}Inline {{ url "{named}" }}\nInline {{ url "parts/box.wrl" }}\n')
-    commands.info(path, True)
+    mesh.info(path, True)
     said = json.loads(capsys.readouterr().out)
     assert said["triangles"] == 24
     assert "no such file in the folder 'open', and no other is read; it is left out" in said["warnings"][0]
-    commands.convert(path, folder / "a.glb", None, None)
+    mesh.convert(path, folder / "a.glb", None, None)
     capsys.readouterr()
-    commands.info(folder / "a.glb", True)
+    mesh.info(folder / "a.glb", True)
     assert json.loads(capsys.readouterr().out)["triangles"] == 24

@@ -138,11 +138,11 @@ def test_a_plan_is_a_program_of_joint_moves_that_plans_to_itself(folder: Path, c
         (["check", "none"], "none: cannot be read: No such file or directory"),
         (["check", "."], ".: cannot be read: Is a directory"),
         (["check", "binary"], "binary: is not UTF-8 text: byte 0"),
-        (["check", "large"], "large: has more than 65536 bytes, which is no teach program"),
+        (["check", "large"], "large: has more than 65536 bytes, the most that a teach program may have"),
         (["check", "good", "--robot", "pt60"], "pt60: no such robot in the library; did you mean 'pt600'?"),
         (
             ["check", "good", "--robot", "three", "--site", "site.toml"],
-            "--robot three: site.toml has no such robot; there are one, two",
+            "--robot three: site.toml has no such robot; its robots: one, two",
         ),
         (
             ["check", "good", "--start", "1 2 x"],
@@ -185,6 +185,6 @@ def test_a_drawing_becomes_a_program_that_checks(folder: Path, capsys) -> None:
     assert run(["program", *given]) == 0
     assert capsys.readouterr().out == "part\n"
     assert run(["program", *given]) == 2
-    assert capsys.readouterr().err == "robomesh: part: is there already; --force writes over it\n"
+    assert capsys.readouterr().err == "robomesh: part: exists already; --force overwrites it\n"
     assert run(["program", *given, "--force"]) == 0
     assert run(["program", "check", "part", "--start", "0 80 -80 -90 0"]) == 0

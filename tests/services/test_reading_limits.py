@@ -31,8 +31,8 @@ def test_command_that_takes_too_much_memory_says_so_in_one_line() -> None:
     script = (
         "import sys\n"
         "from services.command_line import main\n"
-        "from services.command_line.mesh import commands\n"
-        "commands.info = lambda *_: bytearray(2 << 30)\n"
+        "from robots.meshes import read\n"
+        "read.read_mesh = lambda *_, **__: bytearray(2 << 30)\n"
         "main.limit = lambda command, given=main.limit: given(command, most_bytes=1 << 30)\n"
         "sys.argv = ['robomesh', 'mesh', 'info', 'x.stl']\n"
         "main.main()\n"

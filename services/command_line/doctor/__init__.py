@@ -1,1 +1,1 @@
-"""`robomesh doctor`: this machine, and with `--security` the rights of every role on the mesh."""
+"""`robomesh doctor`: checks of this machine, and with `--security` of every role's rights."""

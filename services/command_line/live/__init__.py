@@ -1,1 +1,1 @@
-"""Commands that attach to a running mesh: list, monitor, send, fault, snapshot, video, alive."""
+"""The commands that attach to a running mesh: list, monitor, send, fault, snapshot, video, alive."""

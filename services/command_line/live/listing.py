@@ -15,7 +15,7 @@ from robomesh.presence import SILENT
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 from services.command_line import discovery
-from services.command_line.alarms.lists import gone_sites, lists
+from services.command_line.alarm_lists import gone_sites, lists
 from services.command_line.live.listing_text import picture
 from services.command_line.live.monitor_text import is_replay, replay_record
 

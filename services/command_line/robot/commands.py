@@ -1,27 +1,34 @@
-"""`robomesh robot`, `fk`: what a robot is, asked on the command line."""
+"""`robomesh robot`: robot descriptions, without a running mesh.
 
-import json
+A command imports the robot model when it runs: numpy and Pinocchio take a second.
+"""
+
 import sys
-from collections.abc import Iterator
-from math import degrees, isfinite
+from math import degrees
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
-from robots.description import load
-from robots.errors import DescriptionError, RobotError
-from services.command_line.discovery import print_json
+from services.command_line.options import Json, command_group
 from services.errors import ServiceError
 
+app = command_group("robot", "Robot descriptions: check, show, import, export.")
 
-class RequestError(ServiceError):
-    """A request line that cannot be answered."""
+_Robot = Annotated[str, typer.Argument(metavar="ROBOT")]
 
 
-def check(robot: str, as_json: bool) -> None:
-    """Print every problem of a description and its meshes; exit status 1 when there is one."""
+class ExportFolderError(ServiceError):
+    """The folder cannot hold the exported robot."""
+
+
+@app.command()
+def check(robot: _Robot, as_json: Json = False) -> None:
+    """Check a description and its meshes: a line a problem; exit status 1 when there is one."""
+    from robots.description import load
+    from robots.errors import DescriptionError
     from robots.mesh_inspection import mesh_findings
+    from services.command_line.discovery import print_json
 
     name = robot
     problems: list[dict[str, Any]] = []
@@ -65,10 +72,19 @@ def check(robot: str, as_json: bool) -> None:
         raise typer.Exit(1)
 
 
-def show(robot: str, as_json: bool, png: Path | None) -> None:
-    """Print a robot's D-H table, limits and derived values; draw its four views."""
+@app.command()
+def show(
+    robot: _Robot,
+    as_json: Json = False,
+    png: Annotated[
+        Path | None, typer.Option(metavar="OUT.png", help="Draw front, left, top and free in one picture.")
+    ] = None,
+) -> None:
+    """Show a robot's D-H table, limits, frames and reach."""
+    from robots.description import load
     from robots.model import build_model, tool_placement
     from robots.summary import description_summary
+    from services.command_line.discovery import print_json
 
     description = load(robot)
     model = build_model(description)
@@ -105,7 +121,7 @@ def _print_summary(summary: dict[str, Any], tool: list[float]) -> None:
                 "d": row["d"] * 1000,
                 "theta": degrees(row["theta"]),
             }
-            # The star: what the joint adds to.
+            # The joint's position is added to the value with the star.
             text = " ".join(
                 f"{_cell(value)}{'*' if key == variable else ' '}" for key, value in cells.items()
             )
@@ -136,8 +152,10 @@ def _cell(value: float) -> str:
     return f"{round(value, 3) + 0.0:9.3f}"
 
 
-def export(robot: str, folder: Path) -> None:
-    """Write URDF and GLB meshes into a folder."""
+@app.command()
+def export(robot: _Robot, folder: Annotated[Path, typer.Argument(metavar="FOLDER")]) -> None:
+    """Write a robot as URDF with GLB meshes."""
+    from robots.description import load
     from robots.glb import collision_meshes, link_meshes
     from robots.urdf.write import collision_beside, glb_beside, to_urdf
 
@@ -146,8 +164,8 @@ def export(robot: str, folder: Path) -> None:
     others = [path for path in folder.glob("*.urdf") if path != urdf]
     if others or (not urdf.exists() and (folder / "meshes").exists()):
         there = others[0].name if others else "meshes"
-        raise RequestError(
-            f"{folder}: holds another robot ({there}); its meshes would be lost: name a new folder"
+        raise ExportFolderError(
+            f"{folder}: holds another robot ({there}), whose meshes would be overwritten: choose a new folder"
         )
     files = {glb_beside(link): glb for link, glb in link_meshes(description).items()}
     files |= {collision_beside(link): glb for link, glb in collision_meshes(description).items()}
@@ -157,16 +175,27 @@ def export(robot: str, folder: Path) -> None:
             (folder / path).write_bytes(glb)
         urdf.write_text(to_urdf(description, collision_uri=collision_beside), encoding="utf-8")
     except OSError as error:
-        raise RequestError(f"{folder}: cannot be written: {error.strerror}") from None
+        raise ExportFolderError(f"{folder}: cannot be written: {error.strerror}") from None
     print(urdf)
 
 
-def import_(source: str, folder: Path, packages: list[Path], as_dh: bool) -> None:
-    """Write a robot from elsewhere as robot.toml and meshes: the whole folder, or nothing."""
+@app.command("import")
+def import_(
+    source: Annotated[str, typer.Argument(metavar="FILE", help="A URDF, an OpenHRP .wrl, a robot.toml.")],
+    folder: Annotated[Path, typer.Argument(metavar="OUT_FOLDER", help="A new folder.")],
+    package: Annotated[
+        list[Path] | None, typer.Option(metavar="DIR", help="Where to look for package://; repeatable.")
+    ] = None,
+    dh: Annotated[bool, typer.Option("--dh", help="As D-H rows, along the chain to the tool.")] = False,
+) -> None:
+    """Convert a robot file to robot.toml and meshes; exit status 1 when meshes are missing.
+
+    Writes the whole folder, or nothing.
+    """
     from robots.importing import import_robot
     from robots.save_description import write_folder
 
-    robot = import_robot(source, packages=packages, as_dh=as_dh)
+    robot = import_robot(source, packages=package or [], as_dh=dh)
     for note in robot.notes:
         print(f"note: {note}", file=sys.stderr)
     for name in robot.missing:
@@ -174,48 +203,3 @@ def import_(source: str, folder: Path, packages: list[Path], as_dh: bool) -> Non
     print(write_folder(robot.values, robot.files, folder.absolute()).path)
     if robot.missing:
         raise typer.Exit(1)
-
-
-def forward(robot: str, requests: str) -> None:
-    """Answer each request line with a line: JSON, SI, in the base frame."""
-    from robots.model import build_model, link_placements, tool_placement
-
-    if requests != "-":
-        raise RequestError(f"{requests!r}: '-' is right, and one JSON request a line on standard input")
-    model = build_model(load(robot))
-    failed = False
-    for line in request_lines():
-        try:
-            positions = _joint_positions(line)
-            placements = link_placements(model, positions)
-            links = {name: placements[index].tolist() for index, name in enumerate(model.link_names)}
-            print_json({"tool": tool_placement(model, positions).tolist(), "links": links})
-        except (RobotError, RequestError) as error:
-            failed = True
-            print_json({"error": str(error)})
-    if failed:
-        raise typer.Exit(1)
-
-
-def request_lines() -> Iterator[str]:
-    """Standard input's lines, but for empty ones; what is no UTF-8 is no reason to answer none behind it."""
-    for line in sys.stdin.buffer:
-        if text := line.decode(errors="replace").strip():
-            yield text
-
-
-def _joint_positions(line: str) -> list[float]:
-    try:
-        positions = json.loads(line, parse_constant=_refuse)["joints"]
-        found = [float(position) for position in positions]
-        if not all(map(isfinite, found)):
-            raise ValueError
-        return found
-    except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
-        raise RequestError(
-            f'{line[:200]!r} is no request; {{"joints": [0.1, 0.2]}} is right, in rad and m'
-        ) from None
-
-
-def _refuse(constant: str) -> float:
-    raise ValueError(constant)

@@ -1,4 +1,4 @@
-"""A robot's four views in one picture, drawn off screen."""
+"""A picture of a robot's four views, drawn off screen."""
 
 from pathlib import Path
 
@@ -14,15 +14,15 @@ _MARGIN = 1.3
 
 
 class PictureError(RobotError):
-    """A picture that cannot be written."""
+    """The picture cannot be written."""
 
 
 def draw_four_views(description: RobotDescription, out: Path) -> None:
-    """Front, left, top and free, two by two, all joints at home.
+    """Draw front, left, top and free, two by two, all joints at home.
 
     Raises:
-        RobotError: If a mesh cannot be read, or the picture not written.
-        RendererError: If there is no OpenGL.
+        RobotError: If a mesh cannot be read, or the picture cannot be written.
+        RendererError: If OpenGL is missing.
     """
     from renderer.appearance import home_placements, look_of, mesh_name
     from renderer.cache import cache_folder, prepared_once
@@ -59,7 +59,7 @@ def draw_four_views(description: RobotDescription, out: Path) -> None:
         for view in _VIEWS:
             camera = camera_of(look, view, aspect=aspect)
             if corners is not None:
-                # A site's views leave room for every pose; here it is this one that is looked at.
+                # A site's views leave room for every pose; this picture shows one pose.
                 camera = fitted(camera, aspect, corners, margin=_MARGIN)
             picture = drawing.draw(scene, camera).copy()
             write_over(picture, Overlay(message.title, view, time="", state="", rows=()))

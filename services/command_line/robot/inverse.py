@@ -1,4 +1,4 @@
-"""`robomesh ik`: where the joints must be for the tool to be there."""
+"""`robomesh ik`: joint positions that bring the tool to a pose."""
 
 import json
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from robots.inverse import InverseResult, InverseSolver, Task, build_solver, nat
 from robots.joints import JointType
 from robots.poses import rpy_rotation
 from services.command_line.discovery import print_json
-from services.command_line.robot.commands import RequestError, request_lines
+from services.command_line.robot.kinematics import RequestError, request_lines
 
 _KEYS = {"pose", "task", "near", "all", "seed"}
 _EXAMPLE = '{"pose": [[1, 0, 0, 0.3], ...], "task": "6d", "near": [...], "all": false, "seed": 0}'
@@ -22,7 +22,7 @@ _NUMBERS = "X Y Z in mm, and with ROLL PITCH YAW in degrees the tool's pose; or 
 
 
 def inverse(robot: str, words: Sequence[str], task: str, all_solutions: bool, as_json: bool) -> None:
-    """Answer a pose in degrees and millimetres, or JSON lines in SI; exit status 1: one has no solution."""
+    """Solve a pose in degrees and millimetres, or JSON lines in SI; exit status 1 without a solution."""
     asked = None if not task else _task(task)
     numbers = None if list(words) == ["-"] else _numbers(words)
     solver = build_solver(load(robot))

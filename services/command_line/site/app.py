@@ -6,16 +6,13 @@ from typing import Annotated
 import typer
 
 from robomesh.endpoints import DEFAULT_ROUTER
-from services.command_line.options import Connect, Metrics, SiteFile, Started
+from services.command_line.options import Connect, Metrics, SiteFile, Started, command_group
 from services.simulator.fault_table import FAULTS
 
-
-def add(app: typer.Typer) -> None:
-    """Give `robomesh` these commands."""
-    for command in (up, router, gateway, kinematics, recorder, player, renderer, console, watch, simulate):
-        app.command()(command)
+app = command_group()
 
 
+@app.command()
 def up(
     site: Annotated[Path | None, typer.Argument(metavar="[SITE.toml]", help="The site file.")] = None,
     metrics: Annotated[
@@ -33,6 +30,7 @@ def up(
     command.run(site, metrics)
 
 
+@app.command()
 def router(
     site: SiteFile = None,
     config_out: Annotated[
@@ -46,6 +44,7 @@ def router(
     router.run(site, config_out, metrics)
 
 
+@app.command()
 def gateway(
     site: SiteFile = None,
     connect: Connect = DEFAULT_ROUTER,
@@ -62,29 +61,33 @@ def gateway(
     services.gateway(site, connect, controller or [], started, metrics)
 
 
+@app.command()
 def kinematics(
     site: SiteFile = None, connect: Connect = DEFAULT_ROUTER, started: Started = "", metrics: Metrics = ""
 ) -> None:
-    """Tell what the robots are and where their parts are."""
+    """Publish what the robots are and where their links are."""
     from services.command_line.site import services
 
     services.kinematics(site, connect, started, metrics)
 
 
+@app.command()
 def recorder(site: SiteFile = None, connect: Connect = DEFAULT_ROUTER, metrics: Metrics = "") -> None:
-    """Record what is asked for."""
+    """Record robots on request."""
     from services.command_line.site import services
 
     services.recorder(site, connect, metrics)
 
 
+@app.command()
 def player(site: SiteFile = None, connect: Connect = DEFAULT_ROUTER, metrics: Metrics = "") -> None:
-    """Play recordings back as robots of their own."""
+    """Play recordings back as separate robots."""
     from services.command_line.site import services
 
     services.player(site, connect, metrics)
 
 
+@app.command()
 def renderer(site: SiteFile = None, connect: Connect = DEFAULT_ROUTER, metrics: Metrics = "") -> None:
     """Draw the robots off screen and publish video."""
     from services.command_line.site import services
@@ -92,6 +95,7 @@ def renderer(site: SiteFile = None, connect: Connect = DEFAULT_ROUTER, metrics: 
     services.renderer(site, connect, metrics)
 
 
+@app.command()
 def console(
     site: SiteFile = None,
     connect: Connect = DEFAULT_ROUTER,
@@ -106,13 +110,15 @@ def console(
     services.console(site, connect, supervised, metrics)
 
 
+@app.command()
 def watch(site: SiteFile = None, connect: Connect = DEFAULT_ROUTER, metrics: Metrics = "") -> None:
-    """Hold the site's alarms, and look at the mesh: who is there, clocks, versions, names used twice."""
+    """Hold the site's alarms, and check presence, clocks, versions and names."""
     from services.command_line.site import services
 
     services.watch(site, connect, metrics)
 
 
+@app.command()
 def simulate(
     robot: Annotated[str, typer.Option(metavar="R", help="A library robot or a description.")] = "pt600",
     listen: Annotated[str, typer.Option(metavar="HOST:PORT")] = "127.0.0.1:5400",
@@ -140,7 +146,7 @@ def simulate(
     site: SiteFile = None,
     connect: Connect = DEFAULT_ROUTER,
 ) -> None:
-    """Run a controller of the old kind that simulates its arm."""
+    """Run a simulated controller with the old text protocol."""
     from services.command_line.site import services
 
     services.simulate(

@@ -1,6 +1,11 @@
-"""`robomesh keys`: a site's certificate authority, and who may do what."""
+"""`robomesh keys`: a site's certificate authority, and who may do what.
+
+A command imports the authority when it runs: only what changes keys needs the package `cryptography`.
+"""
 
 import json
+import os
+from collections.abc import Iterator
 from datetime import timedelta
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,29 +14,33 @@ import typer
 
 from robomesh.topic_schema import Role
 from robots.bounded_toml import read_toml
-from services.command_line.keys.folder import KeysFolder, keys_folder
-from services.command_line.options import Json
+from services.command_line.options import Json, command_group
+from services.pki.errors import KeysError
+from services.pki.folder import Folder
 
-keys_app = typer.Typer(
-    help="Certificates of a site: who may take part, and as what.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-)
+app = command_group("keys", "A site's certificates: who may take part, in which role.")
 
-_Days = Annotated[float, typer.Option(metavar="N", min=0.0001, max=365, help="How long it is good for.")]
+KeysFolder = Annotated[
+    Path | None,
+    typer.Option(
+        "--folder",
+        metavar="DIR",
+        help="The site's keys; else the folder of a site file here, ./keys, or the folder of ROBOMESH_KEYS.",
+    ),
+]
+_Days = Annotated[float, typer.Option(metavar="N", min=0.0001, max=365, help="Validity.")]
 _SECTION = '\n[keys]\nfolder = "keys"\n'
 
 
-@keys_app.command()
+@app.command()
 def init(
     site: Annotated[Path, typer.Argument(metavar="SITE.toml", help="The site file.")],
 ) -> None:
-    """Make the site's authority, a certificate for each of its services, and the routers' rules.
+    """Create the site's authority, a certificate for each service, and the routers' rules.
 
-    Again after the site file's robots, addresses or border changed: what is there stays.
+    Run it again when the site file's robots, addresses or border change: existing keys stay.
     """
-    from services.pki import Folder, authority
-    from services.pki.errors import KeysError
+    from services.pki import authority
     from services.site_file import site as site_file
     from services.site_file.router import public
     from services.site_file.started_robots import may_start
@@ -40,11 +49,11 @@ def init(
     if read.keys.folder is None:
         if "keys" in read_toml(site):
             raise KeysError(f'{site}: [keys] has no folder: write folder = "keys" below it')
-        # Appended: whoever wrote the file finds it as it was.
+        # Append, so that the rest of the file stays as its author wrote it.
         with site.open("a", encoding="utf-8") as file:
             file.write(_SECTION)
         read = site_file.load(site)
-        print(f'{site}: [keys] folder = "keys" is written into it: its services meet by TLS from now on')
+        print(f'{site}: [keys] folder = "keys" is added: its services connect by TLS from now on')
     assert read.keys.folder is not None
     folder = Folder(read.keys.folder)
     made = authority.prepare(
@@ -62,22 +71,22 @@ def init(
     )
 
 
-@keys_app.command()
+@app.command()
 def issue(
     name: Annotated[
-        str, typer.Argument(metavar="[NAME]", help="Unique at the site; an operator's own.")
+        str, typer.Argument(metavar="[NAME]", help="Unique at the site, such as an operator's name.")
     ] = "",
     role: Annotated[str, typer.Option(metavar="ROLE", help=", ".join(role.value for role in Role))] = "",
-    robots: Annotated[str, typer.Option(metavar="A,B", help="A gateway's.")] = "",
-    guest: Annotated[str, typer.Option(metavar="SITE", help="Let another site's router in.")] = "",
+    robots: Annotated[str, typer.Option(metavar="A,B", help="Robots of a gateway.")] = "",
+    guest: Annotated[str, typer.Option(metavar="SITE", help="Admit another site's router.")] = "",
     sites: Annotated[
-        str, typer.Option(metavar="A,B", help="A guest's: for whom it speaks; '*': all but ours (a hub).")
+        str, typer.Option(metavar="A,B", help="Sites that a guest speaks for; '*': all but ours (a hub).")
     ] = "",
     days: _Days = 30.0,
     folder: KeysFolder = None,
     as_json: Json = False,
 ) -> None:
-    """Issue a certificate, as one file with its key, to hand over."""
+    """Issue a certificate with its key, as one file to hand over."""
     from services.pki import authority
 
     where, lives = keys_folder(folder, quiet=as_json), timedelta(days=days)
@@ -86,64 +95,69 @@ def issue(
         where.access.read_bytes() if where.access.is_file() else b"",
     )
     if guest:
-        _only(not name and not role and not robots, "--guest goes alone, with --sites where it is a hub")
+        _require(
+            not name and not role and not robots,
+            "--guest takes no name, --role or --robots; for a hub add --sites",
+        )
         entry = authority.issue_guest(where, guest, sites=_listed(sites), lives=lives)
     else:
-        _only(
+        _require(
             bool(name and role), "a name and --role are needed, as in: robomesh keys issue li --role operator"
         )
-        _only(not sites, "--sites is for --guest")
+        _require(not sites, "--sites is for --guest")
         entry = authority.issue(where, name, _role(role), robots=_listed(robots) or None, lives=lives)
     file = authority.file_of(where, authority.principals_of(where).site, entry)
     if as_json:
         _print(_record(entry) | {"file": file})
         return
     print(f"{file}: {entry.name}, {entry.role.value}, until {entry.expires:%Y-%m-%d %H:%M} UTC")
-    had = before.find(entry.name)
-    if had is not None and had.revoked is None and had.expires is not None and had.expires > authority.now():
+    earlier = before.find(entry.name)
+    if (
+        earlier is not None
+        and earlier.revoked is None
+        and earlier.expires is not None
+        and earlier.expires > authority.now()
+    ):
         print(
-            f"{entry.name} had a certificate already, good until {had.expires:%Y-%m-%d %H:%M}: now both are. "
-            f"robomesh keys renew {entry.name} makes one for as long as before; keys revoke ends all."
+            f"{entry.name} had a certificate, until {earlier.expires:%Y-%m-%d %H:%M}; now both are valid. "
+            f"robomesh keys renew {entry.name} issues one with the same validity; keys revoke ends all."
         )
     use = f"robomesh keys accept {Path(file).name}, at {guest}," if guest else f"robomesh list --keys {file}"
     print(f"Hand it over as a secret; {use} uses it.")
     if where.access.read_bytes() != rules:
         print(
-            "The routers follow at once: whoever moves a robot now by a lease sees it stop, unless the site "
-            "has two routers."
+            "The routers reload their rules now: a robot that moves under a lease stops, unless the site has "
+            "two routers."
         )
 
 
-@keys_app.command()
+@app.command()
 def accept(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="From another site's keys issue --guest.")],
     sites: Annotated[
-        str, typer.Option(metavar="A,B", help="For whom its router speaks; '*': all but ours (a hub).")
+        str, typer.Option(metavar="A,B", help="Sites that its router speaks for; '*': all but ours (a hub).")
     ] = "",
     folder: KeysFolder = None,
 ) -> None:
-    """Take what lets our routers in at another site."""
+    """Accept a certificate that admits our routers at another site."""
     from services.pki import authority
-    from services.pki.errors import KeysError
     from services.pki.folder import read
 
     try:
         site = authority.accept(keys_folder(folder), read(file), sites=_listed(sites))
     except KeysError as error:
         raise KeysError(f"{file}: {error}" if str(file) not in str(error) else str(error)) from None
-    print(f'site {site} lets us in: connect = ["{site}"] under [router] in the site file links to it')
+    print(f'site {site} admits us: connect = ["{site}"] under [router] in the site file links to it')
 
 
-@keys_app.command()
+@app.command()
 def renew(
     names: Annotated[list[str] | None, typer.Argument(metavar="[NAME]...")] = None,
-    all_: Annotated[
-        bool, typer.Option("--all", help="People's and guests' too, and whenever it expires.")
-    ] = False,
+    all_: Annotated[bool, typer.Option("--all", help="Every certificate, people's and guests' too.")] = False,
     folder: KeysFolder = None,
     as_json: Json = False,
 ) -> None:
-    """Issue anew, for as long as before: the services' that expire within ten days, those named, or all."""
+    """Renew certificates with the same validity: services' that expire within ten days, named, or all."""
     from services.pki.renewals import renew as renew_
 
     renewed = renew_(keys_folder(folder, quiet=as_json), names or (), all_=all_)
@@ -156,28 +170,28 @@ def renew(
     print(
         f"{len(renewed)} renewed"
         if renewed
-        else "no service's expires within ten days; people's and guests' are renewed by name"
+        else "no service's certificate expires within ten days; renew people's and guests' by name"
     )
 
 
-@keys_app.command()
+@app.command()
 def revoke(name: str, folder: KeysFolder = None) -> None:
-    """Take somebody off the routers' list: whoever is on the mesh in that name is cut off.
+    """Revoke a certificate: the routers disconnect every session with that name.
 
-    Nobody gets the name again while a certificate of it is good.
+    The name cannot be issued again while a certificate for it is valid.
     """
     from services.pki import authority
 
     entry = authority.revoke(keys_folder(folder), name)
     print(
-        f"{entry.name} has no rights any more: the site's router drops it now; where there are two, each does"
+        f"{entry.name} has no rights any more: the site's router disconnects it now; each of two routers does"
     )
-    print("when it has this folder's access.json5, and the second up to 12 s after the first.")
+    print("when it has this folder's access.json5, the second up to 12 s after the first.")
 
 
-@keys_app.command("list")
+@app.command("list")
 def list_(folder: KeysFolder = None, as_json: Json = False) -> None:
-    """Who has a certificate, as what, until when."""
+    """List certificates: name, role, expiry."""
     from services.pki import authority
     from services.pki.renewals import RENEW_WITHIN
 
@@ -193,7 +207,7 @@ def list_(folder: KeysFolder = None, as_json: Json = False) -> None:
         elif entry.expires is not None and entry.expires <= now:
             until = f"EXPIRED {entry.expires:%Y-%m-%d %H:%M}"
         elif entry.expires is not None and entry.expires <= now + RENEW_WITHIN:
-            until += ", to be renewed"
+            until += ", renew it"
         what = f"{entry.role.value:<11}{until}"
         for_ = ", ".join(entry.sites or entry.robots or ())
         print(f"{entry.name:<28}{what}" + (f"   {for_}" if for_ else ""))
@@ -213,16 +227,58 @@ def _listed(text: str) -> tuple[str, ...]:
 
 
 def _role(text: str) -> Role:
-    from services.pki.errors import KeysError
-
     try:
         return Role(text)
     except ValueError:
         raise KeysError(f"--role {text}: there are {', '.join(role.value for role in Role)}") from None
 
 
-def _only(right: bool, text: str) -> None:
-    from services.pki.errors import KeysError
-
-    if not right:
+def _require(condition: bool, text: str) -> None:
+    if not condition:
         raise KeysError(text)
+
+
+def keys_folder(given: Path | None, *, quiet: bool = False) -> Folder:
+    """Return the folder of the site's keys, and print it unless it was given.
+
+    Args:
+        given: The folder of `--folder`.
+        quiet: Do not print the folder.
+
+    Raises:
+        KeysError: If no keys are found, or site files here name different folders.
+    """
+    if given is not None:
+        return Folder(given)
+    for places in (_of_site_files(), [Path("keys")], _of_own_bundle()):
+        found = {path.resolve(): path for path in places if Folder(path).principals.is_file()}
+        if len(found) > 1:
+            names = " and ".join(str(path) for path in found.values())
+            raise KeysError(f"site files here name {names}: choose one with --folder")
+        for path in found.values():
+            if not quiet:
+                print(f"keys in {path}")
+            return Folder(path)
+    raise KeysError(
+        "no keys found: no site file here names a folder of keys, there is no ./keys, and ROBOMESH_KEYS is "
+        "in none: create keys with robomesh keys init SITE.toml, or name their folder with --folder"
+    )
+
+
+def _of_site_files() -> Iterator[Path]:
+    """Yield the keys folders of site files in the working directory; skip unreadable files."""
+    for file in sorted(Path().glob("*.toml")):
+        try:
+            values = read_toml(file)
+        except (OSError, ValueError):
+            continue
+        keys = values.get("keys")
+        if "site" in values and isinstance(keys, dict) and isinstance(keys.get("folder"), str):
+            yield file.parent / keys["folder"]
+
+
+def _of_own_bundle() -> Iterator[Path]:
+    """Yield the folder that holds the bundle in ROBOMESH_KEYS."""
+    own = os.environ.get("ROBOMESH_KEYS", "")
+    if own:
+        yield next((each for each in Path(own).parents[:2] if Folder(each).principals.is_file()), Path(own))

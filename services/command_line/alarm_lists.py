@@ -1,4 +1,4 @@
-"""What the watches of all sites hold, and which sites they say are gone."""
+"""The alarms of all sites, and the sites that alarms report as gone."""
 
 from collections.abc import Iterable
 
@@ -11,13 +11,13 @@ _GONE = "site.gone"
 
 
 async def lists(session: Session) -> list[schema.AlarmList]:
-    """Every site's alarms, sorted by site."""
+    """Return every site's alarms, as its watch holds them, sorted by site."""
     found = await last_values(session, f"{ROOT}/*/{WHOLE_SITE}/alarms")
     return [each for each in found.values() if isinstance(each, schema.AlarmList)]
 
 
 def gone_sites(found: Iterable[schema.AlarmList]) -> dict[str, schema.Alarm]:
-    """The sites that are gone, each with the alarm that says so for the longest time."""
+    """Return the sites that are gone, each with its oldest alarm."""
     gone: dict[str, schema.Alarm] = {}
     for each in found:
         for alarm in each.alarms:

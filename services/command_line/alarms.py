@@ -1,26 +1,33 @@
-"""`robomesh alarms`: listed, acknowledged, shelved; of every site that the router reaches."""
+"""`robomesh alarms`: list, acknowledge and shelve the alarms of every site that the router reaches."""
 
 import json
 import re
 from collections import defaultdict
 from collections.abc import Iterable
 from datetime import datetime
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+import typer
 from google.protobuf.timestamp_pb2 import Timestamp
 
+from robomesh.endpoints import DEFAULT_ROUTER
 from robomesh.keys import WHOLE_SITE, check_chunk, robot_key
 from robomesh.messages import to_json
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line import discovery
-from services.command_line.alarms.lists import lists
+from services.command_line.alarm_lists import lists
 from services.command_line.live.listing_text import since
+from services.command_line.options import Connect, Json, command_group
 from services.errors import ServiceError
 
 if TYPE_CHECKING:
     from rich.padding import Padding
     from rich.text import Text
 
+app = command_group("alarms", "Alarms: list, acknowledge, shelve.")
+
+_Ids = Annotated[list[str], typer.Argument(metavar="ID...", help="As `alarms list` or the page shows them.")]
+_Operator = Annotated[str, typer.Option(help="The operator's name; else yours.")]
 _Alarm, _Request = schema.Alarm, schema.AlarmRequest
 _UNITS_S = {"s": 1.0, "m": 60.0, "h": 3600.0}
 _STYLES = {
@@ -32,14 +39,15 @@ _STYLES = {
 
 
 class NoSuchAlarmError(ServiceError):
-    """An alarm that no site has, or a name that several have; or a time that is none."""
+    """No alarm has the name, or several have it; or a duration is invalid."""
 
 
-def print_list(router: str, as_json: bool) -> None:
-    """Print all alarms."""
+@app.command("list")
+def list_(connect: Connect = DEFAULT_ROUTER, as_json: Json = False) -> None:
+    """List the alarms of every site, except those that are over and acknowledged, most urgent first."""
 
     async def collect() -> list[schema.AlarmList]:
-        async with discovery.attached(router) as session:
+        async with discovery.attached(connect) as session:
             return await lists(session)
 
     found = discovery.run(collect())
@@ -49,28 +57,48 @@ def print_list(router: str, as_json: bool) -> None:
     _print(found)
 
 
-def acknowledge(ids: list[str], router: str, operator: str, as_json: bool) -> None:
-    """Say that they were seen."""
-    _ask(ids, _Request(action=_Request.ACKNOWLEDGE), router, operator, as_json)
+@app.command()
+def ack(
+    ids: Annotated[
+        list[str],
+        typer.Argument(metavar="ID...", help="As `alarms list` or the page shows them; all: every alarm."),
+    ],
+    connect: Connect = DEFAULT_ROUTER,
+    operator: _Operator = "",
+    as_json: Json = False,
+) -> None:
+    """Acknowledge alarms."""
+    _ask(ids, _Request(action=_Request.ACKNOWLEDGE), connect, operator, as_json)
 
 
-def shelve(ids: list[str], for_: str, reason: str, router: str, operator: str, as_json: bool) -> None:
-    """Put them aside."""
+@app.command()
+def shelve(
+    ids: _Ids,
+    reason: Annotated[str, typer.Option(help="The reason, which every operator sees.")],
+    for_: Annotated[str, typer.Option("--for", metavar="30m|8h", help="Duration; at most a day.")] = "1h",
+    connect: Connect = DEFAULT_ROUTER,
+    operator: _Operator = "",
+    as_json: Json = False,
+) -> None:
+    """Shelve alarms for a while."""
     request = _Request(action=_Request.SHELVE, shelve_s=_seconds(for_), reason=reason)
-    _ask(ids, request, router, operator, as_json)
+    _ask(ids, request, connect, operator, as_json)
 
 
-def unshelve(ids: list[str], router: str, operator: str, as_json: bool) -> None:
-    """Take them back."""
-    _ask(ids, _Request(action=_Request.UNSHELVE), router, operator, as_json)
+@app.command()
+def unshelve(
+    ids: _Ids, connect: Connect = DEFAULT_ROUTER, operator: _Operator = "", as_json: Json = False
+) -> None:
+    """Take alarms back from the shelf."""
+    _ask(ids, _Request(action=_Request.UNSHELVE), connect, operator, as_json)
 
 
 def record(alarm: schema.Alarm) -> dict[str, Any]:
-    """An alarm for programs; times are seconds since the Unix epoch."""
+    """Return an alarm as JSON values; times are seconds since the Unix epoch."""
     values: dict[str, Any] = json.loads(to_json(alarm))
     for name in ("since", "last", "returned", "at", "shelved_until"):
-        told = alarm.HasField(name)
-        values[name] = getattr(alarm, name).ToNanoseconds() * 1e-9 if told else None
+        known = alarm.HasField(name)
+        values[name] = getattr(alarm, name).ToNanoseconds() * 1e-9 if known else None
     return values
 
 
@@ -94,10 +122,10 @@ def _ask(ids: list[str], request: schema.AlarmRequest, router: str, operator: st
 
 
 def _by_site(ids: Iterable[str], found: list[schema.AlarmList]) -> dict[str, list[str]]:
-    """The alarms that are meant, by the site that has them.
+    """Return the ids of the named alarms, by the site that has them.
 
     Raises:
-        NoSuchAlarmError: If one is nowhere, or there are several of that name.
+        NoSuchAlarmError: If no alarm has a name, or several have it.
     """
     there = [(each.site, alarm) for each in found for alarm in each.alarms]
     wanted: dict[str, list[str]] = defaultdict(list)
@@ -116,21 +144,21 @@ def _by_site(ids: Iterable[str], found: list[schema.AlarmList]) -> dict[str, lis
 
 
 def _kind(alarm: schema.Alarm) -> str:
-    """As the page shows it."""
+    """Return source and code, as the page shows them."""
     return f"{alarm.source} · {alarm.code}"
 
 
 def _other_names(site: str, alarm: schema.Alarm) -> set[str]:
-    """What else a person may call it who has seen it on the page."""
+    """Return other names that an operator may have seen on the page."""
     names = (alarm.code, _kind(alarm), f"{alarm.robot}:{alarm.code}")
     return {*names, *(f"{site}/{name}" for name in names)}
 
 
 def _seconds(text: str) -> float:
-    """A duration as people write it.
+    """Return the seconds of a duration such as 30m.
 
     Raises:
-        NoSuchAlarmError: If it is none.
+        NoSuchAlarmError: If it is not one.
     """
     match = re.fullmatch(r"(\d+(?:\.\d+)?)([smh])", text.strip())
     if match is None:
@@ -140,7 +168,7 @@ def _seconds(text: str) -> float:
 
 def _print(found: list[schema.AlarmList]) -> None:
     if not found:
-        print("no site has a watch here: nobody holds alarms (robomesh watch)")
+        print("no site here runs a watch, so there are no alarms (robomesh watch starts one)")
         return
     if not any(each.alarms for each in found):
         print(f"no alarms at {', '.join(each.site for each in found)}")
@@ -150,15 +178,15 @@ def _print(found: list[schema.AlarmList]) -> None:
     console = Console()
     for each in found:
         for alarm in each.alarms:
-            head, name, rest = picture(each.site, alarm)
-            # A name that is longer than a line is broken by the terminal: it can be copied whole.
+            head, name, rest = alarm_text(each.site, alarm)
+            # Let the terminal wrap a long name, so that it can be copied whole.
             console.print(head, soft_wrap=True)
             console.print(name, soft_wrap=True)
             console.print(rest)
 
 
-def picture(site: str, alarm: schema.Alarm) -> "tuple[Text, Text, Padding]":
-    """An alarm for people: how urgent it is and what kind, its name, and what to do in the lines below."""
+def alarm_text(site: str, alarm: schema.Alarm) -> "tuple[Text, Text, Padding]":
+    """Return an alarm's texts: priority, state and kind; its name; what happened and what to do."""
     from rich.padding import Padding
     from rich.text import Text
 
@@ -175,7 +203,7 @@ def picture(site: str, alarm: schema.Alarm) -> "tuple[Text, Text, Padding]":
 
 
 def _more(alarm: schema.Alarm) -> list[str]:
-    """Who knows, and what to do."""
+    """Return the lines below an alarm: repetitions, operator, shelving, advice."""
     words = [f"{alarm.count} times"] if alarm.count > 1 else []
     if alarm.by:
         words.append(f"by {alarm.by}")

@@ -1,4 +1,7 @@
-"""`robomesh audit`: what was asked of robots, by whom; and whether a log is whole."""
+"""`robomesh audit`: search the audit logs of gateways, and verify a log.
+
+A command imports the reader of logs when it runs: with the gateway's modules it takes half a second.
+"""
 
 import asyncio
 import math
@@ -7,52 +10,65 @@ import sys
 from collections.abc import Sequence
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
-from protocol_gateway.audit import search as audit_find
-from protocol_gateway.audit.entry import audit_entry
-from protocol_gateway.audit.log import Outcome
-from protocol_gateway.audit.log import verify as verify_log
-from protocol_gateway.state_messages import timestamp
+from robomesh.endpoints import DEFAULT_ROUTER
 from robomesh.errors import NoAnswerError
 from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 from services.command_line import discovery
 from services.command_line.discovery import print_json
+from services.command_line.options import Connect, Json, command_group
 from services.errors import ServiceError
 
-# A gateway searches its whole log if need be, gently.
-_PATIENCE_S = 30.0
+app = command_group("audit", "The gateway's audit log.")
+
+# A gateway may search its whole log, at low priority.
+_TIMEOUT_S = 30.0
 _POSITIONS = "joint_positions"
 _ROTARY = schema.Description.Joint.Type.ROTARY
 _UNITS = {"s": "seconds", "m": "minutes", "h": "hours", "d": "days"}
 
 
 class AuditFileError(ServiceError):
-    """An audit log that cannot be read."""
+    """An audit log cannot be read."""
 
 
 class AuditQueryError(ServiceError):
-    """A search that cannot be meant."""
+    """An option value of a search is invalid."""
 
 
 class _Row(NamedTuple):
+    """An entry of a robot's log; `joints` is empty where the robot's description is unknown."""
+
     robot: str
     entry: schema.AuditEntry
-    joints: Sequence[schema.Description.Joint] = ()  # where they are known
+    joints: Sequence[schema.Description.Joint] = ()
 
 
 # ---------------------------------------------------------------------- verify
 
 
-def verify(file: Path, head: str, recording: Path | None, as_json: bool) -> None:
-    """Print whether a log is whole; exit status 1 when it is not."""
+@app.command()
+def verify(
+    file: Annotated[Path, typer.Argument(metavar="FILE")],
+    head: Annotated[str, typer.Option(metavar="HASH", help="The last entry's hash, if known.")] = "",
+    recording: Annotated[
+        Path | None, typer.Option(metavar="REC.mcap", help="A recording that holds the hash, instead.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Check that an audit log, with its older parts, is complete and unchanged; exit status 1 if not."""
+    from protocol_gateway.audit.log import verify as verify_log
+
     if recording is not None:
         if head:
-            raise AuditQueryError("--head or --recording: either says which entry the log must hold")
+            raise AuditQueryError(
+                "--head and --recording both name the entry that the log must hold: give one"
+            )
         head = _recorded_head(recording)
     try:
         result = verify_log(file, head.lower() or None)
@@ -69,10 +85,10 @@ def verify(file: Path, head: str, recording: Path | None, as_json: bool) -> None
             }
         )
     elif not result.entries and result.ok:
-        print(f"{file}: no entry at all: an emptied log looks like this")
+        print(f"{file}: has no entries, as an emptied log would")
     elif result.ok:
         taken = f"; entries 1 to {result.first - 1}, in older parts, are not here" if result.first > 1 else ""
-        print(f"{file}: {result.entries} entries, whole and unchanged{taken}")
+        print(f"{file}: {result.entries} entries, complete and unchanged{taken}")
     else:
         print(f"{file}: {result.text}")
     if not result.ok or not result.entries:
@@ -85,7 +101,7 @@ def _recorded_head(recording: Path) -> str:
     described = describe_file(recording)
     if not described.HasField("audit_head"):
         raise AuditQueryError(
-            f"{recording}: holds no audit head: nothing was in the log, or an old gateway's"
+            f"{recording}: holds no audit head: the log was empty, or the gateway was an earlier version"
         )
     return described.audit_head.hash.hex()
 
@@ -93,19 +109,23 @@ def _recorded_head(recording: Path) -> str:
 # ------------------------------------------------------------------------ list
 
 
+@app.command("list")
 def list_(
-    robot: str,
-    router: str,
-    *,
-    operator: str,
-    request: str,
-    outcome: str,
-    since: str,
-    until: str,
-    most: int,
-    as_json: bool,
+    robot: Annotated[
+        str, typer.Argument(metavar="[ROBOT]", help="Else all robots; or FILE.jsonl, a log.")
+    ] = "",
+    operator: Annotated[str, typer.Option(help="The operator of the request.")] = "",
+    request: Annotated[str, typer.Option(help="stop, acquire, home, move_absolute, ...")] = "",
+    outcome: Annotated[str, typer.Option(help="accepted, refused, failed")] = "",
+    since: Annotated[str, typer.Option(metavar="TIME", help="RFC 3339, 15:04, or 10m (ago)")] = "",
+    until: Annotated[str, typer.Option(metavar="TIME", help="the same")] = "",
+    most: Annotated[int, typer.Option(metavar="N", help="Only the newest N.")] = 100,
+    connect: Connect = DEFAULT_ROUTER,
+    as_json: Json = False,
 ) -> None:
-    """Print entries, oldest first."""
+    """List requests to robots, with operator and outcome, oldest first."""
+    from protocol_gateway.state_messages import timestamp
+
     now = datetime.now().astimezone()
     query = schema.AuditQuery(
         operator=operator,
@@ -120,7 +140,7 @@ def list_(
     rows = (
         _of_file(Path(robot), query)
         if robot.endswith(".jsonl")
-        else discovery.run(_of_mesh(robot, router, query))
+        else discovery.run(_of_mesh(robot, connect, query))
     )
     rows = sorted(rows, key=lambda row: row.entry.timestamp.ToNanoseconds())[-most:]
     if as_json:
@@ -131,10 +151,10 @@ def list_(
 
 
 def moment(text: str, now: datetime) -> int:
-    """A time as people write it, in ns since the Unix epoch: RFC 3339, 15:04[:05] today, or 10m (ago).
+    """Parse a time to ns since the Unix epoch: RFC 3339, 15:04[:05] today, or 10m (ago).
 
     Raises:
-        AuditQueryError: If it is none of them.
+        AuditQueryError: If the text has none of these forms.
     """
     ago = re.fullmatch(r"(\d{1,6})([smhd])( ago)?", text.strip())
     try:
@@ -153,20 +173,27 @@ def moment(text: str, now: datetime) -> int:
 
 
 def _outcome(text: str) -> str:
+    from protocol_gateway.audit.log import Outcome
+
     if text and text.upper() not in Outcome.__members__:
         raise AuditQueryError(f"--outcome {text!r}: it can be accepted, refused or failed")
     return text.upper()
 
 
 def _checked_most(most: int) -> int:
-    if not 1 <= most <= audit_find.MOST:
-        raise AuditQueryError(f"--most {most}: it can be 1 to {audit_find.MOST}")
+    from protocol_gateway.audit import search
+
+    if not 1 <= most <= search.MOST:
+        raise AuditQueryError(f"--most {most}: it can be 1 to {search.MOST}")
     return most
 
 
 def _of_file(file: Path, query: schema.AuditQuery) -> list[_Row]:
+    from protocol_gateway.audit import search
+    from protocol_gateway.audit.entry import audit_entry
+
     try:
-        found = audit_find.find(file, audit_find.query_of(query))
+        found = search.find(file, search.query_of(query))
     except OSError as error:
         raise AuditFileError(f"{file}: cannot be read: {error.strerror}") from None
     return [_Row(file.stem, audit_entry(entry)) for entry in found]
@@ -178,12 +205,12 @@ async def _of_mesh(text: str, router: str, query: schema.AuditQuery) -> list[_Ro
             return await _ask(session, await discovery.find(session, text), query)
         alive = await session.present()
         robots = sorted({discovery.Robot(key.site, key.robot) for key in alive if key.robot != WHOLE_SITE})
-        answers = await asyncio.gather(*(_ask_or_tell(session, robot, query) for robot in robots))
+        answers = await asyncio.gather(*(_ask_or_warn(session, robot, query) for robot in robots))
         return [row for answer in answers for row in answer]
 
 
 async def _ask(session: Session, robot: discovery.Robot, query: schema.AuditQuery) -> list[_Row]:
-    answer = await session.ask(robot_key(*robot, "audit/find"), query, timeout_s=_PATIENCE_S)
+    answer = await session.ask(robot_key(*robot, "audit/find"), query, timeout_s=_TIMEOUT_S)
     assert isinstance(answer, schema.AuditList)
     description = None
     if any(_POSITIONS in entry.values for entry in answer.entries):
@@ -192,15 +219,15 @@ async def _ask(session: Session, robot: discovery.Robot, query: schema.AuditQuer
     return [_Row(str(robot), entry, joints) for entry in answer.entries]
 
 
-async def _ask_or_tell(session: Session, robot: discovery.Robot, query: schema.AuditQuery) -> list[_Row]:
-    """One robot without a gateway must not hide the others."""
+async def _ask_or_warn(session: Session, robot: discovery.Robot, query: schema.AuditQuery) -> list[_Row]:
+    """Return no rows for a robot without a gateway, so that it does not hide the others."""
     alive = {(key.site, key.robot) for key in await session.present() if key.service == "gateway"}
     try:
         if tuple(robot) in alive:
             return await _ask(session, robot, query)
     except NoAnswerError:
         pass
-    print(f"robomesh: {robot}: no gateway answers; its log is on its gateway's disk", file=sys.stderr)
+    print(f"robomesh: {robot}: no gateway answers, and the log is on the gateway's disk", file=sys.stderr)
     return []
 
 
@@ -223,7 +250,7 @@ def _values(row: _Row) -> dict[str, Any]:
 
 def _print(rows: Sequence[_Row], *, of_all: bool) -> None:
     if not rows:
-        print("no entry is like that")
+        print("no entry matches")
     width = max((len(row.robot) for row in rows), default=0)
     for row in rows:
         entry = row.entry
@@ -241,17 +268,17 @@ def _print(rows: Sequence[_Row], *, of_all: bool) -> None:
             " ".join(f"{name}={_plain(row, name, value)}" for name, value in sorted(entry.values.items())),
         )
         line = "  ".join(filter(None, parts)).rstrip()
-        # Colour where people look, none where programs read.
+        # secho colours text on a terminal only.
         typer.secho(line, fg=None if outcome == "ACCEPTED" else typer.colors.RED)
 
 
 def _plain(row: _Row, name: str, value: str) -> str:
-    """A value for people: joint positions in degrees and mm where the robot's joints are known."""
+    """Format a value; joint positions in degrees and mm if the robot's joints are known."""
     if name != _POSITIONS:
         return value
     try:
         pairs = list(zip(map(float, value.split()), row.joints, strict=True))
-    except ValueError:  # no joints, or others than the log's
+    except ValueError:  # the joints are unknown, or differ from the log's
         return f"{value} [rad, m]"
     return " ".join(
         f"{math.degrees(position):.2f}°" if joint.type == _ROTARY else f"{1000 * position:.2f}mm"

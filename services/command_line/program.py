@@ -1,39 +1,58 @@
-"""What `robomesh program` does: programs read, checked, planned, drawn, made from drawings."""
+"""`robomesh program`: check, plan and make teach programs, without a running mesh.
+
+A command imports the robot model and the planner when it runs: with numpy and coal they take a second.
+"""
 
 import sys
 from collections.abc import Iterable, Sequence
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
-from robots.cells import CellDescription, CellRobot
-from robots.collision import Cell, build_cell
-from robots.description import load
-from robots.errors import ProgramError
-from robots.inverse import build_solver
-from robots.joints import FloatArray, Joints
-from robots.programs.check import check_program
-from robots.programs.plan import plan_program
-from robots.programs.steps import CheckResult, Step, Violation, ViolationKind
-from robots.programs.text import MOST_BYTES, joint_scales, parse_program
-from robots.programs.write import number, steps_text
-from services.command_line.discovery import print_json
+from services.command_line.options import Json, SiteFile, command_group
 from services.errors import ServiceError
-from services.site_file import site as site_file
-from services.site_file.cells import cells_of
+
+if TYPE_CHECKING:
+    from robots.collision import Cell
+    from robots.joints import FloatArray, Joints
+    from robots.programs.steps import CheckResult, Step, Violation
+
+app = command_group("program", "Teach programs: check, plan, from CAD.")
+
+_File = Annotated[str, typer.Argument(metavar="FILE", help="The program; - reads standard input.")]
+_Robot = Annotated[
+    str,
+    typer.Option(
+        "--robot", metavar="R", help="A library robot or a description; with --site its name there."
+    ),
+]
+_Start = Annotated[
+    str, typer.Option(metavar="'Q ...'", help="Start position: degrees, mm of prismatic joints; else home.")
+]
 
 
 class ProgramFileError(ServiceError):
-    """A program, or what is asked of it, that cannot be used."""
+    """A program file or an option value that cannot be used."""
 
 
+@app.command()
 def check(
-    file: str, robot: str, site: Path | None, start: str, exact: bool, plot: Path | None, as_json: bool
+    file: _File,
+    robot: _Robot = "pt600",
+    site: SiteFile = None,
+    start: _Start = "",
+    exact: Annotated[bool, typer.Option(help="Check meshes instead of convex hulls: slow.")] = False,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="OUT.png|svg", help="Plot joints, tool speed, clearance over time.")
+    ] = None,
+    as_json: Json = False,
 ) -> None:
-    """Print what a check finds; exit status 1 when it finds anything."""
+    """Show a program's duration and all its violations; exit status 1 if there is one."""
+    from robots.programs.check import check_program
+    from services.command_line.discovery import print_json
+
     text = _text(file)
     cell, name = _cell(robot, site, exact=exact)
     joints = cell.arms[name].joints
@@ -54,8 +73,25 @@ def check(
         raise typer.Exit(1)
 
 
-def plan(file: str, robot: str, site: Path | None, start: str, as_json: bool) -> None:
-    """Print a program's steps, as a program of joint moves or as JSON; exit status 1 when it breaks off."""
+@app.command()
+def plan(
+    file: _File,
+    robot: _Robot = "pt600",
+    site: SiteFile = None,
+    start: _Start = "",
+    as_json: Json = False,
+) -> None:
+    """List the steps that a controller receives: repeats unrolled, lines as joint moves.
+
+    Prints a program of joint moves, or JSON; exit status 1 when the plan ends early.
+    """
+    from robots.errors import ProgramError
+    from robots.inverse import build_solver
+    from robots.programs.plan import plan_program
+    from robots.programs.text import parse_program
+    from robots.programs.write import steps_text
+    from services.command_line.discovery import print_json
+
     cell, name = _cell(robot, site, exact=False)
     arm = cell.arms[name]
     try:
@@ -75,22 +111,33 @@ def plan(file: str, robot: str, site: Path | None, start: str, as_json: bool) ->
         raise typer.Exit(1)
 
 
+@app.command("from-dxf")
 def from_dxf(
-    file: Path,
-    layer: str,
-    handle: str,
-    frame: str,
-    tool: str,
-    approach: float,
-    tolerance: float,
-    unit: float,
-    out: Path | None,
-    force: bool,
+    file: Annotated[Path, typer.Argument(metavar="IN.dxf")],
+    layer: Annotated[str, typer.Option(metavar="NAME", help="Every curve of this layer.")] = "",
+    handle: Annotated[str, typer.Option(metavar="HEX", help="The curve with this handle.")] = "",
+    frame: Annotated[
+        str, typer.Option(metavar="'X Y Z R P Y'", help="Drawing in the base frame: mm, degrees.")
+    ] = "0 0 0 0 0 0",
+    tool: Annotated[
+        str, typer.Option(metavar="'R P Y'", help="Tool orientation in the drawing's frame: degrees.")
+    ] = "180 0 0",
+    approach: Annotated[
+        float, typer.Option(metavar="MM", help="Height above the curve for approach and retreat.")
+    ] = 50.0,
+    tolerance: Annotated[
+        float, typer.Option(metavar="MM", help="Largest deviation of a curve's straight segments.")
+    ] = 0.1,
+    unit: Annotated[
+        float, typer.Option(metavar="MM", help="Unit of a drawing that does not name its own.")
+    ] = 0.0,
+    out: Annotated[Path | None, typer.Option("--out", metavar="OUT", help="Else standard output.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite OUT.")] = False,
 ) -> None:
-    """Write a drawing's curves as a program."""
+    """Convert a drawing's curves to a program of move_line."""
     from robots.programs.dxf import DxfPath, program_from_dxf
 
-    asked = DxfPath(
+    path = DxfPath(
         layer=layer,
         handle=handle,
         frame=tuple(_numbers("--frame", frame, "x y z roll pitch yaw")),
@@ -99,7 +146,7 @@ def from_dxf(
         tolerance_mm=_between("--tolerance", tolerance, 0.001, 100.0),
         unit_mm=_between("--unit", unit, 0.0, 1e6),
     )
-    text = program_from_dxf(file, asked)
+    text = program_from_dxf(file, path)
     if out is None:
         print(text, end="")
         return
@@ -107,16 +154,18 @@ def from_dxf(
         with out.open("w" if force else "x", encoding="utf-8") as opened:
             opened.write(text)
     except FileExistsError:
-        raise ProgramFileError(f"{out}: is there already; --force writes over it") from None
+        raise ProgramFileError(f"{out}: exists already; --force overwrites it") from None
     except OSError as error:
         raise ProgramFileError(f"{out}: cannot be written: {error.strerror}") from None
     print(out)
 
 
-# ------------------------------------------------------------------------- what is given
+# ------------------------------------------------------------------------------ input
 
 
 def _text(file: str) -> str:
+    from robots.programs.text import MOST_BYTES
+
     try:
         if file == "-":
             data = sys.stdin.buffer.read(MOST_BYTES + 1)
@@ -124,7 +173,9 @@ def _text(file: str) -> str:
             with Path(file).open("rb") as opened:
                 data = opened.read(MOST_BYTES + 1)
         if len(data) > MOST_BYTES:
-            raise ProgramFileError(f"{file}: has more than {MOST_BYTES} bytes, which is no teach program")
+            raise ProgramFileError(
+                f"{file}: has more than {MOST_BYTES} bytes, the most that a teach program may have"
+            )
         return data.decode("utf-8")
     except OSError as error:
         raise ProgramFileError(f"{file}: cannot be read: {error.strerror}") from None
@@ -132,8 +183,16 @@ def _text(file: str) -> str:
         raise ProgramFileError(f"{file}: is not UTF-8 text: byte {error.start}") from None
 
 
-def _cell(robot: str, site: Path | None, *, exact: bool) -> tuple[Cell, str]:
-    """The cell to check in, and the robot's name there."""
+def _cell(robot: str, site: Path | None, *, exact: bool) -> tuple["Cell", str]:
+    """Return the cell to check in, and the robot's name in it."""
+    import numpy as np
+
+    from robots.cells import CellDescription, CellRobot
+    from robots.collision import build_cell
+    from robots.description import load
+    from services.site_file import site as site_file
+    from services.site_file.cells import cells_of
+
     if site is None:
         name = load(robot).name
         description = CellDescription(robots=(CellRobot(name=name, model=robot, base_to_site=np.eye(4)),))
@@ -141,12 +200,16 @@ def _cell(robot: str, site: Path | None, *, exact: bool) -> tuple[Cell, str]:
     cells = cells_of(site_file.load(site))
     if robot not in cells:
         there = ", ".join(cells) or "none"
-        raise ProgramFileError(f"--robot {robot}: {site} has no such robot; there are {there}")
+        raise ProgramFileError(f"--robot {robot}: {site} has no such robot; its robots: {there}")
     return build_cell(cells[robot], exact=exact), robot
 
 
-def _start(text: str, joints: Joints) -> FloatArray:
-    """(n,) [rad] or [m]."""
+def _start(text: str, joints: "Joints") -> "FloatArray":
+    """Return the start position: (n,) [rad] or [m]."""
+    import numpy as np
+
+    from robots.programs.text import joint_scales
+
     if not text:
         return joints.home.copy()
     return np.array(_numbers("--start", text, " ".join(joints.names))) * joint_scales(joints)
@@ -173,10 +236,10 @@ def _between(option: str, value: float, lowest: float, highest: float) -> float:
     return value
 
 
-# ------------------------------------------------------------------------ what is printed
+# ------------------------------------------------------------------------------ output
 
 
-def _result_json(result: CheckResult, notes: list[str]) -> dict[str, Any]:
+def _result_json(result: "CheckResult", notes: list[str]) -> dict[str, Any]:
     return {
         "ok": result.ok,
         "duration_s": result.duration_s,
@@ -187,7 +250,7 @@ def _result_json(result: CheckResult, notes: list[str]) -> dict[str, Any]:
     }
 
 
-def _violation_json(violation: Violation) -> dict[str, Any]:
+def _violation_json(violation: "Violation") -> dict[str, Any]:
     return {
         "line": violation.line,
         "time_s": violation.time_s,
@@ -201,17 +264,20 @@ def _violation_json(violation: Violation) -> dict[str, Any]:
     }
 
 
-def _step_json(step: Step) -> dict[str, Any]:
-    told: dict[str, Any] = {"line": step.line, "kind": str(step.kind)}
+def _step_json(step: "Step") -> dict[str, Any]:
+    values: dict[str, Any] = {"line": step.line, "kind": str(step.kind)}
     if step.target is not None:
-        told["joints"] = step.target.tolist()
+        values["joints"] = step.target.tolist()
     for key in ("percent", "seconds", "on"):
         if (value := getattr(step, key)) is not None:
-            told[key] = value
-    return told
+            values[key] = value
+    return values
 
 
-def _print_result(file: str, result: CheckResult, notes: list[str]) -> None:
+def _print_result(file: str, result: "CheckResult", notes: list[str]) -> None:
+    from robots.programs.steps import ViolationKind
+    from robots.programs.write import number
+
     errors = [each for each in result.violations if each.kind is ViolationKind.PROGRAM]
     for each in errors:
         print(f"{file}: line {each.line}: {each.text}")
@@ -229,12 +295,12 @@ def _print_result(file: str, result: CheckResult, notes: list[str]) -> None:
     print(f"assumed of the controller: {result.interpolation}")
 
 
-def _groups(violations: Iterable[Violation]) -> list[list[Violation]]:
-    """Violations of one kind and pair on neighbouring lines: one cause."""
+def _groups(violations: Iterable["Violation"]) -> list[list["Violation"]]:
+    """Group violations of one kind and pair on neighbouring lines: they have one cause."""
     groups: list[list[Violation]] = []
     newest: dict[tuple[Any, ...], list[Violation]] = {}
     for each in violations:
-        # Where no two things are concerned, only the words tell what of.
+        # A violation without a pair is identified by its text.
         key = (each.kind, each.pair or each.text, each.refuses)
         group = newest.get(key)
         if group is None or abs(each.line - group[-1].line) > 1:
@@ -244,8 +310,8 @@ def _groups(violations: Iterable[Violation]) -> list[list[Violation]]:
     return groups
 
 
-def _group_text(group: Sequence[Violation]) -> str:
-    """Where, when, and the worst of it."""
+def _group_text(group: Sequence["Violation"]) -> str:
+    """Describe a group: lines, times, and its worst violation."""
     lowest, highest = min(each.line for each in group), max(each.line for each in group)
     begin, until = group[0].time_s, max(each.until_s for each in group)
     where = f"lines {lowest} to {highest}" if highest > lowest else f"line {lowest}"
@@ -257,6 +323,6 @@ def _group_text(group: Sequence[Violation]) -> str:
         else ""
     )
     warning = "" if worst.refuses else " (a warning)"
-    # What is wrong at the start says so itself.
+    # The text of a violation at the start (line 0) says so.
     placed = f"{where}, {when}: " if highest else ""
     return f"{placed}{worst.kind}: {worst.text}{often}{warning}"

@@ -1,1 +1,0 @@
-"""`robomesh audit`."""

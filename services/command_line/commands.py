@@ -1,0 +1,104 @@
+"""The table of robomesh's commands, and the command group that imports a command when it is used.
+
+`robomesh --help` answers from the table, without importing any command.
+"""
+
+from importlib import import_module
+from typing import Any, NamedTuple
+
+from typer.core import TyperCommand, TyperGroup
+from typer.main import get_command
+
+
+class Row(NamedTuple):
+    """A row of the table.
+
+    Attributes:
+        module: Module of this package; its Typer `app` is the command group, or holds the command.
+        help: First sentence of the command's own help; a test compares the two.
+    """
+
+    module: str
+    help: str
+
+
+COMMANDS = {
+    "up": Row("site.app", "Run a whole site; without a file, the built-in one with a simulated arm."),
+    "router": Row("site.app", "Run a site's router."),
+    "gateway": Row("site.app", "Put the site's controllers on the mesh."),
+    "kinematics": Row("site.app", "Publish what the robots are and where their links are."),
+    "recorder": Row("site.app", "Record robots on request."),
+    "player": Row("site.app", "Play recordings back as separate robots."),
+    "renderer": Row("site.app", "Draw the robots off screen and publish video."),
+    "console": Row("site.app", "Serve the page."),
+    "watch": Row("site.app", "Hold the site's alarms, and check presence, clocks, versions and names."),
+    "simulate": Row("site.app", "Run a simulated controller with the old text protocol."),
+    "foxglove": Row("bridges", "Serve Foxglove and Lichtblick on a Foxglove WebSocket, ws://127.0.0.1:8765."),
+    "ros2": Row("bridges", "Publish the robots to ROS 2 nodes with rmw_zenoh."),
+    "list": Row("live.app", "List sites, robots and services, with monitors, control, ages and round trips."),
+    "monitor": Row("live.app", "Watch a robot in the terminal."),
+    "send": Row("live.app", "Send a command to a robot and wait until it ends; Ctrl-C stops the robot."),
+    "fault": Row("live.app", "Make a simulated controller misbehave: freeze, flood, jump, ..."),
+    "snapshot": Row("live.app", "Save a rendered picture of a robot."),
+    "video": Row("live.app", "Save rendered video of a robot, playable while it is written."),
+    "record": Row("live.app", "Record a robot until Ctrl-C."),
+    "alive": Row("live.app", "Check that a service answers: exit status 0 or 1, for health checks."),
+    "doctor": Row("doctor.app", "Check this machine, and say how to fix what is missing."),
+    "fk": Row(
+        "robot.kinematics", 'Forward kinematics: {"joints": [..]} a line in, {"tool", "links"} a line out.'
+    ),
+    "ik": Row(
+        "robot.kinematics",
+        'Inverse kinematics of a pose; JSON: {"pose", "task", "near", "all", "seed"} a line in.',
+    ),
+    "robot": Row("robot.commands", "Robot descriptions: check, show, import, export."),
+    "mesh": Row("mesh", "Mesh files: inspect, convert."),
+    "program": Row("program", "Teach programs: check, plan, from CAD."),
+    "recordings": Row("recordings.app", "Recordings: list, inspect, play, export, fetch."),
+    "audit": Row("audit", "The gateway's audit log."),
+    "alarms": Row("alarms", "Alarms: list, acknowledge, shelve."),
+    "keys": Row("keys", "A site's certificates: who may take part, in which role."),
+    "accounts": Row("accounts", "Accounts that may sign in to a console."),
+}
+
+
+class _LazyGroup(TyperGroup):
+    """A command group with a placeholder for each row: enough for help and for suggestions."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
+        name, _, rest = super().resolve_command(ctx, args)
+        return name, None if name is None else load(name), rest
+
+    def get_help_option(self, ctx: Any) -> Any:
+        option = super().get_help_option(ctx)
+        if option is not None:
+            # Typer converts a default of None with pydantic, whose import takes 0.2 s.
+            option.default = False
+        return option
+
+
+def load(name: str) -> Any:
+    """Import a command or command group, with `--keys FILE` wherever there is `--connect`."""
+    # Not at the top: its imports would double the time of `robomesh --help`.
+    from services.command_line.connection_options import offer_keys
+
+    app = import_module(f"services.command_line.{COMMANDS[name].module}").app
+    found: Any = get_command(app)
+    if app.info.name != name:
+        # Typer makes an app with a single command that command.
+        found = getattr(found, "commands", {name: found})[name]
+    return offer_keys(found)
+
+
+def root() -> TyperGroup:
+    """Return `robomesh` itself."""
+    return _LazyGroup(
+        name="robomesh",
+        help="A service mesh that puts industrial robot arms on the network.",
+        commands={
+            name: TyperCommand(name=name, help=row.help, rich_markup_mode=None)
+            for name, row in COMMANDS.items()
+        },
+        no_args_is_help=True,
+        rich_markup_mode=None,
+    )

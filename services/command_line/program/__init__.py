@@ -1,1 +1,0 @@
-"""`robomesh program`: teach programs."""
