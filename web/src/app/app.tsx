@@ -18,7 +18,7 @@ import { canBe, isReplay } from "../mesh/robot-name";
 import { stop, stopNotice } from "../mesh/stop";
 import { NoticeLine } from "../ui/parts";
 import { Missing } from "../ui/robot-not-found";
-import { defined, plain, programming, recorded, robotLink, route, walled } from "../ui/route";
+import { type Route, robotLink, robotOf, route } from "../ui/route";
 import { switchTheme, theme } from "../ui/theme";
 
 /** A page that is loaded when it is first shown. */
@@ -62,28 +62,17 @@ const Events = onDemand(async () => (await import("../features/events/events")).
 const Settings = onDemand(async () => (await import("../features/settings/settings")).Settings);
 
 const PAGES = ["fleet", "wall", "recordings", "define", "events", "settings"] as const;
-type Place = (typeof PAGES)[number] | "program" | "robot";
-
-function place(): Place {
-  if (programming.value && !(route.value && isReplay(route.value.robot))) return "program";
-  if (route.value) return "robot";
-  if (plain.value) return plain.value;
-  if (defined.value !== null) return "define";
-  if (walled.value) return "wall";
-  return recorded.value ? "recordings" : "fleet";
-}
-
 export function App() {
   const shown = route.value;
-  const nowhere = shown !== null && !canBe(shown);
-  const key = shown && !nowhere ? `robomesh/${shown.site}/${shown.robot}` : null;
-  const replay = shown !== null && isReplay(shown.robot);
-  const at = place();
+  const robot = robotOf(shown);
+  const notFound = robot !== null && !canBe(robot);
+  const key = robot && !notFound ? `robomesh/${robot.site}/${robot.robot}` : null;
+  const replay = robot !== null && isReplay(robot.robot);
   // Control does not outlive the robot's pages; between them it stays.
   useEffect(() => () => void release(), [key]);
-  const page = at === "fleet" || at === "robot" ? "" : t(at);
-  const what = [nowhere ? "" : shown?.robot, page].filter(Boolean).join(" · ");
-  useEffect(() => void (document.title = what ? `${what} · robomesh` : "robomesh"), [what]);
+  const page = shown.page === "fleet" || shown.page === "robot" ? "" : t(shown.page);
+  const title = [notFound ? "" : robot?.robot, page, "robomesh"].filter(Boolean).join(" · ");
+  useEffect(() => void (document.title = title), [title]);
   useStopKey();
   // Nothing of a replay is live: STOP stays that of the robots that are.
   const robots = key && !replay ? [key] : fleetRobots.value;
@@ -95,7 +84,11 @@ export function App() {
           <span>robomesh</span>
         </a>
         <nav class="crumbs" aria-label={t("pages")}>
-          {mustSignIn.value ? null : shown ? <Crumbs at={at} {...shown} /> : <PageLinks at={at} />}
+          {mustSignIn.value ? null : robot ? (
+            <Crumbs page={shown.page} {...robot} />
+          ) : (
+            <PageLinks current={shown.page} />
+          )}
         </nav>
         <div class="bar-end">
           {mustSignIn.value || <AlarmBadge />}
@@ -117,40 +110,49 @@ export function App() {
       <main lang={language.value === "zh" ? "zh-Hans" : "en"}>
         {mustSignIn.value ? (
           <SignIn />
-        ) : nowhere ? (
-          <Missing {...shown} />
-        ) : at === "program" ? (
-          <Program shown={shown} />
-        ) : shown && isReplay(shown.robot) ? (
-          <ReplayRobot key={key ?? ""} {...shown} />
-        ) : shown ? (
-          <Robot key={key ?? ""} {...shown} />
-        ) : at === "define" ? (
-          <Define name={defined.value ?? ""} />
-        ) : at === "wall" ? (
-          <Wall chosen={walled.value ?? []} />
-        ) : at === "recordings" ? (
-          <Recordings shown={recorded.value ?? []} />
-        ) : at === "events" ? (
-          <Events />
-        ) : at === "settings" ? (
-          <Settings />
+        ) : robot && notFound ? (
+          <Missing {...robot} />
         ) : (
-          <Fleet />
+          <Page route={shown} robotKey={key ?? ""} />
         )}
       </main>
     </>
   );
 }
 
-function Crumbs({ at, site, robot }: { at: Place; site: string; robot: string }) {
+function Page({ route, robotKey }: { route: Route; robotKey: string }) {
+  switch (route.page) {
+    case "robot":
+      return isReplay(route.robot.robot) ? (
+        <ReplayRobot key={robotKey} {...route.robot} />
+      ) : (
+        <Robot key={robotKey} {...route.robot} />
+      );
+    case "program":
+      return <Program shown={route.robot} />;
+    case "define":
+      return <Define name={route.name} />;
+    case "wall":
+      return <Wall chosen={route.views} />;
+    case "recordings":
+      return <Recordings shown={route.recordings} />;
+    case "events":
+      return <Events />;
+    case "settings":
+      return <Settings />;
+    case "fleet":
+      return <Fleet />;
+  }
+}
+
+function Crumbs({ page, site, robot }: { page: Route["page"]; site: string; robot: string }) {
   return (
     <>
       <a href="#/">{t("fleet")}</a>
       <span aria-hidden="true">/</span>
       <span class="dim">{site}</span>
       <span aria-hidden="true">/</span>
-      {at === "program" ? (
+      {page === "program" ? (
         <>
           <a href={robotLink(site, robot)}>{robot}</a>
           <span aria-hidden="true">/</span>
@@ -164,7 +166,7 @@ function Crumbs({ at, site, robot }: { at: Place; site: string; robot: string })
 }
 
 /** The pages, in a row; where that has no place, in a menu that names the one that is shown. */
-function PageLinks({ at }: { at: Place }) {
+function PageLinks({ current }: { current: Route["page"] }) {
   const menu = useRef<HTMLDetailsElement>(null);
   const close = () => menu.current?.removeAttribute("open");
   const links = () =>
@@ -172,7 +174,7 @@ function PageLinks({ at }: { at: Place }) {
       <a
         key={page}
         href={page === "fleet" ? "#/" : `#/${page}`}
-        aria-current={page === at ? "page" : undefined}
+        aria-current={page === current ? "page" : undefined}
         onClick={close}
       >
         {t(page)}
@@ -182,7 +184,7 @@ function PageLinks({ at }: { at: Place }) {
     <>
       <span class="page-links">{links()}</span>
       <details ref={menu} class="page-menu" onKeyDown={(event) => event.key === "Escape" && close()}>
-        <summary>{t(at === "robot" ? "fleet" : at)}</summary>
+        <summary>{t(current === "robot" ? "fleet" : current)}</summary>
         <div>{links()}</div>
       </details>
     </>
@@ -190,7 +192,8 @@ function PageLinks({ at }: { at: Place }) {
 }
 
 function StopButton({ robots }: { robots: readonly string[] }) {
-  const robot = route.value && canBe(route.value) && !isReplay(route.value.robot) ? route.value.robot : "";
+  const named = robotOf(route.value);
+  const robot = named && canBe(named) && !isReplay(named.robot) ? named.robot : "";
   const one = robot !== "";
   return (
     <div class="stop-place">

@@ -1,23 +1,85 @@
-// Where the page is: #/ is the fleet, #/<site>/<robot> a robot, #/define and #/define/<name> Define,
-// #/program the choice of a robot, #/program/<site>/<robot> its program, #/recordings the recordings,
-// #/recordings/<site>/<file> one of them, with /<site>/<file> behind it of another one that it is compared with,
-// #/wall the wall, with /<site>/<robot>/<view> for each picture that was chosen, #/events and #/settings.
+// Route of the page, read from the address's hash, and links to each page.
 
 import { signal } from "@preact/signals";
 import type { RobotName } from "../mesh/robot-name";
-import { canBe } from "../mesh/robot-name";
+import { canBe, isReplay } from "../mesh/robot-name";
 
-// A site of such a name would have its robots' pages hidden behind these.
-const DEFINE = "define";
-const PROGRAM = "program";
-const RECORDINGS = "recordings";
-const WALL = "wall";
-const PLAIN = ["events", "settings"] as const;
+/** The name of a recording's file and the site that has it. */
+export interface RecordingName {
+  site: string;
+  file: string;
+}
 
-// The console closes the connection of a page that watches an impossible key.
+/** One view of a robot on the wall. */
+export interface ViewName extends RobotName {
+  view: string;
+}
+
+/** The page that the hash names, and what it shows. */
+export type Route =
+  | { page: "fleet" | "events" | "settings" }
+  /** `#/<site>/<robot>`; a replay is a robot too. */
+  | { page: "robot"; robot: RobotName }
+  /** `#/program/<site>/<robot>`; null: `#/program`, which offers a choice of robots. */
+  | { page: "program"; robot: RobotName | null }
+  /** `#/define/<name>`; "": a new robot. */
+  | { page: "define"; name: string }
+  /** `#/recordings`, the list; then `/<site>/<file>` for one recording or two to compare. */
+  | { page: "recordings"; recordings: readonly RecordingName[] }
+  /** `#/wall`, one view of every robot; then `/<site>/<robot>/<view>` for each chosen view. */
+  | { page: "wall"; views: readonly ViewName[] };
+
+// The console closes the connection of a page that subscribes to an invalid key.
 const VIEW = /^[A-Za-z0-9][\w.-]{0,62}$/;
 
-/** What a link says; one that was cut or mistyped says what stands there. */
+// A site with the name of a page could not link to its robots.
+function readRoute(): Route {
+  const [, first = "", ...rest] = location.hash.split("/").map(decoded);
+  switch (first) {
+    case "events":
+    case "settings":
+      return { page: first };
+    case "define":
+      return { page: "define", name: rest[0] ?? "" };
+    case "recordings":
+      return { page: "recordings", recordings: readRecordings(rest) };
+    case "wall":
+      return { page: "wall", views: readViews(rest) };
+    case "program": {
+      const robot = readRobot(rest);
+      // A replay has no program: show its own page.
+      return robot && isReplay(robot.robot) ? { page: "robot", robot } : { page: "program", robot };
+    }
+    default: {
+      const robot = readRobot([first, ...rest]);
+      return robot ? { page: "robot", robot } : { page: "fleet" };
+    }
+  }
+}
+
+function readRobot([site, robot]: readonly string[]): RobotName | null {
+  return site && robot ? { site, robot } : null;
+}
+
+function readRecordings(parts: readonly string[]): RecordingName[] {
+  const recordings: RecordingName[] = [];
+  for (const i of [0, 2]) {
+    const [site, file] = parts.slice(i, i + 2);
+    if (site && file) recordings.push({ site, file });
+  }
+  return recordings;
+}
+
+function readViews(parts: readonly string[]): ViewName[] {
+  const views: ViewName[] = [];
+  for (let i = 0; i + 2 < parts.length; i += 3) {
+    const [site, robot, view] = parts.slice(i, i + 3);
+    if (site && robot && view && VIEW.test(view) && canBe({ site, robot })) views.push({ site, robot, view });
+  }
+  return views;
+}
+
+/** Decode a part of the hash; return it unchanged if it is malformed. */
 function decoded(text: string): string {
   try {
     return decodeURIComponent(text);
@@ -26,95 +88,34 @@ function decoded(text: string): string {
   }
 }
 
-function readRobot(): RobotName | null {
-  const [, first, ...rest] = location.hash.split("/");
-  if (first === DEFINE || first === RECORDINGS || first === WALL || readPlain()) return null;
-  const [site, robot] = first === PROGRAM ? rest : [first, ...rest];
-  return site && robot ? { site: decoded(site), robot: decoded(robot) } : null;
-}
-
-/** A page that shows no one thing. */
-export type PlainPage = (typeof PLAIN)[number];
-
-function readPlain(): PlainPage | null {
-  const first = location.hash.split("/")[1];
-  return PLAIN.find((name) => name === first) ?? null;
-}
-
-function readDefined(): string | null {
-  const [, page, name] = location.hash.split("/");
-  return page === DEFINE ? decoded(name ?? "") : null;
-}
-
-function readsProgram(): boolean {
-  return location.hash.split("/")[1] === PROGRAM;
-}
-
-/** A recording, by its file's name. */
-export interface RecordingName {
-  site: string;
-  file: string;
-}
-
-function readRecordings(): readonly RecordingName[] | null {
-  const [, page, ...rest] = location.hash.split("/").map(decoded);
-  if (page !== RECORDINGS) return null;
-  return [0, 2].flatMap((i) => (rest[i] && rest[i + 1] ? [{ site: rest[i], file: rest[i + 1] as string }] : []));
-}
-
-/** One picture of the wall. */
-export interface ViewName extends RobotName {
-  view: string;
-}
-
-function readWall(): readonly ViewName[] | null {
-  const [, page, ...rest] = location.hash.split("/").map(decoded);
-  if (page !== WALL) return null;
-  const shown: ViewName[] = [];
-  for (let i = 0; i + 2 < rest.length; i += 3) {
-    const [site, robot, view] = rest.slice(i, i + 3);
-    if (site && robot && view && VIEW.test(view) && canBe({ site, robot })) shown.push({ site, robot, view });
-  }
-  return shown;
-}
-
-/** The robot shown, on its own page or its program's; null: another page. */
-export const route = signal<RobotName | null>(readRobot());
-/** Whether Program is shown, of the robot or to choose one. */
-export const programming = signal(readsProgram());
-/** The robot that is being defined, "" a new one; null: another page. */
-export const defined = signal<string | null>(readDefined());
-/** The recordings that are played: one, two that are compared, none: the list; null: another page. */
-export const recorded = signal(readRecordings());
-/** What the wall shows, none: of every robot one view; null: another page. */
-export const walled = signal(readWall());
-/** Events or Settings; null: another page. */
-export const plain = signal(readPlain());
+export const route = signal(readRoute());
 addEventListener("hashchange", () => {
-  route.value = readRobot();
-  defined.value = readDefined();
-  programming.value = readsProgram();
-  recorded.value = readRecordings();
-  walled.value = readWall();
-  plain.value = readPlain();
+  route.value = readRoute();
 });
 
+/** Return the robot that a route shows, on its own page or its program's. */
+export function robotOf(shown: Route): RobotName | null {
+  return shown.page === "robot" || shown.page === "program" ? shown.robot : null;
+}
+
 export function robotLink(site: string, robot: string): string {
-  return `#/${encodeURIComponent(site)}/${encodeURIComponent(robot)}`;
+  return link(site, robot);
 }
 
 export function programLink(site: string, robot: string): string {
-  return `#/${PROGRAM}/${encodeURIComponent(site)}/${encodeURIComponent(robot)}`;
+  return link("program", site, robot);
 }
 
-/** Of the list, of one recording, or of two beside each other. */
+/** Link to the list, to one recording, or to two to compare. */
 export function recordingsLink(...shown: readonly RecordingName[]): string {
-  return ["#", RECORDINGS, ...shown.flatMap(({ site, file }) => [site, file].map(encodeURIComponent))].join("/");
+  return link("recordings", ...shown.flatMap(({ site, file }) => [site, file]));
 }
 
-/** Of the wall with these pictures. */
+/** Link to the wall with these views. */
 export function wallLink(shown: readonly ViewName[]): string {
-  return ["#", WALL, ...shown.flatMap(({ site, robot, view }) => [site, robot, view].map(encodeURIComponent))].join(
-    "/",
-  );
+  return link("wall", ...shown.flatMap(({ site, robot, view }) => [site, robot, view]));
+}
+
+function link(...parts: readonly string[]): string {
+  return ["#", ...parts.map(encodeURIComponent)].join("/");
 }
