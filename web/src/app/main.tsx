@@ -7,7 +7,7 @@ import { keepConnected } from "../mesh/connection";
 import { followThisTab } from "../mesh/control";
 import { applyTheme } from "../ui/theme";
 import { App } from "./app";
-import "./style.css";
+import "./styles";
 
 isolateForeignTexts();
 applyTheme();

@@ -1,0 +1,29 @@
+// Style sheets of the first page, in the order of the cascade: a later sheet overrides an earlier one.
+
+import "../ui/tokens.css";
+import "./base.css";
+import "../ui/buttons.css";
+import "../ui/state.css";
+import "./bar.css";
+import "./banners.css";
+import "../ui/robot-alarm.css";
+import "../ui/robot-not-found.css";
+import "../ui/panel.css";
+import "./stop.css";
+import "../features/fleet/fleet-page.css";
+import "../features/fleet/tile.css";
+import "../features/robot/robot.css";
+import "../scene/scene-view.css";
+import "../video/picture.css";
+import "../ui/control/control.css";
+import "../features/robot/joints-panel.css";
+import "../ui/joint-value.css";
+import "../ui/joint-track.css";
+import "../ui/tool-panel.css";
+import "../ui/joint-limits-panel.css";
+import "../features/robot/events-panel.css";
+import "../features/robot/link-facts.css";
+import "../ui/plot.css";
+import "../features/robot/camera.css";
+import "../features/robot/low-bandwidth.css";
+import "./breakpoints.css";
