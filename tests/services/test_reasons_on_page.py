@@ -8,7 +8,8 @@ from robomesh import reason_codes
 from robomesh.reasons import Code
 
 SENTENCES = Path(__file__).resolve().parents[2] / "web/src/i18n/reasons.ts"
-ROW = re.compile(r'^  \[("[^"]+"), \[("(?:[^"\\]|\\.)*"), ("(?:[^"\\]|\\.)*")\]\],$', re.MULTILINE)
+TEXT = r'("(?:[^"\\]|\\.)*")'
+ROW = re.compile(rf"^  \[\s*{TEXT},\s*\[\s*{TEXT},\s*{TEXT},?\s*\],?\s*\],$", re.MULTILINE)
 ROWS = {
     json.loads(code): (json.loads(english), json.loads(chinese))
     for code, english, chinese in ROW.findall(SENTENCES.read_text("utf-8"))
