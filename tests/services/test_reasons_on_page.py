@@ -1,17 +1,17 @@
 """The page has a sentence in each language for every reason of the table."""
 
-import json
 import re
+from ast import literal_eval
 from pathlib import Path
 
 from robomesh import reason_codes
 from robomesh.reasons import Code
 
 SENTENCES = Path(__file__).resolve().parents[2] / "web/src/i18n/reasons.ts"
-TEXT = r'("(?:[^"\\]|\\.)*")'
+TEXT = r"""("(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*')"""
 ROW = re.compile(rf"^  \[\s*{TEXT},\s*\[\s*{TEXT},\s*{TEXT},?\s*\],?\s*\],$", re.MULTILINE)
 ROWS = {
-    json.loads(code): (json.loads(english), json.loads(chinese))
+    literal_eval(code): (literal_eval(english), literal_eval(chinese))
     for code, english, chinese in ROW.findall(SENTENCES.read_text("utf-8"))
 }
 TABLE = {each.name: each for each in vars(reason_codes).values() if isinstance(each, Code)}
