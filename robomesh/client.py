@@ -10,7 +10,7 @@ import zenoh
 from google.protobuf.message import Message
 
 from robomesh import keys, pieces, topics
-from robomesh.endpoints import ON_THE_SECOND_LINK, first_line, settle
+from robomesh.endpoints import ON_THE_SECOND_LINK, settle
 from robomesh.errors import (
     BrokenAnswerError,
     BusError,
@@ -22,6 +22,7 @@ from robomesh.errors import (
 )
 from robomesh.messages import PROTOBUF, TEXT, decode
 from robomesh.reasons import Reason, pairs_of, reason_of
+from robomesh.replies import query
 from robomesh.server import AGAIN_S, BUSY, CODES, MARK_BYTES, OLD_AGAIN_S, WITHIN
 
 _AGAIN_S = 0.05
@@ -50,22 +51,16 @@ async def ask_all(
         timeout_s: Time for the owners to answer [s].
         silent_s: Longest gap between the pieces of a long answer [s]; None: `timeout_s`.
     """
-    loop = asyncio.get_running_loop()
     row = topics.request(keys.parse_expression(key).topic)
     if row.priority in ON_THE_SECOND_LINK:
         # A thread does not keep the order of requests. No command has such a priority.
         await asyncio.to_thread(settle, session, row.priority)
     priorities = (row.priority, ON_THE_SECOND_LINK[0]) if row.both_links else (row.priority,)
     mark = secrets.token_bytes(MARK_BYTES) if row.both_links else None
-    asked = [loop.create_future() for _ in priorities]
-    for priority, done in zip(priorities, asked, strict=True):
-        try:
-            _get(session, key, payload, priority, mark, timeout_s, done)
-        except zenoh.ZError as error:
-            raise NoAnswerError(f"{key} could not be asked: {first_line(error)}") from None
-    answers: _Answers = []
-    for done in asyncio.as_completed(asked):
-        answers = max(answers, await done, key=len)
+    queries = [_query(session, key, payload, priority, mark, timeout_s) for priority in priorities]
+    answers: list[_Answer] = []
+    for replies in asyncio.as_completed(queries):
+        answers = max(answers, await replies, key=len)
         if answers:
             break
     silent_s = timeout_s if silent_s is None else silent_s
@@ -75,65 +70,46 @@ async def ask_all(
             found.append((owner, answer, refused))
             continue
         try:
-            whole = await pieces.whole(session, answer, _zenoh(row.priority), timeout_s=silent_s)
+            whole = await pieces.whole(session, answer, row.priority, timeout_s=silent_s)
             found.append((owner, whole, None))
         except BrokenAnswerError as error:
             found.append((owner, None, error))
     return found
 
 
-_Answers = list[tuple[str, bytes | pieces.First | None, RefusedError | None]]
+_Answer = tuple[str, bytes | pieces.First | None, RefusedError | None]
 
 
-def _get(
+def _query(
     session: zenoh.Session,
     key: str,
     payload: bytes,
     priority: topics.Priority,
     mark: bytes | None,
     timeout_s: float,
-    done: asyncio.Future[_Answers],
-) -> None:
-    """Send a request; set `done` to the owners' answers after the last one or the timeout."""
-    loop = done.get_loop()
-    answers: _Answers = []
+) -> asyncio.Future[list[_Answer]]:
+    """Send a request; return a future for the owners' answers."""
 
-    def on_reply(reply: zenoh.Reply) -> None:
+    def read(reply: zenoh.Reply) -> _Answer | None:
         if reply.ok is not None:
             # Zenoh checks that the key matches the request's.
-            if not keys.has_wildcard(str(reply.ok.key_expr)):
-                answer = pieces.first_of(reply.ok) or reply.ok.payload.to_bytes()
-                answers.append((str(reply.ok.key_expr), answer, None))
-        elif reply.err is not None and (encoding := str(reply.err.encoding)).startswith(TEXT):
-            answers.append((key, None, _refused(reply.err.payload.to_bytes(), encoding)))
+            if keys.has_wildcard(str(reply.ok.key_expr)):
+                return None
+            return str(reply.ok.key_expr), pieces.first_of(reply.ok) or reply.ok.payload.to_bytes(), None
+        if reply.err is not None and (encoding := str(reply.err.encoding)).startswith(TEXT):
+            return key, None, _refused(reply.err.payload.to_bytes(), encoding)
+        return None
 
-    def finish() -> None:
-        if not done.done():
-            done.set_result(answers)
-
-    def on_end() -> None:
-        if not loop.is_closed():
-            loop.call_soon_threadsafe(finish)
-
-    session.get(
+    return query(
+        session,
         f"{pieces.selector(key)};{WITHIN}={timeout_s:.3f};{CODES}",
-        zenoh.handlers.Callback(on_reply, on_end),
+        read,
+        priority=priority,
+        timeout_s=timeout_s,
         payload=payload,
         encoding=PROTOBUF,
         attachment=mark,
-        # By default Zenoh would send the request only to a queryable that declares itself complete.
-        target=zenoh.QueryTarget.ALL,
-        consolidation=zenoh.ConsolidationMode.NONE,
-        # The default, BLOCK, would stall joint states on a full link.
-        congestion_control=zenoh.CongestionControl.DROP,
-        priority=_zenoh(priority),
-        timeout=timeout_s,
     )
-
-
-def _zenoh(priority: topics.Priority) -> zenoh.Priority:
-    found: zenoh.Priority = getattr(zenoh.Priority, priority.value)
-    return found
 
 
 def _refused(words: bytes, encoding: str) -> RefusedError:

@@ -8,7 +8,6 @@ two neighbours, so the difference of their clocks cancels out.
 Source: RFC 5905, sections 8 (offset and delay) and 10 (the sample with the least delay is the best).
 """
 
-import asyncio
 import time
 from collections import deque
 from collections.abc import Callable
@@ -16,16 +15,16 @@ from dataclasses import dataclass, field
 
 import zenoh
 
-from robomesh.endpoints import first_line
 from robomesh.errors import MessageError, NoAnswerError
 from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.messages import PROTOBUF, decode
+from robomesh.replies import query
 from robomesh.schemas.robomesh_pb2 import ClockAnswer, ClockRequest
 from robomesh.server import Answerer, Request
 from robomesh.session import Session
+from robomesh.topics import Priority
 
 _KEPT = 8
-_PRIORITY = zenoh.Priority.INTERACTIVE_HIGH
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,48 +85,31 @@ async def read_clock(
     Raises:
         NoAnswerError: If no answer arrived in time.
     """
-    loop = asyncio.get_running_loop()
-    done: asyncio.Future[None] = loop.create_future()
-    came: list[tuple[int, zenoh.Sample]] = []
 
-    def on_reply(reply: zenoh.Reply) -> None:
-        if reply.ok is not None:
-            came.append((time.time_ns(), reply.ok))
-
-    def finish() -> None:
-        if not done.done():
-            done.set_result(None)
-
-    def on_end() -> None:
-        if not loop.is_closed():
-            loop.call_soon_threadsafe(finish)
+    def read(reply: zenoh.Reply) -> tuple[int, zenoh.Sample] | None:
+        return None if reply.ok is None else (time.time_ns(), reply.ok)
 
     key = robot_key(site, WHOLE_SITE, f"clock/{identity}")
     request = ClockRequest()
     asked_ns = time.time_ns()
     request.asked.FromNanoseconds(asked_ns)
-    try:
-        session.zenoh_session.get(
-            key,
-            zenoh.handlers.Callback(on_reply, on_end),
-            payload=request.SerializeToString(),
-            encoding=PROTOBUF,
-            consolidation=zenoh.ConsolidationMode.NONE,
-            congestion_control=zenoh.CongestionControl.DROP,
-            priority=_PRIORITY,
-            timeout=timeout_s,
-            timestamp_instrumentation=_INSTRUMENTED if hops else None,
-        )
-    except zenoh.ZError as error:
-        raise NoAnswerError(f"{key} could not be asked: {first_line(error)}") from None
-    await done
-    for came_ns, sample in came:
+    replies = await query(
+        session.zenoh_session,
+        key,
+        read,
+        priority=Priority.INTERACTIVE_HIGH,
+        timeout_s=timeout_s,
+        payload=request.SerializeToString(),
+        encoding=PROTOBUF,
+        timestamp_instrumentation=_INSTRUMENTED if hops else None,
+    )
+    for arrived_ns, sample in replies:
         try:
             answer = decode(ClockAnswer, sample.payload.to_bytes())
         except MessageError:
             continue
         received_ns, answered_ns = answer.received.ToNanoseconds(), answer.answered.ToNanoseconds()
-        reading = reading_of(asked_ns, received_ns, answered_ns, came_ns)
+        reading = reading_of(asked_ns, received_ns, answered_ns, arrived_ns)
         return Reading(reading.offset_s, reading.round_trip_s, hops_of(_stamps(sample)))
     raise NoAnswerError(f"no answer to {key} within {timeout_s:g} s: is that process running?")
 

@@ -10,6 +10,7 @@ from robomesh.endpoints import settle
 from robomesh.errors import MessageError
 from robomesh.ignored import REPLY
 from robomesh.messages import decode
+from robomesh.replies import query
 from robomesh.session import Session
 from robomesh.topics import topic
 
@@ -23,35 +24,16 @@ async def last_values(session: Session, key_expr: str, *, timeout_s: float = 1.5
     """
     row = topic(keys.parse_expression(key_expr).topic)
     schema = row.history_schema or row.schema
-    loop = asyncio.get_running_loop()
-    done: asyncio.Future[None] = loop.create_future()
-    found: dict[str, bytes] = {}
 
-    def on_reply(reply: zenoh.Reply) -> None:
-        if reply.ok is not None and session.ignored.key(REPLY, key := str(reply.ok.key_expr)) is not None:
-            found[key] = reply.ok.payload.to_bytes()
-
-    def finish() -> None:
-        if not done.done():
-            done.set_result(None)
-
-    def on_end() -> None:
-        if not loop.is_closed():
-            loop.call_soon_threadsafe(finish)
+    def read(reply: zenoh.Reply) -> tuple[str, bytes] | None:
+        if reply.ok is None or session.ignored.key(REPLY, key := str(reply.ok.key_expr)) is None:
+            return None
+        return key, reply.ok.payload.to_bytes()
 
     await asyncio.to_thread(settle, session.zenoh_session, row.priority)
-    session.zenoh_session.get(
-        key_expr,
-        zenoh.handlers.Callback(on_reply, on_end),
-        target=zenoh.QueryTarget.ALL,
-        consolidation=zenoh.ConsolidationMode.NONE,
-        congestion_control=zenoh.CongestionControl.DROP,
-        priority=getattr(zenoh.Priority, row.priority.value),
-        timeout=timeout_s,
-    )
-    await done
+    found = await query(session.zenoh_session, key_expr, read, priority=row.priority, timeout_s=timeout_s)
     values: dict[str, Message] = {}
-    for key, payload in sorted(found.items()):
+    for key, payload in sorted(dict(found).items()):
         try:
             values[key] = decode(schema, payload)
         except MessageError:

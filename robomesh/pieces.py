@@ -18,9 +18,10 @@ from threading import Lock
 
 import zenoh
 
-from robomesh.endpoints import first_line
-from robomesh.errors import BrokenAnswerError, NoAnswerError
+from robomesh.errors import BrokenAnswerError
 from robomesh.messages import TEXT
+from robomesh.replies import query
+from robomesh.topics import Priority
 
 # Two pieces fit into one of Zenoh's batches.
 PIECE_BYTES = 30_000
@@ -180,7 +181,7 @@ def first_of(sample: zenoh.Sample) -> First | None:
     return First(str(sample.key_expr), data, token.hex(), length)
 
 
-async def whole(session: zenoh.Session, first: First, priority: zenoh.Priority, *, timeout_s: float) -> bytes:
+async def whole(session: zenoh.Session, first: First, priority: Priority, *, timeout_s: float) -> bytes:
     """Fetch the rest of a long answer and return the whole, however long that takes while pieces arrive.
 
     Args:
@@ -226,42 +227,17 @@ def _broken(first: First, taken: dict[int, bytes], why: str) -> BrokenAnswerErro
     return BrokenAnswerError(f"{first.key}: {length} of {first.length} bytes arrived, {why}")
 
 
-async def _ask(
-    session: zenoh.Session, asked: str, priority: zenoh.Priority, timeout_s: float
-) -> bytes | None:
+async def _ask(session: zenoh.Session, selector: str, priority: Priority, timeout_s: float) -> bytes | None:
     """Request a piece; return None if no reply arrived, and no bytes if the owner refused."""
-    loop = asyncio.get_running_loop()
-    done: asyncio.Future[bytes | None] = loop.create_future()
-    answers: list[bytes] = []
 
-    def on_reply(reply: zenoh.Reply) -> None:
+    def read(reply: zenoh.Reply) -> bytes | None:
         if reply.ok is not None:
-            answers.append(reply.ok.payload.to_bytes())
+            return reply.ok.payload.to_bytes()
         # Zenoh's timeout error has another encoding.
-        elif reply.err is not None and str(reply.err.encoding) == TEXT:
-            answers.append(b"")
+        return b"" if reply.err is not None and str(reply.err.encoding) == TEXT else None
 
-    def finish() -> None:
-        if not done.done():
-            done.set_result(answers[0] if answers else None)
-
-    def on_end() -> None:
-        if not loop.is_closed():
-            loop.call_soon_threadsafe(finish)
-
-    try:
-        session.get(
-            asked,
-            zenoh.handlers.Callback(on_reply, on_end),
-            target=zenoh.QueryTarget.ALL,
-            consolidation=zenoh.ConsolidationMode.NONE,
-            congestion_control=zenoh.CongestionControl.DROP,
-            priority=priority,
-            timeout=timeout_s,
-        )
-    except zenoh.ZError as error:
-        raise NoAnswerError(f"{asked} could not be asked: {first_line(error)}") from None
-    return await done
+    found = await query(session, selector, read, priority=priority, timeout_s=timeout_s)
+    return found[0] if found else None
 
 
 def _names(query: zenoh.Query) -> list[str]:

@@ -10,6 +10,7 @@ import zenoh
 from robomesh import keys
 from robomesh.errors import NoAnswerError
 from robomesh.ignored import Ignored
+from robomesh.replies import Handler, collect
 
 _TIMEOUT_S = 2.0
 _RETRY_S = 0.05
@@ -58,25 +59,20 @@ async def _tokens(
     session: zenoh.Session, key_expr: str, seen: Ignored, timeout_s: float
 ) -> set[keys.PresenceKey] | None:
     """Return the keys of all tokens; None: the router did not list all in time."""
-    loop = asyncio.get_running_loop()
-    done = asyncio.Event()
-    found: set[keys.PresenceKey] = set()
     late = False
 
-    def on_reply(reply: zenoh.Reply) -> None:
+    def read(reply: zenoh.Reply) -> keys.PresenceKey | None:
         nonlocal late
         if reply.ok is None:
             late = True
-        elif (key := seen.presence(str(reply.ok.key_expr))) is not None:
-            found.add(key)
+            return None
+        return seen.presence(str(reply.ok.key_expr))
 
-    def on_end() -> None:
-        if not loop.is_closed():
-            loop.call_soon_threadsafe(done.set)
+    def send(handler: Handler) -> None:
+        session.liveliness().get(key_expr, handler, timeout=timeout_s)
 
-    session.liveliness().get(key_expr, zenoh.handlers.Callback(on_reply, on_end), timeout=timeout_s)
-    await done.wait()
-    return None if late else found
+    found = await collect(send, read)
+    return None if late else set(found)
 
 
 class PresenceWatch:

@@ -28,7 +28,7 @@ CASES = [
     ("lease/request/li", "{}", "action: set one of ACQUIRE,"),
     ("command/*", json.dumps(MOVE), "has a wildcard"),
     ("lease/request/*", '{"action": "ACQUIRE"}', "has a wildcard"),
-    ("command/stop", json.dumps(MOVE), "operator 'stop' cannot be used: a request is called so"),
+    ("command/stop", json.dumps(MOVE), "operator 'stop' cannot be used: it is the name of a request"),
     ("command/李\x1b[1m", json.dumps(MOVE), "cannot be used: letters, digits"),
     ("lease/request/" + "o" * 300, '{"action": "ACQUIRE"}', "at most 200 characters"),
 ]
