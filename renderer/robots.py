@@ -15,7 +15,7 @@ from renderer.cache import store_glb, stored_glb
 from renderer.errors import RendererError
 from renderer.robot_state import Ages, RobotState
 from robomesh.errors import BusError, MessageError
-from robomesh.keys import ROOT, robot_key
+from robomesh.keys import ROOT, is_replay, robot_key
 from robomesh.schemas.robomesh_pb2 import ControllerState, Description, KinematicState
 from robomesh.session import Session
 from robomesh.subscription import Sample, Subscription
@@ -210,9 +210,7 @@ class Robots:
                 group.create_task(self._describe_again(who.robot, group))
             if not makers:
                 del self._makers[who.robot]
-                state = self.states.get(who.robot)
-                replay = who.service == "player" or (state is not None and _is_replay(state))
-                after_s = _FORGET_REPLAY_AFTER_S if replay else _FORGET_AFTER_S
+                after_s = _FORGET_REPLAY_AFTER_S if is_replay(who.robot) else _FORGET_AFTER_S
                 loop = asyncio.get_running_loop()
                 self._forgetting[who.robot] = loop.call_later(after_s, self._forget, who.robot)
 
@@ -227,7 +225,3 @@ class Robots:
             log.info("%s/%s is there no more", state.site, state.name)
             self._forgotten.add(robot)
             self._follower.gone(state)
-
-
-def _is_replay(state: RobotState) -> bool:
-    return state.look is not None and state.look.description.HasField("replay")

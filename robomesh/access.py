@@ -38,7 +38,7 @@ Border = Literal["open", "slow"]
 # it, and every player for its replay.
 PROBE_ROBOT = "matrix-probe"
 _ROS_DOMAINS = 233
-_REPLAYS = ("replay-$*",)
+_REPLAYS = (keys.replay_name("$*"),)
 _PUBLISH: tuple[Act, ...] = ("put", "declare_queryable", "reply")
 _ANSWER: tuple[Act, ...] = ("declare_queryable", "reply")
 _LISTEN: tuple[Act, ...] = ("declare_subscriber",)

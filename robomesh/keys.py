@@ -14,8 +14,8 @@ from robomesh.texts import one_line
 
 ROOT = "robomesh"
 WHOLE_SITE = "-"
-# A recording played back is a robot named replay-<id>.
-REPLAY = "replay-"
+# A player publishes a replay as a robot named replay-<id>.
+_REPLAY = "replay-"
 
 # Characters of a site's or robot's name, and of any other chunk of a key.
 LONGEST_NAME, LONGEST_CHUNK = 64, 200
@@ -128,9 +128,14 @@ def has_wildcard(key: str) -> bool:
     return "*" in key  # Zenoh's `$` is valid only in front of `*`
 
 
-def is_replay(key: str) -> bool:
-    """Return whether a key belongs to a replay, whose source times are those of the recording."""
-    return f"/{REPLAY}" in key
+def replay_name(identity: str) -> str:
+    """Return the robot's name of a replay."""
+    return f"{_REPLAY}{identity}"
+
+
+def is_replay(robot: str) -> bool:
+    """Return whether a robot's name is that of a replay, which has the source times of its recording."""
+    return robot.startswith(_REPLAY)
 
 
 def presence_key(site: str, robot: str, service: str, identity: str) -> str:

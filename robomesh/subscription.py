@@ -77,6 +77,7 @@ class _Seen:
     """State of one key."""
 
     header: Header
+    is_replay: bool = False
     is_reply: bool = False  # of the newest sample
     delay: Delay = field(default_factory=Delay)
     live_at: float | None = None
@@ -293,7 +294,9 @@ class Subscription:
         key = str(sample.key_expr)
         attachment = sample.attachment
         kind = PUBLICATION if queried_at is None else REPLY
-        if key not in self._seen and self._ignored.key(kind, key) is None:
+        seen = self._seen.get(key)
+        parsed = self._ignored.key(kind, key) if seen is None else None
+        if seen is None and parsed is None:
             return
         if attachment is None or sample.kind != zenoh.SampleKind.PUT:
             self._malformed += 1
@@ -305,10 +308,9 @@ class Subscription:
             return
         now = time.monotonic()
         payload = sample.payload.to_bytes()
-        seen = self._seen.get(key)
         if seen is None:
             self._forget(now)
-            self._seen[key] = seen = _Seen(header)
+            self._seen[key] = seen = _Seen(header, parsed is not None and keys.is_replay(parsed.robot))
         elif header.publisher != seen.header.publisher:
             if queried_at is not None and seen.live_at is not None and seen.live_at > queried_at:
                 return  # a live sample overtook the reply
@@ -331,7 +333,8 @@ class Subscription:
         self._received += 1
         late_s = 0.0
         if queried_at is None:
-            late_s = 0.0 if keys.is_replay(key) else seen.delay.of(header, now)
+            # The source times of a replay are those of its recording.
+            late_s = 0.0 if seen.is_replay else seen.delay.of(header, now)
             seen.live_at = now - late_s
         elif self.topic.heartbeat_s is not None:
             seen.live_at = now - self.topic.heartbeat_s

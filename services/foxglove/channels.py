@@ -7,7 +7,7 @@ from functools import partial
 import foxglove
 from foxglove_schemas_protobuf.Log_pb2 import Log
 
-from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.keys import WHOLE_SITE, is_replay, robot_key
 from robomesh.schemas.robomesh_pb2 import Description
 from robomesh.session import Session
 from robomesh.topics import topic
@@ -147,4 +147,4 @@ class Channels:
 def _topics_of(robot: str) -> tuple[str, ...]:
     if robot == WHOLE_SITE:
         return _OF_A_SITE
-    return _OF_A_REPLAY if robot.startswith("replay-") else _OF_A_ROBOT
+    return _OF_A_REPLAY if is_replay(robot) else _OF_A_ROBOT

@@ -11,7 +11,7 @@ from mcap_files.errors import RecordingsError
 from robomesh import reason_codes as codes
 from robomesh import topics
 from robomesh.errors import BusError, RefusedError
-from robomesh.keys import robot_key
+from robomesh.keys import replay_name, robot_key
 from robomesh.publisher import Publisher
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Answerer, Handler, Request
@@ -23,7 +23,7 @@ from services.player.recording_source import Played, Scene, Tape
 
 log = logging.getLogger(__name__)
 
-PREFIX = "replay-"
+
 SERVICE = "player"
 _Ask = schema.ReplayRequest
 # Read ahead so much, by the replay's own time.
@@ -56,7 +56,7 @@ class Replay:
     """
 
     def __init__(self, session: Session, site: str, identity: str, tape: Tape, clock: Clock) -> None:
-        self.robot = f"{PREFIX}{identity}"
+        self.robot = replay_name(identity)
         self._session, self._site, self._tape, self._clock = session, site, tape, clock
         self._text = ""
         self._jump = asyncio.Event()

@@ -4,6 +4,8 @@ import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from robomesh.keys import is_replay
+
 
 def _cache() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "robomesh" / "ros2-meshes"
@@ -32,5 +34,5 @@ class Settings:
     def wants(self, site: str, robot: str) -> bool:
         """Whether ROS 2 is to see a robot; a replay only if it is named."""
         if not self.robots:
-            return not robot.startswith("replay-")
+            return not is_replay(robot)
         return robot in self.robots or f"{site}/{robot}" in self.robots

@@ -79,7 +79,7 @@ class Robot(BaseModel):
     @field_validator("name")
     @classmethod
     def _name(cls, name: str) -> str:
-        if name.startswith("replay-"):
+        if keys.is_replay(name):
             raise ValueError(
                 "replay-... is what recordings are played back as: call the robot something else"
             )

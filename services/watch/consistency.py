@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 
-from robomesh.keys import REPLAY, WHOLE_SITE, PresenceKey
+from robomesh.keys import WHOLE_SITE, PresenceKey, is_replay
 from robomesh.session import CERTIFICATE
 from services.watch.conditions import Condition
 from services.watch.mesh import Mesh, Process
@@ -58,7 +58,7 @@ class Expected:
 
     def expect(self, service: str, robot: str, name: str) -> None:
         """It is there, and should be from now on; a replay ends when its time has come."""
-        if service in _NEEDED and not robot.startswith(REPLAY):
+        if service in _NEEDED and not is_replay(robot):
             self.services[service, robot] = name
 
 

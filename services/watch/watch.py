@@ -11,7 +11,7 @@ from pathlib import Path
 from robomesh.clock import read_clock
 from robomesh.errors import MessageError, NoAnswerError, RefusedError
 from robomesh.ignored import PUBLICATION
-from robomesh.keys import REPLAY, ROOT, WHOLE_SITE, check_name
+from robomesh.keys import ROOT, WHOLE_SITE, check_name, is_replay
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
 from robomesh.session import Session
@@ -109,7 +109,7 @@ class _Watch:
 
     async def _follow_states(self) -> None:
         async for sample in self._controllers:
-            if sample.parsed.robot.startswith(REPLAY):
+            if is_replay(sample.parsed.robot):
                 continue  # it was so then
             try:
                 state = sample.message()
@@ -121,7 +121,7 @@ class _Watch:
 
     async def _follow_events(self, subscription: Subscription) -> None:
         async for sample in subscription:
-            if sample.parsed.robot.startswith(REPLAY):
+            if is_replay(sample.parsed.robot):
                 continue  # it happened then
             try:
                 message = sample.message()

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from robomesh import topics
 from robomesh.access import PROBE_ROBOT, Act, Principal
 from robomesh.errors import UnknownTopicError
-from robomesh.keys import REPLAY, has_wildcard, parse_expression
+from robomesh.keys import has_wildcard, is_replay, parse_expression, replay_name
 from robomesh.topics import REQUESTS, TOPICS, Request, Role, Topic
 
 ROWS: tuple[Topic | Request, ...] = (*TOPICS.values(), *REQUESTS.values())
@@ -16,7 +16,7 @@ ROWS: tuple[Topic | Request, ...] = (*TOPICS.values(), *REQUESTS.values())
 VAGUE = f"{PROBE_ROBOT}$*"
 # Of routers themselves: no rule gives it to anybody.
 ROUTERS_OWN = "@/**"
-ROBOTS = (PROBE_ROBOT, f"{REPLAY}{PROBE_ROBOT}", VAGUE)
+ROBOTS = (PROBE_ROBOT, replay_name(PROBE_ROBOT), VAGUE)
 
 
 def names(row: Topic | Request, who: Principal) -> list[str]:
@@ -74,7 +74,7 @@ def should(who: Principal, act: Act, key: str) -> bool:
     if who.role is Role.GATEWAY:
         return speak and robot in (PROBE_ROBOT, *(who.robots or ()))
     if who.role is Role.PLAYER:
-        return speak and robot.startswith(REPLAY)
+        return speak and is_replay(robot)
     return speak
 
 

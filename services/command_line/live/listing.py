@@ -9,7 +9,7 @@ from typing import Any
 
 from robomesh.clock import Clock, Reading, read_clock
 from robomesh.errors import NoAnswerError
-from robomesh.keys import ROOT, WHOLE_SITE, PresenceKey, robot_key
+from robomesh.keys import ROOT, WHOLE_SITE, PresenceKey, is_replay, robot_key
 from robomesh.last_values import last_values
 from robomesh.presence import SILENT
 from robomesh.schemas import robomesh_pb2 as schema
@@ -17,7 +17,7 @@ from robomesh.session import Session
 from services.command_line import discovery
 from services.command_line.alarm_lists import gone_sites, lists
 from services.command_line.live.listing_text import picture
-from services.command_line.live.monitor_text import is_replay, replay_record
+from services.command_line.live.monitor_text import replay_record
 
 _State = schema.ControllerState
 _Alarm = schema.Alarm

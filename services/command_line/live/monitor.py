@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from robomesh.keys import WHOLE_SITE, robot_key
+from robomesh.keys import WHOLE_SITE, is_replay, robot_key
 from robomesh.presence import MONITOR
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
@@ -25,7 +25,6 @@ from services.command_line.live.monitor_text import (
     alarm_words,
     check_words,
     clearance_record,
-    is_replay,
     near_words,
     program_record,
     program_words,

@@ -24,11 +24,6 @@ Words = tuple[str, str]
 OLD = "dim strike"
 
 
-def is_replay(robot: str) -> bool:
-    """Whether a robot is a recording being played: no site may call one of its own so."""
-    return robot.startswith("replay-")
-
-
 def replay_words(state: schema.ReplayState | None) -> str:
     """What is played, and where in it we are; None: its player has not told yet."""
     if state is None:
