@@ -1,4 +1,4 @@
-"""The player: a recording on the mesh again, as a robot of its own that nobody can move."""
+"""Player service: publishes a recording as a separate robot that cannot be commanded."""
 
 from services.player.player import Settings, serve
 

@@ -1,4 +1,4 @@
-"""Where in a recording a replay is: position by the monotonic clock, never added up."""
+"""Position of a replay, computed from the monotonic clock instead of summed up, so that it does not drift."""
 
 from dataclasses import dataclass
 
@@ -13,9 +13,9 @@ class Clock:
     """The position of a replay.
 
     Attributes:
-        duration_s: Of the recording.
-        now_s: The monotonic clock's time from which `begun_s` counts.
-        begun_s: Position then.
+        duration_s: Duration of the recording.
+        now_s: Time of the monotonic clock at which the position was `begun_s`.
+        begun_s: Position at that time.
     """
 
     duration_s: float
@@ -26,36 +26,36 @@ class Clock:
     loop: bool = False
 
     def position_s(self, now_s: float) -> float:
-        """Position at a time of the monotonic clock, within the recording."""
-        gone_s = (now_s - self.now_s) * self.speed if self.playing else 0.0
-        return min(max(self.begun_s + gone_s, 0.0), self.duration_s)
+        """Return the position at a time of the monotonic clock, within the recording."""
+        elapsed_s = (now_s - self.now_s) * self.speed if self.playing else 0.0
+        return min(max(self.begun_s + elapsed_s, 0.0), self.duration_s)
 
     def at_end(self, now_s: float) -> bool:
-        """Whether there is nothing more to play."""
+        """Return whether the position is at the end."""
         return self.position_s(now_s) >= self.duration_s
 
     def play(self, now_s: float) -> None:
-        """Go on; from the beginning where the end was reached."""
+        """Start or resume; start again from the beginning if the position is at the end."""
         self._begin(0.0 if self.at_end(now_s) else self.position_s(now_s), now_s)
         self.playing = True
 
     def pause(self, now_s: float) -> None:
-        """Stay where it is."""
+        """Stop at the current position."""
         self._begin(self.position_s(now_s), now_s)
         self.playing = False
 
     def seek(self, position_s: float, now_s: float) -> None:
-        """Go there.
+        """Set the position.
 
         Raises:
-            ReplayError: If the recording does not go there.
+            ReplayError: If it is outside the recording.
         """
         if not 0.0 <= position_s <= self.duration_s:
             raise ReplayError(codes.REPLAY_POSITION(seconds=position_s, most=self.duration_s))
         self._begin(position_s, now_s)
 
     def set_speed(self, speed: float, now_s: float) -> None:
-        """Play faster or slower from here on.
+        """Set the speed from the current position on.
 
         Raises:
             ReplayError: If it is not within 0.1 to 100.

@@ -1,7 +1,7 @@
 """Errors of the player.
 
 ServiceError
-└── ReplayError             what cannot be played, or asked of a replay
+└── ReplayError             a recording cannot be played, or a request to a replay is invalid
 """
 
 from robomesh.reasons import Reason
@@ -9,7 +9,7 @@ from services.errors import ServiceError
 
 
 class ReplayError(ServiceError):
-    """A recording that cannot be played, or a request that a replay cannot do; `reason` says why."""
+    """A recording cannot be played, or a request to a replay is invalid; `reason` says why."""
 
     def __init__(self, reason: Reason) -> None:
         super().__init__(reason.text)

@@ -1,4 +1,4 @@
-"""The player service: opens recordings of its site's folder as replays, and ends them."""
+"""Player service: opens recordings of its site's folder as replays, and ends them."""
 
 import asyncio
 import contextlib
@@ -20,23 +20,23 @@ from robomesh.server import Request
 from robomesh.session import Session
 from services.player.clock import Clock
 from services.player.errors import ReplayError
-from services.player.recording_source import Tape
+from services.player.recording_source import RecordingSource
 from services.player.replay import Replay
 
 log = logging.getLogger(__name__)
 
-MOST_REPLAYS = 8
-# Presence may come a moment after the request, and go for a moment when a router is restarted.
-_SESSION_COMES_S = 2.0
-_SESSION_GOES_S = 5.0
+MAX_REPLAYS = 8
+# A client's presence may arrive after its request, and may vanish briefly when a router restarts.
+_SESSION_START_S = 2.0
+_SESSION_END_S = 5.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Whose recordings are played.
+    """Settings of the player service.
 
     Attributes:
-        folder: The recorder's.
+        folder: Folder of the site's recordings.
     """
 
     site: str
@@ -44,7 +44,7 @@ class Settings:
 
 
 async def serve(session: Session, settings: Settings) -> None:
-    """Play what is asked for, until cancelled."""
+    """Play recordings on request, until cancelled."""
     async with asyncio.TaskGroup() as group:
         player = _Player(session, settings, group)
         session.answer(settings.site, WHOLE_SITE, "player/open", player.on_open)
@@ -52,25 +52,25 @@ async def serve(session: Session, settings: Settings) -> None:
 
 
 def open_replay(
-    session: Session, site: str, path: Path, asked: schema.PlayRequest, *, identity: str
+    session: Session, site: str, path: Path, request: schema.PlayRequest, *, identity: str
 ) -> Replay:
-    """A replay as it was asked for; may block on the disk.
+    """Open a replay with the requested position and speed; may block on the disk.
 
     Raises:
         RecordingsError: If the file cannot be read.
-        ReplayError: If it cannot be played like that.
+        ReplayError: If it has no robot, or the position or speed is out of range.
     """
-    tape = Tape(path)
+    source = RecordingSource(path)
     try:
         now = time.monotonic()
-        clock = Clock(max(tape.end_ns - tape.start_ns, 0) * 1e-9, now)
-        clock.set_speed(asked.speed or 1.0, now)
-        clock.seek(asked.position_s, now)
-        clock.loop, clock.playing = asked.loop, not asked.paused
+        clock = Clock(max(source.end_ns - source.start_ns, 0) * 1e-9, now)
+        clock.set_speed(request.speed or 1.0, now)
+        clock.seek(request.position_s, now)
+        clock.loop, clock.playing = request.loop, not request.paused
     except ReplayError:
-        tape.close()
+        source.close()
         raise
-    return Replay(session, site, identity, tape, clock)
+    return Replay(session, site, identity, source, clock)
 
 
 class _Player:
@@ -80,30 +80,30 @@ class _Player:
         self._session, self._settings, self._group = session, settings, group
         self._replays: dict[str, Replay] = {}
         self._opening = 0
-        self._of_session: dict[str, set[str]] = {}
-        # How often each asker's session is present.
+        self._by_session: dict[str, set[str]] = {}
+        # Number of presence tokens of each client session.
         self._present = Counter[str]()
 
     async def on_open(self, request: Request) -> schema.ReplayState:
         """Open a recording.
 
         Raises:
-            RefusedError: Why it cannot be played.
+            RefusedError: If it cannot be played.
         """
-        asked = request.message
-        assert isinstance(asked, schema.PlayRequest)
-        if asked.session:
-            await self._until_present(asked.session)
-        if len(self._replays) + self._opening >= MOST_REPLAYS:
-            raise RefusedError(codes.REPLAY_TOO_MANY(count=MOST_REPLAYS))
+        message = request.message
+        assert isinstance(message, schema.PlayRequest)
+        if message.session:
+            await self._wait_for_session(message.session)
+        if len(self._replays) + self._opening >= MAX_REPLAYS:
+            raise RefusedError(codes.REPLAY_TOO_MANY(count=MAX_REPLAYS))
         self._opening += 1
         identity = secrets.token_hex(2)
         while identity in self._replays:
             identity = secrets.token_hex(2)
         try:
-            path = find_file(self._settings.folder, asked.file)
+            path = find_file(self._settings.folder, message.file)
             replay = await asyncio.to_thread(
-                open_replay, self._session, self._settings.site, path, asked, identity=identity
+                open_replay, self._session, self._settings.site, path, message, identity=identity
             )
         except ReplayError as error:
             raise RefusedError(error.reason) from None
@@ -112,10 +112,10 @@ class _Player:
         finally:
             self._opening -= 1
         self._replays[identity] = replay
-        if asked.session:
-            self._of_session.setdefault(asked.session, set()).add(identity)
-            # It may have gone while the file was opened.
-            asyncio.get_running_loop().call_later(_SESSION_GOES_S, self._end_if_gone, asked.session)
+        if message.session:
+            self._by_session.setdefault(message.session, set()).add(identity)
+            # The session may have ended while the file was opened.
+            asyncio.get_running_loop().call_later(_SESSION_END_S, self._end_if_gone, message.session)
         self._group.create_task(self._run(identity, replay))
         log.info("%s/%s: playing %s", self._settings.site, replay.robot, path.name)
         return replay.describe()
@@ -127,26 +127,26 @@ class _Player:
             log.exception("%s ended", replay.robot)
         finally:
             del self._replays[identity]
-            for own in self._of_session.values():
-                own.discard(identity)
+            for identities in self._by_session.values():
+                identities.discard(identity)
 
-    async def _until_present(self, session: str) -> None:
+    async def _wait_for_session(self, session: str) -> None:
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(_SESSION_COMES_S):
+            async with asyncio.timeout(_SESSION_START_S):
                 while not self._present[session]:
                     await asyncio.sleep(0.02)
         if not self._present[session]:
             raise RefusedError(codes.REPLAY_SESSION(session=session))
 
     async def follow_sessions(self) -> None:
-        """End the replays of those who go."""
-        async for who, alive in self._session.watch_presence(f"robomesh/*/*/alive/{OPERATOR}/*"):
-            self._present[who.id] += 1 if alive else -1
-            if self._present[who.id] <= 0:
-                del self._present[who.id]
-                asyncio.get_running_loop().call_later(_SESSION_GOES_S, self._end_if_gone, who.id)
+        """End the replays of sessions that have ended."""
+        async for presence, alive in self._session.watch_presence(f"robomesh/*/*/alive/{OPERATOR}/*"):
+            self._present[presence.id] += 1 if alive else -1
+            if self._present[presence.id] <= 0:
+                del self._present[presence.id]
+                asyncio.get_running_loop().call_later(_SESSION_END_S, self._end_if_gone, presence.id)
 
     def _end_if_gone(self, session: str) -> None:
         if not self._present[session]:
-            for identity in self._of_session.pop(session, set()):
+            for identity in self._by_session.pop(session, set()):
                 self._replays[identity].close()

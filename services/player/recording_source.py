@@ -1,4 +1,4 @@
-"""A recording as it is played: what was so at a time, and what came next, as the replay publishes it."""
+"""Messages of a recording for a replay: the state at a time, and the messages that follow it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -18,22 +18,22 @@ from robomesh.publisher import LIST_LENGTH
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.topics import History
 from services.player.errors import ReplayError
-from services.player.republish import Names, renamed
+from services.player.republish import NameMapping, renamed
 
-# Of topics that come on change, so often at most while it is played fast.
+# Rate limit of topics that are published on change, during fast replay.
 _ON_CHANGE_HZ = 10.0
-# Faster than this a video's pictures between key frames are left out: nobody could draw them all.
-_EACH_PICTURE_UNTIL = 2.0
-_MOST_AT_ONCE, _MOST_LOOKED_AT = 5000, 100_000
-_MOST_BYTES = 8 << 20
-_MOST_FRAMES = 300
+# At higher speeds only a video's key frames are played, because a viewer cannot decode all frames in time.
+_ALL_FRAMES_UP_TO = 2.0
+_MAX_BATCH, _MAX_SCANNED = 5000, 100_000
+_MAX_BATCH_BYTES = 8 << 20
+_MAX_FRAMES = 300
 
 
-class Played(NamedTuple):
+class ReplayMessage(NamedTuple):
     """A message that is ready to be published.
 
     Attributes:
-        at_ns: When it was so by its publisher's clock, on the recording's time axis.
+        at_ns: Time by its publisher's clock, converted to the recording's time axis.
     """
 
     topic: str
@@ -44,19 +44,19 @@ class Played(NamedTuple):
 
 
 @dataclass
-class Scene:
-    """What was so at a time: the newest of each topic, its video's frames, its lists."""
+class Snapshot:
+    """State at a time: the newest message of each topic, video frames since a key frame, and lists."""
 
-    newest: list[Played] = field(default_factory=list)
-    lists: dict[str, list[Played]] = field(default_factory=dict)
+    newest: list[ReplayMessage] = field(default_factory=list)
+    lists: dict[str, list[ReplayMessage]] = field(default_factory=dict)
 
 
-class Tape:
-    """A recording being played. Its methods may block on the disk; one thread at a time.
+class RecordingSource:
+    """A recording that is being played. Methods may block on the disk; not thread-safe.
 
     Raises:
         RecordingError: If the file cannot be read.
-        ReplayError: If it is no recording of a robot.
+        ReplayError: If it contains no robot.
     """
 
     def __init__(self, path: Path) -> None:
@@ -70,76 +70,76 @@ class Tape:
         first = next(iter(found.values()))
         self.of_site, self.of_robot = first.site, first.robot
         self._keys = {name: key.topic for name, key in found.items()}
-        self._coming: Iterator[RecordedMessage] = iter(())
+        self._upcoming: Iterator[RecordedMessage] = iter(())
         self._taken: dict[str, int] = {}
-        self._held: RecordedMessage | None = None
+        self._pending: RecordedMessage | None = None
         self._times = PublisherTimes()
-        self.names = Names(self.of_site, self.of_robot, self.of_site, self.of_robot)
+        self.names = NameMapping(self.of_site, self.of_robot, self.of_site, self.of_robot)
         self.replay = schema.Description.Replay()
 
     @property
     def topics(self) -> list[str]:
-        """The topics that are published."""
+        """Topics that the replay publishes."""
         return [self.names.topic(topic) for topic in self._keys.values()]
 
     def close(self) -> None:
-        """Read no more."""
+        """Close the file."""
         self.file.close()
 
-    def seek(self, at_ns: int) -> Scene:
-        """Go to a time: what was so then; `take` goes on behind it.
+    def seek(self, at_ns: int) -> Snapshot:
+        """Return the state at a time; `take` continues after it.
 
         Raises:
             RecordingError: If the file is damaged there.
         """
-        scene = Scene()
+        snapshot = Snapshot()
         plain = []
         self._times = PublisherTimes()
         for key, topic in self._keys.items():
             history = topics.topic(topic).history
             if history is History.LAST_100:
-                scene.lists[topic] = [*self._stood(self.file.last(key, at_ns, LIST_LENGTH))]
+                snapshot.lists[topic] = [*self._at_time(self.file.last(key, at_ns, LIST_LENGTH))]
             elif history is History.KEY_FRAME:
-                scene.newest += self._stood(self._since_key_frame(key, at_ns))
+                snapshot.newest += self._at_time(self._since_key_frame(key, at_ns))
             else:
                 plain.append(key)
         newest = self.file.state_at(plain, at_ns)
         for key in plain:
             if key not in newest and self._keys[key] == "description":
-                # What a robot is explains what came before it was told.
+                # The description also applies to messages before it.
                 newest[key] = next(self.file.messages([key]))
-        scene.newest += self._stood(sorted(newest.values()))
-        self._coming = self.file.messages([*self._keys], start_ns=at_ns + 1)
-        self._taken, self._held = {}, None
-        return scene
+        snapshot.newest += self._at_time(sorted(newest.values()))
+        self._upcoming = self.file.messages([*self._keys], start_ns=at_ns + 1)
+        self._taken, self._pending = {}, None
+        return snapshot
 
-    def take(self, until_ns: int, *, speed: float) -> tuple[list[Played], int]:
-        """Return what came next until a time, thinned to the topics' rates, and how far that goes.
+    def take(self, until_ns: int, *, speed: float) -> tuple[list[ReplayMessage], int]:
+        """Return the next messages until a time, thinned to the topics' rates, and the time reached.
 
         Raises:
             RecordingError: If the file is damaged there.
         """
         taken: list[tuple[int, RecordedMessage]] = []
-        room, reached_ns = _MOST_BYTES, until_ns
-        for _ in range(_MOST_LOOKED_AT):
-            message = self._held or next(self._coming, None)
-            self._held = None
+        room, reached_ns = _MAX_BATCH_BYTES, until_ns
+        for _ in range(_MAX_SCANNED):
+            message = self._pending or next(self._upcoming, None)
+            self._pending = None
             if message is None:
                 return [*self._played(taken)], max(until_ns, self.end_ns)
             if message.received_ns > until_ns:
-                self._held = message
+                self._pending = message
                 return [*self._played(taken)], until_ns
             reached_ns = message.received_ns
             at_ns = self._at_ns(message)
             if self._is_due(message, at_ns, speed):
                 taken.append((at_ns, message))
                 room -= len(message.data)
-            if len(taken) >= _MOST_AT_ONCE or room < 0:
+            if len(taken) >= _MAX_BATCH or room < 0:
                 break
         return [*self._played(taken)], reached_ns
 
     def _at_ns(self, message: RecordedMessage) -> int:
-        # Nothing is played behind the end, whatever its publisher's clock said.
+        # A publisher's clock may be ahead; no message is played after the end.
         return min(self._times.of(message), self.end_ns)
 
     def _is_due(self, message: RecordedMessage, at_ns: int, speed: float) -> bool:
@@ -147,10 +147,10 @@ class Tape:
         if speed <= 1.0 or row.history is History.LAST_100:
             return True
         if row.history is History.KEY_FRAME:
-            return speed <= _EACH_PICTURE_UNTIL or holds_key_frame(message.data)
+            return speed <= _ALL_FRAMES_UP_TO or holds_key_frame(message.data)
         gap_ns = 1e9 * speed / (row.rate_hz or _ON_CHANGE_HZ)
         before = self._taken.get(message.topic)
-        # A little early is in time: what comes at just that rate must not lose every second one.
+        # A tolerance for jitter: a topic at exactly this rate must not lose every second message.
         if before is not None and at_ns - before < 0.9 * gap_ns:
             return False
         self._taken[message.topic] = at_ns
@@ -161,20 +161,20 @@ class Tape:
         if first is None:
             return []
         coming = self.file.messages([key], start_ns=first.received_ns, end_ns=at_ns + 1)
-        return [message for message, _ in zip(coming, range(_MOST_FRAMES), strict=False)]
+        return [message for message, _ in zip(coming, range(_MAX_FRAMES), strict=False)]
 
-    def _stood(self, messages: list[RecordedMessage]) -> Iterator[Played]:
+    def _at_time(self, messages: list[RecordedMessage]) -> Iterator[ReplayMessage]:
         return self._played([(self._at_ns(message), message) for message in messages])
 
-    def _played(self, messages: list[tuple[int, RecordedMessage]]) -> Iterator[Played]:
+    def _played(self, messages: list[tuple[int, RecordedMessage]]) -> Iterator[ReplayMessage]:
         for at_ns, message in messages:
             topic = self._keys[message.topic]
             try:
                 payload = renamed(topic, message.data, self.names, self.replay)
             except DecodeError:
-                continue  # one message that somebody's program wrote wrong spoils no replay
+                continue  # skip an invalid message instead of ending the replay
             is_video = topics.topic(topic).history is History.KEY_FRAME
-            yield Played(
+            yield ReplayMessage(
                 self.names.topic(topic),
                 at_ns,
                 message.source_ns,
@@ -184,7 +184,7 @@ class Tape:
 
 
 def _topics_of_robot(file: RecordingFile) -> dict[str, Key]:
-    """The channels of the mesh's recorded topics, of the first robot in the file."""
+    """Return the channels of recorded topics of the first robot in the file."""
     found: dict[str, Key] = {}
     for name in sorted(file.topics):
         try:
@@ -192,8 +192,8 @@ def _topics_of_robot(file: RecordingFile) -> dict[str, Key]:
             row = topics.topic(key.topic)
         except BusError:
             continue
-        whose = next(iter(found.values()), key)
-        same = (key.site, key.robot) == (whose.site, whose.robot)
+        first = next(iter(found.values()), key)
+        same = (key.site, key.robot) == (first.site, first.robot)
         if (
             same
             and key.robot != "-"

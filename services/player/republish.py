@@ -1,4 +1,4 @@
-"""Recorded messages as the replay's own robot publishes them: its frames, and marked as a replay."""
+"""Rewriting of recorded messages for the replay's robot: frame ids, and the mark of a replay."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,8 +13,8 @@ RECORDED = "recorded-"
 
 
 @dataclass(frozen=True)
-class Names:
-    """Whose recording is played as which robot."""
+class NameMapping:
+    """Mapping from the recorded robot's names to the replay's."""
 
     of_site: str
     of_robot: str
@@ -22,7 +22,7 @@ class Names:
     robot: str
 
     def frame(self, frame_id: str) -> str:
-        """A recorded frame's id as the replay has it."""
+        """Return the replay's id of a recorded frame."""
         site, slash, rest = frame_id.partition("/")
         if site != self.of_site:
             return frame_id
@@ -30,17 +30,17 @@ class Names:
         return self.site + slash + (self.robot if robot == self.of_robot else robot) + further + link
 
     def topic(self, recorded: str) -> str:
-        """The topic under which a recorded one is published; a renderer draws the replay's other views."""
+        """Return the replay's topic of a recorded one; other videos of the replay are a renderer's."""
         if recorded.startswith(_VIDEO):
             return f"{_VIDEO}{RECORDED}{recorded.removeprefix(_VIDEO)}"
         return recorded
 
 
-def renamed(topic: str, payload: bytes, names: Names, replay: schema.Description.Replay) -> bytes:
-    """A recorded message as the replay publishes it.
+def renamed(topic: str, payload: bytes, names: NameMapping, replay: schema.Description.Replay) -> bytes:
+    """Return a recorded message rewritten for the replay.
 
     Raises:
-        DecodeError: If it is not what its topic says.
+        DecodeError: If it does not have its topic's schema.
     """
     message: Any
     if topic == "frames":
@@ -58,7 +58,7 @@ def renamed(topic: str, payload: bytes, names: Names, replay: schema.Description
     elif topic == "description":
         message = schema.Description.FromString(payload)
         message.replay.CopyFrom(replay)
-        # Nobody draws it among the live robots of a cell, or checks against it.
+        # Renderer and collision check must not count it among the live robots of the cell.
         message.cell = ""
     elif topic.startswith(_VIDEO):
         message = CompressedVideo.FromString(payload)

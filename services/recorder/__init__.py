@@ -1,4 +1,4 @@
-"""Captures of what a robot publishes, as MCAP files that explain themselves."""
+"""Recorder service: captures of a robot's topics as self-contained MCAP files."""
 
 from services.recorder.attachments import without_secrets
 from services.recorder.recorder import serve

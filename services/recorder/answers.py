@@ -1,4 +1,4 @@
-"""What is asked of recordings, answered from their files: in a process of its own, beside the recording."""
+"""Answers to requests about recordings, read from the files in a separate process."""
 
 import shutil
 from collections.abc import Callable
@@ -26,24 +26,24 @@ _VIDEO = "foxglove.CompressedVideo"
 
 @dataclass(frozen=True)
 class Question:
-    """What a worker is asked; messages as bytes, which are pickled faster."""
+    """A question to a worker; the message is serialized because bytes are pickled faster."""
 
     name: str
     request: bytes
 
 
 class Answers:
-    """Answers from the files of a folder; may block on the disk."""
+    """Answers from the recordings of a folder; methods may block on the disk."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._series = SeriesReader()
 
     def answer(self, question: Question) -> bytes:
-        """The answer to a question, as bytes.
+        """Return the serialized answer to a question.
 
         Raises:
-            RecordingError: In words for who asked.
+            RecordingError: If it cannot be answered; the text is for the client.
         """
         answers: dict[str, tuple[Callable[[Any], Message], Any]] = {
             "list": (self.list, schema.RecordingQuery),
@@ -56,7 +56,7 @@ class Answers:
         return answer(request.FromString(question.request)).SerializeToString()
 
     def list(self, _: schema.RecordingQuery) -> schema.RecordingList:
-        """Every recording, newest first; what cannot be read is told with the reason."""
+        """List every recording, newest first; an unreadable file has its problem as text."""
         recordings = schema.RecordingList()
         paths = [*self._folder.glob(f"*/*{SUFFIX}"), *self._folder.glob(f"*{SUFFIX}")]
         for path in sorted(paths, key=lambda path: path.name, reverse=True):
@@ -69,22 +69,22 @@ class Answers:
             recordings.free_bytes = shutil.disk_usage(self._folder).free
         return recordings
 
-    def info(self, asked: schema.RecordingQuery) -> schema.Recording:
-        """What one recording holds."""
-        return describe_file(find_file(self._folder, asked.file))
+    def info(self, request: schema.RecordingQuery) -> schema.Recording:
+        """Describe one recording."""
+        return describe_file(find_file(self._folder, request.file))
 
-    def range(self, asked: schema.RangeRequest) -> schema.RecordedMessages:
-        """Messages of one topic."""
-        most = min(asked.most or _MESSAGES, _MOST_MESSAGES)
-        with RecordingFile(find_file(self._folder, asked.file)) as file:
-            start_ns, end_ns = _times(file, asked)
-            answer = schema.RecordedMessages(schema=file.schema_name(asked.topic))
-            if asked.from_key_frame and answer.schema == _VIDEO:
-                key_frame = file.newest(asked.topic, start_ns, holds_key_frame)
+    def range(self, request: schema.RangeRequest) -> schema.RecordedMessages:
+        """Return messages of one topic."""
+        most = min(request.most or _MESSAGES, _MOST_MESSAGES)
+        with RecordingFile(find_file(self._folder, request.file)) as file:
+            start_ns, end_ns = _times(file, request)
+            answer = schema.RecordedMessages(schema=file.schema_name(request.topic))
+            if request.from_key_frame and answer.schema == _VIDEO:
+                key_frame = file.newest(request.topic, start_ns, holds_key_frame)
                 start_ns = start_ns if key_frame is None else key_frame.received_ns
             taken = 0
-            messages = file.messages([asked.topic], start_ns=start_ns, end_ns=end_ns + 1)
-            for message in islice(messages, asked.skip, None):
+            messages = file.messages([request.topic], start_ns=start_ns, end_ns=end_ns + 1)
+            for message in islice(messages, request.skip, None):
                 taken += len(message.data)
                 if answer.messages and (len(answer.messages) >= most or taken > _MOST_BYTES):
                     answer.more = True
@@ -94,16 +94,16 @@ class Answers:
                 added.source.FromNanoseconds(message.source_ns)
             return answer
 
-    def series(self, asked: schema.SeriesRequest) -> schema.SeriesAnswer:
-        """Values over time; without names, which there are."""
-        with RecordingFile(find_file(self._folder, asked.file)) as file:
-            if not asked.values:
+    def series(self, request: schema.SeriesRequest) -> schema.SeriesAnswer:
+        """Return values over time, or the known value names if the request names none."""
+        with RecordingFile(find_file(self._folder, request.file)) as file:
+            if not request.values:
                 return schema.SeriesAnswer(known=known_values(file))
-            start_ns, end_ns = _times(file, asked)
-            points = min(asked.points or POINTS, MOST_POINTS)
+            start_ns, end_ns = _times(file, request)
+            points = min(request.points or POINTS, MOST_POINTS)
             answer = schema.SeriesAnswer()
             for each in self._series.read(
-                file, asked.values, start_ns=start_ns, end_ns=end_ns, points=points
+                file, request.values, start_ns=start_ns, end_ns=end_ns, points=points
             ):
                 answer.series.add(
                     name=each.name,
@@ -114,42 +114,46 @@ class Answers:
                 )
             return answer
 
-    def piece(self, asked: schema.PieceRequest) -> schema.Piece:
-        """Bytes of a file, or of something attached to it."""
-        path = find_file(self._folder, asked.file)
-        length = min(asked.length or _PIECE, _MOST_PIECE)
+    def piece(self, request: schema.PieceRequest) -> schema.Piece:
+        """Return bytes of a file or of one of its attachments."""
+        path = find_file(self._folder, request.file)
+        length = min(request.length or _PIECE, _MOST_PIECE)
         with path.open("rb") as stream:
             answer = schema.Piece(version=version_of(path), media_type="application/octet-stream")
             begin, answer.total = 0, path.stat().st_size
-            if asked.attachment:
+            if request.attachment:
                 with RecordingFile(path) as file:
-                    attached = file.attached(asked.attachment)
+                    attached = file.attached(request.attachment)
                 begin, answer.total = attached.offset, attached.length
                 answer.media_type = attached.media_type or answer.media_type
-            if asked.offset > answer.total:
-                raise RecordingError(f"{asked.file}: no byte {asked.offset}: it has {answer.total}")
-            stream.seek(begin + asked.offset)
-            answer.data = stream.read(min(length, answer.total - asked.offset))
+            if request.offset > answer.total:
+                raise RecordingError(f"{request.file}: no byte {request.offset}: it has {answer.total}")
+            stream.seek(begin + request.offset)
+            answer.data = stream.read(min(length, answer.total - request.offset))
             return answer
 
 
 def version_of(path: Path) -> str:
-    """Which file it is now: one that only grew keeps it, one that was written again does not."""
+    """Return a version of the file's contents: growth keeps it, a rewrite changes it."""
     with RecordingFile(path) as file:
         found = path.stat()
         state = f"{found.st_size:x}-{found.st_mtime_ns:x}" if file.layout.whole else "open"
         return f"{found.st_ino:x}-{file.layout.start_ns:x}-{state}"
 
 
-def _times(file: RecordingFile, asked: schema.RangeRequest | schema.SeriesRequest) -> tuple[int, int]:
-    """What was asked for, within the recording, both ends included."""
+def _times(file: RecordingFile, request: schema.RangeRequest | schema.SeriesRequest) -> tuple[int, int]:
+    """Return the requested times clipped to the recording [ns], both ends included.
+
+    Raises:
+        RecordingError: If the range is invalid or outside the recording.
+    """
     first, last = file.layout.start_ns, file.layout.end_ns
     try:
-        start_ns = asked.start.ToNanoseconds() if asked.HasField("start") else first
-        end_ns = asked.end.ToNanoseconds() if asked.HasField("end") else last
+        start_ns = request.start.ToNanoseconds() if request.HasField("start") else first
+        end_ns = request.end.ToNanoseconds() if request.HasField("end") else last
     except ValueError as error:
-        raise RecordingError(f"{file.path.name}: no time that there is: {error}") from None
-    if asked.HasField("start") and asked.HasField("end") and end_ns < start_ns:
+        raise RecordingError(f"{file.path.name}: invalid time: {error}") from None
+    if request.HasField("start") and request.HasField("end") and end_ns < start_ns:
         raise RecordingError("the range ends before it begins")
     if last and (start_ns > last or end_ns < first):
         raise RecordingError(

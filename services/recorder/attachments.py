@@ -1,4 +1,4 @@
-"""What a recording explains itself with: the robot's description and meshes, a picture, the site file."""
+"""Attachments of a recording: the robot's description and meshes, a picture, the site file."""
 
 import asyncio
 import base64
@@ -18,14 +18,14 @@ from robots.urdf.viewers import prefixed
 _MESH_WITHIN_S = 10.0
 _PICTURE_WITHIN_S = 5.0
 _PICTURES = ("close", "far")
-# What nobody but the site needs to know: values of keys that sound like it.
+# Keys of the site file with secret values.
 _SECRET = re.compile(r"(?im)^(\s*[\w.-]*(?:password|secret|token|passphrase|key)[\w.-]*\s*=\s*).*$")
 _SECRET_INLINE = re.compile(r"(?i)([\w-]*(?:password|secret|token|passphrase|key)[\w-]*\s*=\s*)\"[^\"]*\"")
 
 
 @dataclass(frozen=True)
 class Attachment:
-    """Something attached to a file."""
+    """An attachment of an MCAP file."""
 
     name: str
     media_type: str
@@ -33,12 +33,12 @@ class Attachment:
 
 
 @dataclass(frozen=True)
-class Explained:
-    """What is known of a robot.
+class KnownRobot:
+    """A robot's description and meshes.
 
     Attributes:
-        header: Of its description.
-        prefix: What its links' names begin with, as frames.
+        header: Header of its description.
+        prefix: Prefix of its links' frame names.
     """
 
     header: Header
@@ -48,7 +48,7 @@ class Explained:
 
     @property
     def attachments(self) -> list[Attachment]:
-        """What a file of the robot has with it."""
+        """Attachments of each file of the robot."""
         found = [Attachment(f"mesh/{name}", "model/gltf-binary", data) for name, data in self.meshes.items()]
         if self.description.robot_toml:
             found.append(Attachment("robot.toml", "application/toml", self.description.robot_toml.encode()))
@@ -58,27 +58,27 @@ class Explained:
 
 
 def without_secrets(site_file: str) -> str:
-    """A site file's text, values of passwords and keys left out."""
+    """Return a site file's text without the values of passwords and keys."""
     return _SECRET_INLINE.sub(r'\1"..."', _SECRET.sub(r'\1"..."', site_file))
 
 
-class Explainer:
-    """Follows what a site's robots are, so that a recording that begins has it at once.
+class DescriptionCache:
+    """Descriptions and meshes of a site's robots, kept up to date so that a new recording starts with them.
 
     Args:
-        on_explained: Told when a robot is known, or known anew.
+        on_known: Called with a robot's name when its description is complete or has changed.
     """
 
-    def __init__(self, session: Session, site: str, on_explained: Callable[[str], None]) -> None:
-        self.known: dict[str, Explained] = {}
+    def __init__(self, session: Session, site: str, on_known: Callable[[str], None]) -> None:
+        self.known: dict[str, KnownRobot] = {}
         self._session, self._site = session, site
-        self._on_explained = on_explained
-        self._asking: dict[str, asyncio.Task[None]] = {}
-        # By content: a site has many robots of a kind.
+        self._on_known = on_known
+        self._tasks: dict[str, asyncio.Task[None]] = {}
+        # By content hash: robots of one model share their meshes.
         self._meshes: dict[str, bytes] = {}
 
     async def serve(self) -> None:
-        """Follow descriptions until cancelled."""
+        """Receive descriptions until cancelled."""
         async with asyncio.TaskGroup() as group:
             key = robot_key(self._site, WHOLE_SITE, "description").replace("/-/", "/*/")
             async for sample in self._session.subscribe(key, newest=1000):
@@ -89,15 +89,15 @@ class Explainer:
                     continue
                 assert isinstance(description, schema.Description)
                 if not description.HasField("replay"):
-                    task = group.create_task(self._explain(robot, sample.header, description))
-                    self._asking[robot] = task
+                    task = group.create_task(self._fetch_meshes(robot, sample.header, description))
+                    self._tasks[robot] = task
 
-    async def settled(self, robot: str, *, within_s: float) -> None:
-        """Wait for meshes that were asked for, a little."""
-        if (task := self._asking.get(robot)) is not None:
+    async def wait_for_meshes(self, robot: str, *, within_s: float) -> None:
+        """Wait for meshes that are being fetched, at most this long."""
+        if (task := self._tasks.get(robot)) is not None:
             await asyncio.wait([task], timeout=within_s)
 
-    async def _explain(self, robot: str, header: Header, description: schema.Description) -> None:
+    async def _fetch_meshes(self, robot: str, header: Header, description: schema.Description) -> None:
         meshes: dict[str, bytes] = {}
         hashes = {each.mesh: each.mesh_sha256 for each in description.links}
         hashes |= {each.mesh: each.mesh_sha256 for each in description.fixtures}
@@ -109,15 +109,15 @@ class Explainer:
                     key = robot_key(self._site, robot, f"mesh/{name}")
                     data = await self._session.ask_bytes(key, timeout_s=_MESH_WITHIN_S)
                 except BusError:
-                    continue  # the description tells its name and hash
+                    continue  # the description still holds its name and hash
                 self._meshes[sha256] = data
             meshes[name] = data
-        self.known[robot] = Explained(header, description, meshes, prefix=f"{self._site}/{robot}/")
-        self._on_explained(robot)
+        self.known[robot] = KnownRobot(header, description, meshes, prefix=f"{self._site}/{robot}/")
+        self._on_known(robot)
 
 
 async def picture(session: Session, site: str, robot: str) -> Attachment | None:
-    """How a robot looks now; None: nobody draws it."""
+    """Return a robot's current picture, or None if no renderer publishes one."""
     for view in _PICTURES:
         subscription = session.subscribe(robot_key(site, robot, f"image/{view}"), history=False)
         try:
@@ -131,19 +131,19 @@ async def picture(session: Session, site: str, robot: str) -> Attachment | None:
     return None
 
 
-def for_viewers(explained: Explained) -> str:
-    """A robot's URDF with links named as the frames are, and each link's mesh in it as GLB.
+def self_contained_urdf(robot: KnownRobot) -> str:
+    """Return a robot's URDF with links named as the frames and with embedded GLB meshes.
 
-    A viewer that opens the file has nothing else to take a mesh from.
+    A viewer that opens the file has no other source of meshes.
     """
-    description = explained.description
-    mesh_of = {link.name: explained.meshes.get(link.mesh) for link in description.links}
+    description = robot.description
+    mesh_of = {link.name: robot.meshes.get(link.mesh) for link in description.links}
 
     def uri(link: str) -> str | None:
         data = mesh_of.get(link)
         return f"data:model/gltf-binary;base64,{base64.b64encode(data).decode()}" if data else None
 
     try:
-        return ET.tostring(prefixed(description.urdf, explained.prefix, uri), encoding="unicode")
+        return ET.tostring(prefixed(description.urdf, robot.prefix, uri), encoding="unicode")
     except ValueError:
         return description.urdf

@@ -1,4 +1,4 @@
-"""One robot's captures: one at a time, in as many files as it takes."""
+"""Captures of one robot: one at a time, split into several files if it is long."""
 
 import asyncio
 import logging
@@ -16,11 +16,11 @@ from robomesh.errors import KeyNameError, RefusedError
 from robomesh.keys import check_chunk
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wall_clock import WallClock
-from services.recorder.disk import Disk, words
-from services.recorder.file_writer import STATES, Part, Saw
+from services.recorder.disk import Disk, error_text
+from services.recorder.file_writer import STATES, OnPublication, Part
 from services.recorder.finishing import Finisher, Job
 from services.recorder.settings import MIB, Settings
-from services.recorder.subscriptions import Intake
+from services.recorder.subscriptions import Subscriptions
 
 log = logging.getLogger(__name__)
 
@@ -29,7 +29,7 @@ _NO_VIEW = "-"
 
 
 def check_name(name: str) -> str:
-    """A recording's name, which becomes a file's.
+    """Return a recording's name if it can be part of a file name.
 
     Raises:
         RefusedError: If it cannot.
@@ -40,17 +40,22 @@ def check_name(name: str) -> str:
 
 
 class Files:
-    """A robot's files: opened, given what comes, closed.
+    """Opens, fills and closes the files of a robot.
 
     Args:
-        on_open: Told of each file that was opened, to explain it.
+        on_open: Called with each opened file, to add its attachments.
     """
 
     def __init__(
-        self, settings: Settings, robot: str, intake: Intake, disk: Disk, on_open: Callable[[Part], None]
+        self,
+        settings: Settings,
+        robot: str,
+        subscriptions: Subscriptions,
+        disk: Disk,
+        on_open: Callable[[Part], None],
     ) -> None:
         self.settings, self.robot, self.disk = settings, robot, disk
-        self.intake = intake
+        self.subscriptions = subscriptions
         self._on_open = on_open
 
     async def open(
@@ -59,68 +64,68 @@ class Files:
         about: Mapping[str, str],
         names: frozenset[str],
         *,
-        saw: Saw | None = None,
-        instead_of: Part | None = None,
+        on_publication: OnPublication | None = None,
+        replaces: Part | None = None,
     ) -> Part:
-        """Open a file for these topics; what is told to `instead_of` so far ends there, with no gap.
+        """Open a file for these topics; it continues `replaces` without a gap or an overlap.
 
         Raises:
             CaptureError: If it cannot be created.
         """
-        whole = {"site": self.settings.site, "robot": self.robot, **about}
-        # Both clocks at one moment: what comes between two moments would move every message.
+        metadata = {"site": self.settings.site, "robot": self.robot, **about}
+        # Both clocks are read at one moment: a difference would shift every message.
         begun_ns = time.monotonic_ns()
         start_ns = WallClock().latest_ns(begun_ns)
-        capture = await asyncio.to_thread(Capture, path, whole, start_ns=start_ns)
-        part = Part(capture, self.disk, saw, begun_ns=begun_ns)
+        capture = await asyncio.to_thread(Capture, path, metadata, start_ns=start_ns)
+        part = Part(capture, self.disk, on_publication, begun_ns=begun_ns)
         if self.settings.site_file:
             data = self.settings.site_file.encode()
             capture.attach("site.toml", "application/toml", data, time_ns=capture.start_ns)
         self.disk.open(capture)
-        await asyncio.to_thread(self._attach, part, names, instead_of)
+        await asyncio.to_thread(self._attach, part, names, replaces)
         self._on_open(part)
         return part
 
     async def close(self, part: Part) -> None:
-        """Close a file; what arrived before is in it.
+        """Close a file after writing everything that arrived before.
 
         Raises:
-            OSError: If the disk refuses.
+            OSError: If the write fails.
         """
         await asyncio.to_thread(self._close, part)
 
     def detach(self, part: Part) -> None:
-        """Give a file nothing more."""
-        with self.intake.lock:
-            taps = self.intake.robot(self.robot)
+        """Stop adding publications to a file."""
+        with self.subscriptions.lock:
+            topics = self.subscriptions.robot(self.robot)
             self.count(part)
-            taps.detach(part)
+            topics.detach(part)
 
     def count(self, part: Part) -> None:
-        """See what never came for a file."""
-        with self.intake.lock:
-            if (lost := self.intake.robot(self.robot).lost(part)) is not None:
+        """Update a file's count of lost publications."""
+        with self.subscriptions.lock:
+            if (lost := self.subscriptions.robot(self.robot).lost(part)) is not None:
                 part.lost = lost
 
-    def _attach(self, part: Part, names: frozenset[str], instead_of: Part | None) -> None:
-        with self.intake.lock:
-            taps = self.intake.robot(self.robot)
-            if instead_of is not None:
-                taps.sweep()
-                self.count(instead_of)
-            taps.attach(part, names)
-            if instead_of is not None:
-                taps.detach(instead_of)
+    def _attach(self, part: Part, names: frozenset[str], replaces: Part | None) -> None:
+        with self.subscriptions.lock:
+            topics = self.subscriptions.robot(self.robot)
+            if replaces is not None:
+                topics.drain()
+                self.count(replaces)
+            topics.attach(part, names)
+            if replaces is not None:
+                topics.detach(replaces)
 
     def _close(self, part: Part) -> None:
-        with self.intake.lock:
-            self.intake.robot(self.robot).sweep()
+        with self.subscriptions.lock:
+            self.subscriptions.robot(self.robot).drain()
             self.detach(part)
         self.disk.close(part.capture, part.missed)
 
 
 class RobotRecorder:
-    """A robot's capture, on request or while its controller traces."""
+    """Capture of a robot, on request or while its controller traces."""
 
     def __init__(self, files: Files, finisher: Finisher) -> None:
         self._files, self._finisher = files, finisher
@@ -129,22 +134,22 @@ class RobotRecorder:
         self._lock = asyncio.Lock()
         self._names = STATES
         self.part: Part | None = None
-        # The open capture, or the last one.
+        # Describes the open capture, or the last one.
         self.last = schema.Recording(site=self._settings.site, robot=self._robot)
 
     async def open(self, name: str, *, views: tuple[str, ...] | None, started_by: str) -> schema.Recording:
         """Begin a capture.
 
         Args:
-            views: Whose video it holds; None: as the settings say.
+            views: Views to record as video; None for those of the settings.
 
         Raises:
-            RefusedError: If one is open, or it cannot have that name, or the disk refuses.
+            RefusedError: If a capture is open, the name is invalid, or the file cannot be created.
         """
         async with self._lock:
             if self.part is not None:
-                now_as = self.part.capture.about["name"]
-                raise RefusedError(codes.RECORDING_OPEN(robot=self._robot, name=now_as))
+                open_name = self.part.capture.about["name"]
+                raise RefusedError(codes.RECORDING_OPEN(robot=self._robot, name=open_name))
             now = datetime.now(UTC)
             name = check_name(name or now.strftime(f"{self._robot}-%H%M%S"))
             self._names = STATES | _videos(self._settings.views if views is None else views)
@@ -157,7 +162,7 @@ class RobotRecorder:
             return self.describe()
 
     async def close(self) -> schema.Recording:
-        """End the capture; what arrived before is in it. It is indexed afterwards, beside what comes next.
+        """End the capture after writing everything that arrived before; index its file in the background.
 
         Raises:
             RefusedError: If none is open.
@@ -186,29 +191,31 @@ class RobotRecorder:
             about = {**capture.about, "part": str(number + 1)}
             path = self._path(about["name"], number + 1)
             try:
-                following = await self._files.open(path, about, self._names, instead_of=part)
+                following = await self._files.open(path, about, self._names, replaces=part)
             except CaptureError as error:
-                log.error("%s: goes on, since no other can be begun: %s", capture.path.name, error)
+                log.error(
+                    "%s: the next file cannot be created, so this one continues: %s", capture.path.name, error
+                )
                 return
-            if self.part is not part:  # the disk took no more of it meanwhile: the recording has ended
+            if self.part is not part:  # the disk failed in the meantime, which ended the recording
                 await self._end(following, about={})
                 return
             self.part = following
             await self._end(part, about={"part": str(number)})
 
     def failed(self, part_of: Capture, error: OSError) -> Part | None:
-        """The disk took no more of a file; None: of somebody else's."""
+        """End the capture after a disk error; return its part, or None if the file is not this capture's."""
         part = self.part
         if part is None or part.capture is not part_of:
             return None
         self.part = None
         self._files.detach(part)
         self.last = part.describe()
-        self.last.open, self.last.problem = False, f"ended: {words(error)}"
+        self.last.open, self.last.problem = False, f"ended: {error_text(error)}"
         return part
 
     def describe(self) -> schema.Recording:
-        """The open capture as it is now, or the last one."""
+        """Describe the open capture, or the last one."""
         if self.part is not None:
             self._files.count(self.part)
             self.last = self.part.describe()
@@ -219,13 +226,13 @@ class RobotRecorder:
         return self.last
 
     async def _end(self, part: Part, *, about: dict[str, str]) -> str:
-        """Close a file and have it indexed; what was wrong, in words."""
+        """Close a file and queue it for indexing; return the problem as text, or an empty text."""
         try:
             await self._files.close(part)
-        except OSError as error:  # the disk has told it
-            return f"ended: {words(error)}"
+        except OSError as error:  # the disk has already reported it
+            return f"ended: {error_text(error)}"
         path = part.capture.path
-        self._finisher.give(Job(path, (path,), about))
+        self._finisher.submit(Job(path, (path,), about))
         return ""
 
     def _path(self, name: str, part: int) -> Path:
@@ -234,10 +241,10 @@ class RobotRecorder:
 
 
 def _videos(views: tuple[str, ...]) -> frozenset[str]:
-    """The topics of views' video.
+    """Return the video topics of these views.
 
     Raises:
-        RefusedError: If one can be no view.
+        RefusedError: If a view's name is invalid.
     """
     try:
         return frozenset(f"video/{check_chunk(view, 'view')}" for view in views if view != _NO_VIEW)

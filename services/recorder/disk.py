@@ -1,6 +1,6 @@
-"""The disk: open files are written each 0.05 s and synced each second, by threads that alone wait for it.
+"""Disk access: only its threads wait for the disk; they write open files each 0.05 s and sync each second.
 
-What a disk cannot take is given up in order: video, then what follows from the joints, the joints last.
+What a slow or full disk cannot take is dropped in order: video, then data derived from the joints, then all.
 """
 
 import contextlib
@@ -21,18 +21,18 @@ from services.recorder.settings import MIB, Marks
 
 _WRITE_EVERY_S = 0.05
 _SYNC_EVERY_S = 1.0
-_LOOK_EVERY_S = 0.2
-# Waiting to be written, of all files together: from here on less is taken.
+_CHECK_SPACE_EVERY_S = 0.2
+# Bytes that wait to be written, over all files; each threshold raises the recording level by one.
 _MOST_WAITING = (32 * MIB, 64 * MIB, 128 * MIB)
-# Which a full disk's files are closed with.
+# A file that is deleted to make room for the ends of files on a full disk.
 _RESERVE = ".reserve"
 _RESERVE_BYTES = MIB
-# What can be computed again from the joints.
+# Topics that can be computed again from the joints.
 _DERIVED = frozenset({"frames", "kinematics"})
 
 
-class Taken(IntEnum):
-    """What of a robot's topics is recorded."""
+class RecordingLevel(IntEnum):
+    """The topics of a robot that are recorded."""
 
     ALL = 0
     NO_VIDEO = 1
@@ -40,17 +40,17 @@ class Taken(IntEnum):
     NOTHING = 3
 
 
-def takes(taken: Taken, row: Topic) -> bool:
-    """Whether a topic is recorded when that much is."""
+def is_recorded(level: RecordingLevel, row: Topic) -> bool:
+    """Return whether a topic is recorded at this level."""
     if row.history is History.KEY_FRAME:
-        return taken < Taken.NO_VIDEO
+        return level < RecordingLevel.NO_VIDEO
     if row.name in _DERIVED:
-        return taken < Taken.STATES_ONLY
-    return taken < Taken.NOTHING
+        return level < RecordingLevel.STATES_ONLY
+    return level < RecordingLevel.NOTHING
 
 
-def words(error: OSError) -> str:
-    """What a disk refused, for people."""
+def error_text(error: OSError) -> str:
+    """Return a disk error as text for the operator."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return "no space left on the disk"
     return error.strerror or str(error)
@@ -60,22 +60,22 @@ class Disk:
     """The disk of a recorder's folder.
 
     Args:
-        on_failed: Told, on another thread, of a file that could not be written.
+        on_failed: Called, on another thread, with a file that could not be written.
     """
 
     def __init__(self, folder: Path, marks: Marks, on_failed: Callable[[Capture, OSError], None]) -> None:
         self.folder = folder
         self.free_bytes = 0
-        self.taken = Taken.ALL
+        self.level = RecordingLevel.ALL
         self._marks, self._on_failed = marks, on_failed
-        self._by_space = Taken.ALL
+        self._level_by_space = RecordingLevel.ALL
         self._captures: tuple[Capture, ...] = ()
-        # Of the files' tuple; nobody waits for the disk with it.
+        # Guards the tuple of files; never held while waiting for the disk.
         self._lock = threading.Lock()
-        self._mending = threading.Lock()
+        self._repairing = threading.Lock()
         self._wrote_at = time.monotonic()
         self._closed = threading.Event()
-        self.look()
+        self.check_space()
         self._threads = [
             threading.Thread(target=work, args=(every_s,), name=work.__name__, daemon=True)
             for work, every_s in ((self._write, _WRITE_EVERY_S), (self._sync, _SYNC_EVERY_S))
@@ -85,23 +85,23 @@ class Disk:
 
     @property
     def behind_s(self) -> float:
-        """How long what waits has waited, at most [s]."""
+        """Upper bound of the age of waiting data [s]."""
         waits = any(capture.waiting_bytes for capture in self._captures)
         return time.monotonic() - self._wrote_at if waits else 0.0
 
     @property
-    def warned(self) -> bool:
-        """Whether space runs short."""
+    def is_low(self) -> bool:
+        """True if free space is below the warning mark."""
         return self.free_bytes < self._marks.warn
 
-    def weigh(self) -> Taken:
-        """Look how much waits, and say what is recorded from now on."""
+    def update_level(self) -> RecordingLevel:
+        """Set the recording level from the waiting bytes and the free space, and return it."""
         waiting = sum(capture.waiting_bytes for capture in self._captures)
-        self.taken = max(self._by_space, Taken(sum(waiting > most for most in _MOST_WAITING)))
-        return self.taken
+        self.level = max(self._level_by_space, RecordingLevel(sum(waiting > most for most in _MOST_WAITING)))
+        return self.level
 
     def open(self, capture: Capture) -> None:
-        """Write a file from now on."""
+        """Start writing a file."""
         with self._lock:
             self._captures = (*self._captures, capture)
 
@@ -109,7 +109,7 @@ class Disk:
         """Write a file to its end; blocks.
 
         Raises:
-            OSError: If the disk refuses, or has before; the file is given an end then, if there is any room.
+            OSError: If a write fails or failed earlier; the file is then repaired if there is room.
         """
         if self._remove(capture):
             try:
@@ -118,42 +118,44 @@ class Disk:
             except OSError as error:
                 capture.give_up(error)
                 self._on_failed(capture, error)
-        self.mend(capture, missed)
-        raise capture.failure or OSError(errno.EBADF, "it was closed before")
+        self.repair(capture, missed)
+        raise capture.failure or OSError(errno.EBADF, "the file was already closed")
 
-    def mend(self, capture: Capture, missed: Mapping[str, int]) -> None:
-        """Give a file that could not be written an end, if there is any room for it; blocks.
+    def repair(self, capture: Capture, missed: Mapping[str, int]) -> None:
+        """Append a valid end to a file that could not be written, if there is room; blocks.
 
-        One that the disk took nothing of is removed.
+        A file without any content is removed.
         """
         capture.give_up()
-        with self._mending, contextlib.suppress(OSError, ValueError):
+        with self._repairing, contextlib.suppress(OSError, ValueError):
             (self.folder / _RESERVE).unlink(missing_ok=True)
             if capture.path.stat().st_size < len(records.MAGIC):
                 capture.path.unlink()
             else:
                 mend(capture.path, missed)
 
-    def look(self) -> None:
-        """See how much space there is."""
+    def check_space(self) -> None:
+        """Measure the free space, and create the reserve file if there is room."""
         folder = next(each for each in (self.folder, *self.folder.absolute().parents) if each.exists())
         self.free_bytes = free = shutil.disk_usage(folder).free
-        self._by_space = Taken((free < self._marks.no_video) + (free < self._marks.states_only))
+        self._level_by_space = RecordingLevel(
+            (free < self._marks.no_video) + (free < self._marks.states_only)
+        )
         reserve = self.folder / _RESERVE
         if free > 4 * _RESERVE_BYTES and self.folder.exists() and not reserve.exists():
             with contextlib.suppress(OSError), reserve.open("wb") as stream:
                 os.posix_fallocate(stream.fileno(), 0, _RESERVE_BYTES)
 
     def end(self) -> None:
-        """End the threads; files that are still open are closed before."""
+        """Stop the threads; the caller has closed all files before."""
         self._closed.set()
         for thread in self._threads:
-            thread.join(1.0)  # a disk that hangs is not waited for
+            thread.join(1.0)  # do not wait for a disk that hangs
         with contextlib.suppress(OSError):
             (self.folder / _RESERVE).unlink()
 
     def _write(self, every_s: float) -> None:
-        looked_at = 0.0
+        checked_at = 0.0
         while not self._closed.wait(every_s):
             for capture in self._captures:
                 try:
@@ -161,10 +163,10 @@ class Disk:
                 except OSError as error:
                     self._fail(capture, error)
             self._wrote_at = time.monotonic()
-            if self._wrote_at - looked_at > _LOOK_EVERY_S:
-                looked_at = self._wrote_at
+            if self._wrote_at - checked_at > _CHECK_SPACE_EVERY_S:
+                checked_at = self._wrote_at
                 with contextlib.suppress(OSError):
-                    self.look()
+                    self.check_space()
 
     def _sync(self, every_s: float) -> None:
         while not self._closed.wait(every_s):
@@ -175,13 +177,13 @@ class Disk:
                     self._fail(capture, error)
 
     def _fail(self, capture: Capture, error: OSError) -> None:
-        if self._remove(capture):  # else it was closed meanwhile
+        if self._remove(capture):  # otherwise another thread has closed it
             capture.give_up(error)
             self._on_failed(capture, error)
 
     def _remove(self, capture: Capture) -> bool:
-        """Write a file no more; whether it was written until now: only who removed it may end it."""
+        """Stop writing a file; return whether it was open: only the caller that gets True may end it."""
         with self._lock:
-            there = capture in self._captures
+            was_open = capture in self._captures
             self._captures = tuple(each for each in self._captures if each is not capture)
-        return there
+        return was_open

@@ -1,4 +1,4 @@
-"""What a recorder has to say: events, of a robot or of the whole site."""
+"""Events of the recorder, for a robot or for the whole site."""
 
 import logging
 
@@ -6,71 +6,75 @@ from robomesh.keys import WHOLE_SITE
 from robomesh.publisher import Publisher
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
-from services.recorder.disk import Disk, Taken
+from services.recorder.disk import Disk, RecordingLevel
 
 log = logging.getLogger(__name__)
 
 _S = schema.Event.Severity
 _LEVEL = {_S.INFO: logging.INFO, _S.WARNING: logging.WARNING}
-# A disk that takes this long is told of.
+# A disk that is further behind causes an event.
 _SLOW_S = 0.8
-_GIVEN_UP = {
-    Taken.NO_VIDEO: "video is recorded no more",
-    Taken.STATES_ONLY: "only states, events and commands are recorded: no video, no frames, no kinematics",
-    Taken.NOTHING: "nothing is recorded",
+_DROPPED = {
+    RecordingLevel.NO_VIDEO: "video is not recorded",
+    RecordingLevel.STATES_ONLY: (
+        "only states, events and commands are recorded: no video, no frames, no kinematics"
+    ),
+    RecordingLevel.NOTHING: "nothing is recorded",
 }
 
 
-class Notices:
-    """Publishes events at `events/recorder`."""
+class EventReporter:
+    """Publisher of `events/recorder`."""
 
     def __init__(self, session: Session, site: str) -> None:
         self._session, self._site = session, site
         self._publishers: dict[str, Publisher] = {}
-        self._now: dict[tuple[str, str], str] = {}
-        self.ready(WHOLE_SITE)
+        self._states: dict[tuple[str, str], str] = {}
+        self.declare(WHOLE_SITE)
 
-    def ready(self, robot: str) -> None:
-        """Be ready to say something of a robot at once."""
+    def declare(self, robot: str) -> None:
+        """Declare a robot's publisher in advance, so that its first event is not delayed."""
         if robot not in self._publishers:
             self._publishers[robot] = self._session.declare_publisher(self._site, robot, "events/recorder")
 
-    def say(self, robot: str, severity: schema.Event.Severity, code: str, text: str, **values: str) -> None:
-        """An event of a robot, or of the whole site (`-`)."""
+    def report(
+        self, robot: str, severity: schema.Event.Severity, code: str, text: str, **values: str
+    ) -> None:
+        """Log and publish an event of a robot, or of the whole site (`-`)."""
         log.log(_LEVEL.get(severity, logging.ERROR), "%s: %s", robot, text)
         event = schema.Event(severity=severity, code=code, text=text, source="recorder", values=values)
         event.timestamp.GetCurrentTime()
-        self.ready(robot)
+        self.declare(robot)
         self._publishers[robot].put(event)
 
-    def is_so(
+    def report_state(
         self, code: str, severity: schema.Event.Severity, text: str, over: str, *, robot: str = WHOLE_SITE
     ) -> None:
-        """What lasts, told when it begins, changes and ends; an empty text: it is over."""
-        if self._now.get((robot, code), "") == text:
+        """Report a lasting condition when it begins, changes or ends; an empty text means that it is over."""
+        if self._states.get((robot, code), "") == text:
             return
-        self._now[robot, code] = text
-        self.say(robot, severity if text else _S.INFO, code, text or over)
+        self._states[robot, code] = text
+        self.report(robot, severity if text else _S.INFO, code, text or over)
 
 
-def disk_notices(notices: Notices, disk: Disk) -> None:
-    """Say what there is to say of the disk."""
-    taken = disk.taken
-    notices.is_so(
+def report_disk(events: EventReporter, disk: Disk) -> None:
+    """Report the disk's conditions."""
+    level = disk.level
+    events.report_state(
         "recorder.gives_up",
         _S.CRITICAL,
-        f"the disk cannot take everything: {_GIVEN_UP[taken]}" if taken is not Taken.ALL else "",
+        f"the disk cannot store everything: {_DROPPED[level]}" if level is not RecordingLevel.ALL else "",
         "everything is recorded again",
     )
-    notices.is_so(
+    events.report_state(
         "recorder.disk_slow",
         _S.CRITICAL,
-        "the disk is slow: what is recorded waits in memory" if disk.behind_s > _SLOW_S else "",
-        "the disk takes what is recorded again",
+        "the disk is slow: recorded data waits in memory" if disk.behind_s > _SLOW_S else "",
+        "the disk is fast enough again",
     )
-    notices.is_so(
+    events.report_state(
         "recorder.space",
         _S.WARNING,
-        f"little space is left in {disk.folder}" if disk.warned else "",
+        f"little space is left in {disk.folder}" if disk.is_low else "",
         f"there is space again in {disk.folder}",
     )

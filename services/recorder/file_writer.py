@@ -1,4 +1,4 @@
-"""One file that is being recorded: what goes into it, and what does not."""
+"""One open file of a recording, with the counts of publications that are not in it."""
 
 import time
 from collections import Counter
@@ -9,53 +9,55 @@ from robomesh.header import Header
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.topics import TOPICS, Topic
 from robomesh.wall_clock import WallClock
-from services.recorder.disk import Disk, Taken, takes
+from services.recorder.disk import Disk, RecordingLevel, is_recorded
 
-Saw = Callable[[Topic, bytes], None]
+OnPublication = Callable[[Topic, bytes], None]
 STATES = frozenset(row.name for row in TOPICS.values() if row.recorded and not row.name.startswith("video/"))
 
 
 class Part:
-    """A capture as a sink of the intake.
+    """A capture as a sink of the robot's subscriptions.
 
     Args:
         begun_ns: The monotonic clock's time at the capture's start.
-        saw: Told of every publication, on the intake's thread.
+        on_publication: Called with every publication, on the subscriptions' thread.
     """
 
-    def __init__(self, capture: Capture, disk: Disk, saw: Saw | None = None, *, begun_ns: int) -> None:
+    def __init__(
+        self, capture: Capture, disk: Disk, on_publication: OnPublication | None = None, *, begun_ns: int
+    ) -> None:
         self.capture = capture
-        # Publications that came and that the disk could not take, by key.
-        self.given_up: Counter[str] = Counter()
-        # Told by the intake once it is attached.
+        # Publications that were received but dropped because of the disk, by key.
+        self.dropped: Counter[str] = Counter()
+        # Publications that were never received, by key; set from the subscriptions.
         self.lost: Counter[str] = Counter()
-        self._disk, self._saw = disk, saw
-        # The clock may be set while it is recorded: within a file time goes on as it did at its beginning.
+        self._disk, self._on_publication = disk, on_publication
+        # The wall clock may be set during a recording: times within a file follow the monotonic clock.
         self._begun_ns = begun_ns
         self._wall_clock, self._clock_was_set = WallClock(), False
 
     @property
     def age_s(self) -> float:
-        """How long it has been open [s], whatever the clock was set to."""
+        """Time since it was opened [s], on the monotonic clock."""
         return (time.monotonic_ns() - self._begun_ns) * 1e-9
 
     @property
     def missed(self) -> Counter[str]:
         """Publications that are not in the file, by key."""
-        return self.lost + self.given_up
+        return self.lost + self.dropped
 
     def take(self, key: str, row: Topic, header: Header, payload: bytes, received_ns: int) -> None:
-        """Write a publication, if there is room."""
-        if self._disk.taken is not Taken.ALL and not takes(self._disk.taken, row):
-            self.given_up[key] += 1
+        """Add a publication, unless the recording level excludes it."""
+        if self._disk.level is not RecordingLevel.ALL and not is_recorded(self._disk.level, row):
+            self.dropped[key] += 1
         else:
             self.capture.add(key, row, header, payload, received_ns=self.log_time_ns(received_ns))
-        if self._saw is not None:
-            self._saw(row, payload)
+        if self._on_publication is not None:
+            self._on_publication(row, payload)
 
     def log_time_ns(self, received_ns: int) -> int:
-        """Return the file's time of a time of the monotonic clock, ns since the Unix epoch."""
-        # What was told before is part of what was so when it began.
+        """Convert a time of the monotonic clock to the file's time, ns since the Unix epoch."""
+        # Earlier messages describe the state at the start of the file.
         return self.capture.start_ns + max(received_ns - self._begun_ns, 0)
 
     def clock_was_set(self) -> bool:
@@ -63,12 +65,12 @@ class Part:
         self._clock_was_set = self._wall_clock.was_set() or self._clock_was_set
         return self._clock_was_set
 
-    def swept(self) -> None:
-        """It may be written."""
+    def drained(self) -> None:
+        """Release the added publications for writing."""
         self.capture.hand_over()
 
     def describe(self) -> schema.Recording:
-        """The file as it is now."""
+        """Describe the open file."""
         capture, about = self.capture, self.capture.about
         recording = schema.Recording(
             site=about["site"],

@@ -1,4 +1,4 @@
-"""Closed files made quick to read, and killed ones whole, one after the other in a process of its own."""
+"""Queue that indexes closed files and recovers unfinished ones, one at a time, in a separate process."""
 
 import asyncio
 import json
@@ -13,18 +13,18 @@ from pathlib import Path
 log = logging.getLogger(__name__)
 
 _MODULE = "mcap_files.reindex"
-# Then its process ends.
+# Time without a job after which the process is stopped.
 _IDLE_S = 10.0
 _ERRNO = re.compile(r"^\[Errno \d+\] ")
 
 
 @dataclass(frozen=True)
 class Job:
-    """Files that become one.
+    """Files to merge into one.
 
     Attributes:
-        about: What the file says of itself more, or otherwise, than the first of them.
-        done: Called afterwards; None: it succeeded, else why not.
+        about: Metadata to add to, or replace in, that of the first source.
+        done: Called afterwards with the problem as text, or None after success.
     """
 
     target: Path
@@ -34,20 +34,20 @@ class Job:
 
 
 class Finisher:
-    """Does jobs one by one. `serve` runs it."""
+    """Queue of jobs, run one by one by `serve`."""
 
     def __init__(self) -> None:
         self._jobs: asyncio.Queue[Job] = asyncio.Queue()
-        # How far the files are that are worked on or wait for it, by name: 0 to 1.
+        # Progress of running and waiting jobs, by the target's name: 0 to 1.
         self.progress: dict[str, float] = {}
 
-    def give(self, job: Job) -> None:
-        """Do a job when those before it are done."""
+    def submit(self, job: Job) -> None:
+        """Add a job to the queue."""
         self.progress[job.target.name] = 0.0
         self._jobs.put_nowait(job)
 
     async def serve(self) -> None:
-        """Do what is given until cancelled; the file that is worked on stays as it was then."""
+        """Run jobs until cancelled; a job that is cancelled leaves its files unchanged."""
         while True:
             job: Job | None = await self._jobs.get()
             try:
@@ -57,7 +57,7 @@ class Finisher:
                         job = await self._next() if process.returncode is None else None
             except OSError as error:
                 if job is not None:
-                    self._end(job, f"no process can be started for it: {error.strerror}")
+                    self._end(job, f"its process cannot be started: {error.strerror}")
 
     async def _next(self) -> Job | None:
         with suppress(TimeoutError):
@@ -72,16 +72,16 @@ class Finisher:
         try:
             job.done(problem)
         except Exception:
-            log.exception("%s: what follows its end failed", job.target)
+            log.exception("%s: the callback of its job failed", job.target)
 
     async def _do(self, process: asyncio.subprocess.Process, job: Job) -> str | None:
-        """What was wrong, in words; None: nothing."""
+        """Run a job; return the problem as text, or None."""
         assert process.stdin is not None
         assert process.stdout is not None
         sources = [str(each) for each in job.sources]
-        asked = {"target": str(job.target), "sources": sources, "about": job.about}
+        request = {"target": str(job.target), "sources": sources, "about": job.about}
         with suppress(ConnectionError):
-            process.stdin.write(json.dumps(asked).encode() + b"\n")
+            process.stdin.write(json.dumps(request).encode() + b"\n")
             await process.stdin.drain()
         try:
             async for line in process.stdout:
@@ -91,9 +91,9 @@ class Finisher:
                 if word == "failed":
                     return _ERRNO.sub("", text)
                 self.progress[job.target.name] = float(word)
-        except ValueError:  # what it says later would be taken for another job's
+        except ValueError:  # its later output would be mistaken for the next job's
             process.kill()
-            return f"its process ended with {await process.wait()}, after words of its own"
+            return f"its process sent an invalid line and ended with {await process.wait()}"
         return f"its process ended with {await process.wait()}"
 
 

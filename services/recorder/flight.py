@@ -1,4 +1,4 @@
-"""The flight recorder: a robot's last minutes in short files on the disk, kept when something happens."""
+"""Flight recorder: a ring of short files with a robot's last minutes, saved after an event."""
 
 import asyncio
 import json
@@ -22,7 +22,7 @@ from robomesh.messages import decode
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.topics import Topic
 from services.recorder.captures import Files, check_name
-from services.recorder.disk import words
+from services.recorder.disk import error_text
 from services.recorder.file_writer import STATES, Part
 from services.recorder.finishing import Finisher, Job
 from services.recorder.settings import MIB, Flight
@@ -33,12 +33,13 @@ FOLDER = ".flight"
 SOURCE = "recorder"
 _S = schema.Event.Severity
 _SEGMENTS = 10
-_SHORTEST_S = 5.0
-_AGAIN_AFTER_S = 5.0
-# And of a save that failed, at first.
-_SAVE_AGAIN_AFTER_S = 30.0
-# Endings: of what is to be saved, should this process not live to do it; of what cannot be read.
+_MIN_SEGMENT_S = 5.0
+_RETRY_S = 5.0
+# First retry interval of a failed save; it doubles each time.
+_SAVE_RETRY_S = 30.0
+# Extension of the files that list a save in progress, so that a save survives a kill of this process.
 _MARK = ".save.json"
+# Extension of unreadable segments.
 _DAMAGED = ".damaged"
 _RECOVERED = {"started_by": "flight", "recovered": "yes"}
 _KILLED = "the recorder was killed, or its machine lost power"
@@ -46,33 +47,33 @@ _KILLED = "the recorder was killed, or its machine lost power"
 
 @dataclass(frozen=True)
 class _Save:
-    """Segments that become a file.
+    """Segments to merge into one file.
 
     Attributes:
-        segments: None of them are known as long as more follow.
+        segments: Empty while the save is still recording.
     """
 
     target: Path
     about: dict[str, str]
     segments: tuple[Path, ...] = ()
 
-    def note(self, folder: Path) -> None:
-        """Write down what is to be saved, should this process not live to do it."""
+    def write_mark(self, folder: Path) -> None:
+        """Write the mark, from which a later process can finish this save."""
         names = [each.name for each in self.segments]
-        with suppress(OSError):  # it is saved all the same, if this process lives
+        with suppress(OSError):  # without a mark, this process can still save
             self.mark(folder).write_text(json.dumps({"about": self.about, "segments": names}))
 
     def mark(self, folder: Path) -> Path:
-        """The file where it is written down."""
+        """Return the path of this save's mark."""
         return folder / f"{self.target.stem}{_MARK}"
 
 
 class FlightRecorder:
-    """One robot's. Its folder holds segments, oldest first by name.
+    """Flight recorder of one robot. Its folder holds segments, oldest first by name.
 
     Args:
-        on_save: Told of the open segment when a save begins, to explain it.
-        say: Told what a robot's people should know: how grave, code, text.
+        on_save: Called with the open segment when a save begins, to add its attachments.
+        report: Called with severity, code and text of an event.
     """
 
     def __init__(
@@ -82,7 +83,7 @@ class FlightRecorder:
         flight: Flight,
         *,
         on_save: Callable[[Part], None],
-        say: Callable[[schema.Event.Severity, str, str], None],
+        report: Callable[[schema.Event.Severity, str, str], None],
     ) -> None:
         self._files, self._finisher, self._flight = files, finisher, flight
         self._folder = files.settings.folder / FOLDER / files.robot
@@ -90,33 +91,33 @@ class FlightRecorder:
         self._loop = asyncio.get_running_loop()
         self._lock = asyncio.Lock()
         self._retry_at = 0.0
-        # Being saved: until when what follows belongs to it, since when, what it is.
+        # The save that is recording: its end, its start and its metadata (empty: no save is recording).
         self._until = self._since = 0.0
         self._about: dict[str, str] = {}
-        # Of a save that is under way, and must stay until it is done.
-        self._given: set[Path] = set()
-        # Saves that failed, by target: when they are tried again, and after how long the next time.
-        self._unsaved: dict[Path, tuple[float, float, _Save]] = {}
-        self._on_save, self._say = on_save, say
-        # When each segment was first seen closed: the clock, and so a file's time, may be set.
+        # Segments of submitted saves; they are kept until the save is done.
+        self._submitted: set[Path] = set()
+        # Failed saves by target: time of the next attempt, interval after it, the save.
+        self._failed_saves: dict[Path, tuple[float, float, _Save]] = {}
+        self._on_save, self._report = on_save, report
+        # Monotonic time at which each segment was first seen closed; a file's own time is a settable clock's.
         self._closed_at: dict[Path, float] = {}
         self.part: Part | None = None
-        # The file that the last minutes become.
+        # Target of the save that is recording.
         self.saving: Path | None = None
-        # The disk takes nothing.
+        # The disk refuses new segments.
         self.stopped = False
 
     async def begin(self) -> None:
-        """Go on; what an earlier process was about to save, or left when it was killed, is saved."""
-        for save in await asyncio.to_thread(self._left):
-            await self._give(save)
+        """Start recording; finish saves that an earlier process left when it was killed."""
+        for save in await asyncio.to_thread(self._pending_saves):
+            await self._submit(save)
         await self.tick()
 
     async def save(self, cause: str, name: str = "") -> schema.Recording:
-        """Keep the last minutes and what follows; another cause meanwhile lets it go on for longer.
+        """Save the last minutes and what follows; a further cause extends a save that is recording.
 
         Raises:
-            RefusedError: If the disk takes nothing, or it cannot have that name.
+            RefusedError: If no segment is open because of the disk, or the name is invalid.
         """
         name = check_name(name or f"flight-{datetime.now(UTC):%H%M%S}")
         async with self._lock:
@@ -130,11 +131,11 @@ class FlightRecorder:
                 self._on_save(self.part)
             self._until, answer = now + self._flight.after_s, self.describe()
             assert self.saving is not None
-            await asyncio.to_thread(_Save(self.saving, self._about).note, self._folder)
+            await asyncio.to_thread(_Save(self.saving, self._about).write_mark, self._folder)
             return answer
 
     def describe(self) -> schema.Recording:
-        """What is being saved, as far as it is the open segment's."""
+        """Describe the save that is recording; counts are those of the open segment."""
         assert self.part is not None
         assert self.saving is not None
         recording = self.part.describe()
@@ -143,40 +144,40 @@ class FlightRecorder:
         return recording
 
     async def tick(self) -> None:
-        """Begin the next segment, drop what is too old, end a save."""
+        """Begin the next segment, remove old ones, end or retry saves, when due."""
         async with self._lock:
             now = time.monotonic()
-            for at, wait_s, save in tuple(self._unsaved.values()):
+            for at, wait_s, save in tuple(self._failed_saves.values()):
                 if now >= at:
-                    self._unsaved[save.target] = (inf, wait_s * 2, save)
-                    await self._give(save)
-            if self._about and (now >= self._until or self._long(now)):
+                    self._failed_saves[save.target] = (inf, wait_s * 2, save)
+                    await self._submit(save)
+            if self._about and (now >= self._until or self._is_too_long(now)):
                 await self._end_save(now)
             elif self.part is None:
                 if now >= self._retry_at:
                     await self._next()
-            elif self._full(self.part) and now >= self._retry_at:
+            elif self._is_full(self.part) and now >= self._retry_at:
                 await self._next()
-                await asyncio.to_thread(self._drop)
+                await asyncio.to_thread(self._remove_old)
 
     def failed(self, part_of: Capture) -> Part | None:
-        """The disk took no more of a segment; None: of somebody else's."""
+        """Drop the open segment after a disk error; return it, or None if the file is not this recorder's."""
         part = self.part
         if part is None or part.capture is not part_of:
             return None
-        self.part, self._retry_at, self.stopped = None, time.monotonic() + _AGAIN_AFTER_S, True
+        self.part, self._retry_at, self.stopped = None, time.monotonic() + _RETRY_S, True
         self._files.detach(part)
         return part
 
     async def end(self) -> None:
-        """Close the open segment; what was to be saved is, at the next start."""
+        """Close the open segment; a save that is recording is finished at the next start."""
         if self.part is not None:
             part, self.part = self.part, None
             with suppress(OSError):
                 await self._files.close(part)
 
-    def _saw(self, row: Topic, payload: bytes) -> None:
-        """A publication; on the intake's thread."""
+    def _on_publication(self, row: Topic, payload: bytes) -> None:
+        """Start a save if a publication is a severe event. Runs on the subscriptions' thread."""
         if row.schema is schema.Event:
             with suppress(MessageError):
                 event = decode(schema.Event, payload)
@@ -193,41 +194,43 @@ class FlightRecorder:
                 return
             await self._next()
             if self.part is before:
-                return  # no other can be begun: what followed is in this one
+                return  # the next segment cannot be created; this one still belongs to the save
         segments = await asyncio.to_thread(self._segments)
         done = [each for each in segments if self.part is None or each != self.part.capture.path]
         assert self.saving is not None
         save = _Save(self.saving, self._about, tuple(done))
         self._about, self.saving = {}, None
-        await self._give(save)
+        await self._submit(save)
 
     async def _next(self) -> None:
         path = self._folder / f"{datetime.now(UTC):%Y-%m-%dT%H-%M-%S.%f}Z{SUFFIX}"
         before, about = self.part, {"name": "flight", "started_by": "flight"}
         try:
-            self.part = await self._files.open(path, about, STATES, saw=self._saw, instead_of=before)
+            self.part = await self._files.open(
+                path, about, STATES, on_publication=self._on_publication, replaces=before
+            )
         except CaptureError as error:
             log.error("flight recorder: %s", error)
-            self._retry_at, self.stopped = time.monotonic() + _AGAIN_AFTER_S, self.part is None
+            self._retry_at, self.stopped = time.monotonic() + _RETRY_S, self.part is None
             return
         self.stopped = False
         if before is not None:
             with suppress(OSError):
                 await self._files.close(before)
 
-    def _full(self, part: Part) -> bool:
+    def _is_full(self, part: Part) -> bool:
         most = self._files.settings.split.mib * MIB / _SEGMENTS
-        longest_s = max(self._flight.minutes * 60 / _SEGMENTS, _SHORTEST_S)
+        longest_s = max(self._flight.minutes * 60 / _SEGMENTS, _MIN_SEGMENT_S)
         return part.age_s >= longest_s or part.capture.size >= most or part.clock_was_set()
 
-    def _long(self, now: float) -> bool:
+    def _is_too_long(self, now: float) -> bool:
         return now - self._since > self._files.settings.split.minutes * 60
 
     def _segments(self) -> list[Path]:
-        return [each for each in sorted(self._folder.glob(f"*{SUFFIX}")) if each not in self._given]
+        return [each for each in sorted(self._folder.glob(f"*{SUFFIX}")) if each not in self._submitted]
 
-    def _drop(self) -> None:
-        """Remove what is older than the minutes that are kept, or more than the space that is."""
+    def _remove_old(self) -> None:
+        """Remove segments beyond the configured minutes or size."""
         if self._about:
             return
         now, open_now = time.monotonic(), self.part.capture.path if self.part is not None else None
@@ -243,26 +246,26 @@ class FlightRecorder:
     def _target_of(self, segments: list[Path], name: str) -> Path:
         return self._target / f"{segments[0].name.removesuffix(SUFFIX)}_{name}{SUFFIX}"
 
-    def _left(self) -> list[_Save]:
-        """What an earlier process left to be saved; what is no recording is put aside."""
+    def _pending_saves(self) -> list[_Save]:
+        """Return the unfinished saves of an earlier process; quarantine unreadable segments."""
         states: dict[Path, State] = {}
         for segment in self._segments():
             try:
                 if not is_being_written(segment):
                     states[segment] = state_of(segment)
             except (CaptureError, OSError) as error:
-                self._put_aside(segment, error)
+                self._quarantine(segment, error)
         saves, begun = [], {"name": "killed", "cause": _KILLED}
         any_begun = False
         for mark in sorted(self._folder.glob(f"*{_MARK}")):
             target = self._target / f"{mark.name.removesuffix(_MARK)}{SUFFIX}"
             try:
-                noted = json.loads(mark.read_text())
-                about, names = {**begun, **noted["about"]}, [str(each) for each in noted["segments"]]
+                stored = json.loads(mark.read_text())
+                about, names = {**begun, **stored["about"]}, [str(each) for each in stored["segments"]]
             except (OSError, ValueError, KeyError, TypeError):
                 about, names = begun, []
             segments = tuple(each for each in states if each.name in names)
-            if _is_indexed(target):  # the kill came after it was saved
+            if _is_indexed(target):  # the process was killed after the save was done
                 for segment in segments:
                     segment.unlink(missing_ok=True)
             elif segments:
@@ -279,21 +282,21 @@ class FlightRecorder:
             saves.append(save)
         return saves
 
-    def _put_aside(self, segment: Path, error: Exception) -> None:
+    def _quarantine(self, segment: Path, error: Exception) -> None:
         with suppress(OSError):
             segment.rename(segment.with_suffix(_DAMAGED))
-        text = f"a segment of the flight recorder cannot be read, and is put aside: {error}"
-        self._loop.call_soon_threadsafe(self._say, _S.WARNING, "recorder.damaged", text)
+        text = f"a segment of the flight recorder cannot be read and was renamed to *{_DAMAGED}: {error}"
+        self._loop.call_soon_threadsafe(self._report, _S.WARNING, "recorder.damaged", text)
 
-    async def _give(self, save: _Save) -> None:
-        self._given |= set(save.segments)
+    async def _submit(self, save: _Save) -> None:
+        self._submitted |= set(save.segments)
         try:
             await asyncio.to_thread(save.target.parent.mkdir, parents=True, exist_ok=True)
         except OSError as error:
-            self._on_saved(save, words(error))
+            self._on_saved(save, error_text(error))
             return
-        await asyncio.to_thread(save.note, self._folder)
-        self._finisher.give(Job(save.target, save.segments, save.about, partial(self._on_saved, save)))
+        await asyncio.to_thread(save.write_mark, self._folder)
+        self._finisher.submit(Job(save.target, save.segments, save.about, partial(self._on_saved, save)))
 
     def _on_saved(self, save: _Save, problem: str | None) -> None:
         name = save.about["name"]
@@ -301,15 +304,15 @@ class FlightRecorder:
             for each in (*save.segments, save.mark(self._folder)):
                 with suppress(OSError):
                     each.unlink(missing_ok=True)
-            self._given -= set(save.segments)
-            if self._unsaved.pop(save.target, None) is not None:
-                self._say(_S.INFO, "recorder.saved", f"{name} is saved after all: {save.target.name}")
+            self._submitted -= set(save.segments)
+            if self._failed_saves.pop(save.target, None) is not None:
+                self._report(_S.INFO, "recorder.saved", f"{name} is saved now: {save.target.name}")
             return
-        _, wait_s, _ = self._unsaved.get(save.target, (0.0, _SAVE_AGAIN_AFTER_S, save))
-        if save.target not in self._unsaved:
-            text = f"{name} is not saved: {problem}; its segments are kept, and it is tried again"
-            self._say(_S.CRITICAL, "recorder.not_saved", text)
-        self._unsaved[save.target] = (time.monotonic() + wait_s, wait_s, save)
+        _, wait_s, _ = self._failed_saves.get(save.target, (0.0, _SAVE_RETRY_S, save))
+        if save.target not in self._failed_saves:
+            text = f"{name} is not saved: {problem}; its segments are kept, and the recorder tries again"
+            self._report(_S.CRITICAL, "recorder.not_saved", text)
+        self._failed_saves[save.target] = (time.monotonic() + wait_s, wait_s, save)
 
 
 def _is_indexed(path: Path) -> bool:

@@ -1,4 +1,4 @@
-"""What an earlier recorder left in a folder, and whose it is to make it whole."""
+"""Files that an earlier recorder left unfinished, and the lock that decides which recorder recovers them."""
 
 import fcntl
 import os
@@ -10,14 +10,14 @@ from mcap_files.recover import State, is_ours, state_of
 _LOCK = ".lock"
 
 
-def own(folder: Path) -> int | None:
-    """Have a folder as one of its recorders alone, until the file that is returned is closed.
+def lock_folder(folder: Path) -> int | None:
+    """Take the folder's exclusive lock; closing the returned file descriptor releases it, as does a kill.
 
     Returns:
-        None: another has it; a recorder that was killed has it no more.
+        The file descriptor, or None if another recorder holds the lock.
 
     Raises:
-        OSError: If the folder cannot be made, or has no locks.
+        OSError: If the folder cannot be created, or does not support locks.
     """
     folder.mkdir(parents=True, exist_ok=True)
     file = os.open(folder / _LOCK, os.O_WRONLY | os.O_CREAT, 0o644)
@@ -32,10 +32,12 @@ def own(folder: Path) -> int | None:
 
 
 def left_state(path: Path) -> State | None:
-    """How far a file that was left came; None: it is a stranger's, or being written. An empty one is removed.
+    """Return the state of a left file; None if another program wrote it or it is being written.
+
+    An empty file is removed.
 
     Raises:
-        CaptureError: If it is no recording.
+        CaptureError: If it is not a recording.
         OSError: If it cannot be read.
     """
     if is_being_written(path):

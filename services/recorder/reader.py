@@ -1,4 +1,4 @@
-"""The process that reads recordings for `serving`: `python -m services.recorder.reader`."""
+"""Worker process that reads recordings for `serving`: `python -m services.recorder.reader`."""
 
 from robomesh.worker import answer_all
 from services.recorder.answers import Answers

@@ -1,4 +1,4 @@
-"""The recorder service: captures on request or when a controller's trace goes on, and the flight recorder."""
+"""Recorder service: captures on request or while a controller's trace is on, and the flight recorder."""
 
 import asyncio
 import logging
@@ -19,33 +19,33 @@ from robomesh.keys import WHOLE_SITE, robot_key
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
 from robomesh.session import Session
-from services.recorder.attachments import Explainer, for_viewers, picture
+from services.recorder.attachments import DescriptionCache, picture, self_contained_urdf
 from services.recorder.captures import Files, RobotRecorder
-from services.recorder.disk import Disk, words
-from services.recorder.events import Notices, disk_notices
+from services.recorder.disk import Disk, error_text
+from services.recorder.events import EventReporter, report_disk
 from services.recorder.file_writer import Part
 from services.recorder.finishing import Finisher, Job
 from services.recorder.flight import FlightRecorder
-from services.recorder.orphans import left_state, own
-from services.recorder.serving import Serving
+from services.recorder.orphans import left_state, lock_folder
+from services.recorder.serving import RecordingServer
 from services.recorder.settings import Settings
-from services.recorder.subscriptions import Intake
+from services.recorder.subscriptions import Subscriptions
 
 log = logging.getLogger(__name__)
 
 _TICK_S = 0.1
 _BEATS = 10  # ticks
-_EXPLAINED_WITHIN_S = 1.0
-_ASK_AGAIN_AFTER_S = (0.1, 2.0)
-_OWN_AGAIN_AFTER_S = 2.0
-_MOST_ENDED = 100
+_MESHES_WITHIN_S = 1.0
+_REFRESH_AFTER_S = (0.1, 2.0)
+_LOCK_RETRY_S = 2.0
+_MAX_ENDED = 100
 _Request = schema.RecorderRequest
 _State = schema.ControllerState
 _S = schema.Event.Severity
 
 
 async def serve(session: Session, settings: Settings) -> None:
-    """Record what is asked for, until cancelled; open captures are closed then."""
+    """Record a site's robots until cancelled, then close open captures."""
     recorder = _Recorder(session, settings)
     try:
         await recorder.serve()
@@ -54,11 +54,11 @@ async def serve(session: Session, settings: Settings) -> None:
 
 
 class _Robot:
-    """What there is of one robot."""
+    """Capture, flight recorder and request handler of one robot."""
 
     def __init__(self, recorder: "_Recorder", name: str) -> None:
         session, settings = recorder.session, recorder.settings
-        files = Files(settings, name, recorder.intake, recorder.disk, self._explain)
+        files = Files(settings, name, recorder.subscriptions, recorder.disk, self._on_open)
         self.name = name
         self.recorder = recorder
         self.captures = RobotRecorder(files, recorder.finisher)
@@ -68,86 +68,86 @@ class _Robot:
                 files,
                 recorder.finisher,
                 settings.flight,
-                on_save=self._explain_save,
-                say=partial(recorder.notices.say, name),
+                on_save=self._add_description,
+                report=partial(recorder.events.report, name),
             )
-        recorder.notices.ready(name)
-        self.told = session.declare_publisher(settings.site, name, "recording")
+        recorder.events.declare(name)
+        self.publisher = session.declare_publisher(settings.site, name, "recording")
         session.answer(settings.site, name, "recorder/request", self.on_request)
 
     async def on_request(self, request: Request) -> schema.Recording:
         """Begin or end a capture, or save the last minutes.
 
         Raises:
-            RefusedError: Why not.
+            RefusedError: If that is not possible.
         """
-        asked = request.message
-        assert isinstance(asked, _Request)
-        if asked.action == _Request.SAVE:
+        message = request.message
+        assert isinstance(message, _Request)
+        if message.action == _Request.SAVE:
             if self.flight is None:
                 raise RefusedError(codes.FLIGHT_NONE())
-            return await self.flight.save("asked for", asked.name)
-        if asked.action == _Request.TRACE_ON:
-            self._check(asked.views)
-            views = tuple(asked.views) or None
-            recording = await self.captures.open(asked.name, views=views, started_by="request")
+            return await self.flight.save("asked for", message.name)
+        if message.action == _Request.TRACE_ON:
+            self._check(message.views)
+            views = tuple(message.views) or None
+            recording = await self.captures.open(message.name, views=views, started_by="request")
         else:
             recording = await self.close()
-        self.tell()
+        self.publish()
         return recording
 
     async def close(self) -> schema.Recording:
-        """End the capture, explained."""
-        await self.recorder.explainer.settled(self.name, within_s=_EXPLAINED_WITHIN_S)
+        """End the capture with its attachments."""
+        await self.recorder.descriptions.wait_for_meshes(self.name, within_s=_MESHES_WITHIN_S)
         return await self.captures.close()
 
     async def follow(self, state: _State, before: int) -> None:
-        """A controller's trace, whoever turned it on, is a capture."""
+        """Open a capture when the controller's trace is switched on, and close it when it is switched off."""
         part = self.captures.part
         try:
             if state.trace == _State.YES and before != _State.YES and part is None:
                 await self.captures.open("", views=None, started_by="trace")
             elif state.trace == _State.YES and before != _State.YES and part is not None:
                 name = part.capture.about["name"]
-                text = f"the controller's trace goes into {name}, which is being recorded already"
-                self.recorder.notices.say(self.name, _S.INFO, "recorder.trace_joined", text, recording=name)
+                text = f"the controller's trace is recorded in {name}, which was already open"
+                self.recorder.events.report(self.name, _S.INFO, "recorder.trace_joined", text, recording=name)
             elif state.trace == _State.NO and part and part.capture.about["started_by"] == "trace":
                 await self.close()
         except RefusedError as error:
-            self.recorder.notices.say(
+            self.recorder.events.report(
                 self.name, _S.ERROR, "recorder.refused", f"the trace is not recorded: {error}"
             )
 
     async def tick(self) -> None:
-        """Go on with files that are long enough."""
+        """Begin next files when due; report an error instead of raising it."""
         try:
             await self.captures.tick()
             if self.flight is not None:
                 await self.flight.tick()
             text = ""
-        except Exception as error:  # one robot's fault is not the others'
+        except Exception as error:  # an error of one robot must not stop the others' recordings
             log.exception("%s", self.name)
-            text = f"the recorder of {self.name} failed, and goes on: {error or type(error).__name__}"
-        said = f"the recorder of {self.name} works again"
-        self.recorder.notices.is_so("recorder.failed", _S.ERROR, text, said, robot=self.name)
+            text = f"the recorder of {self.name} failed and tries again: {error or type(error).__name__}"
+        over = f"the recorder of {self.name} works again"
+        self.recorder.events.report_state("recorder.failed", _S.ERROR, text, over, robot=self.name)
 
-    def tell(self) -> None:
-        """Publish how the capture is."""
-        self.told.put(self.captures.describe())
+    def publish(self) -> None:
+        """Publish the state of the capture."""
+        self.publisher.put(self.captures.describe())
 
-    def explain_open(self) -> None:
-        """What the robot is has become known."""
+    def attach_description(self) -> None:
+        """Attach the robot's new description to the open files."""
         for part in (self.captures.part, self.flight.part if self.flight and self.flight.saving else None):
             if part is not None:
                 self._attach(part)
 
     def _check(self, views: Sequence[str]) -> None:
-        """Whether there can be such views.
+        """Check the names of views against the robot's description, if it is known.
 
         Raises:
-            RefusedError: If not.
+            RefusedError: If the robot has no view of that name.
         """
-        known = self.recorder.explainer.known.get(self.name)
+        known = self.recorder.descriptions.known.get(self.name)
         if known is None or not known.description.views:
             return
         names = [view.name for view in known.description.views]
@@ -155,25 +155,25 @@ class _Robot:
             if view not in (*names, "-", "far") and not view.startswith("free-"):
                 raise RefusedError(codes.VIEW_UNKNOWN_OF(view=view, robot=self.name, views=", ".join(names)))
 
-    def _explain(self, part: Part) -> None:
-        # A segment of the flight recorder is explained when it is kept.
+    def _on_open(self, part: Part) -> None:
+        # A segment of the flight recorder gets its attachments when it is saved.
         if part.capture.about["started_by"] != "flight":
-            self._explain_save(part)
+            self._add_description(part)
 
-    def _explain_save(self, part: Part) -> None:
+    def _add_description(self, part: Part) -> None:
         self._attach(part)
-        self.recorder.begin(self._picture(part))
+        self.recorder.start(self._picture(part))
 
     def _attach(self, part: Part) -> None:
-        known = self.recorder.explainer.known.get(self.name)
+        known = self.recorder.descriptions.known.get(self.name)
         if known is None:
             return
         now_ns = time.time_ns()
         for each in known.attachments:
             part.capture.attach(each.name, each.media_type, each.data, time_ns=now_ns)
         if known.description.urdf:
-            text = for_viewers(known)
-            with self.recorder.intake.lock:
+            text = self_contained_urdf(known)
+            with self.recorder.subscriptions.lock:
                 log_time_ns = part.log_time_ns(time.monotonic_ns())
                 part.capture.add_text("/robot_description", text, known.header, received_ns=log_time_ns)
                 part.capture.hand_over()
@@ -192,12 +192,12 @@ class _Recorder:
         self._loop = asyncio.get_running_loop()
         self._group = asyncio.TaskGroup()
         self._robots: dict[str, _Robot] = {}
-        self.intake = Intake(session.zenoh_session, settings.site, session.ignored)
+        self.subscriptions = Subscriptions(session.zenoh_session, settings.site, session.ignored)
         self.disk = Disk(settings.folder, settings.marks, self._on_failed)
         self.finisher = Finisher()
-        self.notices = Notices(session, settings.site)
-        self.explainer = Explainer(session, settings.site, self._on_explained)
-        self._serving = Serving(
+        self.events = EventReporter(session, settings.site)
+        self.descriptions = DescriptionCache(session, settings.site, self._on_known)
+        self._serving = RecordingServer(
             session,
             settings.site,
             settings.folder,
@@ -205,12 +205,12 @@ class _Recorder:
             flight=self._flight_runs,
             quotas=settings.quotas,
         )
-        self._owned: int | None = None
-        # Captures that the disk ended, by file: what the files themselves cannot tell.
+        self._folder_lock: int | None = None
+        # Captures that a disk error ended, by file: the files do not contain the reason.
         self._ended: dict[str, schema.Recording] = {}
 
     def _measure(self) -> None:
-        """Numbers for who looks after it."""
+        """Register the recorder's metrics."""
 
         def recorded() -> list[schema.Recording]:
             return [robot.captures.last for robot in tuple(self._robots.values()) if robot.captures.part]
@@ -218,47 +218,47 @@ class _Recorder:
         measure, disk = self.session.measure, self.disk
         measure("captures", "Recordings that are open", lambda: len(recorded()))
         measure("disk_free_bytes", "Free on the disk of the recordings", lambda: disk.free_bytes)
-        measure("disk_behind_seconds", "How long what waits for the disk has waited", lambda: disk.behind_s)
-        measure("recording_level", "0: all; 1: no video; 2: states only; 3: nothing", lambda: disk.taken)
+        measure("disk_behind_seconds", "Age of the data that waits for the disk", lambda: disk.behind_s)
+        measure("recording_level", "0: all; 1: no video; 2: states only; 3: nothing", lambda: disk.level)
 
     async def serve(self) -> None:
-        """Until cancelled."""
+        """Record until cancelled."""
         self._measure()
         async with self._group as group:
             left = sorted(self.settings.folder.glob(f"*/*{SUFFIX}"))
             for robot in self.settings.robots:
                 await self._add(robot)
-            for work in (self.finisher.serve, self.explainer.serve, self._follow_traces, self._tick):
+            for work in (self.finisher.serve, self.descriptions.serve, self._follow_traces, self._tick):
                 group.create_task(work())
             group.create_task(self._watch())
-            self.begin(self._recover(left))
-            async for who, alive in self.session.watch_presence():
-                if alive and who.site == self.settings.site:
-                    if who.service == "gateway" and who.robot not in self._robots:
-                        await self._add(who.robot)
-                    self.begin(self._refresh_soon(who.robot))
+            self.start(self._recover(left))
+            async for presence, alive in self.session.watch_presence():
+                if alive and presence.site == self.settings.site:
+                    if presence.service == "gateway" and presence.robot not in self._robots:
+                        await self._add(presence.robot)
+                    self.start(self._refresh_soon(presence.robot))
 
     async def end(self) -> None:
-        """Close what is open."""
+        """Close open files and release the folder."""
         for robot in self._robots.values():
             with suppress(RefusedError):
                 await robot.captures.close()
             if robot.flight is not None:
                 await robot.flight.end()
-        self.intake.close()
+        self.subscriptions.close()
         self.disk.end()
-        if self._owned is not None:
-            os.close(self._owned)
+        if self._folder_lock is not None:
+            os.close(self._folder_lock)
         await self._serving.close()
 
-    def begin(self, work: Coroutine[None, None, None]) -> None:
-        """Do something beside, which ends nothing else when it fails."""
+    def start(self, work: Coroutine[None, None, None]) -> None:
+        """Run a coroutine in the background; log its errors."""
 
         async def guarded() -> None:
             try:
                 await work
             except Exception:
-                log.exception("the recorder goes on")
+                log.exception("a background task of the recorder failed")
 
         self._group.create_task(guarded())
 
@@ -271,16 +271,16 @@ class _Recorder:
                 log.error("%s: flight recorder: %s", name, error)
 
     async def _recover(self, left: Sequence[Path]) -> None:
-        """Files of a recorder that was killed are made whole; their originals stay until that is done.
+        """Queue the recovery of files that a killed recorder left; each original stays until that succeeds.
 
-        Of a folder that is another recorder's too, one alone does it.
+        Recorders that share a folder take its lock, so that only one of them recovers.
         """
-        while (owned := await asyncio.to_thread(own, self.settings.folder)) is None:
-            await asyncio.sleep(_OWN_AGAIN_AFTER_S)
-        self._owned = owned
+        while (lock := await asyncio.to_thread(lock_folder, self.settings.folder)) is None:
+            await asyncio.sleep(_LOCK_RETRY_S)
+        self._folder_lock = lock
         for path in self.settings.folder.glob(f"*/*{INDEXING}"):
             if path.with_suffix(SUFFIX).name not in self.finisher.progress:
-                path.unlink()  # of a writer that was killed; the file itself is whole
+                path.unlink()  # left by a killed indexer; the recording itself is complete
         for path in left:
             try:
                 state = await asyncio.to_thread(left_state, path)
@@ -288,18 +288,18 @@ class _Recorder:
                 log.warning("%s", error)
                 continue
             if state is State.UNFINISHED:
-                self.finisher.give(Job(path, (path,), {"recovered": "yes"}, self._recovered(path)))
+                self.finisher.submit(Job(path, (path,), {"recovered": "yes"}, self._recovered(path)))
             elif state is State.CLOSED:
-                self.finisher.give(Job(path, (path,)))
+                self.finisher.submit(Job(path, (path,)))
 
     def _recovered(self, path: Path) -> Callable[[str | None], None]:
         def done(problem: str | None) -> None:
             if problem is None:
-                text = f"{path.name} had not been closed; it is whole now"
-                self.notices.say(path.parent.name, _S.INFO, "recorder.recovered", text, file=path.name)
+                text = f"{path.name} had not been closed; it is complete now"
+                self.events.report(path.parent.name, _S.INFO, "recorder.recovered", text, file=path.name)
             else:
-                text = f"{path.name} had not been closed, and stays as it is: {problem}"
-                self.notices.say(path.parent.name, _S.WARNING, "recorder.not_recovered", text)
+                text = f"{path.name} had not been closed and could not be recovered: {problem}"
+                self.events.report(path.parent.name, _S.WARNING, "recorder.not_recovered", text)
 
         return done
 
@@ -315,8 +315,8 @@ class _Recorder:
             except MessageError:
                 continue
             assert isinstance(state, _State)
-            was, before[name] = before.get(name, _State.KNOWN_UNSPECIFIED), state.trace
-            await robot.follow(state, was)
+            previous, before[name] = before.get(name, _State.KNOWN_UNSPECIFIED), state.trace
+            await robot.follow(state, previous)
 
     async def _tick(self) -> None:
         while True:
@@ -325,33 +325,33 @@ class _Recorder:
             await asyncio.sleep(_TICK_S)
 
     async def _watch(self) -> None:
-        """What goes on also while a disk hangs: see what it takes, and tell."""
+        """Update the recording level and publish events and states; must also run while a disk hangs."""
         ticks = 0
         while True:
-            self.disk.weigh()
-            disk_notices(self.notices, self.disk)
+            self.disk.update_level()
+            report_disk(self.events, self.disk)
             ticks += 1
             if ticks % _BEATS == 0:
                 for robot in tuple(self._robots.values()):
-                    robot.tell()
+                    robot.publish()
             await asyncio.sleep(_TICK_S)
 
     async def _refresh_soon(self, name: str) -> None:
-        """A service has come alive: ask for what it published while the link was down."""
-        # What it answers with is declared after its presence, on a busy machine much later.
-        for after_s in _ASK_AGAIN_AFTER_S:
+        """Query a service that came online for what it published while the link was down."""
+        # The service declares its queryables after its presence, on a busy machine much later.
+        for after_s in _REFRESH_AFTER_S:
             await asyncio.sleep(after_s)
             await asyncio.to_thread(self._refresh, name)
 
     def _refresh(self, name: str) -> None:
         robots = tuple(self._robots) if name == WHOLE_SITE else (name,) if name in self._robots else ()
-        with self.intake.lock:
+        with self.subscriptions.lock:
             for each in robots:
-                self.intake.robot(each).refresh()
+                self.subscriptions.robot(each).refresh()
 
-    def _on_explained(self, name: str) -> None:
+    def _on_known(self, name: str) -> None:
         if (robot := self._robots.get(name)) is not None:
-            robot.explain_open()
+            robot.attach_description()
 
     def _on_failed(self, capture: Capture, error: OSError) -> None:
         self._loop.call_soon_threadsafe(self._failed, capture, error)
@@ -359,22 +359,24 @@ class _Recorder:
     def _failed(self, capture: Capture, error: OSError) -> None:
         for robot in self._robots.values():
             if (part := robot.captures.failed(capture, error)) is not None:
-                text = f"recording {capture.about['name']} ended: {words(error)}; what was written is kept"
-                self.notices.say(robot.name, _S.CRITICAL, "recorder.ended", text)
+                text = (
+                    f"recording {capture.about['name']} ended: {error_text(error)}; what was written is kept"
+                )
+                self.events.report(robot.name, _S.CRITICAL, "recorder.ended", text)
                 self._note_ended(robot.captures.last)
-                robot.tell()
+                robot.publish()
             elif robot.flight is not None and (part := robot.flight.failed(capture)) is not None:
-                text = f"the flight recorder of {robot.name} keeps nothing now: {words(error)}"
-                self.notices.say(robot.name, _S.CRITICAL, "recorder.flight_ended", text)
+                text = f"the flight recorder of {robot.name} stopped: {error_text(error)}"
+                self.events.report(robot.name, _S.CRITICAL, "recorder.flight_ended", text)
             if part is not None:
-                self.begin(asyncio.to_thread(self.disk.mend, capture, part.missed))
+                self.start(asyncio.to_thread(self.disk.repair, capture, part.missed))
                 return
-        # It was just being closed: who closes it mends it.
-        text = f"{capture.path.name} was cut short: {words(error)}; what was written is kept"
-        self.notices.say(capture.about["robot"], _S.CRITICAL, "recorder.ended", text)
+        # The file was being closed; `Disk.close` repairs it.
+        text = f"{capture.path.name} was cut short: {error_text(error)}; what was written is kept"
+        self.events.report(capture.about["robot"], _S.CRITICAL, "recorder.ended", text)
 
     def _note_ended(self, last: schema.Recording) -> None:
-        while len(self._ended) >= _MOST_ENDED:
+        while len(self._ended) >= _MAX_ENDED:
             self._ended.pop(next(iter(self._ended)))
         self._ended[last.file] = ended = schema.Recording()
         ended.CopyFrom(last)

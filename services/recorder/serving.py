@@ -1,4 +1,4 @@
-"""Requests `recordings/*`, answered beside the recording, which never waits for them."""
+"""Request handlers of `recordings/*`; worker processes read the files, so that recording never waits."""
 
 import asyncio
 from collections.abc import Awaitable, Callable
@@ -20,25 +20,25 @@ from services.recorder.settings import MIB
 
 _MODULE = "services.recorder.reader"
 _NICE = 5
-# Who asked has given up by then; a long recording's values are looked through once.
+# Timeouts of the workers. Values of a long recording need a whole pass through the file.
 _WITHIN_S = 20.0
 _SERIES_WITHIN_S = 120.0
-# A list that takes longer is answered with "busy", after this share of its asker's time at the latest.
-_PATIENCE_S = 4.0
+# A slower `list` or `info` is answered with "busy", at the latest after this share of the client's timeout.
+_MAX_WAIT_S = 4.0
 _SHARE = 0.8
-# An asker who was told "busy" asks again within this.
-_KEPT_S = 1.0
+# A finished answer is kept this long for a client that received "busy" and asks again.
+_CACHE_S = 1.0
 
 
-class Serving:
-    """Answers what is asked of a site's recordings, from worker processes.
+class RecordingServer:
+    """Request handlers for a site's recordings.
 
-    Values of a long recording take long, and are asked of a process of their own.
+    `series` of long recordings is slow and has its own worker process.
 
     Args:
-        open_now: The captures that are being written, by their files' names.
-        flight: Whether the flight recorder keeps what comes.
-        quotas: Of each asker.
+        open_now: Returns the open captures by file name.
+        flight: Returns whether the flight recorder is running.
+        quotas: Quotas of each client.
     """
 
     def __init__(
@@ -52,8 +52,8 @@ class Serving:
         quotas: Quotas = DEFAULT_QUOTAS,
     ) -> None:
         self._open_now, self._flight = open_now, flight
-        self._quick, self._long = (Worker(_MODULE, folder, nice=_NICE) for _ in range(2))
-        self._under_way: dict[tuple[str, bytes], asyncio.Task[bytes]] = {}
+        self._fast_worker, self._series_worker = (Worker(_MODULE, folder, nice=_NICE) for _ in range(2))
+        self._tasks: dict[tuple[str, bytes], asyncio.Task[bytes]] = {}
         self._mebibytes = Quota("recordings_mib", a_minute=quotas.recordings_mib_a_minute)
         session.answer(site, WHOLE_SITE, "recordings/list", self._list)
         session.answer(site, WHOLE_SITE, "recordings/info", self._info)
@@ -62,16 +62,16 @@ class Serving:
 
     @property
     def pid(self) -> int | None:
-        """The process that answers quick questions; None: it has not been asked yet."""
-        return self._quick.pid
+        """Id of the process for fast requests; None before its first request."""
+        return self._fast_worker.pid
 
     async def close(self) -> None:
-        """End the processes."""
-        for task in self._under_way.values():
+        """Stop the worker processes."""
+        for task in self._tasks.values():
             task.cancel()
-        await asyncio.gather(*self._under_way.values(), return_exceptions=True)
-        await self._quick.close()
-        await self._long.close()
+        await asyncio.gather(*self._tasks.values(), return_exceptions=True)
+        await self._fast_worker.close()
+        await self._series_worker.close()
 
     def _handler(self, name: str) -> Callable[[Request], Awaitable[Message]]:
         schemas: dict[str, type[Message]] = {
@@ -90,7 +90,7 @@ class Serving:
         return answer
 
     async def _list(self, request: Request) -> schema.RecordingList:
-        answer = await self._in_time("list", schema.RecordingQuery(), request.within_s)
+        answer = await self._ask_in_time("list", schema.RecordingQuery(), request.within_s)
         listed = schema.RecordingList.FromString(answer)
         open_now = self._open_now()
         known = {recording.file for recording in listed.recordings}
@@ -100,51 +100,53 @@ class Serving:
         return schema.RecordingList(recordings=rows, free_bytes=listed.free_bytes, flight=self._flight())
 
     async def _info(self, request: Request) -> schema.Recording:
-        asked = request.message
-        assert isinstance(asked, schema.RecordingQuery)
-        if (open_now := self._open_now().get(asked.file)) is not None:
+        query = request.message
+        assert isinstance(query, schema.RecordingQuery)
+        if (open_now := self._open_now().get(query.file)) is not None:
             return open_now
-        return schema.Recording.FromString(await self._in_time("info", asked, request.within_s))
+        return schema.Recording.FromString(await self._ask_in_time("info", query, request.within_s))
 
-    async def _in_time(self, name: str, asked: Message, within_s: float | None) -> bytes:
-        """Return the worker's answer while its asker still waits.
+    async def _ask_in_time(self, name: str, query: Message, within_s: float | None) -> bytes:
+        """Return the worker's answer, before the client's timeout.
 
-        What takes longer goes on, and is kept for a moment for the asker, who asks again.
+        A slower answer is completed in the background and kept for a moment, for the client's next attempt.
 
         Raises:
             BusyError: If it takes longer.
-            RefusedError: Why there is none.
+            RefusedError: If the worker cannot answer.
         """
-        key = name, asked.SerializeToString()
-        if (task := self._under_way.get(key)) is None:
-            task = self._under_way[key] = asyncio.create_task(self._ask(name, asked))
+        key = name, query.SerializeToString()
+        if (task := self._tasks.get(key)) is None:
+            task = self._tasks[key] = asyncio.create_task(self._ask(name, query))
             task.add_done_callback(lambda task: self._keep(key, task))
-        patience_s = _PATIENCE_S if within_s is None else min(_PATIENCE_S, _SHARE * within_s)
+        wait_s = _MAX_WAIT_S if within_s is None else min(_MAX_WAIT_S, _SHARE * within_s)
         try:
-            async with asyncio.timeout(patience_s):
+            async with asyncio.timeout(wait_s):
                 return await asyncio.shield(task)
         except TimeoutError:
             raise BusyError(codes.RECORDER_BUSY(request=name)) from None
         finally:
-            if task.done():  # the next asker gets what is there then
+            if task.done():  # the next client gets a fresh answer
                 self._forget(key, task)
 
     def _keep(self, key: tuple[str, bytes], task: asyncio.Task[bytes]) -> None:
         if not task.cancelled():
-            task.exception()  # its asker may have gone
-        asyncio.get_running_loop().call_later(_KEPT_S, self._forget, key, task)
+            task.exception()  # marks it as retrieved: the client may have gone
+        asyncio.get_running_loop().call_later(_CACHE_S, self._forget, key, task)
 
     def _forget(self, key: tuple[str, bytes], task: asyncio.Task[bytes]) -> None:
-        if self._under_way.get(key) is task:
-            del self._under_way[key]
+        if self._tasks.get(key) is task:
+            del self._tasks[key]
 
     async def _ask(self, name: str, request: Message) -> bytes:
-        """The worker's answer.
+        """Return the worker's serialized answer.
 
         Raises:
-            RefusedError: Why there is none.
+            RefusedError: If the recording cannot be read, or the worker crashed or timed out.
         """
-        worker, within_s = (self._long, _SERIES_WITHIN_S) if name == "series" else (self._quick, _WITHIN_S)
+        worker, within_s = self._fast_worker, _WITHIN_S
+        if name == "series":
+            worker, within_s = self._series_worker, _SERIES_WITHIN_S
         try:
             answer = await worker.ask(Question(name, request.SerializeToString()), timeout_s=within_s)
         except (RecordingError, WorkerError, OSError) as error:

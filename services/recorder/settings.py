@@ -1,4 +1,4 @@
-"""What a recorder is told."""
+"""Settings of the recorder service."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ MIB = 1 << 20
 
 @dataclass(frozen=True, kw_only=True)
 class Flight:
-    """The flight recorder.
+    """Settings of the flight recorder.
 
     Attributes:
-        minutes: How much it always keeps.
-        severity: Of an event that has it saved.
-        after_s: How long it goes on after the last such event.
+        minutes: Length of the ring.
+        severity: Lowest severity of an event that causes a save.
+        after_s: Time that a save continues after its last cause.
     """
 
     minutes: float = 5.0
@@ -28,7 +28,7 @@ class Flight:
 
 @dataclass(frozen=True, kw_only=True)
 class Split:
-    """When a capture goes on in a next file."""
+    """Size and length at which a capture continues in another file."""
 
     mib: float = 1024.0
     minutes: float = 60.0
@@ -36,12 +36,12 @@ class Split:
 
 @dataclass(frozen=True, kw_only=True)
 class Marks:
-    """Free space below which something happens [bytes].
+    """Thresholds of free space [bytes].
 
     Attributes:
-        warn: It is told.
-        no_video: Video is recorded no more.
-        states_only: What follows from the joints is recorded no more either.
+        warn: Below it the recorder publishes a warning.
+        no_video: Below it video is not recorded.
+        states_only: Below it frames and kinematics are not recorded either.
     """
 
     warn: int = 2048 * MIB
@@ -50,7 +50,7 @@ class Marks:
 
 
 def flight_of(values: Mapping[str, Any]) -> Flight | None:
-    """The flight recorder of a site file's values; None: it has none."""
+    """Return the flight recorder of a site file's values, or None if it is switched off."""
     if not values["minutes"]:
         return None
     severity: Event.Severity = getattr(Event.Severity, values["severity"].upper())
@@ -58,7 +58,7 @@ def flight_of(values: Mapping[str, Any]) -> Flight | None:
 
 
 def marks_of(values: Mapping[str, float]) -> Marks:
-    """The marks of a site file's values."""
+    """Return the thresholds of a site file's values."""
     return Marks(
         warn=round(values["warn_mib"] * MIB),
         no_video=round(values["video_mib"] * MIB),
@@ -68,14 +68,14 @@ def marks_of(values: Mapping[str, float]) -> Marks:
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Whose captures go where.
+    """Settings of a site's recorder.
 
     Attributes:
-        robots: Those that can be recorded from the start; others of the site once their gateway is there.
-        views: Those whose video a capture holds, unless its request names others.
-        flight: None: no flight recorder.
-        quotas: Of each asker of recordings.
-        site_file: The site file's text, which goes into each recording; empty: there is none.
+        robots: Robots that can be recorded from the start; others of the site once their gateway is online.
+        views: Views that a capture records as video, unless its request names others.
+        flight: Settings of the flight recorder, or None for no flight recorder.
+        quotas: Quotas of each client that reads recordings.
+        site_file: Text of the site file, attached to each recording; empty if there is none.
     """
 
     site: str

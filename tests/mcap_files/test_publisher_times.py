@@ -14,7 +14,7 @@ from mcap_files.series import SeriesReader
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.recordings.export import Wanted
 from services.command_line.recordings.export import run as export
-from services.player.recording_source import Tape
+from services.player.recording_source import RecordingSource
 from tests.recordings import START_NS, joints
 
 JOINTS, KINEMATICS = "robomesh/site/arm/joints", "robomesh/site/arm/kinematics"
@@ -85,12 +85,12 @@ def test_series_go_by_the_publishers_times_whatever_its_clock_says(tmp_path, clo
 
 
 def test_a_replay_puts_each_state_at_its_publishers_time(tmp_path):
-    tape = Tape(bunched(tmp_path / "a.mcap"))
+    source = RecordingSource(bunched(tmp_path / "a.mcap"))
     try:
-        tape.seek(tape.start_ns)
-        played, _ = tape.take(tape.end_ns, speed=1.0)
+        source.seek(source.start_ns)
+        played, _ = source.take(source.end_ns, speed=1.0)
     finally:
-        tape.close()
+        source.close()
     at_ns = [each.at_ns for each in played if each.topic == "joints"]
     assert at_ns == [START_NS + number * 10 * MS for number in range(TOGETHER, STATES)]
 

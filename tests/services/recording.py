@@ -1,4 +1,4 @@
-"""What the recorder's tests share: a recorder and the publishers of a robot, over a real router."""
+"""Fixtures of the recorder's tests: a recorder and a robot's publishers, over a real router."""
 
 import asyncio
 from contextlib import asynccontextmanager
@@ -13,13 +13,13 @@ from services.recorder.settings import Settings
 
 Ask = schema.RecorderRequest
 KEY = "robomesh/site/arm/recorder/request"
-# On a busy machine a service takes its time to come alive.
+# Services start slowly on a busy machine.
 WITHIN_S = 20.0
 
 
 @asynccontextmanager
 async def recording_site(mesh, folder, **settings):
-    """A recorder, and a session that publishes for robot `arm`."""
+    """Run a recorder; yield a session that publishes for robot `arm`."""
     async with open_session(mesh) as own, open_session(mesh) as gateway:
         settings = Settings(site="site", robots=("arm",), folder=folder, **settings)
         task = asyncio.create_task(recorder.serve(own, settings))
@@ -48,7 +48,7 @@ async def put_states(publisher, numbers, *, hz=200.0):
 
 
 async def until(condition):
-    """Until it is so; a test has a deadline."""
+    """Wait until the condition holds; the test's deadline limits the wait."""
     while not condition():
         await asyncio.sleep(0.02)
 
@@ -57,10 +57,10 @@ async def until_indexed(path):
     await until(lambda: path.exists() and state_of(path) is State.INDEXED)
 
 
-async def next_event(said, code):
-    """The next event of that code that a subscription brings."""
+async def next_event(subscription, code):
+    """Return a subscription's next event with that code."""
     while True:
-        message = (await anext(said)).message()
+        message = (await anext(subscription)).message()
         for each in message.events if isinstance(message, schema.EventList) else [message]:
             if each.code == code:
                 return each

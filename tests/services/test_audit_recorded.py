@@ -1,4 +1,4 @@
-"""The audit log's head in recordings: who has one can tell whether the log was cut after it."""
+"""Audit head in recordings: with a recording, a log that was cut after it can be detected."""
 
 import asyncio
 import contextlib
@@ -48,10 +48,10 @@ def test_a_log_that_was_cut_shows_against_a_recording_of_its_time(mesh, tmp_path
 
     file, log = run(main())
     described = json.loads(robomesh("recordings", "info", str(file), "--json").stdout)
-    number, told = described["audit_head"]["number"], described["audit_head"]["hash"]
+    number, head_hash = described["audit_head"]["number"], described["audit_head"]["hash"]
     assert number >= 3
-    assert told == list(read_entries(log))[number - 1].hash
-    assert f"audit log: entry {number}, {told}" in robomesh("recordings", "info", str(file)).stdout
+    assert head_hash == list(read_entries(log))[number - 1].hash
+    assert f"audit log: entry {number}, {head_hash}" in robomesh("recordings", "info", str(file)).stdout
 
     done = robomesh("audit", "verify", str(log), "--recording", str(file), "--json")
     found = json.loads(done.stdout)
@@ -59,6 +59,6 @@ def test_a_log_that_was_cut_shows_against_a_recording_of_its_time(mesh, tmp_path
     log.write_bytes(b"".join(log.read_bytes().splitlines(keepends=True)[: number - 1]))
     done = robomesh("audit", "verify", str(log), "--recording", str(file))
     assert done.returncode == 1
-    assert f"ends after entry {number - 1}, but no entry has the hash {told}" in done.stdout
-    # By itself nothing is wrong with it: what was cut off leaves no trace.
+    assert f"ends after entry {number - 1}, but no entry has the hash {head_hash}" in done.stdout
+    # Without the recording the cut is not detected.
     assert robomesh("audit", "verify", str(log)).returncode == 0

@@ -1,4 +1,4 @@
-"""The flight recorder: the last minutes are there when something happens, also after a kill."""
+"""Flight recorder: the last minutes are saved after an event, also when the recorder was killed."""
 
 import asyncio
 import json
@@ -44,17 +44,17 @@ def positions(path):
 
 
 async def saved(folder):
-    """The one file that was saved."""
+    """Wait for the only saved file and return its path."""
     await until(lambda: len(list(folder.glob(SAVED))) == 1)
     (path,) = folder.glob(SAVED)
     await until_indexed(path)
     return path
 
 
-def test_an_event_keeps_what_was_before_it_and_what_followed(mesh, tmp_path, monkeypatch):
-    # Saves go on until the test says so: a busy machine may take any time.
+def test_an_event_saves_the_messages_before_and_after_it(mesh, tmp_path, monkeypatch):
+    # The test ends the save itself, because a busy machine may take any time.
     ended = threading.Event()
-    monkeypatch.setattr(flight.FlightRecorder, "_long", lambda recorder, now: ended.is_set())
+    monkeypatch.setattr(flight.FlightRecorder, "_is_too_long", lambda recorder, now: ended.is_set())
 
     async def main():
         async with recording_site(mesh, tmp_path, flight=Flight(after_s=3600.0)) as session:
@@ -62,7 +62,7 @@ def test_an_event_keeps_what_was_before_it_and_what_followed(mesh, tmp_path, mon
             events = session.declare_publisher("site", "arm", "events")
             await until(lambda: joints.watched and events.watched)
             await put_states(joints, range(50), hz=500)
-            events.put(event(S.WARNING, "not grave enough"))
+            events.put(event(S.WARNING, "not severe enough"))
             events.put(event(S.ERROR, "drive 3 failed"))
             await put_states(joints, range(50, 100), hz=500)
             events.put(event(S.ERROR, "drive 4 failed"))
@@ -71,7 +71,7 @@ def test_an_event_keeps_what_was_before_it_and_what_followed(mesh, tmp_path, mon
                 await asyncio.sleep(0.02)
             ended.set()
             path = await saved(tmp_path)
-            # A second save has only what came since.
+            # A second save holds only later messages.
             await put_states(joints, range(200, 210), hz=500)
             answer = await session.ask(KEY, Ask(action=Ask.SAVE, name="by-hand"), timeout_s=WITHIN_S)
             assert (answer.name, answer.cause, answer.open) == ("by-hand", "asked for", True)
@@ -89,7 +89,7 @@ def test_an_event_keeps_what_was_before_it_and_what_followed(mesh, tmp_path, mon
 
 
 async def joints_listed(session):
-    """How many joint states the file that is being saved has so far."""
+    """Return the number of joint states in the save that is recording."""
     listed = await session.ask("robomesh/site/-/recordings/list", timeout_s=WITHIN_S)
     assert listed.flight
     rows = [row for recording in listed.recordings for row in recording.topics if row.topic == JOINTS]
@@ -106,7 +106,7 @@ ABOUT = {"site": "site", "robot": "arm", "name": "flight", "started_by": "flight
 
 
 def segment_in(folder, number, *, end):
-    """A segment that an earlier process left: of one message, this number; `end`: it was closed."""
+    """Write a segment of an earlier process with one message; `end` closes it properly."""
     path = folder / ".flight" / "arm" / f"2026-01-01T00-00-0{number}.000000Z.mcap"
     capture = Capture(path, ABOUT, start_ns=time.time_ns())
     state = JointStates()
@@ -127,10 +127,10 @@ def segment_in(folder, number, *, end):
     return path
 
 
-def test_what_a_killed_flight_recorder_left_is_saved_at_the_next_start(mesh, tmp_path):
+def test_segments_of_a_killed_flight_recorder_are_saved_at_the_next_start(mesh, tmp_path):
     segment = segment_in(tmp_path, 1, end=False)
     unreadable = segment.with_name("2026-01-01T00-00-00.000000Z.mcap")
-    unreadable.write_bytes(bytes(4096))  # as a power loss leaves one
+    unreadable.write_bytes(bytes(4096))  # as after a power loss
 
     async def main():
         async with recording_site(mesh, tmp_path, flight=Flight()):
@@ -144,14 +144,14 @@ def test_what_a_killed_flight_recorder_left_is_saved_at_the_next_start(mesh, tmp
     assert unreadable.with_suffix(".damaged").exists()
 
 
-def test_what_a_kill_left_of_a_save_that_was_done_is_not_saved_again(mesh, tmp_path):
+def test_a_save_that_was_done_before_a_kill_is_not_repeated(mesh, tmp_path):
     first, second = (segment_in(tmp_path, number, end=True) for number in (1, 2))
     (tmp_path / "arm").mkdir()
     rewrite([first, second], tmp_path / "arm" / "done.mcap", about={"name": "done"})
     noted = {"about": {"name": "done", "cause": "drive"}, "segments": [first.name, second.name]}
     mark = first.with_name("done.save.json")
     mark.write_text(json.dumps(noted))
-    first.unlink()  # killed here
+    first.unlink()  # the process was killed here
 
     async def main():
         async with recording_site(mesh, tmp_path, flight=Flight()) as session:
@@ -164,13 +164,13 @@ def test_what_a_kill_left_of_a_save_that_was_done_is_not_saved_again(mesh, tmp_p
     assert [path.name for path in tmp_path.glob(SAVED)] == ["done.mcap"]
 
 
-def test_a_save_that_fails_is_told_kept_and_tried_again(mesh, tmp_path, monkeypatch):
-    monkeypatch.setattr(flight, "_SAVE_AGAIN_AFTER_S", 0.1)
+def test_a_failed_save_is_reported_and_retried(mesh, tmp_path, monkeypatch):
+    monkeypatch.setattr(flight, "_SAVE_RETRY_S", 0.1)
     (tmp_path / "arm").write_bytes(b"")  # no folder can be made there
 
     async def main():
         async with recording_site(mesh, tmp_path, flight=Flight(after_s=0.0)) as session:
-            said = session.subscribe("robomesh/site/arm/events/recorder", newest=100)
+            events = session.subscribe("robomesh/site/arm/events/recorder", newest=100)
             joints = session.declare_publisher("site", "arm", "joints")
             await until(lambda: joints.watched)
             await put_states(joints, range(5))
@@ -178,21 +178,21 @@ def test_a_save_that_fails_is_told_kept_and_tried_again(mesh, tmp_path, monkeypa
                 with pytest.raises(RefusedError, match="at most 81 letters"):
                     await session.ask(KEY, Ask(action=Ask.SAVE, name=name), timeout_s=WITHIN_S)
             await session.ask(KEY, Ask(action=Ask.SAVE, name="kept"), timeout_s=WITHIN_S)
-            told = await next_event(said, "recorder.not_saved")
+            failure = await next_event(events, "recorder.not_saved")
             (tmp_path / "arm").unlink()
             path = await saved(tmp_path)
-            await next_event(said, "recorder.saved")
-            return told, path
+            await next_event(events, "recorder.saved")
+            return failure, path
 
-    told, path = run(main(), timeout_s=60.0)
-    assert told.severity == S.CRITICAL
-    assert "kept is not saved" in told.text
+    failure, path = run(main(), timeout_s=60.0)
+    assert failure.severity == S.CRITICAL
+    assert "kept is not saved" in failure.text
     assert positions(path) == list(range(5))
     assert not list((tmp_path / ".flight" / "arm").glob("*.json"))
 
 
-def test_old_segments_are_removed_and_nothing_else(mesh, tmp_path, monkeypatch):
-    monkeypatch.setattr(flight, "_SHORTEST_S", 0.2)
+def test_only_old_segments_are_removed(mesh, tmp_path, monkeypatch):
+    monkeypatch.setattr(flight, "_MIN_SEGMENT_S", 0.2)
 
     async def main():
         async with recording_site(mesh, tmp_path, flight=Flight(minutes=0.01)) as session:
@@ -204,12 +204,12 @@ def test_old_segments_are_removed_and_nothing_else(mesh, tmp_path, monkeypatch):
                 await put_states(joints, range(10))
             return len(list(folder.glob("*.mcap")))
 
-    # 0.6 s in segments of 0.2 s, and what a busy machine is late with.
+    # 0.6 s in segments of 0.2 s; a busy machine removes them late.
     assert 1 <= run(main()) <= 8
     assert not list(tmp_path.glob(SAVED))
 
 
-def test_without_a_flight_recorder_a_save_is_refused_in_words(mesh, tmp_path):
+def test_without_a_flight_recorder_a_save_is_refused(mesh, tmp_path):
     async def main():
         async with recording_site(mesh, tmp_path) as session:
             with pytest.raises(RefusedError, match=r"no flight recorder here: \[recorder\] flight"):

@@ -1,4 +1,4 @@
-"""A recording's log time is never before its publish time, however busy the machine is."""
+"""Log times of a recording: never before the publish time, also on a busy machine."""
 
 import asyncio
 import time
@@ -9,8 +9,7 @@ from mcap_files.capture import Capture
 from robomesh.header import Header, pack
 from robomesh.session import open_session
 from robomesh.wall_clock import WallClock
-from services.recorder import captures as recorder_robot
-from services.recorder import subscriptions
+from services.recorder import captures, subscriptions
 from tests.conftest import run
 from tests.services.recording import put_states, recording_site, trace_off, trace_on, until, until_indexed
 
@@ -22,8 +21,8 @@ def messages_of(path):
         return [message for _, _, message in make_reader(stream).iter_messages()]
 
 
-def test_what_comes_while_the_recorder_is_busy_came_after_it_was_published(mesh):
-    class Slow:
+def test_a_busy_recorder_dates_no_message_before_its_publication(mesh):
+    class SlowSink:
         def __init__(self):
             self.times = []
 
@@ -31,19 +30,16 @@ def test_what_comes_while_the_recorder_is_busy_came_after_it_was_published(mesh)
             self.times.append((header.source_time_ns, received_ns))
             time.sleep(0.02)
 
-        def swept(self):
+        def drained(self):
             pass
 
     async def main():
         async with open_session(mesh) as own, open_session(mesh) as other:
-            taking, sink, wall_clock = (
-                subscriptions.Intake(own.zenoh_session, "site", own.ignored),
-                Slow(),
-                WallClock(),
-            )
+            subscribed = subscriptions.Subscriptions(own.zenoh_session, "site", own.ignored)
+            sink, wall_clock = SlowSink(), WallClock()
             try:
-                with taking.lock:
-                    taking.robot("arm").attach(sink, frozenset({"joints"}))
+                with subscribed.lock:
+                    subscribed.robot("arm").attach(sink, frozenset({"joints"}))
                 number = 0
                 while len(sink.times) < 50:
                     number += 1
@@ -51,20 +47,20 @@ def test_what_comes_while_the_recorder_is_busy_came_after_it_was_published(mesh)
                     other.zenoh_session.put(JOINTS, b"", attachment=pack(header))
                     await asyncio.sleep(0.005)
             finally:
-                taking.close()
+                subscribed.close()
             wall_clock.was_set()
             return [wall_clock.latest_ns(received_ns) - source_ns for source_ns, received_ns in sink.times]
 
     assert min(run(main(), timeout_s=60)) >= 0
 
 
-def test_a_file_that_takes_time_to_be_made_moves_no_message_into_the_past(mesh, tmp_path, monkeypatch):
+def test_a_slowly_created_file_dates_no_message_before_its_publication(mesh, tmp_path, monkeypatch):
     class SlowCapture(Capture):
         def __init__(self, *args, **kwargs):
             super().__init__(*args, **kwargs)
             time.sleep(0.2)
 
-    monkeypatch.setattr(recorder_robot, "Capture", SlowCapture)
+    monkeypatch.setattr(captures, "Capture", SlowCapture)
 
     async def main():
         async with recording_site(mesh, tmp_path, flight=None) as session:
@@ -82,7 +78,7 @@ def test_a_file_that_takes_time_to_be_made_moves_no_message_into_the_past(mesh, 
     assert min(message.log_time - message.publish_time for message in messages) >= 0
 
 
-def test_a_clock_that_is_set_forward_begins_the_next_file(mesh, tmp_path, monkeypatch):
+def test_setting_the_clock_forward_begins_the_next_file(mesh, tmp_path, monkeypatch):
     async def main():
         async with recording_site(mesh, tmp_path, flight=None) as session:
             joints = session.declare_publisher("site", "arm", "joints")
@@ -104,5 +100,5 @@ def test_a_clock_that_is_set_forward_begins_the_next_file(mesh, tmp_path, monkey
     second, set_ns = run(main(), timeout_s=60)
     assert ".part2" in second.name
     messages = [message for message in messages_of(second) if message.publish_time >= set_ns]
-    assert len(messages) >= 15  # the end of the trace may overtake the last states
+    assert len(messages) >= 15  # the request may overtake the last states
     assert min(message.log_time - message.publish_time for message in messages) >= 0

@@ -1,4 +1,4 @@
-"""The player over a real router: what a monitor sees of a replay, and what it can ask of it."""
+"""Player over a real router: topics of a replay, and requests to it."""
 
 import asyncio
 import json
@@ -11,6 +11,7 @@ import pytest
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 
+from robomesh import reason_codes as codes
 from robomesh.errors import NoAnswerError, RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
@@ -25,7 +26,7 @@ OPEN = "robomesh/site/-/player/open"
 
 @asynccontextmanager
 async def playing_site(mesh, folder):
-    """A player, and somebody who watches."""
+    """Run a player; yield a monitor's session."""
     async with open_session(mesh) as own, open_session(mesh) as monitor:
         task = asyncio.create_task(player.serve(own, player.Settings(site="site", folder=folder)))
         try:
@@ -55,14 +56,14 @@ async def until_state(session, state, condition):
     async for sample in session.subscribe(f"robomesh/site/{state.robot}/replay"):
         if condition(message := sample.message()):
             return message
-    raise AssertionError("the replay tells no more")
+    raise AssertionError("the subscription ended")
 
 
 def waist(sample):
     return {joint.name: joint.position for joint in sample.message().joints}["waist"]
 
 
-def test_a_monitor_sees_each_recorded_state_once_with_its_recorded_time(mesh, folder):
+def test_a_monitor_receives_each_recorded_state_once_with_its_recorded_time(mesh, folder):
     async def main():
         async with playing_site(mesh, folder) as session:
             state = await opened(session, paused=True)
@@ -80,15 +81,15 @@ def test_a_monitor_sees_each_recorded_state_once_with_its_recorded_time(mesh, fo
             return samples, (await anext(frames)).message()
 
     samples, frames = run(main())
-    # The first stood there before anybody listened, and comes as an answer.
-    told = {sample.header.source_time_ns: waist(sample) for sample in samples}
-    assert told == {START_NS + number * 10_000_000 - 1000: number / 100 for number in range(400)}
+    # The first state was published before the subscription, and is its history.
+    received = {sample.header.source_time_ns: waist(sample) for sample in samples}
+    assert received == {START_NS + number * 10_000_000 - 1000: number / 100 for number in range(400)}
     assert isinstance(frames, FrameTransforms)
     assert frames.transforms[0].child_frame_id.startswith("site/replay-")
     assert frames.transforms[0].parent_frame_id == "site"
 
 
-def test_what_a_recorder_wrote_is_played_as_it_was(mesh, tmp_path):
+def test_a_recorders_file_is_replayed_unchanged(mesh, tmp_path):
     async def main():
         async with playing_site(mesh, tmp_path) as session, open_session(mesh) as own:
             settings = recorder.Settings(site="site", robots=("arm",), folder=tmp_path)
@@ -104,13 +105,13 @@ def test_what_a_recorder_wrote_is_played_as_it_was(mesh, tmp_path):
                 put[header.source_time_ns] = number / 7
                 await asyncio.sleep(0.01)
             done = await session.ask(key, _Record(action=_Record.TRACE_OFF), timeout_s=15.0)
-            # Again and again: a player that is late on a busy machine leaves something out.
-            asked = schema.PlayRequest(file=done.file, paused=True, loop=True)
-            state = await session.ask(OPEN, asked, timeout_s=10.0)
+            # In a loop, because a player that is late on a busy machine skips messages.
+            request = schema.PlayRequest(file=done.file, paused=True, loop=True)
+            state = await session.ask(OPEN, request, timeout_s=10.0)
             seen = session.subscribe(f"robomesh/site/{state.robot}/joints", newest=1000)
             await ask(session, state, _Ask.PLAY)
             played = {}
-            # Of what stood there when the recording began the newest is told.
+            # Of the messages before the recording only the newest is replayed.
             begin_ns = state.start.ToNanoseconds()
             while {time_ns for time_ns in put if time_ns > begin_ns} - played.keys():
                 sample = await anext(seen)
@@ -124,7 +125,7 @@ def test_what_a_recorder_wrote_is_played_as_it_was(mesh, tmp_path):
     assert played.items() <= put.items()
 
 
-def test_a_late_joiner_learns_what_the_replay_is_and_has_its_meshes(mesh, folder):
+def test_a_late_joiner_gets_the_replays_description_events_and_meshes(mesh, folder):
     async def main():
         async with playing_site(mesh, folder) as session:
             state = await opened(session, paused=True, position_s=2.5)
@@ -134,7 +135,7 @@ def test_a_late_joiner_learns_what_the_replay_is_and_has_its_meshes(mesh, folder
             mesh_bytes = await session.ask_bytes(f"{robot}/mesh/base")
             with pytest.raises(RefusedError, match="it has mesh/base"):
                 await session.ask_bytes(f"{robot}/mesh/none", timeout_s=8.0)
-            alive = {(who.robot, who.service) for who in await session.present()}
+            alive = {(each.robot, each.service) for each in await session.present()}
             assert (state.robot, "player") in alive
             return state, description, events, mesh_bytes
 
@@ -147,7 +148,7 @@ def test_a_late_joiner_learns_what_the_replay_is_and_has_its_meshes(mesh, folder
     assert state.duration_s == pytest.approx(3.99)
 
 
-def test_seeking_shows_what_was_so_then_and_video_from_the_key_frame_before(mesh, folder):
+def test_a_seek_publishes_the_state_then_and_video_since_the_key_frame(mesh, folder):
     async def main():
         async with playing_site(mesh, folder) as session:
             state = await opened(session, paused=True)
@@ -169,13 +170,13 @@ def test_seeking_shows_what_was_so_then_and_video_from_the_key_frame_before(mesh
     message, video, events = run(main())
     assert [joint.position for joint in message.joints] == [3.2, -3.2]
     assert len(events.events) == 4
-    # Each fiftieth is a key frame, each fifth a picture: 300, 305, 310, 315, 320.
+    # Each fifth state has a frame, each fiftieth a key frame: 300, 305, 310, 315, 320.
     pictures = [CompressedVideo.FromString(frame.data) for frame in video.frames]
     assert {picture.frame_id.split("/", 2)[2] for picture in pictures} == {"camera/front"}
     assert [picture.data[-3:] for picture in pictures] == [b"300", b"305", b"310", b"315", b"320"]
 
 
-def test_what_is_paused_stays_and_is_told_again_so_that_nobody_calls_it_stale(mesh, folder):
+def test_a_paused_replay_repeats_its_state_so_that_it_does_not_expire(mesh, folder):
     async def main():
         async with playing_site(mesh, folder) as session:
             state = await opened(session, paused=True, position_s=1.0)
@@ -189,7 +190,7 @@ def test_what_is_paused_stays_and_is_told_again_so_that_nobody_calls_it_stale(me
     assert (state.playing, state.position_s) == (False, 1.0)
 
 
-def test_a_hundred_times_as_fast_is_thinned_and_ends_a_hundred_times_as_soon(mesh, tmp_path):
+def test_a_replay_at_a_hundred_times_the_speed_is_thinned_and_on_time(mesh, tmp_path):
     write_recording(tmp_path / "trial.mcap", seconds=60.0, video=False)
 
     async def main():
@@ -211,17 +212,17 @@ def test_a_hundred_times_as_fast_is_thinned_and_ends_a_hundred_times_as_soon(mes
 
     took_s, count = run(main())
     assert took_s >= 0.59
-    assert count < 120  # of 6000; of a machine that cannot keep up it is less, not later
+    assert count < 120  # of 6000; a slow machine skips messages and is not late
 
 
-def test_a_loop_begins_again_and_close_ends_it_for_everybody(mesh, folder):
+def test_a_loop_restarts_and_close_ends_the_replay(mesh, folder):
     async def main():
         async with playing_site(mesh, folder) as session:
             state = await opened(session, loop=True, position_s=3.8, speed=1.0)
             await until_state(session, state, lambda state: state.position_s < 1.0)
             await ask(session, state, _Ask.CLOSE)
             async with asyncio.timeout(40):
-                while any(who.robot == state.robot for who in await session.present()):
+                while any(each.robot == state.robot for each in await session.present()):
                     await asyncio.sleep(0.02)
             with pytest.raises(NoAnswerError):
                 await session.ask(
@@ -231,31 +232,32 @@ def test_a_loop_begins_again_and_close_ends_it_for_everybody(mesh, folder):
     run(main())
 
 
-def test_nothing_of_a_replay_can_be_moved_or_recorded(mesh, folder):
+def test_a_replay_can_be_neither_moved_nor_recorded(mesh, folder):
     async def main():
         async with playing_site(mesh, folder) as session:
             state = await opened(session)
             robot = f"robomesh/site/{state.robot}"
-            asked = {
+            requests = {
                 "stop": schema.StopRequest(),
                 "lease/request/li": schema.LeaseRequest(action=schema.LeaseRequest.ACQUIRE),
                 "command/li": schema.CommandRequest(command=schema.CommandRequest.HOME),
                 "recorder/request": schema.RecorderRequest(action=schema.RecorderRequest.TRACE_ON),
             }
-            words = {}
-            for name, message in asked.items():
+            refusals = {}
+            for name, message in requests.items():
                 with pytest.raises(RefusedError) as refused:
                     await session.ask(f"{robot}/{name}", message)
-                words[name] = str(refused.value)
-            return words
+                refusals[name] = refused.value.reason.code
+            return refusals
 
-    words = run(main())
-    assert words["stop"] == words["command/li"] == "a replay of trial.mcap: nothing here can move"
-    assert words["recorder/request"] == "a replay of trial.mcap: recorded already"
+    refusals = run(main())
+    moves = ("stop", "lease/request/li", "command/li")
+    assert {refusals[name] for name in moves} == {codes.REPLAY_CANNOT_MOVE.name}
+    assert refusals["recorder/request"] == codes.REPLAY_IS_RECORDED.name
 
 
-def test_a_replay_ends_when_its_askers_session_goes(mesh, folder, monkeypatch):
-    monkeypatch.setattr(player.player, "_SESSION_GOES_S", 0.1)
+def test_a_replay_ends_with_its_clients_session(mesh, folder, monkeypatch):
+    monkeypatch.setattr(player.player, "_SESSION_END_S", 0.1)
 
     async def main():
         async with playing_site(mesh, folder) as session:
@@ -266,41 +268,41 @@ def test_a_replay_ends_when_its_askers_session_goes(mesh, folder, monkeypatch):
             await until_state(session, state, lambda state: state.position_s > 0.1)
             token.undeclare()
             async with asyncio.timeout(40):
-                while any(who.robot == state.robot for who in await session.present()):
+                while any(each.robot == state.robot for each in await session.present()):
                     await asyncio.sleep(0.02)
 
     run(main())
 
 
-def test_a_replay_whose_asker_goes_while_it_is_opened_ends_too(mesh, folder, monkeypatch):
-    monkeypatch.setattr(player.player, "_SESSION_GOES_S", 0.1)
+def test_a_replay_ends_when_its_clients_session_ends_during_the_opening(mesh, folder, monkeypatch):
+    monkeypatch.setattr(player.player, "_SESSION_END_S", 0.1)
     opening, go_on, open_replay = threading.Event(), threading.Event(), player.player.open_replay
 
-    def slowly(*args, **values):
+    def open_slowly(*args, **values):
         opening.set()
         go_on.wait(30.0)
         return open_replay(*args, **values)
 
-    monkeypatch.setattr(player.player, "open_replay", slowly)
+    monkeypatch.setattr(player.player, "open_replay", open_slowly)
 
     async def main():
         async with playing_site(mesh, folder) as session:
             token = session.declare_presence_of("site", "-", "operator", "tab")
-            asked = asyncio.create_task(opened(session, session="tab", loop=True))
+            task = asyncio.create_task(opened(session, session="tab", loop=True))
             async with asyncio.timeout(60):
                 while not opening.is_set():
                     await asyncio.sleep(0.02)
                 token.undeclare()
                 await asyncio.sleep(1.0)
                 go_on.set()
-                state = await asked
-                while any(who.robot == state.robot for who in await session.present()):
+                state = await task
+                while any(each.robot == state.robot for each in await session.present()):
                     await asyncio.sleep(0.02)
 
     run(main(), timeout_s=90)
 
 
-def test_what_cannot_be_played_is_refused_in_words(mesh, folder):
+def test_a_file_that_cannot_be_played_is_refused(mesh, folder):
     (folder / "arm" / "text.mcap").write_text("no recording")
 
     async def refused(session, file, **values):
@@ -321,7 +323,7 @@ def test_what_cannot_be_played_is_refused_in_words(mesh, folder):
     run(main())
 
 
-def test_a_recording_of_one_moment_is_shown_once_however_it_is_to_loop(mesh, tmp_path):
+def test_a_recording_of_one_moment_is_not_looped(mesh, tmp_path):
     with Written(tmp_path / "trial.mcap") as file:
         file.put("joints", joints(waist=1.0), 0.0)
 
@@ -334,7 +336,7 @@ def test_a_recording_of_one_moment_is_shown_once_however_it_is_to_loop(mesh, tmp
     assert run(main()) == 0.0
 
 
-def test_a_monitor_in_the_terminal_never_takes_a_replay_for_a_robot(mesh, router, folder, capsys):
+def test_the_terminal_monitor_marks_a_replay(mesh, router, folder, capsys):
     async def main():
         async with playing_site(mesh, folder) as session:
             state = await opened(session, position_s=1.0, loop=True)

@@ -1,4 +1,4 @@
-"""The recorder over a real router: what it writes, what a kill leaves, what it refuses."""
+"""Recorder over a real router: files, recovery after a kill, refused requests."""
 
 import asyncio
 import contextlib
@@ -34,14 +34,14 @@ LIST = "robomesh/site/-/recordings/list"
 
 @asynccontextmanager
 async def recording_arm(mesh, folder, **settings):
-    """A recorder and a gateway's publishers."""
+    """Run a recorder; yield a gateway's session and its joints publisher."""
     async with recording_site(mesh, folder, **settings) as gateway:
         publisher = gateway.declare_publisher("site", "arm", "joints")
         gateway.declare_publisher("site", "arm", "description").put(schema.Description(name="pt600"))
         yield gateway, publisher
 
 
-def describe_chunks(file):
+def chunk_count(file):
     with file.open("rb") as stream:
         return make_reader(stream).get_summary().statistics.chunk_count
 
@@ -51,7 +51,7 @@ async def until_watched(publisher):
         await asyncio.sleep(0.01)
 
 
-def test_a_capture_holds_everything_and_opens_with_the_foxglove_schemas(mesh, tmp_path):
+def test_a_capture_holds_every_message_with_the_foxglove_schemas(mesh, tmp_path):
     async def main():
         async with recording_arm(mesh, tmp_path) as (session, publisher):
             begun = await trace_on(session, name="trial")
@@ -62,7 +62,7 @@ def test_a_capture_holds_everything_and_opens_with_the_foxglove_schemas(mesh, tm
             listed = await session.ask(LIST, timeout_s=20.0)
             assert [(row.name, row.open, row.problem) for row in listed.recordings] == [("trial", False, "")]
             file = tmp_path / "arm" / done.file
-            while describe_chunks(file) == 0:  # indexed beside what comes next
+            while chunk_count(file) == 0:  # indexed in the background
                 await asyncio.sleep(0.02)
             return file
 
@@ -80,7 +80,7 @@ def test_a_capture_holds_everything_and_opens_with_the_foxglove_schemas(mesh, tm
     assert all(topic.startswith("robomesh/site/arm/") for _, topic, _ in rows)
 
 
-def test_what_each_service_notices_and_the_programs_progress_are_recorded(mesh, tmp_path):
+def test_events_of_each_service_and_program_progress_are_recorded(mesh, tmp_path):
     async def main():
         async with recording_arm(mesh, tmp_path) as (session, publisher):
             program = session.declare_publisher("site", "arm", "program")
@@ -110,19 +110,19 @@ def test_what_each_service_notices_and_the_programs_progress_are_recorded(mesh, 
     assert all(row.lost == 0 for row in describe_file(file).topics)
     with file.open("rb") as stream:
         reader = make_reader(stream, decoder_factories=[DecoderFactory()])
-        told = {channel.topic: message for _, channel, _, message in reader.iter_decoded_messages()}
-    assert told["robomesh/site/arm/program"].line == 3
-    assert told["robomesh/site/arm/events/kinematics"].code == "of events/kinematics"
-    assert told["robomesh/site/arm/events"].code == "of events"
+        last = {channel.topic: message for _, channel, _, message in reader.iter_decoded_messages()}
+    assert last["robomesh/site/arm/program"].line == 3
+    assert last["robomesh/site/arm/events/kinematics"].code == "of events/kinematics"
+    assert last["robomesh/site/arm/events"].code == "of events"
 
 
-def test_what_is_lost_on_the_way_is_told_in_the_file(mesh, tmp_path):
+def test_lost_publications_are_counted_in_the_file(mesh, tmp_path):
     async def main():
         async with recording_arm(mesh, tmp_path) as (session, publisher):
             await trace_on(session)
             await until_watched(publisher)
             await put_states(publisher, range(3))
-            publisher._sequence += 7  # what a full link drops, nobody hears of
+            publisher._sequence += 7  # as if a congested link had dropped seven
             await put_states(publisher, range(3))
             done = await trace_off(session)
             return tmp_path / "arm" / done.file
@@ -151,23 +151,21 @@ def test_a_controllers_trace_opens_and_closes_a_capture(mesh, tmp_path):
     run(main())
 
 
-def test_a_trace_while_another_recording_runs_is_said_to_have_joined_it(mesh, tmp_path):
+def test_a_trace_during_a_recording_joins_it_with_an_event(mesh, tmp_path):
     async def main():
         async with recording_arm(mesh, tmp_path) as (session, publisher):
-            said = session.subscribe("robomesh/site/arm/events/recorder", newest=100)
+            events = session.subscribe("robomesh/site/arm/events/recorder", newest=100)
             controller = session.declare_publisher("site", "arm", "controller")
             await trace_on(session, name="trial")
             await until_watched(publisher)
             controller.put(schema.ControllerState(trace=schema.ControllerState.YES))
-            event = await next_event(said, "recorder.trace_joined")
-            assert "goes into trial" in event.text
+            event = await next_event(events, "recorder.trace_joined")
+            assert event.values["recording"] == "trial"
 
     run(main())
 
 
-def test_what_an_earlier_recorder_left_is_made_whole_but_neither_anothers_open_file_nor_a_strangers(
-    mesh, tmp_path
-):
+def test_an_unfinished_file_is_recovered_but_no_open_or_foreign_one(mesh, tmp_path):
     about = {"site": "site", "robot": "arm", "name": "left", "started_by": "request"}
     left, empty = (tmp_path / "arm" / name for name in ("left.mcap", "empty.mcap"))
     killed = Capture(left, about, start_ns=1)
@@ -175,8 +173,8 @@ def test_what_an_earlier_recorder_left_is_made_whole_but_neither_anothers_open_f
     killed.give_up()
     another = Capture(tmp_path / "arm" / "open.mcap", about, start_ns=1)
     another.write_out()
-    stranger = tmp_path / "arm" / "stranger.mcap"
-    stranger.write_bytes(records.start())
+    other_program = tmp_path / "arm" / "other.mcap"
+    other_program.write_bytes(records.start())
     empty.touch()
 
     async def main():
@@ -185,12 +183,12 @@ def test_what_an_earlier_recorder_left_is_made_whole_but_neither_anothers_open_f
 
     run(main())
     assert state_of(another.path) is State.OPEN
-    assert stranger.read_bytes() == records.start()
+    assert other_program.read_bytes() == records.start()
     another.finish({})
     assert state_of(another.path) is State.INDEXED
 
 
-def test_wrong_requests_are_refused_in_words(mesh, tmp_path):
+def test_invalid_requests_are_refused(mesh, tmp_path):
     async def main():
         async with recording_arm(mesh, tmp_path) as (session, _):
             with pytest.raises(RefusedError, match="not being recorded"):
@@ -204,7 +202,7 @@ def test_wrong_requests_are_refused_in_words(mesh, tmp_path):
     run(main())
 
 
-def test_an_end_of_the_service_closes_the_file(mesh, tmp_path):
+def test_the_end_of_the_service_closes_the_file(mesh, tmp_path):
     async def main():
         async with recording_arm(mesh, tmp_path) as (session, publisher):
             await trace_on(session, name="cut")
@@ -218,7 +216,7 @@ def test_an_end_of_the_service_closes_the_file(mesh, tmp_path):
     assert {row.topic.rsplit("/", 1)[-1]: row.messages for row in recording.topics}["joints"] == 20
 
 
-def test_a_full_disk_ends_the_capture_and_says_so_and_the_recorder_goes_on(mesh, tmp_path, caplog):
+def test_a_full_disk_ends_the_capture_with_an_event_but_not_the_recorder(mesh, tmp_path, caplog):
     async def main():
         async with recording_arm(mesh, tmp_path) as (session, publisher):
             await trace_on(session, name="full")
@@ -240,7 +238,7 @@ def test_a_full_disk_ends_the_capture_and_says_so_and_the_recorder_goes_on(mesh,
 
 
 def fill_disk_under(folder):
-    """From now on the one open recording of a folder stands on a full disk."""
+    """Redirect the only open recording of a folder to a full disk."""
     (file,) = folder.glob("*.mcap")
     (descriptor,) = [int(link.name) for link in Path("/proc/self/fd").iterdir() if opens(link) == str(file)]
     with Path("/dev/full").open("wb") as full:
@@ -254,7 +252,7 @@ def opens(link):
         return ""
 
 
-def test_a_file_cut_anywhere_or_with_a_changed_byte_is_told_of_and_breaks_nothing(mesh, tmp_path):
+def test_a_file_cut_anywhere_or_with_a_changed_byte_is_described_or_refused(mesh, tmp_path):
     async def main():
         async with recording_arm(mesh, tmp_path) as (session, publisher):
             await trace_on(session, name="whole")
@@ -270,28 +268,28 @@ def test_a_file_cut_anywhere_or_with_a_changed_byte_is_told_of_and_breaks_nothin
         cut.write_bytes(data[:length])
         with contextlib.suppress(RecordingError):
             assert describe_file(cut).problem
-    for place in range(0, len(data), 61):
-        cut.write_bytes(data[:place] + bytes([data[place] ^ 0xA5]) + data[place + 1 :])
+    for position in range(0, len(data), 61):
+        cut.write_bytes(data[:position] + bytes([data[position] ^ 0xA5]) + data[position + 1 :])
         with contextlib.suppress(RecordingError):
             describe_file(cut)
 
 
 @pytest.mark.processes
-def test_what_two_kills_leave_is_without_a_gap_and_recovered_by_the_next_recorder(tmp_path):
-    # How little is lost is for the program itself to tell, on a machine that does nothing else.
+def test_recordings_of_two_killed_recorders_have_no_gap_and_are_recovered(tmp_path):
+    # The amount lost at the end is measured by the program itself, on an idle machine.
     kills = recorder_kills.kills(2, tmp_path, seed=5, longest_s=1.0, most_lost_s=30.0)
     report = run(kills, timeout_s=120.0)
     assert report.problems == []
     assert (report.kills, report.recovered) == (2, 2)
 
 
-def test_a_robot_that_comes_later_is_recorded_too(mesh, tmp_path):
+def test_a_robot_that_comes_online_later_can_be_recorded(mesh, tmp_path):
     async def main():
         async with recording_arm(mesh, tmp_path) as (gateway, _):
             publisher = gateway.declare_publisher("site", "late", "joints")
             gateway.declare_presence("site", "late", "gateway")
             key = "robomesh/site/late/recorder/request"
-            # Once: an ask that was not answered in time may have been done all the same.
+            # Ask once only: a request that timed out may still have been executed.
             with gateway.zenoh_session.declare_querier(key) as querier:
                 await until(lambda: querier.matching_status.matching)
             await gateway.ask(key, _Request(action=_Request.TRACE_ON, name="late"), timeout_s=WITHIN_S)

@@ -1,4 +1,4 @@
-"""The disk of a recorder: what it refuses ends one file, and no other."""
+"""Disk of a recorder: a write error ends one file and no other."""
 
 import errno
 import threading
@@ -38,58 +38,58 @@ def opened(disk, name):
 
 
 def refuse(capture, monkeypatch, attempt="write_out"):
-    """From now on the disk takes no more of a file; a wait until that was noticed."""
-    given_up = threading.Event()
+    """Make writes of a file fail from now on, and wait until the disk has noticed."""
+    noticed = threading.Event()
     give_up = capture.give_up
 
-    def refused():
+    def fail():
         raise FULL
 
-    def give_up_and_tell(error=None):
+    def give_up_and_notify(error=None):
         give_up(error)
-        given_up.set()
+        noticed.set()
 
-    monkeypatch.setattr(capture, "give_up", give_up_and_tell)
-    monkeypatch.setattr(capture, attempt, refused)
-    assert given_up.wait(WITHIN_S)
+    monkeypatch.setattr(capture, "give_up", give_up_and_notify)
+    monkeypatch.setattr(capture, attempt, fail)
+    assert noticed.wait(WITHIN_S)
 
 
-def test_a_file_that_failed_is_closed_without_a_byte_into_the_next_one(disk, failed, monkeypatch):
+def test_a_failed_file_is_closed_without_a_byte_in_the_next_one(disk, failed, monkeypatch):
     first = opened(disk, "a.mcap")
     while first.waiting_bytes:
         first.write_out()
     refuse(first, monkeypatch)
-    second = opened(disk, "b.mcap")  # has the first one's descriptor
+    second = opened(disk, "b.mcap")  # reuses the first one's descriptor
     with pytest.raises(OSError, match="No space left"):
         disk.close(first, {})
     disk.close(second, {})
     assert failed == [first]
-    assert state_of(first.path) is State.CLOSED, "it was given an end"
+    assert state_of(first.path) is State.CLOSED, "the file was not repaired"
     assert state_of(second.path) is State.CLOSED
     assert second.path.read_bytes().count(b"AAAA") == 1
 
 
-def test_a_file_that_the_disk_took_nothing_of_is_removed(disk, monkeypatch):
+def test_a_file_without_content_is_removed(disk, monkeypatch):
     capture = Capture(disk.folder / "a.mcap", {}, start_ns=1)
 
-    def refused(missed):
+    def fail(missed):
         raise FULL
 
     monkeypatch.setattr(capture, "write_out", lambda: None)
-    monkeypatch.setattr(capture, "finish", refused)
+    monkeypatch.setattr(capture, "finish", fail)
     disk.open(capture)
     with pytest.raises(OSError, match="No space left"):
         disk.close(capture, {})
     assert not capture.path.exists()
 
 
-def test_a_file_can_be_opened_while_the_disk_takes_nothing(disk, monkeypatch):
-    hangs, goes_on = threading.Event(), threading.Event()
+def test_a_file_can_be_opened_while_the_disk_hangs(disk, monkeypatch):
+    hangs, resume = threading.Event(), threading.Event()
     first = Capture(disk.folder / "a.mcap", {}, start_ns=1)
 
     def hang():
         hangs.set()
-        goes_on.wait(WITHIN_S)
+        resume.wait(WITHIN_S)
 
     monkeypatch.setattr(first, "write_out", hang)
     disk.open(first)
@@ -97,7 +97,7 @@ def test_a_file_can_be_opened_while_the_disk_takes_nothing(disk, monkeypatch):
     opening = threading.Thread(target=disk.open, args=(Capture(disk.folder / "b.mcap", {}, start_ns=1),))
     opening.start()
     opening.join(WITHIN_S)
-    stood = opening.is_alive() or goes_on.is_set()
-    goes_on.set()
+    blocked = opening.is_alive() or resume.is_set()
+    resume.set()
     opening.join()
-    assert not stood
+    assert not blocked

@@ -1,4 +1,4 @@
-"""`robomesh recordings`: tables, video and plots of a recording, and what bad input gets."""
+"""`robomesh recordings`: tables, video and plots of a recording, and refusals of bad input."""
 
 import asyncio
 import csv
@@ -21,7 +21,7 @@ from robots.urdf.write import to_urdf
 from services.command_line.main import run
 from services.command_line.recordings.output import whole_file
 from services.kinematics.descriptions import describe
-from services.recorder.serving import Serving
+from services.recorder.serving import RecordingServer
 from tests.conftest import run as run_async
 from tests.recordings import START_NS, Written, joints, write_recording
 
@@ -30,7 +30,7 @@ SIZE, FPS = (160, 120), 10
 
 @pytest.fixture(scope="module")
 def moving(tmp_path_factory):
-    """A Pt600 that swings its waist for 2 s, told as its gateway and kinematics would."""
+    """Record a Pt600 that swings its waist for 2 s, as its gateway and kinematics would publish it."""
     description = load("pt600")
     glbs = link_meshes(description)
     message = describe(
@@ -64,16 +64,16 @@ def test_a_table_holds_the_files_numbers(moving, tmp_path, capsys):
     assert at_s == pytest.approx([number / 100 - 1e-6 for number in range(50, 101)], abs=1e-8)
 
 
-def test_a_table_has_a_row_a_state_whatever_else_was_recorded(tmp_path):
+def test_a_table_has_one_row_for_each_joint_state(tmp_path):
     source, out = tmp_path / "trial.mcap", tmp_path / "out.csv"
     with Written(source) as file:
-        # What stood when the recording began is told at once, the oldest first.
+        # Last values from before the recording all have its start time, oldest first.
         for waist in (0.1, 0.2, 0.3):
             file.put("joints", joints(waist=waist), 0.0)
         file.put("kinematics", schema.KinematicState(tool_to_base=range(16)), 0.0)
         file.put("joints", joints(waist=0.4), 0.01)
         file.put("joints", joints(waist=0.4), 0.01)
-        file.put("joints", schema.RecorderRequest(name="\x07"), 0.02)  # no joints, in their place
+        file.put("joints", schema.RecorderRequest(name="\x07"), 0.02)  # a message of the wrong type
         file.put("joints", joints(waist=0.4), 0.02)
     assert run(["recordings", "export", str(source), str(out)]) == 0
     with out.open() as stream:
@@ -86,7 +86,7 @@ def test_a_table_has_a_row_a_state_whatever_else_was_recorded(tmp_path):
 
 
 @pytest.mark.slow
-def test_video_is_rendered_afresh_from_the_joints(moving, tmp_path):
+def test_video_is_rendered_from_the_joints(moving, tmp_path):
     out = tmp_path / "out.mp4"
     size = "x".join(map(str, SIZE))
     assert (
@@ -114,24 +114,24 @@ def test_video_is_rendered_afresh_from_the_joints(moving, tmp_path):
     assert np.abs(frames[0] - frames[12]).max() > 60
 
 
-def test_recorded_video_is_taken_as_it_is_and_what_is_none_is_refused(tmp_path, capsys):
+def test_a_view_that_was_not_recorded_is_refused(tmp_path, capsys):
     source = write_recording(tmp_path / "trial.mcap")
     assert run(["recordings", "export", str(source), str(tmp_path / "out.mp4"), "--recorded", "top"]) == 2
     assert "no video/top in it; it has" in capsys.readouterr().err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["trial.mcap"]
 
 
-def test_plots_mark_what_happened(moving, tmp_path):
+def test_plots_mark_events(moving, tmp_path):
     out = tmp_path / "out.svg"
     assert run(["recordings", "export", str(moving), str(out)]) == 0
     text = out.read_text()
     assert text.startswith("<?xml")
     assert "#b37400" in text  # the warning's mark
-    assert "<!-- odd -->" in text  # and its name
+    assert "<!-- odd -->" in text  # its code
     assert f"<!-- site/arm   moving   {datetime.fromtimestamp(START_NS * 1e-9).astimezone():%Y-%m-%d}" in text
 
 
-def test_more_values_than_a_plot_takes_are_drawn_as_far_as_they_go(tmp_path):
+def test_a_plot_of_too_many_values_shows_the_first_64(tmp_path):
     source, out = tmp_path / "trial.mcap", tmp_path / "out.svg"
     with Written(source) as file:
         for at_s in (0.0, 1.0):
@@ -153,7 +153,7 @@ def test_more_values_than_a_plot_takes_are_drawn_as_far_as_they_go(tmp_path):
     ],
 )
 @pytest.mark.slow
-def test_what_cannot_be_exported_gets_one_line_and_leaves_no_file(moving, tmp_path, capsys, arguments, words):
+def test_a_refused_export_prints_one_line_and_leaves_no_file(moving, tmp_path, capsys, arguments, words):
     name, *options = arguments
     assert run(["recordings", "export", str(moving), str(tmp_path / name), *options]) == 2
     (line,) = capsys.readouterr().err.splitlines()
@@ -161,7 +161,7 @@ def test_what_cannot_be_exported_gets_one_line_and_leaves_no_file(moving, tmp_pa
     assert not list(tmp_path.iterdir())
 
 
-def test_a_file_that_is_none_is_told_by_every_command(tmp_path, capsys):
+def test_every_command_refuses_a_file_that_is_not_a_recording(tmp_path, capsys):
     text = tmp_path / "notes.mcap"
     text.write_text("not a recording")
     for command in (["info", str(text)], ["export", str(text), "out.csv"], ["recover", str(text)]):
@@ -169,7 +169,7 @@ def test_a_file_that_is_none_is_told_by_every_command(tmp_path, capsys):
         assert "notes.mcap: no MCAP file: it does not begin as one" in capsys.readouterr().err
 
 
-def test_interrupted_work_leaves_nothing_under_the_final_name(tmp_path):
+def test_an_interrupted_write_leaves_no_file(tmp_path):
     out = tmp_path / "out.csv"
 
     def write():
@@ -182,19 +182,19 @@ def test_interrupted_work_leaves_nothing_under_the_final_name(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_cut_file_is_recovered_and_the_whole_one_is_left_alone(tmp_path, capsys):
+def test_a_cut_file_is_recovered_once(tmp_path, capsys):
     path = write_recording(tmp_path / "trial.mcap", chunked=False)
     path.write_bytes(path.read_bytes()[:-30_000])
     assert run(["recordings", "recover", str(path)]) == 0
     assert "recovered" in capsys.readouterr().out
     assert run(["recordings", "info", str(path), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["problem"], told["recovered"]) == ("", True)
+    info = json.loads(capsys.readouterr().out)
+    assert (info["problem"], info["recovered"]) == ("", True)
     assert run(["recordings", "recover", str(path)]) == 0
     assert "whole already" in capsys.readouterr().out
 
 
-def test_a_file_that_is_being_recorded_is_not_recovered_away(tmp_path, capsys):
+def test_recovery_of_an_open_recording_is_refused(tmp_path, capsys):
     path = tmp_path / "trial.mcap"
     capture = Capture(path, {"site": "hall", "robot": "arm", "name": "trial"}, start_ns=START_NS)
     try:
@@ -204,8 +204,8 @@ def test_a_file_that_is_being_recorded_is_not_recovered_away(tmp_path, capsys):
         assert "trial.mcap: is being recorded now" in capsys.readouterr().err
         assert (path.stat().st_ino, path.read_bytes()) == before
         assert run(["recordings", "info", str(path), "--json"]) == 0
-        told = json.loads(capsys.readouterr().out)
-        assert (told["open"], told["problem"]) == (True, "")
+        info = json.loads(capsys.readouterr().out)
+        assert (info["open"], info["problem"]) == (True, "")
     finally:
         capture.finish({})
 
@@ -224,37 +224,37 @@ def test_a_recording_of_a_site_has_one_name_for_every_command(mesh, router, tmp_
 
     async def main():
         async with open_session(mesh) as own:
-            serving = Serving(own, "site", folder, open_now=dict, flight=lambda: False)
-            monkeypatch.setattr(serving._mebibytes, "check", check)
+            server = RecordingServer(own, "site", folder, open_now=dict, flight=lambda: False)
+            monkeypatch.setattr(server._mebibytes, "check", check)
             own.declare_presence("site", "-", "recorder")
             try:
-                for what, command in (
+                for recording, command in (
                     ("site/2026_trial", ["info"]),
                     ("2026_trial.mcap", ["fetch", str(tmp_path)]),
                     ("2026_trial", ["export", str(tmp_path / "out.csv")]),
                 ):
                     name, *more = command
-                    arguments = ["recordings", name, what, *more, "--connect", router]
+                    arguments = ["recordings", name, recording, *more, "--connect", router]
                     assert await asyncio.to_thread(run, arguments) == 0, capsys.readouterr().err
                 assert await asyncio.to_thread(run, ["recordings", "info", "no", "--connect", router]) == 2
                 assert await asyncio.to_thread(run, ["recordings", "list", "--connect", router]) == 0
             finally:
-                await serving.close()
+                await server.close()
 
     run_async(main())
-    told = capsys.readouterr()
-    assert "site/arm/joints: 50" in told.out
-    assert "site/arm/video/front: 10, 20.4 pictures/s" in told.out
-    header, row, _ = told.out.splitlines()[-3:]
+    printed = capsys.readouterr()
+    assert "site/arm/joints: 50" in printed.out
+    assert "site/arm/video/front: 10, 20.4 pictures/s" in printed.out
+    header, row, _ = printed.out.splitlines()[-3:]
     assert header.split() == ["recorded", "length", "size", "robot", "name"]
     assert row.split()[-3:] == ["MB", "site/arm", "2026_trial"]
-    assert "2026_trial.mcap waits: more than one name may have: ask again in 30.0 s" in told.err
-    assert "no recording 'no', neither a file here nor in robomesh recordings list" in told.err
+    assert "2026_trial.mcap waits: more than one name may have: ask again in 30.0 s" in printed.err
+    assert "no recording 'no', neither a file here nor in robomesh recordings list" in printed.err
     assert (tmp_path / "2026_trial.mcap").read_bytes() == source.read_bytes()
     assert len((tmp_path / "out.csv").read_text().splitlines()) == 51
 
 
-def test_one_recorder_s_silence_hides_no_other_s_recordings(mesh, router, capsys):
+def test_a_silent_recorder_does_not_hide_the_recordings_of_others(mesh, router, capsys):
     async def main():
         async with open_session(mesh) as own:
 
@@ -267,12 +267,12 @@ def test_one_recorder_s_silence_hides_no_other_s_recordings(mesh, router, capsys
             assert await asyncio.to_thread(run, ["recordings", "list", "--connect", router]) == 0
 
     run_async(main())
-    told = capsys.readouterr()
-    assert "site/arm" in told.out
-    assert "without the recordings of silent" in told.err
+    printed = capsys.readouterr()
+    assert "site/arm" in printed.out
+    assert "without the recordings of silent" in printed.err
 
 
-def test_a_recorder_cannot_choose_where_its_file_goes(mesh, router, tmp_path, capsys):
+def test_a_recorder_cannot_choose_the_folder_of_a_fetched_file(mesh, router, tmp_path, capsys):
     folder = tmp_path / "own"
     folder.mkdir()
 
@@ -297,7 +297,7 @@ def test_a_recorder_cannot_choose_where_its_file_goes(mesh, router, tmp_path, ca
     assert not list(folder.iterdir())
 
 
-def test_a_replay_whose_player_goes_ends_for_who_plays_it(mesh, router):
+def test_the_play_command_ends_when_its_player_goes_offline(mesh, router):
     async def main():
         async with open_session(mesh) as own:
 
@@ -317,11 +317,11 @@ def test_a_replay_whose_player_goes_ends_for_who_plays_it(mesh, router):
                 stderr=asyncio.subprocess.PIPE,
             )
             try:
-                _, told = await playing.communicate()
+                _, printed = await playing.communicate()
             finally:
                 if playing.returncode is None:
                     playing.kill()
                     await playing.wait()
-            assert (playing.returncode, b"its player is gone" in told) == (2, True), told
+            assert (playing.returncode, b"its player is gone" in printed) == (2, True), printed
 
     run_async(main())

@@ -1,4 +1,4 @@
-"""The recorder's files in other people's hands: plain mcap readers, PyAV, Rerun."""
+"""The recorder's files in other programs: plain MCAP readers, PyAV, Rerun."""
 
 import asyncio
 import xml.etree.ElementTree as ET
@@ -29,7 +29,7 @@ GLB = b"glTF" + bytes(60)
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
-    """A finished file of joints, frames and video, and when each picture was put."""
+    """Record joints, frames and video; return the finished file and each picture's time."""
 
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     folder = tmp_path_factory.mktemp("recordings")
@@ -54,12 +54,12 @@ async def record(mesh, folder):
         description.links.add(name="base", mesh="base", mesh_sha256="00")
         description.links.add(name="column")
         publishers["description"].put(description)
-        # The picture before the recording: what is recorded must begin with a key frame.
+        # A key frame before the recording: its video must begin with that frame.
         encoder = H264Encoder((320, 240), 30, codec="libx264")
         put_picture(publishers["video/front"], encoder, 0)
         begun = await trace_on(session)
         await until(lambda: publishers["joints"].watched and publishers["video/front"].watched)
-        assert not publishers["video/top"].watched, "only what is recorded is drawn"
+        assert not publishers["video/top"].watched, "a view that is not recorded is rendered"
         await put_states(publishers["joints"], range(STATES), hz=500)
         times = [put_picture(publishers["video/front"], encoder, number) for number in range(1, PICTURES)]
         frames = FrameTransforms()
@@ -74,11 +74,11 @@ async def record(mesh, folder):
 
 
 async def counted(session, wanted):
-    """Until the recorder tells that it has so many of each topic."""
+    """Wait until the recorder reports this many messages of each topic."""
     counts = {}
     while any(counts.get(name, 0) < number for name, number in wanted.items()):
-        told = await session.last("robomesh/site/arm/recording")
-        counts = {each.topic.split("/", 3)[3]: each.messages for each in told.topics} if told else {}
+        state = await session.last("robomesh/site/arm/recording")
+        counts = {each.topic.split("/", 3)[3]: each.messages for each in state.topics} if state else {}
         await asyncio.sleep(0.05)
 
 
@@ -99,7 +99,7 @@ def messages(path, topic):
 
 
 @pytest.mark.slow
-def test_plain_readers_find_every_message_once_and_in_time(recorded):
+def test_plain_readers_find_every_message_once_in_order(recorded):
     path, _ = recorded
     joints = messages(path, "robomesh/site/arm/joints")
     assert [decoded.joints[0].position for _, decoded in joints] == list(range(STATES))
@@ -126,13 +126,13 @@ def test_video_begins_with_a_key_frame_and_every_picture_decodes(recorded):
     assert white == pytest.approx([5 * number / 320 for number in range(PICTURES)], abs=0.02)
 
 
-def test_a_file_explains_itself(recorded):
+def test_a_file_is_self_contained(recorded):
     path, _ = recorded
     with path.open("rb") as stream:
         reader = make_reader(stream)
         attached = {each.name: bytes(each.data) for each in reader.iter_attachments()}
         metadata = {each.name: each.metadata for each in reader.iter_metadata()}
-        (said,) = [m.data for _, _, m in reader.iter_messages(topics=["/robot_description"])]
+        (text,) = [m.data for _, _, m in reader.iter_messages(topics=["/robot_description"])]
         schemas = {
             c.topic: reader.get_summary().schemas[c.schema_id] for c in reader.get_summary().channels.values()
         }
@@ -144,7 +144,7 @@ def test_a_file_explains_itself(recorded):
     assert b"site.key" not in attached["site.toml"]
     assert metadata["robomesh"]["robot"] == "arm"
     assert schemas["/robot_description"].name == "std_msgs/msg/String"
-    urdf = ET.fromstring(said[8:-1].decode())
+    urdf = ET.fromstring(text[8:-1].decode())
     assert [link.get("name") for link in urdf.iter("link")] == ["site/arm/base", "site/arm/column"]
     assert urdf.find("joint/child").get("link") == "site/arm/column"
     assert urdf.find("link/visual/geometry/mesh").get("filename").startswith("data:model/gltf-binary;base64,")

@@ -1,4 +1,4 @@
-"""Recordings over the mesh and over HTTP: lists, ranges, values, whole files, and what is refused."""
+"""Recordings over the mesh and over HTTP: lists, ranges, values, whole files, refusals."""
 
 import asyncio
 import csv
@@ -21,7 +21,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import open_session
 from services.console.http.recordings import Recordings
 from services.recorder.answers import Answers
-from services.recorder.serving import Serving
+from services.recorder.serving import RecordingServer
 from tests.conftest import run
 from tests.recordings import START_NS, Written, joints, write_recording
 
@@ -40,32 +40,34 @@ def folder(tmp_path):
 async def served(mesh, folder, quotas=DEFAULT_QUOTAS, **open_now):
     """A recorder's answers, and somebody who asks."""
     async with open_session(mesh) as own, open_session(mesh) as asker:
-        serving = Serving(own, "site", folder, open_now=lambda: open_now, flight=lambda: True, quotas=quotas)
+        serving = RecordingServer(
+            own, "site", folder, open_now=lambda: open_now, flight=lambda: True, quotas=quotas
+        )
         try:
             yield asker
         finally:
             await serving.close()
 
 
-def test_a_recorder_whose_reader_is_held_up_says_that_it_is_busy_and_answers_later(mesh, folder):
+def test_a_recorder_with_a_hanging_reader_is_busy_and_answers_later(mesh, folder):
     async def main():
-        async with open_session(mesh) as own, open_session(mesh) as asker:
-            serving = Serving(own, "site", folder, open_now=dict, flight=lambda: True)
+        async with open_session(mesh) as own, open_session(mesh) as client:
+            server = RecordingServer(own, "site", folder, open_now=dict, flight=lambda: True)
             try:
-                assert (await asker.ask(f"{BASE}/list", timeout_s=50.0)).recordings
-                os.kill(serving.pid, signal.SIGSTOP)
+                assert (await client.ask(f"{BASE}/list", timeout_s=50.0)).recordings
+                os.kill(server.pid, signal.SIGSTOP)
                 for _ in range(2):
                     with pytest.raises(BusyError, match="the recorder is busy: its recordings/list"):
-                        await asker.ask(f"{BASE}/list", timeout_s=0.5)
-                os.kill(serving.pid, signal.SIGCONT)
-                assert (await asker.ask(f"{BASE}/list", timeout_s=50.0)).recordings
+                        await client.ask(f"{BASE}/list", timeout_s=0.5)
+                os.kill(server.pid, signal.SIGCONT)
+                assert (await client.ask(f"{BASE}/list", timeout_s=50.0)).recordings
             finally:
-                await serving.close()
+                await server.close()
 
     run(main())
 
 
-def test_recordings_are_listed_ranged_and_refused_over_the_mesh(mesh, folder):
+def test_list_info_and_range_over_the_mesh_with_their_refusals(mesh, folder):
     (folder / "broken.mcap").write_text("no recording")
 
     async def main():
@@ -74,16 +76,16 @@ def test_recordings_are_listed_ranged_and_refused_over_the_mesh(mesh, folder):
         async with served(mesh, folder, quotas, **{"zz.mcap": writing}) as session:
             listed = await session.ask(f"{BASE}/list", timeout_s=20.0)
             info = await session.ask(f"{BASE}/info", schema.RecordingQuery(file="trial.mcap"))
-            asked = schema.RangeRequest(file="trial.mcap", topic=JOINTS, most=10)
-            asked.start.FromNanoseconds(START_NS + 1_000_000_000)
-            messages = await session.ask(f"{BASE}/range/li", asked)
+            request = schema.RangeRequest(file="trial.mcap", topic=JOINTS, most=10)
+            request.start.FromNanoseconds(START_NS + 1_000_000_000)
+            messages = await session.ask(f"{BASE}/range/li", request)
             with pytest.raises(QuotaError, match=r"recordings_mib_a_minute = 0\.0001 a name .* ask again in"):
-                await session.ask(f"{BASE}/range/li", asked)
+                await session.ask(f"{BASE}/range/li", request)
             with pytest.raises(RefusedError, match=r"no recording 'gone\.mcap' here"):
                 await session.ask(f"{BASE}/info", schema.RecordingQuery(file="gone.mcap"))
-            asked.start.FromNanoseconds(START_NS + 60_000_000_000)
+            request.start.FromNanoseconds(START_NS + 60_000_000_000)
             with pytest.raises(RefusedError, match=r"nothing from .* it goes from 2023-11-14"):
-                await session.ask(f"{BASE}/range/wang", asked)
+                await session.ask(f"{BASE}/range/wang", request)
             return listed, info, messages
 
     listed, info, messages = run(main())
@@ -99,14 +101,16 @@ def test_recordings_are_listed_ranged_and_refused_over_the_mesh(mesh, folder):
     assert JointStates.FromString(messages.messages[0].data).joints[0].position == 1.0
 
 
-def test_video_can_be_asked_for_from_the_key_frame_before(folder):
-    asked = schema.RangeRequest(file="trial.mcap", topic="robomesh/site/arm/video/front", from_key_frame=True)
-    asked.start.FromNanoseconds(START_NS + 1_300_000_000)
-    answer = Answers(folder).range(asked)
+def test_a_range_of_video_can_begin_with_the_key_frame_before(folder):
+    request = schema.RangeRequest(
+        file="trial.mcap", topic="robomesh/site/arm/video/front", from_key_frame=True
+    )
+    request.start.FromNanoseconds(START_NS + 1_300_000_000)
+    answer = Answers(folder).range(request)
     assert answer.messages[0].received.ToNanoseconds() == START_NS + 1_000_000_000
 
 
-def test_series_tell_what_there_is_and_what_it_was(folder):
+def test_series_lists_the_known_values_and_returns_their_numbers(folder):
     answers = Answers(folder)
     known = answers.series(schema.SeriesRequest(file="trial.mcap")).known
     assert "joints/waist/position" in known
@@ -116,7 +120,7 @@ def test_series_tell_what_there_is_and_what_it_was(folder):
     assert (min(waist.lowest), max(waist.highest), waist.unit) == (0.0, 3.99, "rad")
 
 
-def test_pieces_keep_their_version_while_a_file_grows_and_not_when_it_is_written_again(tmp_path):
+def test_a_files_version_is_kept_by_growth_and_changed_by_a_rewrite(tmp_path):
     path = tmp_path / "trial.mcap"
     answers = Answers(tmp_path)
     write_recording(path, chunked=False)
@@ -128,13 +132,13 @@ def test_pieces_keep_their_version_while_a_file_grows_and_not_when_it_is_written
         stream.write(whole[40_000:60_000])
     grown = answers.piece(schema.PieceRequest(file="trial.mcap", offset=50_000, length=10))
     assert (grown.version, grown.total, grown.data) == (before.version, 60_000, whole[50_000:50_010])
-    again = write_recording(tmp_path / "again", chunked=True)
-    again.replace(path)
+    rewritten = write_recording(tmp_path / "again", chunked=True)
+    rewritten.replace(path)
     assert answers.piece(schema.PieceRequest(file="trial.mcap")).version != before.version
 
 
 class _Direct:
-    """A session whose recorder is this process, for the routes alone."""
+    """A session that answers from this process, to test only the HTTP routes."""
 
     def __init__(self, folder):
         self._answers = Answers(folder)
@@ -143,15 +147,15 @@ class _Direct:
         from mcap_files.errors import RecordingError
 
         try:
-            what = key.split("/recordings/")[1].removesuffix("/li")
-            return getattr(self._answers, what)(request)
+            name = key.split("/recordings/")[1].removesuffix("/li")
+            return getattr(self._answers, name)(request)
         except RecordingError as error:
             raise RefusedError(str(error)) from None
 
 
 @dataclass
 class _Answer:
-    """What came of a request."""
+    """An HTTP response."""
 
     status_code: int
     headers: dict
@@ -163,7 +167,7 @@ class _Answer:
 
 
 class _Http:
-    """The routes asked without a socket."""
+    """A client that calls the routes without a socket."""
 
     def __init__(self, app):
         self._app = app
@@ -179,20 +183,20 @@ class _Http:
                 "query_string": query.encode(),
                 "headers": [(key.lower().encode(), value.encode()) for key, value in (headers or {}).items()],
             }
-            told, body = {}, bytearray()
+            start, body = {}, bytearray()
 
             async def receive():
-                await asyncio.get_running_loop().create_future()  # it stays to the end
+                await asyncio.get_running_loop().create_future()  # the client never disconnects
 
             async def send(message):
                 if message["type"] == "http.response.start":
-                    told.update(message)
+                    start.update(message)
                 else:
                     body.extend(message.get("body", b""))
 
             await self._app(scope, receive, send)
-            named = {key.decode(): value.decode() for key, value in told["headers"]}
-            return _Answer(told["status"], named, bytes(body))
+            named = {key.decode(): value.decode() for key, value in start["headers"]}
+            return _Answer(start["status"], named, bytes(body))
 
         return run(main())
 
@@ -205,7 +209,7 @@ def http(folder):
     return _Http(Starlette(routes=Recordings(_Direct(folder), lambda _: "li").routes()))
 
 
-def test_a_file_comes_whole_in_ranges_and_resumes_where_it_was_broken_off(http, folder):
+def test_a_file_can_be_fetched_whole_in_ranges_and_resumed(http, folder):
     whole = (folder / "arm" / "trial.mcap").read_bytes()
     url = "/recordings/site/trial.mcap"
     answer = http.get(url)
@@ -214,24 +218,24 @@ def test_a_file_comes_whole_in_ranges_and_resumes_where_it_was_broken_off(http, 
     tag = answer.headers["etag"]
     head = http.head(url)
     assert (head.status_code, head.headers["content-length"], head.content) == (200, str(len(whole)), b"")
-    for asked, begin, end in (
+    for requested, begin, end in (
         ("bytes=100-199", 100, 200),
         ("bytes=1000-", 1000, len(whole)),
         ("bytes=-10", len(whole) - 10, len(whole)),
         ("bytes=0-99999999", 0, len(whole)),
     ):
-        part = http.get(url, headers={"Range": asked, "If-Range": tag})
+        part = http.get(url, headers={"Range": requested, "If-Range": tag})
         assert (part.status_code, part.content) == (206, whole[begin:end])
         assert part.headers["content-range"] == f"bytes {begin}-{end - 1}/{len(whole)}"
     assert http.get(url, headers={"Range": "bytes=5-9", "If-Range": '"older"'}).content == whole
-    for no_range in ("lines=5-9", "bytes=0-" + "9" * 5000):
-        assert http.get(url, headers={"Range": no_range}).status_code == 200
+    for invalid in ("lines=5-9", "bytes=0-" + "9" * 5000):
+        assert http.get(url, headers={"Range": invalid}).status_code == 200
     assert http.get(url, headers={"If-None-Match": tag}).status_code == 304
     beyond = http.get(url, headers={"Range": "bytes=99999999-"})
     assert (beyond.status_code, beyond.headers["content-range"]) == (416, f"bytes */{len(whole)}")
 
 
-def test_what_is_not_there_is_refused_in_words_over_http(http):
+def test_a_missing_file_or_attachment_is_404_with_a_sentence(http):
     gone = http.get("/recordings/site/gone.mcap")
     assert (gone.status_code, "no recording 'gone.mcap' here" in gone.text) == (404, True)
     none = http.get("/recordings/site/trial.mcap/thumbnail.jpg")
@@ -247,7 +251,7 @@ def test_what_is_not_there_is_refused_in_words_over_http(http):
         (BrokenAnswerError("30000 of 90000 bytes came"), 504, None),
     ],
 )
-def test_over_http_it_is_told_when_to_ask_again(folder, error, status, again):
+def test_http_errors_have_a_status_and_a_retry_after(folder, error, status, again):
     async def refuse(*_, **__):
         raise error
 
@@ -274,21 +278,21 @@ def test_values_as_csv_equal_the_files_numbers(http, folder, monkeypatch):
     assert rows[1][:4] == [published, received, "10", "0.009999000"]
 
 
-def test_values_of_a_clock_that_stood_still_are_all_there_and_nonsense_is_left_out(http, folder, monkeypatch):
-    nonsense = SimpleNamespace(SerializeToString=lambda: b"\xff")
+def test_csv_keeps_states_of_equal_times_and_skips_invalid_messages(http, folder, monkeypatch):
+    invalid = SimpleNamespace(SerializeToString=lambda: b"\xff")
     with Written(folder / "still.mcap") as file:
         for number in range(50):
             file.put("joints", joints(waist=number), 0.5)
             file.put("joints", joints(waist=number), 0.5)
-            file.put("joints", nonsense, 0.5)
+            file.put("joints", invalid, 0.5)
     monkeypatch.setattr("services.console.http.recordings._ROWS", 7)
     answer = http.get("/recordings/site/still.mcap/values.csv")
     _, *rows = csv.reader(io.StringIO(answer.text))
-    # A row a state: equal times and values make no two states one.
+    # One row for each state: states with equal times and values are not merged.
     assert [float(row[4]) for row in rows] == [number for number in range(50) for _ in range(2)]
 
 
-def test_a_thumbnail_is_a_picture_that_need_not_be_sent_twice(http, folder):
+def test_a_thumbnail_is_not_sent_again_to_a_client_that_has_it(http, folder):
     with Written(folder / "seen.mcap") as file:
         file.put("joints", joints(waist=1), 0.0)
         file.attach("thumbnail.jpg", b"\xff\xd8picture", "image/jpeg")
@@ -300,7 +304,7 @@ def test_a_thumbnail_is_a_picture_that_need_not_be_sent_twice(http, folder):
     assert again.status_code == 304
 
 
-def test_an_empty_file_has_its_names_word_and_time_and_says_that_nothing_was_written(tmp_path):
+def test_an_empty_file_is_listed_by_its_file_name_with_a_problem(tmp_path):
     (tmp_path / "arm").mkdir()
     empty = tmp_path / "arm" / "2026-11-21T20-55-01.500000Z_full.mcap"
     empty.touch()
@@ -310,9 +314,9 @@ def test_an_empty_file_has_its_names_word_and_time_and_says_that_nothing_was_wri
 
 
 @pytest.mark.parametrize("seconds", [1 << 62, -(1 << 62), 253402300800])
-def test_a_time_that_no_calendar_has_is_refused_in_words(folder, seconds):
+def test_a_time_out_of_range_is_refused(folder, seconds):
     for field in ("start", "end"):
-        asked = schema.RangeRequest(file="trial.mcap", topic=JOINTS)
-        getattr(asked, field).seconds = seconds
-        with pytest.raises(RecordingError, match=r"trial\.mcap: no time that there is"):
-            Answers(folder).range(asked)
+        request = schema.RangeRequest(file="trial.mcap", topic=JOINTS)
+        getattr(request, field).seconds = seconds
+        with pytest.raises(RecordingError, match=r"trial\.mcap: invalid time"):
+            Answers(folder).range(request)
