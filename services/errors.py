@@ -1,18 +1,18 @@
 """Errors of the services.
 
 ServiceError
-├── SiteFileError           a site file that cannot be read, or says something wrong
-└── ListenError             an address that cannot be listened on
+├── SiteFileError           a site file cannot be read, or a value in it is invalid
+└── ListenError             a service cannot listen on an address
 """
 
 
 class ServiceError(Exception):
-    """Base of the services' errors; its text is one line (or a line a problem) for people."""
+    """Base of the services' errors; the text has one line for each problem and is for the operator."""
 
 
 class SiteFileError(ServiceError):
-    """A site file that cannot be read, or says something wrong."""
+    """A site file cannot be read, or a value in it is invalid."""
 
 
 class ListenError(ServiceError):
-    """An address that cannot be listened on: taken, not ours, or beyond loopback without leave."""
+    """A service cannot listen on an address: in use, foreign, or not permitted beyond loopback."""

@@ -1,8 +1,8 @@
-"""The supervisor: a process a service, prefixed logs, restarts with back-off, all down in time.
+"""Supervisor: one process for each service, prefixed logs, restarts with back-off, bounded shutdown.
 
-It holds no robot state and is on no data path: killed, it takes its processes with it; a killed
-process comes back, and the others do not notice. What is added while it runs comes and goes beside
-the rest, in groups. Of what nobody can do without, another waits, loaded, to take its place.
+It holds no robot state and is on no data path. If it is killed, its processes end too; a killed process is
+restarted without an effect on the others. Groups of programs can be added and removed at run time. A critical
+service has a warm standby process.
 """
 
 import asyncio
@@ -18,29 +18,29 @@ from dataclasses import dataclass
 
 from services.errors import ServiceError
 
-# A site is down within 2 s, unless a process still finishes what it writes.
-_ASK_S = 1.2
-_SAY_AFTER_S = 1.5
+# A site stops within 2 s, unless a process still has to finish its writes.
+_STOP_S = 1.2
+_REPORT_AFTER_S = 1.5
 _FINISH_S = 10.0
 _LAST_S = 0.3
-# Longer than all of them together: after it `robomesh up` exits, whatever hangs.
+# Longer than the sum of them: after it `robomesh up` exits even if a process hangs.
 ENDS_WITHIN_S = 13.0
 _SHORTEST_WAIT_S = 0.1
 _LONGEST_WAIT_S = 10.0
-# What ran this long is taken for well: its next failure waits the shortest time again.
-_WELL_AFTER_S = 20.0
-_COULD_NOT = 2
+# A process that ran this long counts as healthy: its next restart is immediate.
+_HEALTHY_AFTER_S = 20.0
+_CANNOT_START = 2  # exit status
 _READ_BYTES = 1 << 16
 _LONGEST_LINE = 2000
 _PR_SET_PDEATHSIG = 1
 _FOLLOW_EACH_S = 0.4
-# A spare is loaded when what it stands by for has run this long: not while everything starts.
-_SPARE_AFTER_S = 5.0
-_SPARE = "ROBOMESH_SPARE"
+# A standby is started when its program has run this long, so that it does not slow down the site's start.
+_STANDBY_AFTER_S = 5.0
+_STANDBY = "ROBOMESH_SPARE"
 
-# Groups of programs that are to run beside the others, now: a key that is new starts its own, one that
-# is gone has them ended.
-Following = Callable[[], Mapping[Hashable, Callable[[], Sequence["Program"]]]]
+# Returns the groups of programs that should run in addition, now. A new key starts its group's programs; a
+# removed key stops them.
+ExtraPrograms = Callable[[], Mapping[Hashable, Callable[[], Sequence["Program"]]]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,17 +48,17 @@ class Program:
     """A process to keep running.
 
     Attributes:
-        needed: The site cannot do without it: when it cannot start at all, nothing starts.
-        spare: Another process of it stands by (`wait_for_turn`): on a busy machine loading a service takes
-            seconds, and starting one that is loaded does not.
-        finishes: What it finishes at its end and no kill may cut, in words; empty: nothing.
-        last: Ends after the others, which need it for that.
+        required: If it cannot start, the whole site does not start.
+        standby: A second process waits, loaded, to replace it (`wait_as_standby`): on a busy machine loading
+            a service takes seconds.
+        finishes: Description of the work that it must finish before it ends; empty for none.
+        last: Stopped after the others, which need it to end.
     """
 
     name: str
     arguments: tuple[str, ...]
-    needed: bool = True
-    spare: bool = False
+    required: bool = True
+    standby: bool = False
     finishes: str = ""
     last: bool = False
 
@@ -70,7 +70,7 @@ class _Running:
 
 
 class CouldNotStartError(ServiceError):
-    """A needed service says that it cannot run as it is configured; its own line said why."""
+    """A required service cannot run with its configuration; its log has the reason."""
 
 
 async def supervise(
@@ -78,32 +78,32 @@ async def supervise(
     *,
     ready: Callable[[], Awaitable[None]],
     write: Callable[[str], None],
-    following: Following = dict,
+    extra: ExtraPrograms = dict,
 ) -> None:
-    """Run the programs, in order, until cancelled; then end them. Cancelled again, kill them.
+    """Run the programs, in order, until cancelled; then stop them. A second cancellation kills them.
 
     Args:
-        ready: Runs beside them; for whoever waits until the site is up.
-        write: Takes a line of log.
-        following: Asked again and again for what is to run beside them.
+        ready: Runs concurrently; may wait until the site is up and report it.
+        write: Writes a line of log.
+        extra: Polled for the programs to run in addition.
 
     Raises:
-        CouldNotStartError: If a needed one exits with status 2 before it ever ran well.
+        CouldNotStartError: If a required program exits with status 2 before it was ever healthy.
     """
     width = max(len(program.name) for program in programs)
     running: dict[str, _Running] = {}
 
     def keep(program: Program) -> Coroutine[None, None, None]:
-        return _keep(program, running, _prefixed(write, f"{program.name:<{width}} | "))
+        return _keep_running(program, running, _prefixed(write, f"{program.name:<{width}} | "))
 
     try:
         async with asyncio.TaskGroup() as group:
             for program in programs:
                 group.create_task(keep(program))
             group.create_task(_once(ready))
-            group.create_task(_follow(following, running, keep, write))
+            group.create_task(_run_extra(extra, running, keep, write))
     except ExceptionGroup as errors:
-        # Not `except*`: before Python 3.11.4 what it raises comes out in a group again.
+        # Not `except*`: before Python 3.11.4 an exception raised in it is wrapped in a group again.
         could_not, others = errors.split(ServiceError)
         if others is not None or could_not is None:
             raise
@@ -115,9 +115,9 @@ async def supervise(
             await _kill([*running.values()])
 
 
-def wait_for_turn() -> None:
-    """As a spare, wait until the process that it stands by for has ended; as any other, not at all."""
-    if not os.environ.pop(_SPARE, ""):
+def wait_as_standby() -> None:
+    """In a standby process, wait until the serving process has ended; in any other, return immediately."""
+    if not os.environ.pop(_STANDBY, ""):
         return
     if not os.read(0, 1):
         sys.exit(0)  # the supervisor has ended
@@ -130,23 +130,23 @@ def _prefixed(write: Callable[[str], None], prefix: str) -> Callable[[str], None
     return lambda line: write(prefix + line)
 
 
-async def _follow(
-    following: Following,
+async def _run_extra(
+    extra: ExtraPrograms,
     running: dict[str, _Running],
     keep: Callable[[Program], Coroutine[None, None, None]],
     write: Callable[[str], None],
 ) -> None:
-    """Start what is wanted and does not run yet; end what runs and is not wanted any more."""
+    """Start the extra programs that are new, and stop those that were removed."""
     groups: dict[Hashable, list[tuple[Program, asyncio.Task[None]]]] = {}
     async with asyncio.TaskGroup() as tasks:
         while True:
-            wanted = await asyncio.to_thread(following)
-            gone = [each for key in list(groups) if key not in wanted for each in groups.pop(key)]
-            for _, task in gone:
+            wanted = await asyncio.to_thread(extra)
+            removed = [each for key in list(groups) if key not in wanted for each in groups.pop(key)]
+            for _, task in removed:
                 task.cancel()
-            # A robot that changed must have let go of its name before it comes again.
-            await asyncio.gather(*(task for _, task in gone), return_exceptions=True)
-            names = [program.name for program, _ in gone if program.name in running]
+            # The old processes of a changed robot must release its name before the new ones start.
+            await asyncio.gather(*(task for _, task in removed), return_exceptions=True)
+            names = [program.name for program, _ in removed if program.name in running]
             await _end([running[name] for name in names], write)
             for name in names:
                 del running[name]
@@ -159,39 +159,39 @@ async def _once(ready: Callable[[], Awaitable[None]]) -> None:
     await ready()
 
 
-async def _keep(program: Program, running: dict[str, _Running], write: Callable[[str], None]) -> None:
+async def _keep_running(program: Program, running: dict[str, _Running], write: Callable[[str], None]) -> None:
     wait_s = _SHORTEST_WAIT_S
-    ran_well = False
+    was_healthy = False
     while True:
         started = time.monotonic()
         status: int | None = None
         try:
             process = await _next(program, running)
-        except OSError as error:  # no memory, or no process, is left just now: the others need not end too
-            how = f"could not be started: {error.strerror}"
+        except OSError as error:  # out of memory or processes: must not end the other programs
+            outcome = f"could not be started: {error.strerror}"
         else:
             running[program.name] = _Running(program, process)
             assert process.stdout is not None
-            async with _standing_by(program, running):
+            async with _standby_of(program, running):
                 async for line in _lines(process.stdout):
                     write(line)
                 status = await process.wait()
-            how = f"ended ({_status(status)})"
+            outcome = f"ended ({_status(status)})"
         ran_s = time.monotonic() - started
-        if status == _COULD_NOT and not ran_well and ran_s < _WELL_AFTER_S:
-            if program.needed:
-                raise CouldNotStartError(f"{program.name} could not start, so the site does not")
+        if status == _CANNOT_START and not was_healthy and ran_s < _HEALTHY_AFTER_S:
+            if program.required:
+                raise CouldNotStartError(f"{program.name} could not start, so the site does not start")
             write("could not start; everything else runs without it")
             return
-        if ran_s > _WELL_AFTER_S:
-            ran_well, wait_s = True, 0.0
-        write(f"{how}; again {f'in {wait_s:.1f} s' if wait_s else 'at once'}")
+        if ran_s > _HEALTHY_AFTER_S:
+            was_healthy, wait_s = True, 0.0
+        write(f"{outcome}; restarting {f'in {wait_s:.1f} s' if wait_s else 'now'}")
         await asyncio.sleep(wait_s * random.uniform(0.8, 1.2))
         wait_s = min(max(2 * wait_s, _SHORTEST_WAIT_S), _LONGEST_WAIT_S)
 
 
 async def _lines(stream: asyncio.StreamReader) -> AsyncIterator[str]:
-    """Lines of log, cut where they are endless: no service may end the site by its words."""
+    """Yield lines of log, cut at a maximum length so that no service can exhaust the supervisor's memory."""
     rest = b""
     while chunk := await stream.read(_READ_BYTES):
         *lines, rest = (rest + chunk).split(b"\n")
@@ -203,43 +203,43 @@ async def _lines(stream: asyncio.StreamReader) -> AsyncIterator[str]:
 
 
 async def _next(program: Program, running: dict[str, _Running]) -> asyncio.subprocess.Process:
-    """The spare, told that it is its turn, or a new process."""
-    waiting = running.pop(_spare(program), None)
+    """Activate the standby process, or start a new one; return it."""
+    waiting = running.pop(_standby_name(program), None)
     if waiting is None or waiting.process.returncode is not None:
         return await _start(program)
-    spare = waiting.process
-    assert spare.stdin is not None
-    spare.stdin.write(b"\n")
-    return spare
+    standby = waiting.process
+    assert standby.stdin is not None
+    standby.stdin.write(b"\n")
+    return standby
 
 
 @contextlib.asynccontextmanager
-async def _standing_by(program: Program, running: dict[str, _Running]) -> AsyncIterator[None]:
-    """See to it that a spare is there, where there is to be one."""
+async def _standby_of(program: Program, running: dict[str, _Running]) -> AsyncIterator[None]:
+    """Keep a standby process during the block, if the program has one."""
 
     async def keep() -> None:
         while True:
-            await asyncio.sleep(_SPARE_AFTER_S)
-            with contextlib.suppress(OSError):  # the next time
-                spare = await _start(program, spare=True)
-                running[_spare(program)] = _Running(program, spare)
-                await spare.wait()
+            await asyncio.sleep(_STANDBY_AFTER_S)
+            with contextlib.suppress(OSError):  # try again later
+                standby = await _start(program, standby=True)
+                running[_standby_name(program)] = _Running(program, standby)
+                await standby.wait()
 
-    task = asyncio.create_task(keep()) if program.spare else None
+    task = asyncio.create_task(keep()) if program.standby else None
     try:
         yield
     finally:
         if task is not None:
             task.cancel()
-            # A spare that is being started is killed and waited for.
+            # Waits also for the kill of a standby that is being started.
             await asyncio.gather(task, return_exceptions=True)
 
 
-def _spare(program: Program) -> str:
-    return f"{program.name}, spare"
+def _standby_name(program: Program) -> str:
+    return f"{program.name}, standby"
 
 
-async def _start(program: Program, *, spare: bool = False) -> asyncio.subprocess.Process:
+async def _start(program: Program, *, standby: bool = False) -> asyncio.subprocess.Process:
     supervisor = os.getpid()
 
     def die_with_the_supervisor() -> None:
@@ -252,67 +252,67 @@ async def _start(program: Program, *, spare: bool = False) -> asyncio.subprocess
         "-m",
         "services.command_line.main",
         *program.arguments,
-        stdin=asyncio.subprocess.PIPE if spare else asyncio.subprocess.DEVNULL,
+        stdin=asyncio.subprocess.PIPE if standby else asyncio.subprocess.DEVNULL,
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.STDOUT,
-        # A terminal's Ctrl-C is for the supervisor, which ends the others in order.
+        # A terminal's Ctrl-C must reach only the supervisor, which stops the others in order.
         start_new_session=True,
         preexec_fn=die_with_the_supervisor,
-        env={**_environment(), "PYTHONUNBUFFERED": "1", **({_SPARE: "1"} if spare else {})},
+        env={**_environment(), "PYTHONUNBUFFERED": "1", **({_STANDBY: "1"} if standby else {})},
     )
 
 
 def _environment() -> dict[str, str]:
-    """Ours, but for the certificate of whoever started the site: services have their own."""
+    """Return this environment without the operator's certificate: services have their own certificates."""
     return {name: value for name, value in os.environ.items() if name != "ROBOMESH_KEYS"}
 
 
-async def _end(those: Sequence[_Running], write: Callable[[str], None]) -> None:
-    """End processes: what finishes something is waited for, and what it needs ends after it."""
-    before = [each for each in those if not each.program.last]
-    _signal(before, signal.SIGTERM)
-    finishing = [each for each in before if each.program.finishes]
+async def _end(processes: Sequence[_Running], write: Callable[[str], None]) -> None:
+    """Stop processes: wait for those that must finish their work, then stop the `last` ones."""
+    first = [each for each in processes if not each.program.last]
+    _signal(first, signal.SIGTERM)
+    finishing = [each for each in first if each.program.finishes]
     async with asyncio.TaskGroup() as group:
-        group.create_task(_end_soon([each for each in before if not each.program.finishes]))
+        group.create_task(_end_soon([each for each in first if not each.program.finishes]))
         group.create_task(_finish(finishing, write))
-    last = [each for each in those if each.program.last]
+    last = [each for each in processes if each.program.last]
     _signal(last, signal.SIGTERM)
-    await _ended(last, within_s=_LAST_S)
+    await _wait(last, within_s=_LAST_S)
     await _kill(last)
 
 
-async def _end_soon(those: Sequence[_Running]) -> None:
-    await _ended(those, within_s=_ASK_S)
-    await _kill(those)
+async def _end_soon(processes: Sequence[_Running]) -> None:
+    await _wait(processes, within_s=_STOP_S)
+    await _kill(processes)
 
 
-async def _finish(those: Sequence[_Running], write: Callable[[str], None]) -> None:
-    await _ended(those, within_s=_SAY_AFTER_S)
-    for each in _left(those):
+async def _finish(processes: Sequence[_Running], write: Callable[[str], None]) -> None:
+    await _wait(processes, within_s=_REPORT_AFTER_S)
+    for each in _alive(processes):
         write(f"waiting for {each.program.name}: {each.program.finishes}; Ctrl-C again kills it")
-    await _ended(those, within_s=_FINISH_S - _SAY_AFTER_S)
-    for each in _left(those):
+    await _wait(processes, within_s=_FINISH_S - _REPORT_AFTER_S)
+    for each in _alive(processes):
         write(f"{each.program.name} did not end within {_FINISH_S:.0f} s and is killed")
-    await _kill(those)
+    await _kill(processes)
 
 
-async def _ended(those: Sequence[_Running], *, within_s: float) -> None:
+async def _wait(processes: Sequence[_Running], *, within_s: float) -> None:
     with contextlib.suppress(TimeoutError):
         async with asyncio.timeout(within_s):
-            await asyncio.gather(*(each.process.wait() for each in those))
+            await asyncio.gather(*(each.process.wait() for each in processes))
 
 
-async def _kill(those: Sequence[_Running]) -> None:
-    _signal(those, signal.SIGKILL)
-    await asyncio.gather(*(each.process.wait() for each in those))
+async def _kill(processes: Sequence[_Running]) -> None:
+    _signal(processes, signal.SIGKILL)
+    await asyncio.gather(*(each.process.wait() for each in processes))
 
 
-def _left(those: Sequence[_Running]) -> list[_Running]:
-    return [each for each in those if each.process.returncode is None]
+def _alive(processes: Sequence[_Running]) -> list[_Running]:
+    return [each for each in processes if each.process.returncode is None]
 
 
-def _signal(those: Sequence[_Running], number: signal.Signals) -> None:
-    for each in _left(those):
+def _signal(processes: Sequence[_Running], number: signal.Signals) -> None:
+    for each in _alive(processes):
         with contextlib.suppress(ProcessLookupError):
             each.process.send_signal(number)
 

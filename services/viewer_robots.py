@@ -1,4 +1,4 @@
-"""Robots as other people's viewers have them: from a description, with meshes where the viewer finds them."""
+"""Conversion of robot descriptions for other programs' viewers (Foxglove, RViz)."""
 
 from collections.abc import Callable
 
@@ -8,7 +8,7 @@ from robots.urdf.viewers import Fixture, Viewed
 
 
 def meshes_of(description: Description) -> dict[str, str]:
-    """The hash (SHA-256, hex) of each mesh that a description names, by the mesh's name."""
+    """Return the hash (SHA-256, hex) of each mesh of a description, by the mesh's name."""
     hashes = {link.mesh: link.mesh_sha256 for link in description.links}
     hashes |= {fixture.mesh: fixture.mesh_sha256 for fixture in description.fixtures}
     hashes.pop("", None)
@@ -16,10 +16,10 @@ def meshes_of(description: Description) -> dict[str, str]:
 
 
 def viewed(site: str, robot: str, description: Description, uri: Callable[[str], str | None]) -> Viewed:
-    """A robot to be shown, and what stands in its cell.
+    """Return a robot with its cell's fixtures, for a viewer.
 
     Args:
-        uri: Where a mesh is, by its name; None: nowhere.
+        uri: Returns the URI of a mesh by its name, or None if the viewer cannot get it.
     """
     mesh_of = {link.name: link.mesh for link in description.links}
     fixtures = (

@@ -1,4 +1,4 @@
-"""The mesh for ROS 2: its topics in the wire form of rmw_zenoh, no bridge between."""
+"""Bridge to ROS 2: publishes the mesh's topics in the wire format of rmw_zenoh."""
 
 from services.ros2.service import serve
 from services.ros2.settings import Settings

@@ -1,4 +1,4 @@
-"""The robots' meshes as files, because RViz takes them from nowhere on the mesh."""
+"""Robots' meshes as files, because RViz cannot fetch them from the mesh."""
 
 import asyncio
 import hashlib
@@ -18,20 +18,20 @@ _WITHIN_S = 10.0
 
 
 class Meshes:
-    """A folder of GLB files, named by what is in them."""
+    """Folder of GLB files, named by their content's hash."""
 
     def __init__(self, session: Session, folder: Path) -> None:
         self._session, self._folder = session, folder
 
     async def of(self, site: str, robot: str, description: Description) -> dict[str, str]:
-        """The address of each mesh, by the mesh's name; one that cannot be had has none."""
+        """Return the URI of each mesh, by the mesh's name; without those that cannot be fetched."""
         hashes = meshes_of(description).items()
         paths = {mesh: await self._path(site, robot, mesh, sha256) for mesh, sha256 in hashes}
         return {mesh: path.as_uri() for mesh, path in paths.items() if path}
 
     async def _path(self, site: str, robot: str, mesh: str, sha256: str) -> Path | None:
         path = self._folder / f"{sha256}.glb"
-        # The hash comes from the mesh too: what is no hash must not become a path.
+        # The hash comes from another program: check it before it is part of a path.
         if len(sha256) != 64 or not sha256.isalnum():
             return None
         if await asyncio.to_thread(path.exists):

@@ -1,4 +1,4 @@
-"""The service: ROS 2 nodes with rmw_zenoh see the mesh's robots."""
+"""ROS 2 service: makes the mesh's robots visible to ROS 2 nodes with rmw_zenoh."""
 
 import asyncio
 

@@ -1,4 +1,4 @@
-"""What a bridge to ROS 2 is told."""
+"""Settings of the ROS 2 service."""
 
 import os
 from dataclasses import dataclass, field
@@ -13,15 +13,15 @@ def _cache() -> Path:
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Which part of the mesh ROS 2 sees, and where.
+    """Settings of the ROS 2 service.
 
     Attributes:
-        domain: ROS_DOMAIN_ID of the nodes that are to see it.
-        robots: `robot` or `site/robot`; none: all of the mesh.
-        site: Where it is present itself; empty: at the first site that is seen.
-        metrics: Host and port at which Prometheus may ask; None: nowhere.
-        node: Its name in the ROS graph.
-        meshes: Folder for the meshes that `/robot_description` names as files.
+        domain: ROS_DOMAIN_ID of the ROS 2 nodes.
+        robots: Robots to publish, as `robot` or `site/robot`; empty for all of the mesh.
+        site: Site of the service's presence; empty for the first site found.
+        metrics: Host and port of the Prometheus endpoint; None for none.
+        node: Name of the node in the ROS graph.
+        meshes: Folder for the mesh files that `/robot_description` names.
     """
 
     domain: int = 0
@@ -32,7 +32,7 @@ class Settings:
     meshes: Path = field(default_factory=_cache)
 
     def wants(self, site: str, robot: str) -> bool:
-        """Whether ROS 2 is to see a robot; a replay only if it is named."""
+        """Return whether to publish a robot to ROS 2; replays only if the settings name them."""
         if not self.robots:
             return not is_replay(robot)
         return robot in self.robots or f"{site}/{robot}" in self.robots

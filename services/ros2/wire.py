@@ -1,11 +1,11 @@
-"""rmw_zenoh's wire form: keys, attachments and liveliness tokens of ROS 2 topics.
+"""Wire format of rmw_zenoh: keys, attachments and liveliness tokens of ROS 2 topics.
 
 <domain>/<topic>/<package>::msg::dds_::<Type>_/<type hash>                       data: CDR with its header
 @ros2_lv/<domain>/<session>/<node>/<node>/NN/%/%/<name>                          a node
 @ros2_lv/<domain>/<session>/<node>/<entity>/MP/%/%/<name>/%<topic>/<type>/<hash>/<qos>   a publisher
-<data key>/@adv/pub/<session>/<entity>/...                                       what a late joiner asks
+<data key>/@adv/pub/<session>/<entity>/...                                       a late joiner's query
 
-Attachment: sequence (int64), source time (int64, ns), 16 bytes that tell the publisher (their length first).
+Attachment: sequence (int64), source time (int64, ns), publisher (its length, then 16 bytes).
 Source: the design document and the sources of ros2/rmw_zenoh (Jazzy).
 """
 
@@ -27,7 +27,7 @@ _ATTACHMENT = struct.Struct("<qqB16s")
 _TOKENS = "@ros2_lv"
 _NODE = 0
 _NODE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-# rmw_zenoh's own: how long after a message it is told again that there was one.
+# rmw_zenoh's value: delay of the heartbeat that follows a message.
 _SPORADIC_S = 0.5
 
 
@@ -36,10 +36,10 @@ class Topic:
     """A ROS 2 topic.
 
     Attributes:
-        name: Without the first slash.
-        kind: As in `sensor_msgs/msg/JointState`.
-        depth: How many messages are kept for who is slow, or late.
-        latched: Who comes late gets the last of them (transient local).
+        name: Name without the first slash.
+        kind: Type, such as `sensor_msgs/msg/JointState`.
+        depth: Number of messages to keep for slow or late subscribers.
+        latched: Late subscribers get the last messages (transient local).
     """
 
     name: str
@@ -50,36 +50,36 @@ class Topic:
 
     @property
     def qos(self) -> str:
-        """Reliable, keep last: what differs from ROS 2's default stands there, the rest is empty."""
+        """Quality of service: reliable, keep last. Values equal to ROS 2's defaults are empty."""
         return f":{1 if self.latched else ''}:,{self.depth}:,:,:,,"
 
     @property
     def dds_type(self) -> str:
-        """Its type as DDS names it."""
+        """DDS name of the type."""
         package, _, name = self.kind.split("/")
         return f"{package}::msg::dds_::{name}_"
 
     @property
     def type_hash(self) -> str:
-        """Of its type's definition, RIHS01."""
+        """RIHS01 hash of the type's definition."""
         return str(_STORE.hash_rihs01(self.kind))
 
     def key(self, domain: int) -> str:
-        """Where its messages travel."""
+        """Return the key of its messages."""
         return f"{domain}/{self.name}/{self.dds_type}/{self.type_hash}"
 
 
 def message(kind: str, **fields: Any) -> Any:
-    """A message of a ROS 2 type."""
+    """Return a message of a ROS 2 type."""
     return _STORE.types[kind](**fields)
 
 
 class NodeNameError(ServiceError):
-    """A name that no ROS 2 node can have."""
+    """The name of a ROS 2 node is invalid."""
 
 
 class Node:
-    """A ROS 2 node of a Zenoh session: its publishers, and the tokens that tell of them."""
+    """A ROS 2 node of a Zenoh session: its publishers and their liveliness tokens."""
 
     def __init__(self, session: zenoh.Session, name: str, *, domain: int) -> None:
         if not _NODE_NAME.fullmatch(name):
@@ -95,7 +95,7 @@ class Node:
         self._publishers: list[Publisher] = []
 
     def publish(self, topic: Topic) -> "Publisher":
-        """A publisher of a topic, told to the ROS graph."""
+        """Create a publisher of a topic and announce it in the ROS graph."""
         self._entities += 1
         publisher = Publisher(self._session, topic, topic.key(self.domain))
         self._publishers.append(publisher)
@@ -109,7 +109,7 @@ class Node:
         return f"{_TOKENS}/{self.domain}/{zid}/{_NODE}/{entity}/{kind}/%/%"
 
     def close(self) -> None:
-        """The node is gone from the ROS graph."""
+        """Remove the node from the ROS graph."""
         for token in self._tokens:
             token.undeclare()
         for publisher in self._publishers:
@@ -125,32 +125,32 @@ class Publisher:
         self._sequence = 0
         self._publisher: Any = _declare(session, topic, key)
 
-    def put(self, told: Any, *, source_time_ns: int) -> None:
+    def put(self, content: Any, *, source_time_ns: int) -> None:
         """Publish a message of the topic's type.
 
         Args:
-            source_time_ns: When what it tells was so, ns since the Unix epoch.
+            source_time_ns: Time of the content, ns since the Unix epoch.
         """
         self._sequence += 1
         attachment = _ATTACHMENT.pack(self._sequence, source_time_ns, 16, self._identity)
-        payload = bytes(_STORE.serialize_cdr(told, self.topic.kind))
+        payload = bytes(_STORE.serialize_cdr(content, self.topic.kind))
         self._publisher.put(payload, attachment=attachment)
 
     @property
     def watched(self) -> bool:
-        """Whether anybody subscribes to it now; of a latched topic it does not matter."""
+        """True if the topic has a subscriber now; always True for a latched topic."""
         if not isinstance(self._publisher, zenoh.Publisher):
             return True
         status: Any = self._publisher.matching_status  # typed as bool, but an object that is always true
         return bool(status.matching)
 
     def close(self) -> None:
-        """Publish no more."""
+        """Undeclare the publisher."""
         self._publisher.undeclare()
 
 
 def _declare(session: zenoh.Session, topic: Topic, key: str) -> zenoh.Publisher | zenoh.ext.AdvancedPublisher:
-    # rmw_zenoh drops too, unless everything is to be kept: a slow node must not stall a robot's states.
+    # Drop, as rmw_zenoh does except for "keep all": a slow node must not delay a robot's states.
     drop, priority = zenoh.CongestionControl.DROP, getattr(zenoh.Priority, topic.priority.value)
     if topic.latched:
         return zenoh.ext.declare_advanced_publisher(

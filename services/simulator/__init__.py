@@ -1,1 +1,1 @@
-"""A simulated controller of the paper's kind: a TCP server that moves any described arm, outside the mesh."""
+"""Simulated controller with the paper's protocol: a TCP server that moves any described arm."""

@@ -1,17 +1,17 @@
-"""The simulated controller itself: what it does with a unit, and what it tells. No I/O; time is an argument.
+"""State machine of the simulated controller: units in, state records out. No I/O; time is an argument.
 
     state     move, home   hold      resume   stop      reset     at rest
     --------  -----------  --------  -------  --------  --------  -----------------
     idle      moving       holding   -        stopped   -         demo: moving
     moving    moving*      holding   -        stopped   -         next motion, idle
     homing    then moving  holding   -        stopped   -         next motion, idle
-    holding   refused      -         goes on  stopped   idle      -
+    holding   refused      -         resumes  stopped   idle      -
     stopped   refused      -         -        -         idle      -
 
-*A new unit's motions take the place of the running one, smoothly; only homing is first brought to
-its end. The motions of one unit are done one after the other. What began at rest keeps to its straight
-line, whatever its speed becomes, when it is held, goes on or is stopped. While the arm brakes it is told
-as moving: "stopped" and "holding" are said of an arm that stands.
+*A new unit's motions replace the running one smoothly; only homing is completed first. The motions of one
+unit run one after the other. A motion that began at rest stays on its straight line when its speed changes
+or when it is held, resumed or stopped. The status is "moving" while the arm brakes; "stopped" and "holding"
+mean that it is at rest.
 """
 
 from collections import deque
@@ -43,10 +43,10 @@ class Controller:
     """State of one simulated controller.
 
     Args:
-        codes: Type codes as in the site file; empty: names are written.
-        demo: Targets [rad] or [m] of an endless motion, until the first motion command; None: at rest.
-            Controllers boot without knowing where they are, and tell `homed` only after homing. A demo
-            begins homed: it stands for an arm that has been at work since long before one looked.
+        codes: Type codes as in the site file; if empty, names are written.
+        demo: Targets [rad] or [m] of an endless motion until the first motion command; None for rest.
+            A controller boots without a reference position and reports `homed` only after homing. A demo
+            begins homed, because it represents an arm that has been at work for a long time.
         now_s: The clock's time at boot.
     """
 
@@ -65,16 +65,16 @@ class Controller:
         self._demo = demo
         self._boot_s = now_s
         self._homed = demo is not None
-        self._trace = self._stopped = self._held = False
+        self._trace = self._stopped = self._holding = False
         self._speed = 1.0
         self._task: Move | None = None
         self._queue: deque[Move] = deque()
 
-    def obey(self, records: Sequence[Record], now_s: float) -> Error | None:
-        """Do what a client's unit says, all or nothing; the record that answers it when it is refused."""
+    def execute(self, records: Sequence[Record], now_s: float) -> Error | None:
+        """Execute a client's unit, all or nothing; return the error record if it is refused."""
         orders = orders_of(records, self._joints, self._situation(now_s))
         if isinstance(orders, Error):
-            # Whatever else is wrong with a unit, a stop in it is a stop.
+            # A stop is executed even if the rest of its unit is invalid.
             if asks_to_stop(records):
                 self._do([Word("stop")], now_s)
             return orders
@@ -82,8 +82,8 @@ class Controller:
         return None
 
     def tick(self, now_s: float) -> None:
-        """Go from a motion that has ended to the next one."""
-        if self._held or self._stopped or self._motion.moving(now_s):
+        """Begin the next motion if the current one has ended."""
+        if self._holding or self._stopped or self._motion.moving(now_s):
             return
         if self._task is not None and now_s >= self._motion.end_s + self._pause_s():
             self._homed = self._homed or self._task.homing
@@ -93,8 +93,8 @@ class Controller:
         elif self._task is None and self._demo is not None:
             self._begin(Move(next(self._demo)), now_s)
 
-    def told(self, now_s: float) -> tuple[Record, ...]:
-        """The records that tell the controller's state."""
+    def state_records(self, now_s: float) -> tuple[Record, ...]:
+        """Return the records of the controller's state."""
         state = self._motion.state(now_s)
         positions = (state.positions / self._scales).round(_DECIMALS) + 0.0  # no "-0.00"
         velocities = (state.velocities / self._scales).round(_DECIMALS) + 0.0
@@ -108,28 +108,28 @@ class Controller:
     # ------------------------------------------------------------------------ orders
 
     def _situation(self, now_s: float) -> Situation:
-        where = self._motion.state(now_s).positions
+        positions = self._motion.state(now_s).positions
         if self._homing():
-            where = self._queue[-1].target if self._queue else self._joints.home
-        return Situation(stopped=self._stopped, held=self._held, where=where)
+            positions = self._queue[-1].target if self._queue else self._joints.home
+        return Situation(stopped=self._stopped, holding=self._holding, positions=positions)
 
     def _do(self, orders: Sequence[Order], now_s: float) -> None:
         motions = [order for order in orders if isinstance(order, Move)]
         if motions and not self._homing():
-            self._forget()
+            self._clear_motions()
         for order in orders:
             match order:
                 case Move():
                     self._queue.append(order)
                 case SetSpeed(fraction):
                     self._speed = fraction
-                    if self._task is not None and not self._held and self._motion.moving(now_s):
+                    if self._task is not None and not self._holding and self._motion.moving(now_s):
                         self._begin(self._task, now_s)
                 case Word(word):
                     self._word(word, now_s)
         if any(isinstance(order, Move) or _moves(order) for order in orders):
             self._demo = None
-        if self._queue and self._task is None and not (self._held or self._stopped):
+        if self._queue and self._task is None and not (self._holding or self._stopped):
             self._begin(self._queue.popleft(), now_s)
 
     def _word(self, word: str, now_s: float) -> None:
@@ -137,27 +137,27 @@ class Controller:
             case "trace" | "untrace":
                 self._trace = word == "trace"
             case "stop":
-                self._stopped, self._held = True, False
-                self._forget()
+                self._stopped, self._holding = True, False
+                self._clear_motions()
                 self._motion.brake(now_s)
             case "hold" if not self._stopped:
-                self._held = True
+                self._holding = True
                 self._motion.brake(now_s)
-            case "resume" if self._held:
-                self._held = False
+            case "resume" if self._holding:
+                self._holding = False
                 if self._task is not None:
                     self._begin(self._task, now_s)
             case "reset":
-                if self._held:
-                    self._forget()
-                self._stopped = self._held = False
+                if self._holding:
+                    self._clear_motions()
+                self._stopped = self._holding = False
 
     def _begin(self, task: Move, now_s: float) -> None:
         self._task = task
         slower = HOMING_SPEED if task.homing else _DEMO_SPEED if self._demo is not None else 1.0
         self._motion.move(task.target, now_s, speed=self._speed * slower)
 
-    def _forget(self) -> None:
+    def _clear_motions(self) -> None:
         self._queue.clear()
         self._task = None
 
@@ -167,7 +167,7 @@ class Controller:
         return self._task is not None and self._task.homing
 
     def _pause_s(self) -> float:
-        """How long the arm rests at the end of the running task."""
+        """Return the time that the arm rests after the running task [s]."""
         if self._homing():
             return HOMING_REST_S
         return _DEMO_REST_S if self._demo is not None else 0.0
@@ -177,10 +177,10 @@ class Controller:
         return (self._activity(now_s), "remote", *flags)
 
     def _activity(self, now_s: float) -> str:
-        braking = (self._stopped or self._held) and self._motion.moving(now_s)
+        braking = (self._stopped or self._holding) and self._motion.moving(now_s)
         if braking:
             return "moving"
-        if self._stopped or self._held:
+        if self._stopped or self._holding:
             return "stopped" if self._stopped else "holding"
         if self._homing():
             return "homing"
@@ -188,5 +188,5 @@ class Controller:
 
 
 def _moves(order: Order) -> bool:
-    """Whether a word has to do with motion: tracing a demo, or slowing it, does not end it."""
+    """Return whether a word concerns motion and so ends a demo; traces and speeds do not."""
     return isinstance(order, Word) and order.word not in ("trace", "untrace")

@@ -1,8 +1,8 @@
-"""The built-in motion: an endless tour of poses that any described arm can show.
+"""Built-in motion: an endless tour of poses for any described arm.
 
-Poses are spread evenly over the joints' ranges around home, kept when the whole arm stays well above
-the floor on the way to them, and chosen each as far as possible from those before, so that every
-leg of the tour is a wide sweep. Nothing is random: the same arm always dances the same dance.
+Candidate poses are spread evenly over the joints' ranges around home. A pose is used if the whole arm stays
+well above the floor on the way to it, and if it is far from the poses before, so that every leg of the tour
+is a wide sweep. The tour is deterministic.
 """
 
 import itertools
@@ -18,17 +18,17 @@ _Reachable: TypeAlias = Callable[[FloatArray, FloatArray], bool]
 
 _POSES = 8
 _CANDIDATES = 240
-# Of the way from home to each limit: a demonstration has no business near a limit.
+# Fraction of the way from home to each limit; a demonstration stays away from limits.
 _REACH = 0.62
-# Lowest height of the tool and of the links beyond the first two, as a part of the arm's greatest height.
+# Lowest height of the tool and of the links after the first two, as a fraction of the arm's greatest height.
 _FLOOR = 0.22
 _STEPS = 12
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37)
 
 
 def demo_tour(description: RobotDescription) -> Iterator[FloatArray]:
-    """Targets (n,) [rad] or [m], for ever; it begins and comes round at home."""
-    from robots.model import build_model, link_placements, tool_placement  # 0.4 s that only a demo pays
+    """Return an endless iterator of targets (n,) [rad] or [m]; the tour begins and ends at home."""
+    from robots.model import build_model, link_placements, tool_placement  # takes 0.4 s, only for a demo
 
     joints = joints_of(description)
     model = build_model(description)
@@ -48,7 +48,7 @@ def demo_tour(description: RobotDescription) -> Iterator[FloatArray]:
     ranges = joints.upper - joints.lower
     for _ in range(_POSES):
         poses = np.array(tour)
-        # Farthest from every pose so far, measured in parts of each joint's range.
+        # Distance from every pose so far, in fractions of each joint's range.
         spread = [float(np.abs((poses - pose) / ranges).sum(axis=1).min()) for pose in candidates]
         order = np.argsort(spread)[::-1]
         found = next((candidates[i] for i in order if reachable(tour[-1], candidates[i])), None)
@@ -59,7 +59,7 @@ def demo_tour(description: RobotDescription) -> Iterator[FloatArray]:
 
 
 def _way_home(tour: list[FloatArray], reachable: _Reachable) -> list[FloatArray]:
-    """Home, and back over the poses that have been shown where the straight way is not free."""
+    """Return the poses back to home, over earlier poses of the tour if the direct way is blocked."""
     for index in range(len(tour) - 1, -1, -1):
         if reachable(tour[index], tour[0]):
             return [*reversed(tour[index:-1]), tour[0]]
@@ -67,7 +67,7 @@ def _way_home(tour: list[FloatArray], reachable: _Reachable) -> list[FloatArray]
 
 
 def _candidates(joints: Joints) -> list[FloatArray]:
-    """Poses around home, evenly spread by a Halton sequence."""
+    """Return poses around home, evenly spread by a Halton sequence."""
     lower = joints.home + (joints.lower - joints.home) * _REACH
     upper = joints.home + (joints.upper - joints.home) * _REACH
     bases = [_PRIMES[i % len(_PRIMES)] for i in range(len(joints))]
@@ -78,7 +78,7 @@ def _candidates(joints: Joints) -> list[FloatArray]:
 
 
 def _radical_inverse(number: int, base: int) -> float:
-    """The digits of a number mirrored behind the point: evenly spread over 0 to 1."""
+    """Return the number's digits mirrored at the radix point, a value of an even spread over 0 to 1."""
     value, place = 0.0, 1.0 / base
     while number:
         number, digit = divmod(number, base)

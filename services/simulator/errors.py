@@ -1,11 +1,11 @@
 """Errors of the simulator.
 
 ServiceError (services.errors)
-└── SimulatorError          settings that no simulated controller can run with
+└── SimulatorError          a setting or a fault of a simulated controller is invalid
 """
 
 from services.errors import ServiceError
 
 
 class SimulatorError(ServiceError):
-    """Settings that no simulated controller can run with; the text names the one and says what is right."""
+    """A setting or a fault of a simulated controller is invalid; the text names the value and valid ones."""

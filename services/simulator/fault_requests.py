@@ -1,4 +1,4 @@
-"""Faults begun and ended by request: `robomesh/<site>/<robot>/simulator/fault`."""
+"""Handler of the request `robomesh/<site>/<robot>/simulator/fault`, which begins and ends faults."""
 
 import asyncio
 import time
@@ -18,7 +18,7 @@ from services.simulator.faults import Faults
 
 @dataclass(frozen=True, kw_only=True)
 class Mesh:
-    """For whom the simulator stands on the mesh, and how it gets there."""
+    """Robot name and session settings of the simulator on the mesh."""
 
     site: str
     robot: str
@@ -26,7 +26,7 @@ class Mesh:
 
 
 async def answer_requests(mesh: Mesh, faults: Faults) -> None:
-    """Answer until cancelled; while no router is there, wait for one."""
+    """Answer requests until cancelled; wait for the router if there is none yet."""
 
     async def answer(request: Request) -> FaultAnswer:
         message = request.message

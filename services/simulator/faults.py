@@ -1,7 +1,7 @@
-"""Faults that a real controller shows, on purpose: each begun and ended while it runs.
+"""Injection of faults that real controllers show; each can begin and end while the simulator runs.
 
-NAME, NAME@BEGIN, NAME+LENGTH or NAME@BEGIN+LENGTH, in seconds: of the command line after the first
-client came, of a request from now. What the faults do is a function of records, names and time.
+Syntax: NAME, NAME@BEGIN, NAME+LENGTH or NAME@BEGIN+LENGTH, in seconds. A fault from the command line counts
+from the first client's connection, a requested one from now. Their effects are pure functions.
 """
 
 import itertools
@@ -19,7 +19,7 @@ _TEXT = "drive of axis 1 overheated (simulated)"
 
 @dataclass(frozen=True)
 class Span:
-    """A fault and when it is there [s], from a beginning that is told elsewhere."""
+    """A fault with its begin and length [s], relative to a start that the caller knows."""
 
     name: str
     begin_s: float
@@ -27,13 +27,13 @@ class Span:
 
 
 def parse_fault(text: str, *, begin_s: float | None = None) -> Span:
-    """What NAME, NAME@BEGIN, NAME+LENGTH or NAME@BEGIN+LENGTH means.
+    """Parse NAME, NAME@BEGIN, NAME+LENGTH or NAME@BEGIN+LENGTH.
 
     Args:
-        begin_s: When it begins unless said; None: as its row says.
+        begin_s: Default begin; None for the default of the fault's row.
 
     Raises:
-        SimulatorError: If there is no such fault, or these are no such times.
+        SimulatorError: If the fault is unknown, or a time is invalid.
     """
     head, plus, length = text.partition("+")
     name, at, begin = head.partition("@")
@@ -56,13 +56,13 @@ def parse_fault(text: str, *, begin_s: float | None = None) -> Span:
 
 
 class Faults:
-    """Which faults there are when.
+    """Schedule of the faults.
 
     Args:
-        texts: Of the command line: their time begins when the first client comes.
+        texts: Faults of the command line; their time starts with the first client's connection.
 
     Raises:
-        SimulatorError: If one is none.
+        SimulatorError: If one is invalid.
     """
 
     def __init__(self, texts: Sequence[str]) -> None:
@@ -70,59 +70,59 @@ class Faults:
         self._spans: dict[str, Span] = {}
 
     def first_client(self, now_s: float) -> None:
-        """A client has come; the first one starts the clock of those that wait."""
+        """Start the time of the waiting faults; later calls have no effect."""
         for span in self._waiting:
             self._spans[span.name] = replace(span, begin_s=now_s + span.begin_s)
         self._waiting = []
 
     def begin(self, text: str, now_s: float) -> None:
-        """Begin a fault, at once unless it says otherwise.
+        """Begin a fault now, or at its @BEGIN.
 
         Raises:
-            SimulatorError: If there is no such fault.
+            SimulatorError: If it is invalid.
         """
         span = parse_fault(text, begin_s=0.0)
         self._spans[span.name] = replace(span, begin_s=now_s + span.begin_s)
 
     def end(self, text: str) -> None:
-        """End a fault, if it is there.
+        """End a fault, if it is active or waiting.
 
         Raises:
-            SimulatorError: If there is no such fault.
+            SimulatorError: If it is unknown.
         """
         name = parse_fault(text).name
         self._spans.pop(name, None)
         self._waiting = [span for span in self._waiting if span.name != name]
 
     def active(self, now_s: float) -> frozenset[str]:
-        """The names of those that are there now."""
+        """Return the names of the active faults."""
         return frozenset(
             name for name, span in self._spans.items() if 0.0 <= now_s - span.begin_s < span.length_s
         )
 
 
-# ------------------------------------------------------------------------ what they do
+# ------------------------------------------------------------------------ effects
 
 
-def disguised(records: Sequence[Record], active: Collection[str], now_s: float) -> list[Record]:
-    """What is told in place of a state's records."""
-    told: list[Record] = []
+def faulty_records(records: Sequence[Record], active: Collection[str], now_s: float) -> list[Record]:
+    """Return a state's records as the active faults change them."""
+    changed: list[Record] = []
     for record in records:
         match record:
             case AbsolutePositions(values):
                 leap = LEAP if "jump" in active and int(now_s) % 2 else 0.0
                 more = (0.0,) if "joints" in active else ()
-                told.append(AbsolutePositions((values[0] + leap, *values[1:], *more)))
+                changed.append(AbsolutePositions((values[0] + leap, *values[1:], *more)))
             case _ if "bare" in active:
                 pass
             case Velocities(values) if "joints" in active:
-                told.append(Velocities((*values, 0.0)))
+                changed.append(Velocities((*values, 0.0)))
             case Status(words):
                 if "mute" not in active:
-                    told.append(Status(_words(words, active)))
+                    changed.append(Status(_words(words, active)))
             case _:
-                told.append(record)
-    return told
+                changed.append(record)
+    return changed
 
 
 def _words(words: Sequence[str], active: Collection[str]) -> tuple[str, ...]:
@@ -135,7 +135,7 @@ def _words(words: Sequence[str], active: Collection[str]) -> tuple[str, ...]:
 
 
 def refusal(records: Sequence[Record], active: Collection[str]) -> Error | None:
-    """The answer to a client's unit that a fault forbids; None: it forbids nothing."""
+    """Return the error record if an active fault forbids a client's unit, else None."""
     words = [word for record in records if isinstance(record, Command) for word in record.words]
     if asks_to_stop(records):
         return None
@@ -147,17 +147,17 @@ def refusal(records: Sequence[Record], active: Collection[str]) -> Error | None:
 
 
 def fault_error() -> Error:
-    """What a controller says of its fault."""
+    """Return the record that reports the fault `fault`."""
     return Error(FAULT, _TEXT)
 
 
 def copies(active: Collection[str]) -> int:
-    """How many times each unit is sent."""
+    """Return how many times each unit is sent."""
     return max((count for name, count in COPIES.items() if name in active), default=1)
 
 
 def pieces(unit: bytes) -> Iterator[bytes]:
-    """A unit cut into pieces of 1, 2, 3, 5, 7 and 97 bytes."""
+    """Yield a unit in pieces of 1, 2, 3, 5, 7 and 97 bytes."""
     begin = 0
     for size in itertools.cycle((1, 2, 3, 5, 7, 97)):
         if begin >= len(unit):
@@ -166,7 +166,7 @@ def pieces(unit: bytes) -> Iterator[bytes]:
         begin += size
 
 
-# A unit out of ten, each refused for a reason of its own, each taken as a good one by a careless reader.
+# One unit out of ten is malformed. Each entry breaks another rule and would pass a careless parser.
 _EVERY = 10
 _GARBAGE = (
     b"3#ABSOLUTE.DEG*1.00;2.00;3.00@",
@@ -183,7 +183,7 @@ _GARBAGE = (
 
 
 def garbage() -> Iterator[bytes]:
-    """What goes before each good unit: mostly nothing."""
+    """Yield the bytes to send before each valid unit, mostly none."""
     for number in itertools.count():
         index, rest = divmod(number, _EVERY)
         yield b"" if rest else _GARBAGE[index % len(_GARBAGE)]

@@ -1,4 +1,4 @@
-"""All clients of one simulated controller: what each is told at the rate, and what its units do."""
+"""Server of one simulated controller: sends its state at a fixed rate and executes its clients' units."""
 
 import asyncio
 import itertools
@@ -18,7 +18,7 @@ from services.simulator.unit_execution import MALFORMED, asks_to_stop
 logger = logging.getLogger(__name__)
 
 _TOO_MANY = Error(1, "too many clients")
-# Prime, so that the cut of a unit into two pieces wanders over all its places.
+# Prime, so that the position at which a unit is cut takes every value.
 _CUT_STEP = 37
 _DROP_EACH_S = 1.0
 _HOLD_BACK_S = 2.0
@@ -26,14 +26,19 @@ _PAUSE_S = 0.001
 
 
 class Server:
-    """Serves one controller.
+    """Server of one controller.
 
     Args:
-        boot: A controller at a time; the first one, and after each restart one that moves by nobody's word.
+        boot: Creates the controller after a restart, at rest, for the fault_schedule time.
     """
 
     def __init__(
-        self, controller: Controller, boot: Callable[[float], Controller], given: Faults, *, max_clients: int
+        self,
+        controller: Controller,
+        boot: Callable[[float], Controller],
+        fault_schedule: Faults,
+        *,
+        max_clients: int,
     ) -> None:
         self._controller = controller
         self._boot = boot
@@ -41,28 +46,28 @@ class Server:
         self._clients: list[Client] = []
         self._connections: set[Client] = set()
         self._empty = asyncio.Event()
-        self._faults = given
+        self._faults = fault_schedule
         self._active: frozenset[str] = frozenset()
         self._dropped_s = 0.0
-        self._held: list[bytes] = []
-        self._held_since_s = 0.0
+        self._held_back: list[bytes] = []
+        self._held_back_since_s = 0.0
 
     def new_client(self) -> Client:
-        """The protocol of a connection that has just been accepted."""
+        """Return the protocol of a connection that has just been accepted."""
         return Client(self, self._controller.table)
 
     async def run(self, rate_hz: float) -> None:
-        """Tell the state at the rate, for ever. A tick that comes late is left out, never made up for."""
+        """Send the state at the rate until cancelled. Missed ticks are skipped, not made up for."""
         period_s = 1.0 / rate_hz
         noise = faults.garbage()
         next_s = time.monotonic()
         for number in itertools.count():
             now_s = time.monotonic()
             self._controller.tick(now_s)
-            self._turn(now_s)
+            self._apply_faults(now_s)
             if self._clients and "freeze" not in self._active:
                 before = next(noise) if "garbage" in self._active else b""
-                await self._tell(before + self._told(now_s), number, now_s)
+                await self._send(before + self._state_unit(now_s), number, now_s)
             next_s = max(next_s + period_s, now_s)
             await asyncio.sleep(next_s - time.monotonic())
 
@@ -76,38 +81,38 @@ class Server:
     # ------------------------------------------------------------------------ clients
 
     def joined(self, client: Client) -> None:
-        """Take a client in, or turn it away."""
+        """Accept a client, or reject it if there are too many."""
         self._connections.add(client)
         self._empty.clear()
-        self._turn(time.monotonic())
+        self._apply_faults(time.monotonic())
         if "restart" in self._active:
             client.abort()
             return
         if len(self._clients) >= self._max_clients or "refuse" in self._active:
-            logger.warning("client %s turned away: too many clients", client.name)
+            logger.warning("client %s rejected: too many clients", client.name)
             client.close(write_unit((_TOO_MANY,), self._controller.table))
             return
         self._clients.append(client)
         self._faults.first_client(time.monotonic())
-        logger.info("client %s has come, %d in all", client.name, len(self._clients))
+        logger.info("client %s connected, %d in all", client.name, len(self._clients))
 
     def left(self, client: Client) -> None:
-        """Forget a client."""
+        """Remove a client that has disconnected."""
         if client in self._clients:
             self._clients.remove(client)
-            logger.info("a client has gone, %d are left", len(self._clients))
+            logger.info("client %s disconnected, %d left", client.name, len(self._clients))
         self._connections.discard(client)
         if not self._connections:
             self._empty.set()
 
     def gave_up(self, client: Client, why: str) -> None:
-        """A client is closed for its own fault."""
+        """Log that a client is closed because it misbehaved."""
         logger.warning("client %s %s: closed", client.name, why)
 
     def heard(self, client: Client, events: list[StreamEvent]) -> None:
-        """Do what a client's units say, in their order; answer those that are refused."""
+        """Execute a client's units in order; answer the refused ones."""
         now_s = time.monotonic()
-        self._turn(now_s)
+        self._apply_faults(now_s)
         if client not in self._clients or "freeze" in self._active:
             return
         for event in events:
@@ -117,39 +122,39 @@ class Server:
                 client.answer(write_unit((refusal,), self._controller.table))
 
     def overheard(self, client: Client, events: list[StreamEvent]) -> None:
-        """Nothing: whom a controller turns away it does not hear."""
+        """Do nothing: a controller ignores units of a rejected client."""
 
     def outpaced(self, client: Client) -> None:
-        """Nothing: a client may send what it likes."""
+        """Do nothing: the rate of a client's units is not limited."""
 
     def _refusal_of(self, event: StreamEvent, now_s: float) -> Error | None:
         if isinstance(event, Malformed):
             return Error(MALFORMED, f"malformed, {event.reason}")
         if "deaf" in self._active and asks_to_stop(event.records):
             return None
-        refusal = faults.refusal(event.records, self._active) if _asks(event) else None
+        refusal = faults.refusal(event.records, self._active) if _is_request(event) else None
         if refusal is None:
-            refusal = self._controller.obey(event.records, now_s)
+            refusal = self._controller.execute(event.records, now_s)
             if "fault" in self._active and any(_resets(record) for record in event.records):
                 self._faults.end("fault")
         return refusal
 
-    # ---------------------------------------------------------------------- what is told
+    # ---------------------------------------------------------------------- state
 
-    def _told(self, now_s: float) -> bytes:
-        records = faults.disguised(self._controller.told(now_s), self._active, now_s)
+    def _state_unit(self, now_s: float) -> bytes:
+        records = faults.faulty_records(self._controller.state_records(now_s), self._active, now_s)
         return write_unit(records, self._controller.table)
 
-    async def _tell(self, unit: bytes, number: int, now_s: float) -> None:
+    async def _send(self, unit: bytes, number: int, now_s: float) -> None:
         if "burst" in self._active:
-            self._held.append(unit)
-            if now_s - self._held_since_s < _HOLD_BACK_S:
+            self._held_back.append(unit)
+            if now_s - self._held_back_since_s < _HOLD_BACK_S:
                 return
-        if self._held:
-            unit = b"".join(self._held)
-            self._held, self._held_since_s = [], now_s
+        if self._held_back:
+            unit = b"".join(self._held_back)
+            self._held_back, self._held_back_since_s = [], now_s
         if "split" in self._active:
-            await _tell_in_pieces(tuple(self._clients), unit)
+            await _send_in_pieces(tuple(self._clients), unit)
             return
         unit *= faults.copies(self._active)
         for client in tuple(self._clients):
@@ -157,14 +162,14 @@ class Server:
 
     # ---------------------------------------------------------------------------- faults
 
-    def _turn(self, now_s: float) -> None:
-        """Do what a fault does when it begins, ends or is there."""
+    def _apply_faults(self, now_s: float) -> None:
+        """Update the active faults and apply their effects on connections and controller."""
         before, self._active = self._active, self._faults.active(now_s)
         for name in self._active - before:
-            logger.warning("fault: %s, %s", name, FAULTS[name].what)
+            logger.warning("fault: %s, %s", name, FAULTS[name].effect)
             self._begin(name, now_s)
         for name in before - self._active:
-            logger.warning("the fault %s is over", name)
+            logger.warning("fault %s is over", name)
         if "freeze" in before - self._active:
             for client in self._clients:
                 client.read_on()
@@ -178,9 +183,9 @@ class Server:
     def _begin(self, name: str, now_s: float) -> None:
         match name:
             case "burst":
-                self._held_since_s = now_s
+                self._held_back_since_s = now_s
             case "fault":
-                self._controller.obey((Command(("stop",)),), now_s)
+                self._controller.execute((Command(("stop",)),), now_s)
                 unit = write_unit((faults.fault_error(),), self._controller.table)
                 for client in self._clients:
                     client.answer(unit)
@@ -197,14 +202,14 @@ class Server:
             client.abort()
 
 
-async def _tell_in_pieces(clients: tuple[Client, ...], unit: bytes) -> None:
+async def _send_in_pieces(clients: tuple[Client, ...], unit: bytes) -> None:
     for piece in faults.pieces(unit):
         for client in clients:
             client.answer(piece)
         await asyncio.sleep(_PAUSE_S)
 
 
-def _asks(unit: Unit) -> bool:
+def _is_request(unit: Unit) -> bool:
     return any(isinstance(each, Command | AbsolutePositions | RelativePositions) for each in unit.records)
 
 

@@ -1,4 +1,4 @@
-"""The simulator: a controller from its settings, listening; on the mesh only for its faults."""
+"""Simulator service: a simulated controller on a TCP port; on the mesh only for fault requests."""
 
 import asyncio
 import logging
@@ -23,17 +23,17 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What a simulated controller is.
+    """Settings of a simulated controller.
 
     Attributes:
         robot: A library robot, or a path to a robot.toml or URDF.
         listen: `HOST:PORT`; port 0 takes a free one.
         rate_hz: State units a second.
-        demo: Moves by itself until the first motion command, and begins homed.
-        faults: As `services.simulator.faults` takes them.
-        codes: Type codes, as in the site file; empty: names.
+        demo: Begins homed and moves until the first motion command.
+        faults: Faults in the syntax of `services.simulator.faults`.
+        codes: Type codes, as in the site file; empty for names.
         insecure: May listen beyond loopback; the protocol has no TLS.
-        mesh: Where faults can be asked for; None: nowhere, and the mesh knows nothing of it.
+        mesh: Where to answer fault requests; None to stay off the mesh.
     """
 
     robot: str
@@ -51,12 +51,12 @@ async def serve(settings: Settings, *, ready: Callable[[str], None] | None = Non
     """Simulate a controller until cancelled.
 
     Args:
-        ready: Gets the line `listening on HOST:PORT` once clients can come.
+        ready: Called with the line `listening on HOST:PORT` once clients can connect.
 
     Raises:
-        ListenError: If it cannot listen there.
-        SimulatorError: If the settings make no controller.
-        DescriptionError: If there is no such robot.
+        ListenError: If it cannot listen on that address.
+        SimulatorError: If a setting is invalid.
+        DescriptionError: If the robot is unknown.
     """
     host, port = split_address(settings.listen)
     remedy = "listen on 127.0.0.1, or take the risk with --insecure: the controllers' old protocol has no TLS"
@@ -88,7 +88,7 @@ def _server(settings: Settings, faults: Faults) -> Server:
     if not 0.0 < settings.rate_hz <= 1000.0:
         raise SimulatorError(f"rate {settings.rate_hz:g} Hz is outside 0 to 1000 Hz")
     if settings.max_clients < 1:
-        raise SimulatorError(f"{settings.max_clients} clients at most is too few: 1 or more")
+        raise SimulatorError(f"a maximum of {settings.max_clients} clients is too low: 1 or more")
     description = load(settings.robot)
     joints = joints_of(description)
 

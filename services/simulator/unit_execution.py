@@ -1,7 +1,7 @@
-"""From a unit's records to what the controller is to do: all of it, or a refusal and nothing.
+"""Validation of a client's unit: the orders for the controller, or one refusal of the whole unit.
 
-The unit is rehearsed on a copy of the state before anything is done, so that `reset` allows the
-move behind it, and a target beyond a limit takes the words before it with it.
+The unit is first applied to a copy of the state, so that `reset` permits the move after it, and a target
+beyond a limit also refuses the words before it.
 """
 
 from collections.abc import Sequence
@@ -37,14 +37,14 @@ class Word:
 
 @dataclass(frozen=True)
 class SetSpeed:
-    """A fraction of the greatest speeds, 0.01 to 1."""
+    """A change of speed, as a fraction 0.01 to 1 of the maximum speeds."""
 
     fraction: float
 
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """Go to a target [rad] or [m]; homing goes slower, and finds the reference marks at its end."""
+    """A motion to a target [rad] or [m]; homing is slower and finds the reference marks at its end."""
 
     target: FloatArray
     homing: bool = False
@@ -55,25 +55,25 @@ Order: TypeAlias = Word | SetSpeed | Move
 
 @dataclass(frozen=True, eq=False)
 class Situation:
-    """What decides whether an order can be done.
+    """State that decides whether an order is permitted.
 
     Attributes:
-        where: (n,) where the arm will be when the next motion begins [rad] or [m].
+        positions: (n,) positions at which the next motion begins [rad] or [m].
     """
 
     stopped: bool
-    held: bool
-    where: FloatArray
+    holding: bool
+    positions: FloatArray
 
 
 def orders_of(records: Sequence[Record], joints: Joints, situation: Situation) -> list[Order] | Error:
-    """The orders of a client's unit, or the record that refuses it."""
+    """Return the orders of a client's unit, or the error record that refuses it."""
     orders: list[Order] = []
     for record in records:
-        rehearsed = _rehearsed(record, joints, situation)
-        if isinstance(rehearsed, Error):
-            return rehearsed
-        for order in rehearsed:
+        found = _orders_of_record(record, joints, situation)
+        if isinstance(found, Error):
+            return found
+        for order in found:
             if refusal := _refusal(order, joints, situation):
                 return refusal
             orders.append(order)
@@ -82,11 +82,11 @@ def orders_of(records: Sequence[Record], joints: Joints, situation: Situation) -
 
 
 def asks_to_stop(records: Sequence[Record]) -> bool:
-    """Whether a unit holds a stop: done even when the rest of the unit is refused."""
+    """Return whether a unit holds a stop, which is executed even if the rest is refused."""
     return any(isinstance(record, Command) and "stop" in record.words for record in records)
 
 
-def _rehearsed(record: Record, joints: Joints, situation: Situation) -> Sequence[Order] | Error:
+def _orders_of_record(record: Record, joints: Joints, situation: Situation) -> Sequence[Order] | Error:
     match record:
         case Command(words):
             orders = [_word(word, joints) for word in words]
@@ -96,12 +96,12 @@ def _rehearsed(record: Record, joints: Joints, situation: Situation) -> Sequence
         case AbsolutePositions(values) | RelativePositions(values):
             if len(values) != len(joints):
                 return Error(JOINT_COUNT, f"{len(values)} values for {len(joints)} joints")
-            origin = situation.where if isinstance(record, RelativePositions) else np.zeros(len(joints))
+            origin = situation.positions if isinstance(record, RelativePositions) else np.zeros(len(joints))
             return (Move(origin + np.array(values) * si_scales(joints.types)),)
         case Unknown(type_name):
             return Error(UNKNOWN_WORD, f"unknown type {type_name[:40]}")
         case _:
-            # Data about somebody's state or clock, or an answer: it asks for nothing.
+            # State, time or an answer: not a request.
             return ()
 
 
@@ -126,7 +126,7 @@ def _refusal(order: Order, joints: Joints, situation: Situation) -> Error | None
         return None
     if situation.stopped:
         return Error(STOPPED, "stopped, reset first")
-    if situation.held:
+    if situation.holding:
         return Error(STOPPED, "holding, resume or reset first")
     if beyond := violations(joints, order.target):
         # Units are ASCII.
@@ -137,14 +137,14 @@ def _refusal(order: Order, joints: Joints, situation: Situation) -> Error | None
 def _after(order: Order, situation: Situation) -> Situation:
     match order:
         case Move(target):
-            return replace(situation, where=target)
+            return replace(situation, positions=target)
         case Word("stop"):
-            return replace(situation, stopped=True, held=False)
+            return replace(situation, stopped=True, holding=False)
         case Word("reset"):
-            return replace(situation, stopped=False, held=False)
+            return replace(situation, stopped=False, holding=False)
         case Word("hold"):
-            return replace(situation, held=not situation.stopped)
+            return replace(situation, holding=not situation.stopped)
         case Word("resume"):
-            return replace(situation, held=False)
+            return replace(situation, holding=False)
         case _:
             return situation

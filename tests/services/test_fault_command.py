@@ -1,4 +1,4 @@
-"""`robomesh fault` towards a real simulator on a real mesh, and what `monitor` says of a link."""
+"""`robomesh fault` against a real simulator on a real mesh, and the words of `monitor` for a link."""
 
 import asyncio
 import json
@@ -66,7 +66,7 @@ def test_monitor_says_what_is_known_of_a_link_and_what_is_wrong():
     assert link_words(silent) == "0 units/s, 2.3 s old"
 
 
-def test_the_document_of_faults_says_of_each_what_the_simulator_does():
+def test_the_document_of_faults_has_the_simulators_descriptions():
     text = (Path(__file__).parents[2] / "docs" / "faults.md").read_text(encoding="utf-8")
     rows = [line.split(" | ")[:2] for line in text.splitlines() if line.startswith("| `")]
-    assert rows == [[f"| `{name}`", fault.what] for name, fault in FAULTS.items()]
+    assert rows == [[f"| `{name}`", fault.effect] for name, fault in FAULTS.items()]

@@ -100,12 +100,12 @@ def test_whoever_was_started_from_the_page_is_named_in_the_rules_without_the_aut
     keys("init", str(site))
     folder = Folder(tmp_path / "keys")
     folder.authority_key.unlink()
-    following = up._Started(load(site), site, load(site).listened[0])
+    started = up._Started(load(site), site, load(site).listened[0])
     file = tmp_path / "robots" / "started.toml"
     file.parent.mkdir()
 
     def rights():
-        following.wanted()
+        started.wanted()
         control = read_access(folder.access)["access_control"]
         (policy,) = (each for each in control["policies"] if each["subjects"] == ["started.hall"])
         rules = (rule for rule in control["rules"] if rule["id"] in policy["rules"])
@@ -137,14 +137,14 @@ def test_no_router_opens_anew_for_the_first_start_of_a_robot_that_was_there_befo
         (saved.parent.parent / other).mkdir()
         (saved.parent.parent / other / "robot.toml").write_text("")
     assert may_start(load(site)) == tuple(sorted(("mine", *library_names())))
-    following = up._Started(load(site), site, load(site).listened[0])
-    following.wanted()
+    started = up._Started(load(site), site, load(site).listened[0])
+    started.wanted()
     rules = Folder(tmp_path / "keys").access.stat()
     for name in ("mine", library_names()[0]):
         (tmp_path / "robots" / "started.toml").write_text(
             'site = "hall"' + ONE_ARM.replace('"arm"', f'"{name}"')
         )
-        assert [key[0] for key in following.wanted()] == [name]
+        assert [key[0] for key in started.wanted()] == [name]
     assert Folder(tmp_path / "keys").access.stat() == rules
 
 
@@ -163,13 +163,13 @@ def test_where_no_names_can_be_written_ahead_the_robots_that_were_started_run_on
         raise KeysError(f"{folder.principals}: cannot be written: no space left on device")
 
     monkeypatch.setattr(authority, "save", full)
-    following = up._Started(load(site), site, load(site).listened[0])
-    assert [key[0] for key in following.wanted()] == ["mine"]
+    started = up._Started(load(site), site, load(site).listened[0])
+    assert [key[0] for key in started.wanted()] == ["mine"]
     assert "no space left on device; the robots that were started run" in caplog.text
     caplog.clear()
     # Nobody would let in a gateway of this one.
     started.write_text(started.read_text() + ONE_ARM.replace('"arm"', '"new"'))
-    assert [key[0] for key in following.wanted()] == ["mine"]
+    assert [key[0] for key in started.wanted()] == ["mine"]
     assert "no space left on device; the robots that were started before stay" in caplog.text
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from services.command_line.site.metrics_ports import following_with_metrics, with_metrics
+from services.command_line.site.metrics_ports import extra_with_metrics, with_metrics
 from services.command_line.site.up import programs
 from services.errors import ListenError
 from services.site_file import site as site_file
@@ -39,9 +39,9 @@ def test_port_0_is_a_free_one_for_each_and_without_an_address_nobody_serves():
 
 
 def test_what_is_started_from_the_page_takes_a_free_port():
-    made = [Program(name="gateway two", arguments=("gateway",), needed=False)]
-    following = following_with_metrics(lambda: {"two": lambda: made}, ("127.0.0.1", 9101))
-    (make,) = following().values()
+    made = [Program(name="gateway two", arguments=("gateway",), required=False)]
+    extra = extra_with_metrics(lambda: {"two": lambda: made}, ("127.0.0.1", 9101))
+    (make,) = extra().values()
     assert places(make()) == {"gateway two": "127.0.0.1:0"}
 
 

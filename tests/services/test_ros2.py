@@ -1,4 +1,4 @@
-"""The mesh in the hands of ROS 2 tools: an independent client of rmw_zenoh's wire form decodes it."""
+"""ROS 2 service, decoded by an independent client of rmw_zenoh's wire format."""
 
 import asyncio
 import hashlib
@@ -29,12 +29,12 @@ DEFINITIONS = get_typestore(Stores.ROS2_JAZZY)
 
 
 def definition(kind):
-    """A type's definition, with those of the types in it, as ROS 2 writes it."""
+    """Return a type's definition with those of its fields' types, in ROS 2's format."""
     return DEFINITIONS.generate_msgdef(kind, ros_version=2)[0]
 
 
 class Tools:
-    """ROS 2 tools on the mesh's router, by somebody else's hand."""
+    """ROS 2 tools of an independent library on the mesh's router."""
 
     def __init__(self, port):
         self.port = port
@@ -47,7 +47,7 @@ class Tools:
         return {name: kind for name, (kind,) in found}
 
     async def echo(self, topic, kind, qos=None):
-        """What comes on a topic, as it comes."""
+        """Subscribe to a topic; return the list that received messages are appended to."""
         got = []
         await asyncio.to_thread(
             ROS2Subscriber,
@@ -83,8 +83,8 @@ async def bridge(mesh, folder, **settings):
 
 
 @asynccontextmanager
-async def hall(mesh, robot="arm"):
-    """A session that is a robot's services."""
+async def robot_session(mesh, robot="arm"):
+    """Open a session that publishes as a robot's services."""
     async with open_session(mesh) as session:
 
         async def mesh_of(_):
@@ -103,10 +103,10 @@ def joints(position):
 
 
 def description(sha256):
-    told = schema.Description(name="arm", urdf=URDF, base_to_site=np.eye(4).ravel())
-    told.links.add(name="base", mesh="foot", mesh_sha256=sha256)
-    told.links.add(name="column", mesh="bad", mesh_sha256="../../evil")
-    return told
+    message = schema.Description(name="arm", urdf=URDF, base_to_site=np.eye(4).ravel())
+    message.links.add(name="base", mesh="foot", mesh_sha256=sha256)
+    message.links.add(name="column", mesh="bad", mesh_sha256="../../evil")
+    return message
 
 
 def test_ros_2_lists_the_topics_with_their_types(mesh, tools, tmp_path):
@@ -122,52 +122,50 @@ def test_ros_2_lists_the_topics_with_their_types(mesh, tools, tmp_path):
     run(main(), timeout_s=60.0)
 
 
-def test_joint_states_come_with_the_robot_in_their_names_and_the_gateways_time(mesh, tools, tmp_path):
+def test_joint_states_have_prefixed_names_and_the_gateways_time(mesh, tools, tmp_path):
     async def main():
-        async with hall(mesh) as robot, bridge(mesh, tmp_path):
+        async with robot_session(mesh) as robot, bridge(mesh, tmp_path):
             states = robot.declare_publisher("hall", "arm", "joints")
             got = await tools.echo("/joint_states", JOINT_STATES.kind)
             await until(lambda: states.watched)
             while not got:
                 states.put(joints(0.5))
                 await asyncio.sleep(0.05)
-            told = got[0]
-            assert list(told.name) == ["hall/arm/waist", "hall/arm/shoulder"]
-            assert list(told.position) == [0.5, -1.0]
-            assert list(told.velocity) == [0.25, -0.5]
-            assert len(told.effort) == 0
-            assert (told.header.stamp.sec, told.header.stamp.nanosec) == (1_700_000_000, 250_000_000)
+            message = got[0]
+            assert list(message.name) == ["hall/arm/waist", "hall/arm/shoulder"]
+            assert list(message.position) == [0.5, -1.0]
+            assert list(message.velocity) == [0.25, -0.5]
+            assert len(message.effort) == 0
+            assert (message.header.stamp.sec, message.header.stamp.nanosec) == (1_700_000_000, 250_000_000)
 
     run(main())
 
 
-def test_old_joints_are_not_told_again_and_a_robot_that_was_named_has_its_own_joints_names(
-    mesh, tools, tmp_path
-):
+def test_last_values_are_not_published_and_a_single_named_robot_has_plain_joint_names(mesh, tools, tmp_path):
     async def main():
-        async with hall(mesh) as robot, hall(mesh, "arm-2") as other:
+        async with robot_session(mesh) as robot, robot_session(mesh, "arm-2") as other:
             states = robot.declare_publisher("hall", "arm", "joints")
-            states.remember(joints(1.0), source_time_ns=5)  # nobody knows how old
+            states.remember(joints(1.0), source_time_ns=5)  # a last value of unknown age
             others = other.declare_publisher("hall", "arm-2", "joints")
             async with bridge(mesh, tmp_path, robots=("hall/arm",)):
                 got = await tools.echo("/joint_states", JOINT_STATES.kind)
                 await until(lambda: states.watched)
                 far = joints(4.0)
-                far.timestamp.seconds = 200_000_000_000  # later than a ROS 2 stamp can be
+                far.timestamp.seconds = 200_000_000_000  # beyond the range of a ROS 2 stamp
                 while not got:
                     others.put(joints(3.0))
                     states.put(far)
                     states.put(joints(2.0))
                     await asyncio.sleep(0.05)
-                assert {told.position[0] for told in got} == {2.0}
+                assert {message.position[0] for message in got} == {2.0}
                 assert list(got[0].name) == ["waist", "shoulder"]
 
     run(main())
 
 
-def test_frames_come_as_tf_in_the_sites_frame(mesh, tools, tmp_path):
+def test_frames_are_published_as_tf_in_the_sites_frame(mesh, tools, tmp_path):
     async def main():
-        async with hall(mesh) as robot, bridge(mesh, tmp_path):
+        async with robot_session(mesh) as robot, bridge(mesh, tmp_path):
             publisher = robot.declare_publisher("hall", "arm", "frames")
             got = await tools.echo("/tf", TF.kind)
             frames = FrameTransforms()
@@ -178,26 +176,30 @@ def test_frames_come_as_tf_in_the_sites_frame(mesh, tools, tmp_path):
             while not got:
                 publisher.put(frames)
                 await asyncio.sleep(0.05)
-            (told,) = got[0].transforms
-            assert (told.header.frame_id, told.child_frame_id) == ("hall", "hall/arm/base")
-            assert (told.header.stamp.sec, told.header.stamp.nanosec) == (7, 9)
-            assert (told.transform.translation.x, told.transform.rotation.w) == (1.5, 1.0)
+            (stamped,) = got[0].transforms
+            assert (stamped.header.frame_id, stamped.child_frame_id) == ("hall", "hall/arm/base")
+            assert (stamped.header.stamp.sec, stamped.header.stamp.nanosec) == (7, 9)
+            assert (stamped.transform.translation.x, stamped.transform.rotation.w) == (1.5, 1.0)
 
     run(main())
 
 
-def test_who_comes_late_gets_the_description_of_all_robots_with_meshes_as_files(mesh, tools, tmp_path):
+def test_late_subscribers_get_the_description_of_all_robots_with_mesh_files(mesh, tools, tmp_path):
 
     async def main():
         sha256 = hashlib.sha256(GLB).hexdigest()
-        async with hall(mesh) as robot, hall(mesh, "arm-2") as other, bridge(mesh, tmp_path / "meshes"):
+        async with (
+            robot_session(mesh) as robot,
+            robot_session(mesh, "arm-2") as other,
+            bridge(mesh, tmp_path / "meshes"),
+        ):
             for session, name in ((robot, "arm"), (other, "arm-2")):
                 session.declare_publisher("hall", name, "description").put(description(sha256))
             texts, got = set(), []
             async with asyncio.timeout(30):
                 while not any("hall/arm-2/base" in text and "hall/arm/base" in text for text in texts):
                     got = await tools.echo("/robot_description", ROBOT_DESCRIPTION.kind, LATCHED)
-                    texts |= {told.data for told in got}
+                    texts |= {message.data for message in got}
             urdf = max(texts, key=len)
             assert 'joint name="hall/arm/waist"' in urdf
             file = tmp_path / "meshes" / f"{sha256}.glb"
@@ -209,12 +211,12 @@ def test_who_comes_late_gets_the_description_of_all_robots_with_meshes_as_files(
     run(main())
 
 
-def test_a_subscription_as_rmw_zenoh_makes_it_gets_the_description_before_and_after_it_comes(mesh, tmp_path):
+def test_rmw_zenohs_subscription_gets_the_description_early_and_late(mesh, tmp_path):
     async def main():
         key, texts = ROBOT_DESCRIPTION.key(0), []
 
         def subscribed(session):
-            """As for a node that asks for reliable and transient local."""
+            """Subscribe as rmw_zenoh does for reliable and transient local."""
             return zenoh.ext.declare_advanced_subscriber(
                 session,
                 key,
@@ -224,7 +226,7 @@ def test_a_subscription_as_rmw_zenoh_makes_it_gets_the_description_before_and_af
                 subscriber_detection=True,
             )
 
-        async with hall(mesh) as robot, open_session(mesh) as early, open_session(mesh) as late:
+        async with robot_session(mesh) as robot, open_session(mesh) as early, open_session(mesh) as late:
             robot.declare_publisher("hall", "arm", "description").put(description(""))
             before = subscribed(early.zenoh_session)
             async with bridge(mesh, tmp_path):
@@ -248,15 +250,15 @@ def test_a_subscription_as_rmw_zenoh_makes_it_gets_the_description_before_and_af
     ids=lambda each: each.name if isinstance(each, Topic) else "",
 )
 def test_types_have_the_hashes_that_ros_2_prints(topic, hashed):
-    """`ros2 topic info --verbose`, Jazzy."""
+    """Source of the hashes: `ros2 topic info --verbose`, Jazzy."""
     assert topic.type_hash == f"RIHS01_{hashed}"
 
 
 def test_keys_tokens_and_attachments_are_rmw_zenohs(mesh, tmp_path):
-    """As in its sources, and as other clients of it have them."""
+    """Compare with its sources and with other clients."""
 
     async def main():
-        async with hall(mesh) as robot, open_session(mesh) as ros:
+        async with robot_session(mesh) as robot, open_session(mesh) as ros:
             taken, tokens = [], []
             found = ros.zenoh_session.declare_subscriber("7/joint_states/**", taken.append)
             alive = ros.zenoh_session.liveliness().declare_subscriber(

@@ -1,4 +1,4 @@
-"""The simulated controller, with time as an argument: what it does with a unit, and what it tells."""
+"""Simulated controller with time as an argument: execution of units, and state records."""
 
 import numpy as np
 import pytest
@@ -26,50 +26,50 @@ HOME = tuple(np.round(JOINTS.home * DEGREES, 6).tolist())
 
 
 class Bench:
-    """A controller with a clock that the test turns."""
+    """A controller with a clock that the test advances."""
 
     def __init__(self, **options):
         self.now_s = 100.0
         self.controller = Controller(JOINTS, **{"codes": {}, "demo": None, "now_s": self.now_s, **options})
 
-    def obey(self, *records):
-        return self.controller.obey(records, self.now_s)
+    def execute(self, *records):
+        return self.controller.execute(records, self.now_s)
 
     def word(self, *words):
-        return self.obey(Command(words))
+        return self.execute(Command(words))
 
     def pass_s(self, seconds):
-        told = []
+        states = []
         for _ in range(round(seconds * 100)):
             self.now_s += 0.01
             self.controller.tick(self.now_s)
-            told.append(self.told())
-        return told
+            states.append(self.state())
+        return states
 
-    def told(self):
-        return self.controller.told(self.now_s)
+    def state(self):
+        return self.controller.state_records(self.now_s)
 
     @property
     def positions(self):
-        return self.told()[0].values
+        return self.state()[0].values
 
     @property
     def words(self):
-        return self.told()[2].words
+        return self.state()[2].words
 
 
-def test_a_controller_boots_at_rest_and_does_not_claim_to_be_homed():
+def test_a_controller_boots_at_rest_and_not_homed():
     bench = Bench()
-    positions, velocities, status, clock = bench.told()
+    positions, velocities, status, clock = bench.state()
     assert positions == AbsolutePositions(HOME)
     assert velocities == Velocities((0.0,) * 5)
     assert status == Status(("idle", "remote"))
     assert clock == Time(0.0)
 
 
-def test_homing_is_told_and_ends_homed():
+def test_homing_is_reported_and_ends_homed():
     bench = Bench()
-    bench.obey(AbsolutePositions(TARGET))
+    bench.execute(AbsolutePositions(TARGET))
     bench.pass_s(4.0)
     bench.word("home")
     bench.pass_s(0.1)
@@ -81,7 +81,7 @@ def test_homing_is_told_and_ends_homed():
 
 def test_the_papers_unit_traces_homes_and_then_moves_in_this_order():
     bench = Bench()
-    assert bench.obey(Command(("trace", "home")), AbsolutePositions(TARGET)) is None
+    assert bench.execute(Command(("trace", "home")), AbsolutePositions(TARGET)) is None
     bench.pass_s(0.3)
     assert bench.words == ("homing", "remote", "trace")
     bench.pass_s(5.0)
@@ -89,23 +89,25 @@ def test_the_papers_unit_traces_homes_and_then_moves_in_this_order():
     assert bench.positions == TARGET
 
 
-def test_a_relative_target_is_added_to_where_the_arm_is():
+def test_a_relative_target_is_added_to_the_current_position():
     bench = Bench()
-    bench.obey(RelativePositions((10.0, 0.0, 0.0, 0.0, -10.0)), RelativePositions((1.0, 0.0, 0.0, 0.0, 0.0)))
+    bench.execute(
+        RelativePositions((10.0, 0.0, 0.0, 0.0, -10.0)), RelativePositions((1.0, 0.0, 0.0, 0.0, 0.0))
+    )
     bench.pass_s(3.0)
     assert bench.positions == (HOME[0] + 11.0, *HOME[1:4], HOME[4] - 10.0)
 
 
-def test_stop_brakes_hard_latches_and_forgets_what_was_to_come():
+def test_stop_brakes_hard_latches_and_clears_the_queue():
     bench = Bench()
-    bench.obey(AbsolutePositions(TARGET), AbsolutePositions(HOME))
+    bench.execute(AbsolutePositions(TARGET), AbsolutePositions(HOME))
     bench.pass_s(0.5)
     bench.word("stop")
     assert bench.words[0] == "moving"
     bench.pass_s(0.4)
     assert bench.words == ("stopped", "remote")
     rest = bench.positions
-    assert bench.obey(AbsolutePositions(TARGET)) == Error(8, "stopped, reset first")
+    assert bench.execute(AbsolutePositions(TARGET)) == Error(8, "stopped, reset first")
     assert bench.word("home") == Error(8, "stopped, reset first")
     bench.word("resume")
     bench.pass_s(1.0)
@@ -116,15 +118,15 @@ def test_stop_brakes_hard_latches_and_forgets_what_was_to_come():
     assert bench.positions == rest
 
 
-def test_hold_comes_to_rest_and_resume_goes_on_to_the_target():
+def test_hold_comes_to_rest_and_resume_continues_to_the_target():
     bench = Bench()
-    bench.obey(AbsolutePositions(TARGET))
+    bench.execute(AbsolutePositions(TARGET))
     bench.pass_s(0.3)
     bench.word("hold")
     bench.pass_s(0.5)
     assert bench.words[0] == "holding"
     held = bench.positions
-    assert bench.obey(AbsolutePositions(HOME)) == Error(8, "holding, resume or reset first")
+    assert bench.execute(AbsolutePositions(HOME)) == Error(8, "holding, resume or reset first")
     bench.pass_s(1.0)
     assert bench.positions == held
     bench.word("resume")
@@ -135,7 +137,7 @@ def test_hold_comes_to_rest_and_resume_goes_on_to_the_target():
 
 def test_reset_after_hold_forgets_the_motion():
     bench = Bench()
-    bench.obey(AbsolutePositions(TARGET))
+    bench.execute(AbsolutePositions(TARGET))
     bench.pass_s(0.3)
     bench.word("hold")
     bench.pass_s(0.5)
@@ -146,14 +148,14 @@ def test_reset_after_hold_forgets_the_motion():
     assert bench.words[0] == "idle"
 
 
-def test_speed_slows_a_motion_that_runs():
+def test_speed_slows_a_running_motion():
     fast, slow = Bench(), Bench()
     for bench in (fast, slow):
-        bench.obey(AbsolutePositions(TARGET))
+        bench.execute(AbsolutePositions(TARGET))
         bench.pass_s(0.2)
     slow.word("speed=10")
     slow.pass_s(0.5)
-    top = max(abs(v) for told in slow.pass_s(0.5) for v in told[1].values)
+    top = max(abs(v) for state in slow.pass_s(0.5) for v in state[1].values)
     assert top <= 0.1 * JOINTS.max_speed.max() * DEGREES + 1e-6
     fast.pass_s(1.0)
     assert fast.positions == TARGET
@@ -161,12 +163,12 @@ def test_speed_slows_a_motion_that_runs():
     assert slow.positions == TARGET
 
 
-def test_a_new_target_takes_the_place_of_the_old_one_without_a_jump():
+def test_a_new_target_replaces_the_old_one_without_a_jump():
     bench = Bench()
-    bench.obey(AbsolutePositions(TARGET))
+    bench.execute(AbsolutePositions(TARGET))
     before = bench.pass_s(0.4)[-1]
-    bench.obey(AbsolutePositions(HOME))
-    after = bench.told()
+    bench.execute(AbsolutePositions(HOME))
+    after = bench.state()
     assert after[0].values == pytest.approx(before[0].values, abs=1e-5)
     assert after[1].values == pytest.approx(before[1].values, abs=1e-4)
     bench.pass_s(4.0)
@@ -190,9 +192,9 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("records", "number", "text"), REFUSED)
-def test_a_unit_that_cannot_be_done_is_answered_and_nothing_in_it_is_done(records, number, text):
+def test_an_invalid_unit_is_refused_whole(records, number, text):
     bench = Bench()
-    refusal = bench.obey(Command(("trace",)), AbsolutePositions(TARGET), *records)
+    refusal = bench.execute(Command(("trace",)), AbsolutePositions(TARGET), *records)
     assert refusal.number == number
     assert text in refusal.text
     assert write_unit((refusal,))
@@ -204,24 +206,24 @@ def test_a_unit_that_cannot_be_done_is_answered_and_nothing_in_it_is_done(record
 def test_a_reset_allows_the_motion_behind_it_in_the_same_unit():
     bench = Bench()
     bench.word("stop")
-    assert bench.obey(Command(("reset",)), AbsolutePositions(TARGET)) is None
+    assert bench.execute(Command(("reset",)), AbsolutePositions(TARGET)) is None
     bench.pass_s(3.0)
     assert bench.positions == TARGET
 
 
-def test_a_stop_is_done_even_when_the_rest_of_its_unit_is_refused():
+def test_a_stop_is_executed_even_when_the_rest_of_its_unit_is_refused():
     bench = Bench()
-    bench.obey(AbsolutePositions(TARGET))
+    bench.execute(AbsolutePositions(TARGET))
     bench.pass_s(0.2)
     assert bench.word("stop", "dance").number == 3
     bench.pass_s(0.5)
     assert bench.words[0] == "stopped"
 
 
-def test_states_and_answers_of_others_are_not_commands():
+def test_state_records_and_errors_are_not_commands():
     bench = Bench()
-    told = bench.told()
-    assert bench.obey(told[1], told[2], told[3], Error(9, "x")) is None
+    state = bench.state()
+    assert bench.execute(state[1], state[2], state[3], Error(9, "x")) is None
     bench.pass_s(0.5)
     assert bench.positions == HOME
 
@@ -235,7 +237,7 @@ def test_the_demo_moves_until_the_first_motion_command_and_begins_homed():
     before = bench.positions
     bench.pass_s(6.0)
     assert bench.positions != before
-    bench.obey(AbsolutePositions(TARGET))
+    bench.execute(AbsolutePositions(TARGET))
     bench.pass_s(20.0)
     assert bench.positions == TARGET
     assert bench.words == ("idle", "remote", "homed", "trace")

@@ -1,4 +1,4 @@
-"""The simulated arm's motion as a function of time."""
+"""Motion of the simulated arm as a function of time."""
 
 import itertools
 
@@ -61,24 +61,24 @@ def test_the_demo_tours_several_poses_within_limits_and_above_the_floor(robot):
         now_s = motion.end_s
 
 
-def test_speed_hold_resume_and_stop_in_mid_motion_keep_to_the_line_that_was_checked():
+def test_speed_hold_resume_and_stop_stay_on_the_checked_line():
     target = np.array([140.0, 20.0, 60.0, -80.0, -170.0])
     controller = Controller(JOINTS, codes={}, demo=None, now_s=0.0)
-    told = []
-    # Each word at a hundredth of a second; braking is under way when some of them come.
+    reported = []
+    # Words by time [s]; some are received while the arm brakes.
     words = {0.4: "speed=30", 0.8: "hold", 0.85: "resume", 0.9: "hold", 2.0: "speed=90", 2.5: "resume"}
     words |= {3.2: "stop"}
-    controller.obey((AbsolutePositions(tuple(target)),), 0.0)
+    controller.execute((AbsolutePositions(tuple(target)),), 0.0)
     for tick in range(400):
         now_s = tick / 100
         if word := words.get(now_s):
-            assert controller.obey((Command((word,)),), now_s) is None
+            assert controller.execute((Command((word,)),), now_s) is None
         controller.tick(now_s)
-        told.append(controller.told(now_s)[0].values)
+        reported.append(controller.state_records(now_s)[0].values)
     start, way = np.degrees(JOINTS.home), target - np.degrees(JOINTS.home)
-    shares = (np.array(told) - start) @ way / (way @ way)
-    # Six decimals are told.
-    assert np.abs(np.array(told) - start - shares[:, None] * way).max() < 2e-6
+    shares = (np.array(reported) - start) @ way / (way @ way)
+    # Positions are reported with six decimals.
+    assert np.abs(np.array(reported) - start - shares[:, None] * way).max() < 2e-6
     assert np.all(np.diff(shares) > -1e-7)
     assert 0.2 < shares[-1] < 0.9
-    assert controller.told(4.0)[2].words[0] == "stopped"
+    assert controller.state_records(4.0)[2].words[0] == "stopped"

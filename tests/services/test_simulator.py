@@ -1,4 +1,4 @@
-"""The simulated controller over real sockets."""
+"""Simulated controller over real sockets."""
 
 import asyncio
 import contextlib
@@ -44,7 +44,7 @@ async def simulator(**options):
 
 
 class Client:
-    """A client: what it reads, unit by unit."""
+    """A client that reads unit by unit."""
 
     def __init__(self, reader, writer):
         self.reader, self.writer = reader, writer
@@ -52,7 +52,7 @@ class Client:
         self.events = []
 
     async def next(self, wanted):
-        """The next event that is wanted."""
+        """Return the next event that meets the predicate."""
         while True:
             while self.events:
                 event = self.events.pop(0)
@@ -87,7 +87,7 @@ async def client(port):
             await writer.wait_closed()
 
 
-def test_states_come_at_the_rate_and_the_clock_of_the_controller_runs():
+def test_states_arrive_at_the_rate_with_a_running_clock():
     async def main():
         async with simulator() as port, client(port) as one:
             first = await one.state(lambda *records: True)
@@ -100,7 +100,7 @@ def test_states_come_at_the_rate_and_the_clock_of_the_controller_runs():
     run(main())
 
 
-def test_every_client_sees_the_motion_that_one_of_them_asked_for():
+def test_every_client_sees_the_motion_that_one_of_them_commanded():
     async def main():
         async with simulator() as port, client(port) as one, client(port) as two:
             one.send(b"2# COMMAND* trace; home&ABSOLUTE.DEG* 20.00; 60.00; - 40.00; 10.00; 90.00@")
@@ -126,7 +126,7 @@ def test_a_refused_unit_is_answered_to_its_sender():
     run(main())
 
 
-def test_numbers_instead_of_names_both_ways():
+def test_type_codes_are_used_in_both_directions():
     async def main():
         codes = {2: "ABSOLUTE.DEG", 101: "COMMAND:home"}
         async with simulator(codes=codes) as port, client(port) as one:
@@ -138,7 +138,7 @@ def test_numbers_instead_of_names_both_ways():
     run(main())
 
 
-def test_a_client_past_the_maximum_is_told_so_and_closed():
+def test_a_client_past_the_maximum_gets_an_error_and_is_closed():
     async def main():
         async with simulator(max_clients=1) as port, client(port) as one:
             await one.state(lambda *records: True)
@@ -149,7 +149,7 @@ def test_a_client_past_the_maximum_is_told_so_and_closed():
     run(main())
 
 
-def test_a_place_that_a_client_leaves_is_free():
+def test_a_client_that_disconnects_makes_room_for_another():
     async def main():
         async with simulator(max_clients=1) as port:
             for _ in range(3):
@@ -161,7 +161,7 @@ def test_a_place_that_a_client_leaves_is_free():
 
 
 @pytest.mark.slow
-def test_a_client_that_does_not_read_delays_nobody_gets_the_newest_state_and_is_closed():
+def test_a_client_that_does_not_read_delays_no_other_and_is_closed():
     async def main():
         async with simulator(rate_hz=1000.0) as port, client(port) as quick:
             with socket.socket() as slow:
@@ -174,7 +174,7 @@ def test_a_client_that_does_not_read_delays_nobody_gets_the_newest_state_and_is_
                     worst_s = max(worst_s, time.monotonic() - last_s)
                     last_s = time.monotonic()
                 assert worst_s < 0.5
-                # Closed with what it had not read still in its buffers.
+                # Closed while unread data is still in its buffers.
                 slow.settimeout(2.0)
                 with contextlib.suppress(ConnectionError):
                     while slow.recv(65536):
@@ -183,8 +183,8 @@ def test_a_client_that_does_not_read_delays_nobody_gets_the_newest_state_and_is_
     run(main())
 
 
-def test_clients_that_go_while_they_are_told_much_leave_no_fault_behind(caplog):
-    def come_and_go(port):
+def test_clients_that_disconnect_during_a_flood_cause_no_error(caplog):
+    def connect_and_disconnect(port):
         for number in range(25):
             with socket.create_connection(("127.0.0.1", port), timeout=5) as one:
                 end = time.monotonic() + 0.05 + number % 7 * 0.01
@@ -193,8 +193,8 @@ def test_clients_that_go_while_they_are_told_much_leave_no_fault_behind(caplog):
 
     async def main():
         async with simulator(demo=True, faults=("deluge",)) as port:
-            await asyncio.to_thread(come_and_go, port)
-            # Whatever was left of the last one is done by now.
+            await asyncio.to_thread(connect_and_disconnect, port)
+            # The last one's callbacks have run when another client gets a state.
             async with client(port) as last:
                 await last.state(lambda *records: True)
 
@@ -202,7 +202,7 @@ def test_clients_that_go_while_they_are_told_much_leave_no_fault_behind(caplog):
     assert not [record for record in caplog.records if record.name == "asyncio"]
 
 
-def test_frozen_the_socket_stays_open_and_nothing_comes():
+def test_freeze_sends_nothing_and_keeps_the_socket_open():
     async def main():
         async with simulator(faults=("freeze@0.3",)) as port, client(port) as one:
             await one.state(lambda *records: True)
@@ -213,7 +213,7 @@ def test_frozen_the_socket_stays_open_and_nothing_comes():
     run(main())
 
 
-def test_garbage_comes_between_good_units_and_harms_none():
+def test_garbage_is_sent_between_valid_units():
     async def main():
         async with simulator(faults=("garbage",), rate_hz=500.0) as port, client(port) as one:
             reasons = {(await one.next(lambda e: isinstance(e, Malformed))).reason for _ in range(20)}
@@ -234,7 +234,7 @@ def test_garbage_comes_between_good_units_and_harms_none():
         ({"max_clients": 0}, SimulatorError, "1 or more"),
     ],
 )
-def test_settings_that_make_no_controller_are_refused_in_one_line(options, error, text):
+def test_invalid_settings_are_refused_in_one_line(options, error, text):
     async def main():
         async with simulator(**options):
             pass
@@ -244,7 +244,7 @@ def test_settings_that_make_no_controller_are_refused_in_one_line(options, error
     assert "\n" not in str(caught.value)
 
 
-def test_a_port_in_use_is_told_in_one_line():
+def test_a_port_in_use_is_refused_in_one_line():
     async def main():
         async with simulator() as port:
             with pytest.raises(ListenError, match="address already in use"):
@@ -263,5 +263,5 @@ def test_a_port_in_use_is_told_in_one_line():
         ("drop+2", Span("drop", 0.0, 2.0)),
     ],
 )
-def test_a_fault_says_when_it_begins_and_how_long_it_lasts(text, span):
+def test_a_fault_is_parsed_with_its_begin_and_length(text, span):
     assert parse_fault(text) == span

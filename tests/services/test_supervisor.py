@@ -1,4 +1,4 @@
-"""The supervisor's small parts; a whole site is tried in test_whole_site."""
+"""Parts of the supervisor; test_whole_site tests a whole site."""
 
 import asyncio
 import errno
@@ -15,7 +15,7 @@ from services.supervisor import CouldNotStartError, Program, _lines, supervise
 from tests.conftest import free_port, run
 
 
-def test_lines_of_any_length_and_any_bytes_end_nobody():
+def test_lines_of_any_length_and_any_bytes_are_read():
     async def main():
         stream = asyncio.StreamReader()
         stream.feed_data(b"one\n" + b"x" * 200_000 + b"\ntw\xff\no\nlast")
@@ -28,23 +28,23 @@ def test_lines_of_any_length_and_any_bytes_end_nobody():
 
 
 @pytest.mark.slow
-def test_a_needed_program_that_cannot_start_ends_all_and_another_does_not():
+def test_only_a_required_program_that_cannot_start_ends_the_others():
     async def never():
         await asyncio.Event().wait()
 
     log = []
 
-    async def main(needed):
-        wrong = Program(name="wrong", arguments=("robot", "show", "nobody"), needed=needed)
+    async def main(required):
+        wrong = Program(name="wrong", arguments=("robot", "show", "nobody"), required=required)
         await supervise([wrong], ready=never, write=log.append)
 
     with pytest.raises(CouldNotStartError, match="wrong could not start"):
-        run(main(needed=True))
+        run(main(required=True))
     assert "wrong | robomesh: nobody: no such robot" in log[0]
     log.clear()
 
     async def without_it():
-        task = asyncio.create_task(main(needed=False))
+        task = asyncio.create_task(main(required=False))
         while "wrong | could not start; everything else runs without it" not in log:
             await asyncio.sleep(0.02)
         assert not task.done()
@@ -55,30 +55,30 @@ def test_a_needed_program_that_cannot_start_ends_all_and_another_does_not():
 
 
 @pytest.mark.slow
-def test_what_is_wanted_comes_what_is_not_any_more_goes_and_the_rest_stays():
+def test_extra_programs_start_and_stop_while_the_others_run():
     wanted, log = {}, []
 
     def group(name):
         arguments = ("simulate", "--listen", "127.0.0.1:0")
-        return lambda: [Program(name=name, arguments=arguments, needed=False)]
+        return lambda: [Program(name=name, arguments=arguments, required=False)]
 
     async def until(condition):
         while not condition():
             await asyncio.sleep(0.02)
 
-    def told(name, words):
+    def logged(name, words):
         return sum(line.startswith(name) and words in line for line in list(log))
 
     async def steps():
         wanted["one"] = group("one")
-        await until(lambda: told("one", "listening"))
+        await until(lambda: logged("one", "listening"))
         wanted["two"] = group("two")
-        await until(lambda: told("two", "listening"))
+        await until(lambda: logged("two", "listening"))
         del wanted["one"]
-        wanted["one anew"] = group("one")
-        await until(lambda: told("one", "listening") == 2)
-        assert told("two", "listening") == 1
-        assert not told("one", "ended"), "it was ended, it did not end"
+        wanted["one again"] = group("one")
+        await until(lambda: logged("one", "listening") == 2)
+        assert logged("two", "listening") == 1
+        assert not logged("one", "ended"), "an intended stop is logged as a failure"
 
     async def main():
         supervising = asyncio.create_task(
@@ -86,20 +86,20 @@ def test_what_is_wanted_comes_what_is_not_any_more_goes_and_the_rest_stays():
                 [Program(name="rest", arguments=("simulate", "--listen", "127.0.0.1:0"))],
                 ready=lambda: asyncio.Event().wait(),
                 write=log.append,
-                following=lambda: dict(wanted),
+                extra=lambda: dict(wanted),
             )
         )
         await steps()
         supervising.cancel()
         await asyncio.gather(supervising, return_exceptions=True)
-        assert told("rest", "listening") == 1
+        assert logged("rest", "listening") == 1
 
     run(main())
 
 
 @pytest.mark.slow
-def test_a_held_terminal_holds_no_service():
-    # Nobody reads the pipe: what does not fit is dropped.
+def test_a_blocked_terminal_does_not_block_a_service():
+    # The test does not read the pipe: lines that do not fit are dropped.
     program = (
         "import logging, time\n"
         "from robomesh.service import log_to_stderr\n"
@@ -120,11 +120,11 @@ def test_a_held_terminal_holds_no_service():
 
 
 @pytest.mark.slow
-def test_a_spare_takes_the_place_of_what_was_killed(tmp_path, monkeypatch):
-    monkeypatch.setattr(supervisor, "_SPARE_AFTER_S", 0.1)
+def test_a_standby_replaces_a_killed_process(tmp_path, monkeypatch):
+    monkeypatch.setattr(supervisor, "_STANDBY_AFTER_S", 0.1)
     site = tmp_path / "site.toml"
     site.write_text(f'site = "hall"\n[router]\nlisten = ["tcp/127.0.0.1:{free_port()}"]\n')
-    router = Program(name="router", arguments=("router", "--site", str(site)), spare=True)
+    router = Program(name="router", arguments=("router", "--site", str(site)), standby=True)
     log = []
 
     def pids():
@@ -138,11 +138,11 @@ def test_a_spare_takes_the_place_of_what_was_killed(tmp_path, monkeypatch):
         task = asyncio.create_task(supervise([router], ready=asyncio.Event().wait, write=log.append))
         await until(lambda: sum("routing on" in line for line in log) == 1)
         await until(lambda: len(pids()) == 2)
-        serving, spare = pids()
+        serving, standby = pids()
         os.kill(serving, signal.SIGKILL)
         await until(lambda: sum("routing on" in line for line in log) == 2)
         await until(lambda: serving not in pids() and len(pids()) == 2)
-        assert spare in pids()
+        assert standby in pids()
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
 
@@ -151,7 +151,7 @@ def test_a_spare_takes_the_place_of_what_was_killed(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_machine_that_has_no_process_left_for_a_moment_ends_nobody(monkeypatch):
+def test_a_temporary_lack_of_processes_ends_no_program(monkeypatch):
     start, failures, log = supervisor._start, [], []
 
     async def short_of_processes(program, **how):
@@ -165,17 +165,17 @@ def test_a_machine_that_has_no_process_left_for_a_moment_ends_nobody(monkeypatch
         Program(name=name, arguments=("simulate", "--listen", "127.0.0.1:0")) for name in ("rest", "late")
     ]
 
-    def told(name, words):
+    def lines(name, words):
         return [line for line in log if line.startswith(name) and words in line]
 
     async def main():
         supervising = asyncio.create_task(supervise(programs, ready=asyncio.Event().wait, write=log.append))
-        while not (told("rest", "listening") and told("late", "listening")):
+        while not (lines("rest", "listening") and lines("late", "listening")):
             assert not supervising.done()
             await asyncio.sleep(0.02)
         supervising.cancel()
         await asyncio.gather(supervising, return_exceptions=True)
 
     run(main())
-    assert len(told("late", "could not be started: Resource temporarily unavailable; again in")) == 2
-    assert not told("rest", "ended")
+    assert len(lines("late", "could not be started: Resource temporarily unavailable; restarting in")) == 2
+    assert not lines("rest", "ended")

@@ -16,7 +16,7 @@ def run(robot: str, name: str, off: bool, router: str, as_json: bool) -> None:
     else:
         for known in answer.known:
             mark = "*" if known in answer.active else " "
-            print(f"{mark} {known:<8} {FAULTS[known].what if known in FAULTS else ''}".rstrip())
+            print(f"{mark} {known:<8} {FAULTS[known].effect if known in FAULTS else ''}".rstrip())
 
 
 async def _ask(name: str, request: FaultRequest, router: str) -> FaultAnswer:

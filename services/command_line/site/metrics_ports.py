@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import partial
 
 from services.errors import ListenError
-from services.supervisor import Following, Program
+from services.supervisor import ExtraPrograms, Program
 
 _MOST = 65535
 
@@ -40,16 +40,16 @@ def with_metrics(programs: Sequence[Program], listen: tuple[str, int] | None) ->
     )
 
 
-def following_with_metrics(following: Following, listen: tuple[str, int] | None) -> Following:
+def extra_with_metrics(extra: ExtraPrograms, listen: tuple[str, int] | None) -> ExtraPrograms:
     """What comes while the site runs serves at free ports: nobody knows beforehand how many come."""
     if listen is None:
-        return following
+        return extra
     free = (listen[0], 0)
 
     def started(make: Callable[[], Sequence[Program]]) -> tuple[Program, ...]:
         return with_metrics(make(), free)
 
     def wanted() -> dict[Hashable, Callable[[], Sequence[Program]]]:
-        return {key: partial(started, make) for key, make in following().items()}
+        return {key: partial(started, make) for key, make in extra().items()}
 
     return wanted

@@ -8,7 +8,7 @@ from services import router as role
 from services.pki import Folder
 from services.site_file.listen_address import check_reach, split_address
 from services.site_file.router import RoutedSite, read_routed
-from services.supervisor import wait_for_turn
+from services.supervisor import wait_as_standby
 
 logger = logging.getLogger(__name__)
 
@@ -16,7 +16,7 @@ logger = logging.getLogger(__name__)
 def run(path: Path | None, config_out: Path | None = None, metrics: str = "") -> None:
     """Run the router of the site."""
     service.log_to_stderr()
-    wait_for_turn()
+    wait_as_standby()
     # zenohd may be started in another folder.
     site = _read(path if path is None or config_out is None else path.absolute())
     settings = _settings(site, metrics_address(site, metrics))

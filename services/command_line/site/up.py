@@ -14,7 +14,7 @@ from pathlib import Path
 from robomesh import service
 from robomesh.keys import robot_key
 from robomesh.session import SessionSettings, open_session
-from services.command_line.site.metrics_ports import following_with_metrics, with_metrics
+from services.command_line.site.metrics_ports import extra_with_metrics, with_metrics
 from services.command_line.site.router import metrics_address
 from services.errors import SiteFileError
 from services.pki import Folder
@@ -53,7 +53,7 @@ def run(path: Path | None, metrics: str = "") -> None:
             with_metrics(programs(site, path, endpoint), metered),
             ready=ready,
             write=_write,
-            following=following_with_metrics(_Started(site, path, endpoint).wanted, metered),
+            extra=extra_with_metrics(_Started(site, path, endpoint).wanted, metered),
         ),
         ends_within_s=ENDS_WITHIN_S,
     )
@@ -79,17 +79,17 @@ def programs(site: Site, path: Path | None, endpoint: str) -> tuple[Program, ...
         Program(name="kinematics", arguments=("kinematics", *of_site, *attach)),
     )
     return (
-        Program(name="router", arguments=("router", *of_site), spare=True, last=True),
+        Program(name="router", arguments=("router", *of_site), standby=True, last=True),
         *simulators,
         *(of_robots if site.robot else ()),
         Program(name="console", arguments=("console", *of_site, *attach, "--supervised")),
         Program(
             name="recorder", arguments=("recorder", *of_site, *attach), finishes="closing its recordings"
         ),
-        Program(name="player", arguments=("player", *of_site, *attach), needed=False),
-        Program(name="watch", arguments=("watch", *of_site, *attach), needed=False),
+        Program(name="player", arguments=("player", *of_site, *attach), required=False),
+        Program(name="watch", arguments=("watch", *of_site, *attach), required=False),
         # Without OpenGL everything else runs.
-        Program(name="renderer", arguments=("renderer", *of_site, *attach), needed=False),
+        Program(name="renderer", arguments=("renderer", *of_site, *attach), required=False),
     )
 
 
@@ -100,14 +100,14 @@ def _programs_of_started(robot: Robot, site: str, path: Path | None, endpoint: s
     name = robot.name
     rest = (*attach, "--started", name)
     return (
-        replace(simulator, needed=False),
+        replace(simulator, required=False),
         Program(
             name=f"gateway {name}",
             arguments=("gateway", *rest, *controller),
-            needed=False,
+            required=False,
             finishes=_STOPS_AND_AUDIT,
         ),
-        Program(name=f"kinematics {name}", arguments=("kinematics", *rest), needed=False),
+        Program(name=f"kinematics {name}", arguments=("kinematics", *rest), required=False),
     )
 
 
