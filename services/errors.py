@@ -15,4 +15,4 @@ class SiteFileError(ServiceError):
 
 
 class ListenError(ServiceError):
-    """A service cannot listen on an address: in use, foreign, or not permitted beyond loopback."""
+    """A service cannot listen on an address: in use, unavailable, or not permitted."""

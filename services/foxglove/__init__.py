@@ -1,4 +1,4 @@
-"""The mesh for Foxglove and Lichtblick: one WebSocket server of theirs."""
+"""Bridge to Foxglove and Lichtblick: the mesh's robots on a WebSocket server of Foxglove's SDK."""
 
 from services.foxglove.server import serve
 from services.foxglove.settings import Settings

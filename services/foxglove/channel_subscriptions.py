@@ -1,4 +1,4 @@
-"""A channel of Foxglove's, and the topic behind it: subscribed to on the mesh only while somebody watches."""
+"""Foxglove channels and their subscriptions on the mesh, which last while a client watches."""
 
 import asyncio
 import logging
@@ -22,15 +22,15 @@ _NEWEST = {History.LAST_100: 200, History.KEY_FRAME: 75}
 _NEWEST_STATES = 100
 
 
-class Lane:
+class TopicChannel:
     """A topic of one robot as a channel.
 
     Args:
-        key_exprs: What it is fed from.
-        as_shown: What becomes of each message; none: shown as it is.
+        key_exprs: Key expressions to subscribe to.
+        convert: Converts each message; None to show messages unchanged.
 
     Attributes:
-        watchers: The clients that watch it.
+        watchers: Ids of the subscribed clients.
     """
 
     def __init__(
@@ -38,44 +38,44 @@ class Lane:
         session: Session,
         channel: foxglove.Channel,
         key_exprs: tuple[str, ...],
-        as_shown: Callable[[bytes], bytes] | None = None,
+        convert: Callable[[bytes], bytes] | None = None,
     ) -> None:
         self.channel = channel
         self.watchers: set[int] = set()
         self._session = session
         self._keys = key_exprs
-        self._as_shown = as_shown
+        self._convert = convert
         self._row = topic(parse_expression(key_exprs[0]).topic)
         kept = {History.LAST_100: 100, History.KEY_FRAME: 0}.get(self._row.history, 1)
-        # What somebody gets who comes while others watch already.
-        self._held: deque[Timed] = deque(maxlen=kept)
+        # Messages for a client that subscribes while others already watch.
+        self._history: deque[Timed] = deque(maxlen=kept)
         self._subscriptions: list[Subscription] = []
-        self._nonsense: set[str] = set()
+        self._invalid_keys: set[str] = set()
         self._tasks: set[asyncio.Task[None]] = set()
 
     def join(self, client: int) -> None:
-        """A client watches: the first one begins with what the mesh holds, another with what is held here."""
+        """Add a client: the first one starts with the mesh's history, a further one with this channel's."""
         if self.watchers:
-            for payload, time_ns in self._held:
-                # The SDK tells no client's sink; while clients are the only sinks, both are numbered alike.
+            for payload, time_ns in self._history:
+                # The SDK does not report sink ids; clients are the only sinks, so the ids are equal.
                 self.channel.log(payload, log_time=time_ns, sink_id=client)
             if self._row.history is History.KEY_FRAME:
-                self._keep(self._ask_for_key_frame())
+                self._start_task(self._ask_for_key_frame())
         self.watchers.add(client)
         if not self._subscriptions:
             newest = _NEWEST.get(self._row.history, _NEWEST_STATES)
             self._subscriptions = [self._session.subscribe(key, newest=newest) for key in self._keys]
             for subscription in self._subscriptions:
-                self._keep(self._pass_on(subscription))
+                self._start_task(self._forward(subscription))
 
     def leave(self, client: int) -> None:
-        """A client watches no more; the last one ends the subscription."""
+        """Remove a client; the last one ends the subscription."""
         self.watchers.discard(client)
         if not self.watchers:
             self._end()
 
     def close(self) -> None:
-        """The channel is there no more."""
+        """Remove the channel."""
         self._end()
         self.channel.close()
 
@@ -83,25 +83,25 @@ class Lane:
         for subscription in self._subscriptions:
             subscription.close()
         self._subscriptions = []
-        self._held.clear()
+        self._history.clear()
         for task in self._tasks:
             task.cancel()
 
-    def _keep(self, work: Coroutine[Any, Any, None]) -> None:
+    def _start_task(self, work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    async def _pass_on(self, subscription: Subscription) -> None:
+    async def _forward(self, subscription: Subscription) -> None:
         async for sample in subscription:
             try:
                 for payload, time_ns in timed(self._row, sample):
-                    shown = payload if self._as_shown is None else self._as_shown(payload)
-                    self._held.append((shown, max(time_ns, 0)))
+                    shown = payload if self._convert is None else self._convert(payload)
+                    self._history.append((shown, max(time_ns, 0)))
                     self.channel.log(shown, log_time=max(time_ns, 0))
-            except Exception as error:  # one publisher's nonsense must not end the channel
-                level = logging.DEBUG if sample.key in self._nonsense else logging.WARNING
-                self._nonsense.add(sample.key)
+            except Exception as error:  # an invalid message must not end the channel
+                level = logging.DEBUG if sample.key in self._invalid_keys else logging.WARNING
+                self._invalid_keys.add(sample.key)
                 log.log(level, "%s: a message cannot be shown: %s", sample.key, error)
 
     async def _ask_for_key_frame(self) -> None:
@@ -111,31 +111,31 @@ class Lane:
             log.debug("no key frame on %s: %s", self._keys[0], error)
 
 
-class Told:
-    """A channel that tells one thing, whole, to whoever comes."""
+class LatchedChannel:
+    """A channel with one current message, which each new client receives."""
 
     def __init__(self, channel: foxglove.Channel) -> None:
         self.channel = channel
         self.watchers: set[int] = set()
-        self._told: Timed | None = None
+        self._current: Timed | None = None
 
-    def tell(self, payload: bytes, time_ns: int) -> None:
-        """Tell it to all; again only if it is another."""
-        if self._told is None or self._told[0] != payload:
-            self._told = payload, time_ns
+    def publish(self, payload: bytes, time_ns: int) -> None:
+        """Send a message to all clients if it differs from the current one."""
+        if self._current is None or self._current[0] != payload:
+            self._current = payload, time_ns
             self.channel.log(payload, log_time=time_ns)
 
     def join(self, client: int) -> None:
-        """A client watches."""
+        """Add a client."""
         self.watchers.add(client)
-        if self._told is not None:
-            payload, time_ns = self._told
+        if self._current is not None:
+            payload, time_ns = self._current
             self.channel.log(payload, log_time=time_ns, sink_id=client)
 
     def leave(self, client: int) -> None:
-        """A client watches no more."""
+        """Remove a client."""
         self.watchers.discard(client)
 
     def close(self) -> None:
-        """The channel is there no more."""
+        """Remove the channel."""
         self.channel.close()

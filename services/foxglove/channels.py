@@ -1,4 +1,4 @@
-"""Which channels there are: those of each robot, of each site, and one description of all robots."""
+"""Set of channels: those of each robot and of each site, and one description of all robots."""
 
 import logging
 import time
@@ -12,7 +12,7 @@ from robomesh.schemas.robomesh_pb2 import Description
 from robomesh.session import Session
 from robomesh.topics import topic
 from robots.urdf.viewers import together
-from services.foxglove.channel_subscriptions import Lane, Told
+from services.foxglove.channel_subscriptions import LatchedChannel, TopicChannel
 from services.foxglove.messages import TEXT_SCHEMA, log_of, protobuf_schema, text_message
 from services.viewer_robots import meshes_of, viewed
 
@@ -33,54 +33,54 @@ _OF_A_ROBOT = (
 )
 _OF_A_REPLAY = ("joints", "frames", "kinematics", "controller", "lease", "program", "replay", "description")
 _OF_A_SITE = ("mesh", "alarms")
-# What the renderer draws beside the views that a description names.
+# Views that the renderer offers in addition to those of a description.
 _VIEWS = ("free", "close")
-# Recordings have it under this name too: a layout made for them fits.
+# The same name as in recordings, so that a layout fits both.
 _DESCRIPTION = "/robot_description"
 _ASSETS = "package://robomesh/"
 
 
 class Channels:
-    """The channels of what is on the mesh.
+    """The channels of the robots and sites on the mesh.
 
     Attributes:
-        lanes: By channel's topic.
+        topic_channels: The channels by topic.
     """
 
     def __init__(self, session: Session, context: foxglove.Context, *, one_robot: bool) -> None:
-        self.lanes: dict[str, Lane | Told] = {}
+        self.topic_channels: dict[str, TopicChannel | LatchedChannel] = {}
         self._session, self._context = session, context
         self._one_robot = one_robot
-        # A robot that comes again may be what it was, and then nobody tells it again.
+        # Kept when a robot goes offline: its description is not published again when it returns.
         self._described: dict[tuple[str, str], Description] = {}
-        self._there: set[tuple[str, str]] = set()
+        self._present: set[tuple[str, str]] = set()
         channel = self._channel(_DESCRIPTION, "cdr", TEXT_SCHEMA)
-        self._whole = self.lanes[_DESCRIPTION] = Told(channel)
+        self._all_robots = self.topic_channels[_DESCRIPTION] = LatchedChannel(channel)
 
     def add(self, site: str, robot: str) -> None:
-        """A robot, or a site (`-`), is there.
+        """Add the channels of a robot, or of a site (`-`).
 
         Raises:
-            KeyNameError: If its name can be in no key.
+            KeyNameError: If its name is invalid in a key.
         """
-        if (site, robot) in self._there:
+        if (site, robot) in self._present:
             return
         for name in _topics_of(robot):
             self._add(site, robot, name)
         key = robot_key(site, robot, "log")
         events = tuple(robot_key(site, robot, name) for name in ("events", "events/*"))
         channel = self._channel(key, "protobuf", protobuf_schema(Log))
-        place = site if robot == WHOLE_SITE else f"{site}/{robot}"
-        self.lanes[key] = Lane(self._session, channel, events, partial(log_of, robot=place))
-        self._there.add((site, robot))
+        name = site if robot == WHOLE_SITE else f"{site}/{robot}"
+        self.topic_channels[key] = TopicChannel(self._session, channel, events, partial(log_of, robot=name))
+        self._present.add((site, robot))
         if (known := self._described.get((site, robot))) is not None:
             self.describe(site, robot, known)
 
     def describe(self, site: str, robot: str, description: Description) -> None:
-        """What a robot is that is there: its views as video, and its place in the description of all.
+        """Add the video channels of a robot's views, and the robot to the common description.
 
         Raises:
-            BusError: If a view of it has a name that can be in no key.
+            BusError: If a view's name is invalid in a key.
         """
         views = dict.fromkeys((*(view.name for view in description.views), *_VIEWS))
         for view in views:
@@ -88,28 +88,32 @@ class Channels:
             if description.HasField("replay"):
                 self._add(site, robot, f"video/recorded-{view}")
         self._described[site, robot] = description
-        self._tell()
+        self._publish_description()
 
     def drop(self, site: str, robot: str) -> None:
-        """A robot, or a site, is there no more."""
+        """Remove the channels of a robot or a site."""
         prefix = robot_key(site, robot, "")
-        for key in [key for key in self.lanes if key.startswith(prefix)]:
-            self.lanes.pop(key).close()
-        self._there.discard((site, robot))
-        self._tell()
+        for key in [key for key in self.topic_channels if key.startswith(prefix)]:
+            self.topic_channels.pop(key).close()
+        self._present.discard((site, robot))
+        self._publish_description()
 
     def watches(self, client: int, site: str, robot: str) -> bool:
-        """Whether a client watches anything of a robot."""
+        """Return whether a client is subscribed to a channel of a robot."""
         prefix = robot_key(site, robot, "")
-        return any(client in lane.watchers for key, lane in self.lanes.items() if key.startswith(prefix))
+        return any(
+            client in channel.watchers
+            for key, channel in self.topic_channels.items()
+            if key.startswith(prefix)
+        )
 
     @property
     def watched(self) -> int:
-        """How many channels somebody watches."""
-        return sum(bool(lane.watchers) for lane in self.lanes.values())
+        """Number of channels with at least one client."""
+        return sum(bool(channel.watchers) for channel in self.topic_channels.values())
 
     def asset_key(self, uri: str) -> str | None:
-        """What to ask the mesh for a file that a description names; None: it names no such file."""
+        """Return the key of a file that a description names, or None for any other URI."""
         parts = uri.removeprefix(_ASSETS).removesuffix(".glb").split("/")
         if not uri.startswith(_ASSETS) or len(parts) != 3:
             return None
@@ -120,28 +124,28 @@ class Channels:
         return robot_key(site, robot, f"mesh/{mesh}")
 
     def close(self) -> None:
-        """None of them is there any more."""
-        for lane in self.lanes.values():
-            lane.close()
-        self.lanes.clear()
+        """Remove all channels."""
+        for channel in self.topic_channels.values():
+            channel.close()
+        self.topic_channels.clear()
 
     def _add(self, site: str, robot: str, name: str) -> None:
         key = robot_key(site, robot, name)
-        if key not in self.lanes:
+        if key not in self.topic_channels:
             channel = self._channel(key, "protobuf", protobuf_schema(topic(name).schema))
-            self.lanes[key] = Lane(self._session, channel, (key,))
+            self.topic_channels[key] = TopicChannel(self._session, channel, (key,))
 
     def _channel(self, name: str, encoding: str, schema: foxglove.Schema) -> foxglove.Channel:
         return foxglove.Channel(name, message_encoding=encoding, schema=schema, context=self._context)
 
-    def _tell(self) -> None:
+    def _publish_description(self) -> None:
         robots = [
-            viewed(site, robot, told, f"{_ASSETS}{site}/{robot}/{{}}.glb".format)
-            for (site, robot), told in sorted(self._described.items())
-            if told.urdf and (site, robot) in self._there
+            viewed(site, robot, description, f"{_ASSETS}{site}/{robot}/{{}}.glb".format)
+            for (site, robot), description in sorted(self._described.items())
+            if description.urdf and (site, robot) in self._present
         ]
         text = together(robots, plain_joints=self._one_robot)
-        self._whole.tell(text_message(text), time.time_ns())
+        self._all_robots.publish(text_message(text), time.time_ns())
 
 
 def _topics_of(robot: str) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
-"""Commands as Foxglove's services: stop for everybody who may attach, the others in one operator's name.
+"""Commands as Foxglove services: stop for every client, the others in the name of one operator.
 
-A client has control only while it watches the robot: who closes the panel, or whose line breaks, has let go,
-and the robot's own gateway stops what is running.
+A client has control only while it is subscribed to a channel of the robot. A closed panel or a lost
+connection releases control, and the robot's gateway stops the motion.
 """
 
 import asyncio
@@ -33,7 +33,7 @@ from robomesh.session import Session
 
 log = logging.getLogger(__name__)
 
-_Place = tuple[str, str]
+_RobotKey = tuple[str, str]
 _Watches = Callable[[int, str, str], bool]
 
 _COMMANDS = ("home", "hold", "resume", "reset", "speed", "move_absolute", "move_relative")
@@ -44,7 +44,7 @@ _MOTIONS = (
     CommandRequest.MOVE_RELATIVE,
 )
 _NUMBERS = {"type": "array", "items": {"type": "number"}, "description": "rad, or m for a prismatic joint"}
-# What a request holds; anything else in it is refused.
+# Fields of each request; any other field is refused.
 _FIELDS: dict[str, dict[str, Any]] = {
     "stop": {"reason": {"type": "string"}},
     "speed": {"speed_percent": {"type": "number"}},
@@ -59,25 +59,25 @@ _ANSWER = {
 }
 _LATEST_NS = 3_000_000_000
 _ANSWER_S = 5.0
-# `lease` beats each second: without it the gateway is gone.
-_SILENCE_S = 5.0
-_LOOK_EACH_S = 0.2
+# `lease` is published each second; without it for this long, the gateway is offline.
+_LEASE_TIMEOUT_S = 5.0
+_POLL_S = 0.2
 
 
 @dataclass
-class _Holding:
-    """Control that a client has while a motion runs that it asked for."""
+class _ControlSession:
+    """Control that a client has while its motion runs."""
 
     client: int
-    own: Control
+    control: Control
     commands: int = 0
     since_ns: int = field(default_factory=time.monotonic_ns)
 
     def stamp(self, request: CommandRequest) -> None:
-        """Make a command one of this lease's; late ones must not move an arm."""
+        """Set a command's lease, number and expiry; a late command must not move the arm."""
         self.commands += 1
-        request.lease, request.id = self.own.lease, self.commands
-        now_ns = self.own.now_ns + time.monotonic_ns() - self.since_ns
+        request.lease, request.id = self.control.lease, self.commands
+        now_ns = self.control.now_ns + time.monotonic_ns() - self.since_ns
         request.not_after.FromNanoseconds(now_ns + _LATEST_NS)
 
 
@@ -85,18 +85,18 @@ class Commands:
     """The services of every robot.
 
     Args:
-        operator: In whose name commands are asked; empty: stop alone is offered.
-        watches: Whether a client watches anything of a robot.
+        operator: Name of the operator that commands carry; if empty, only stop is offered.
+        watches: Returns whether a client is subscribed to a channel of a robot.
     """
 
     def __init__(self, session: Session, operator: str, watches: _Watches) -> None:
         self._session, self._operator, self._watches = session, operator, watches
         self._loop = asyncio.get_running_loop()
-        self._holding: dict[_Place, _Holding] = {}
+        self._holding: dict[_RobotKey, _ControlSession] = {}
         self._tasks: set[asyncio.Task[None]] = set()
 
     def of(self, site: str, robot: str) -> list[foxglove.Service]:
-        """A robot's services, by name `robomesh/<site>/<robot>/<command>`."""
+        """Return a robot's services, named `robomesh/<site>/<robot>/<command>`."""
         names = ("stop", *(_COMMANDS if self._operator else ()))
         return [self._service(site, robot, name) for name in names]
 
@@ -104,9 +104,9 @@ class Commands:
         work = self._stop if name == "stop" else partial(self._command, name=name)
 
         def handle(request: ServiceRequest) -> bytes:
-            """On a thread of the SDK's."""
+            """Handle a request on a thread of the SDK."""
             answering = asyncio.run_coroutine_threadsafe(
-                _answered(work(site, robot, request.client_id, request.payload)), self._loop
+                _json_answer(work(site, robot, request.client_id, request.payload)), self._loop
             )
             return answering.result()
 
@@ -119,7 +119,7 @@ class Commands:
         try:
             reason = str(_values("stop", payload).get("reason", ""))
         except RefusedError:
-            reason = ""  # a stop is a stop
+            reason = ""  # an invalid reason must not prevent the stop
         request = StopRequest(by=self._operator or "foxglove", reason=reason or "stop in Foxglove")
         answer = await self._session.ask(robot_key(site, robot, "stop"), request)
         assert isinstance(answer, StopAnswer)
@@ -134,16 +134,18 @@ class Commands:
             request.stop_id = await self._latched_stop(site, robot)
         holding = self._holding.get((site, robot))
         if holding is not None and holding.client == client:
-            return await self._sent(site, robot, holding, request)
+            return await self._send(site, robot, holding, request)
         if request.command in _MOTIONS and not self._watches(client, site, robot):
-            return False, f"this client watches nothing of {site}/{robot}: open its joints before it moves"
+            return False, (
+                f"this client is not subscribed to {site}/{robot}: open its joints before it moves"
+            )
         answered: asyncio.Future[tuple[bool, str]] = self._loop.create_future()
-        task = self._loop.create_task(self._in_control(site, robot, client, request, answered))
+        task = self._loop.create_task(self._run_in_control(site, robot, client, request, answered))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
         return await answered
 
-    async def _in_control(
+    async def _run_in_control(
         self,
         site: str,
         robot: str,
@@ -151,32 +153,32 @@ class Commands:
         request: CommandRequest,
         answered: "asyncio.Future[tuple[bool, str]]",
     ) -> None:
-        """Take control, send, answer, and keep it until the motion ends or the client lets go."""
-        holding: _Holding | None = None
+        """Take control, send the command, and keep control until the motion ends or the client leaves."""
+        holding: _ControlSession | None = None
         try:
-            async with control(self._session, site, robot, self._operator) as own:
-                holding = _Holding(client, own)
-                answer = await self._sent(site, robot, holding, request)
+            async with control(self._session, site, robot, self._operator) as acquired:
+                holding = _ControlSession(client, acquired)
+                answer = await self._send(site, robot, holding, request)
                 moves = answer[0] and request.command in _MOTIONS
                 if moves:
                     self._holding[site, robot] = holding
                 answered.set_result(answer)
                 if moves:
-                    await self._until_over(site, robot, holding)
+                    await self._wait_for_motion(site, robot, holding)
         except BusError as error:
             if answered.done():
                 log.warning("%s/%s: %s", site, robot, error)
             else:
                 answered.set_exception(error)
         finally:
-            # Whoever was refused control leaves it to the client that has it.
+            # Another client's session stays if this client's was refused.
             if holding is not None and self._holding.get((site, robot)) is holding:
                 del self._holding[site, robot]
             if not answered.done():
                 answered.cancel()
 
-    async def _sent(
-        self, site: str, robot: str, holding: _Holding, request: CommandRequest
+    async def _send(
+        self, site: str, robot: str, holding: _ControlSession, request: CommandRequest
     ) -> tuple[bool, str]:
         holding.stamp(request)
         key = robot_key(site, robot, f"command/{self._operator}")
@@ -184,32 +186,30 @@ class Commands:
         assert isinstance(answer, CommandAnswer)
         return answer.accepted, answer.text
 
-    async def _until_over(self, site: str, robot: str, holding: _Holding) -> None:
-        over = asyncio.create_task(self._motion_over(site, robot))
+    async def _wait_for_motion(self, site: str, robot: str, holding: _ControlSession) -> None:
+        over = asyncio.create_task(self._motion_ended(site, robot))
         try:
-            while not over.done() and not holding.own.renewing.done():
-                await asyncio.wait((over, holding.own.renewing), timeout=_LOOK_EACH_S)
+            while not over.done() and not holding.control.renewing.done():
+                await asyncio.wait((over, holding.control.renewing), timeout=_POLL_S)
                 if not self._watches(holding.client, site, robot):
-                    log.warning(
-                        "%s/%s: the client that moves it has gone: control is given back", site, robot
-                    )
+                    log.warning("%s/%s: the client in control has left: control is released", site, robot)
                     return
         finally:
             over.cancel()
 
-    async def _motion_over(self, site: str, robot: str) -> None:
-        """Ends when the gateway tells that the holder's motion does, or tells nothing any more."""
+    async def _motion_ended(self, site: str, robot: str) -> None:
+        """Return when the gateway reports that the holder's motion has ended, or stops reporting."""
         leases = self._session.subscribe(robot_key(site, robot, "lease"), newest=20)
         try:
             while True:
-                async with asyncio.timeout(_SILENCE_S):
+                async with asyncio.timeout(_LEASE_TIMEOUT_S):
                     sample = await anext(leases)
                 lease = sample.message()
                 assert isinstance(lease, Lease)
                 if sample.live and not (lease.motion and lease.holder == self._operator):
                     return
         except (TimeoutError, BusError) as error:
-            log.warning("%s/%s: the gateway fell silent: %s", site, robot, error or "no lease is told")
+            log.warning("%s/%s: the gateway is silent: %s", site, robot, error or "no lease is published")
         finally:
             leases.close()
 
@@ -218,13 +218,13 @@ class Commands:
         return state.stop.id if isinstance(state, ControllerState) else 0
 
     async def close(self) -> None:
-        """Give back all control; the gateways stop what runs."""
+        """Release all control; the gateways stop running motions."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
 
-async def _answered(work: Awaitable[tuple[bool, str]]) -> bytes:
+async def _json_answer(work: Awaitable[tuple[bool, str]]) -> bytes:
     answer: dict[str, object] = {}
     try:
         answer["accepted"], answer["text"] = await work
@@ -237,10 +237,10 @@ async def _answered(work: Awaitable[tuple[bool, str]]) -> bytes:
 
 
 def _values(name: str, payload: bytes) -> dict[str, Any]:
-    """What a request holds.
+    """Parse a request's fields.
 
     Raises:
-        RefusedError: If it is no JSON object, or holds something that this command does not take.
+        RefusedError: If it is not a JSON object, or has a field that this command does not have.
     """
     try:
         values = json.loads(payload or b"{}", parse_constant=_not_finite)

@@ -1,8 +1,8 @@
-"""The door before the SDK's server, which asks nobody where they come from and knows no TLS of a mesh.
+"""Proxy in front of the SDK's server, which checks neither the Origin header nor TLS.
 
-A web page of anywhere can open a WebSocket to the machine that shows it: pages of others are sent away by
-the Origin that browsers tell. What comes after the handshake is passed on as it is. The SDK itself listens
-on an address of 127.0.0.0/8 and a port that nobody can guess.
+Any web page can open a WebSocket to the machine that shows it, so pages are admitted by the Origin header of
+the handshake. Bytes after the handshake are forwarded unchanged. The SDK itself listens on a random address
+of 127.0.0.0/8 and a random port.
 """
 
 import asyncio
@@ -23,26 +23,26 @@ from services.site_file.listen_address import is_loopback
 
 log = logging.getLogger(__name__)
 
-_MOST_HEAD = 16 * 1024
-_HEAD_WITHIN_S = 10.0
-_MOST_CLIENTS = 32
-# Connections of one address, and of all, those that say nothing among them.
-_MOST_OF_ONE = 16
-_MOST_CONNECTIONS = 256
+_MAX_HEAD = 16 * 1024
+_HEAD_TIMEOUT_S = 10.0
+_MAX_CLIENTS = 32
+# Connections of one address and of all, including those before their handshake.
+_MAX_OF_ADDRESS = 16
+_MAX_CONNECTIONS = 256
 _BUSY = "503 Service Unavailable"
-_TAKES_WITHIN_MS = 20_000
+_SEND_TIMEOUT_MS = 20_000
 _PIECE = 64 * 1024
-# Waits here for a client that reads slowly; the rest waits at the SDK, which drops the oldest.
-_MOST_WAITING = 64 * 1024
+# Bytes buffered here for a slow client; the SDK queues the rest and drops the oldest.
+_MAX_BUFFERED = 64 * 1024
 
 
 def hidden_address() -> str:
-    """An address of this machine alone, one of sixteen million."""
+    """Return a random loopback address, one of sixteen million."""
     return "127." + ".".join(str(1 + secrets.randbelow(254)) for _ in range(3))
 
 
-def welcome(origin: str | None, allowed: tuple[str, ...]) -> bool:
-    """Whether a client may attach: a program, a page of this machine's, or one that is allowed."""
+def is_allowed_origin(origin: str | None, allowed: tuple[str, ...]) -> bool:
+    """Return whether a client may connect: programs, pages of this machine, and allowed origins may."""
     if origin is None:
         return True
     try:
@@ -52,90 +52,97 @@ def welcome(origin: str | None, allowed: tuple[str, ...]) -> bool:
     return origin in allowed or is_loopback(host)
 
 
-class Door:
-    """Lets clients in and passes their bytes on.
+class Listener:
+    """Accepts clients and forwards their bytes to the SDK's server.
 
     Attributes:
-        inside: How many there are, their handshakes over.
+        client_count: Number of clients after their handshake.
     """
 
     def __init__(self, server_host: str, server_port: int, origins: tuple[str, ...]) -> None:
         self._server = server_host, server_port
         self._origins = (*ORIGINS, *origins)
-        self.inside = 0
-        self._open: Counter[str] = Counter()
-        self._visits: set[asyncio.Task[None]] = set()
+        self.client_count = 0
+        self._per_address: Counter[str] = Counter()
+        self._connections: set[asyncio.Task[None]] = set()
 
     @asynccontextmanager
     async def open(self, host: str, port: int, tls: ssl.SSLContext | None) -> AsyncIterator[int]:
-        """Listen while the block runs, and no visit outlives it; on which port.
+        """Listen during the block and yield the port; end all connections at its end.
 
         Raises:
-            ListenError: If it cannot.
+            ListenError: If it cannot listen on the address.
         """
         try:
             listener = await asyncio.start_server(
-                self._came, host, port, ssl=tls, limit=_MOST_HEAD, ssl_handshake_timeout=_tls_within(tls)
+                self._on_connect,
+                host,
+                port,
+                ssl=tls,
+                limit=_MAX_HEAD,
+                ssl_handshake_timeout=_tls_timeout_s(tls),
             )
         except OSError as error:
             reason = os.strerror(error.errno) if error.errno else str(error)
             raise ListenError(
-                f"foxglove cannot listen on {host}:{port}: {reason}; --listen another"
+                f"foxglove cannot listen on {host}:{port}: {reason}; choose another address with --listen"
             ) from None
         try:
             yield listener.sockets[0].getsockname()[1]
         finally:
             listener.close()
-            for visit in self._visits:
-                visit.cancel()
-            await asyncio.gather(*self._visits, return_exceptions=True)
+            for task in self._connections:
+                task.cancel()
+            await asyncio.gather(*self._connections, return_exceptions=True)
 
-    def _came(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        # A task of ours: of one that asyncio makes itself, Python 3.11 logs a traceback when it is cancelled.
-        visit = asyncio.create_task(self._serve(reader, writer))
-        self._visits.add(visit)
-        visit.add_done_callback(self._visits.discard)
+    def _on_connect(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        # An explicit task: Python 3.11 logs a traceback when the task that asyncio would create is cancelled.
+        task = asyncio.create_task(self._serve(reader, writer))
+        self._connections.add(task)
+        task.add_done_callback(self._connections.discard)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         address = str((writer.get_extra_info("peername") or ("",))[0])
-        self._open[address] += 1
+        self._per_address[address] += 1
         try:
-            if self._open[address] > _MOST_OF_ONE or self._open.total() > _MOST_CONNECTIONS:
-                await _refuse(writer, _BUSY, f"too many connections: {_MOST_OF_ONE} of an address at most")
+            if self._per_address[address] > _MAX_OF_ADDRESS or self._per_address.total() > _MAX_CONNECTIONS:
+                await _refuse(
+                    writer, _BUSY, f"too many connections: at most {_MAX_OF_ADDRESS} of one address"
+                )
             else:
-                await self._let_in(reader, writer)
+                await self._accept(reader, writer)
         except (TimeoutError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, OSError):
-            pass  # it is no WebSocket client, or it has gone
+            pass  # not a WebSocket client, or it has disconnected
         finally:
-            self._open[address] -= 1
-            if not self._open[address]:
-                del self._open[address]
+            self._per_address[address] -= 1
+            if not self._per_address[address]:
+                del self._per_address[address]
             writer.close()
 
-    async def _let_in(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        async with asyncio.timeout(_HEAD_WITHIN_S):
+    async def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        async with asyncio.timeout(_HEAD_TIMEOUT_S):
             head = await reader.readuntil(b"\r\n\r\n")
         origin = origin_of(head)
-        if not welcome(origin, self._origins):
-            log.warning("a page of %s was sent away: --origin %s lets it attach", origin, origin)
-            await _refuse(writer, "403 Forbidden", f"pages of {origin} may not attach here")
+        if not is_allowed_origin(origin, self._origins):
+            log.warning("refused a page of %s; allow it with --origin %s", origin, origin)
+            await _refuse(writer, "403 Forbidden", f"pages of {origin} may not connect here")
             return
-        if self.inside >= _MOST_CLIENTS:
-            await _refuse(writer, _BUSY, f"more than {_MOST_CLIENTS} clients")
+        if self.client_count >= _MAX_CLIENTS:
+            await _refuse(writer, _BUSY, f"too many clients: at most {_MAX_CLIENTS}")
             return
-        self.inside += 1
+        self.client_count += 1
         try:
-            await self._pass_on(head, reader, writer)
+            await self._forward(head, reader, writer)
         finally:
-            self.inside -= 1
+            self.client_count -= 1
 
-    async def _pass_on(self, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    async def _forward(self, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         server_reader, server_writer = await asyncio.open_connection(*self._server)
         for end in (writer, server_writer):
-            end.transport.set_write_buffer_limits(high=_MOST_WAITING)
-        # Who takes nothing of what was sent for so long is gone: its cable was pulled.
-        line = writer.get_extra_info("socket")
-        line.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _TAKES_WITHIN_MS)
+            end.transport.set_write_buffer_limits(high=_MAX_BUFFERED)
+        # A client that acknowledges nothing for this long has lost its connection.
+        connection = writer.get_extra_info("socket")
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _SEND_TIMEOUT_MS)
         server_writer.write(head)
         pumps = [
             asyncio.create_task(_pump(reader, server_writer)),
@@ -151,7 +158,7 @@ class Door:
 
 
 def origin_of(head: bytes) -> str | None:
-    """The page that a handshake comes from; None: it comes from none."""
+    """Return the Origin header of a handshake, or None if it has none."""
     for line in head.decode("latin-1").split("\r\n")[1:]:
         name, _, value = line.partition(":")
         if name.strip().lower() == "origin":
@@ -173,5 +180,5 @@ async def _refuse(writer: asyncio.StreamWriter, status: str, text: str) -> None:
     await writer.drain()
 
 
-def _tls_within(tls: ssl.SSLContext | None) -> float | None:
-    return None if tls is None else _HEAD_WITHIN_S
+def _tls_timeout_s(tls: ssl.SSLContext | None) -> float | None:
+    return None if tls is None else _HEAD_TIMEOUT_S

@@ -1,4 +1,4 @@
-"""What comes from the mesh as Foxglove has it: messages with their own times, events as logs, schemas."""
+"""Conversion of samples for Foxglove: messages with their own times, events as logs, schemas."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -12,12 +12,12 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.subscription import Sample
 from robomesh.topics import History, Topic
 
-# A message's bytes, and when what it tells was so [ns since the Unix epoch].
+# A message's bytes, and the time of its content [ns since the Unix epoch].
 Timed = tuple[bytes, int]
 
 
 def protobuf_schema(message: type[Message]) -> Schema:
-    """A message's schema, with all that it needs."""
+    """Return a message's schema with its dependencies."""
     described = FileDescriptorSet()
     seen: set[str] = set()
 
@@ -33,7 +33,7 @@ def protobuf_schema(message: type[Message]) -> Schema:
 
 
 def text_message(text: str) -> bytes:
-    """A text as ROS 2 has it (std_msgs/msg/String, CDR)."""
+    """Encode a text as ROS 2's std_msgs/msg/String (CDR)."""
     data = text.encode() + b"\0"
     return b"\0\1\0\0" + len(data).to_bytes(4, "little") + data
 
@@ -42,10 +42,10 @@ TEXT_SCHEMA = Schema(name="std_msgs/msg/String", encoding="ros2msg", data=b"stri
 
 
 def timed(row: Topic, sample: Sample) -> Iterator[Timed]:
-    """What a sample holds, message by message; nothing of what ages and is of nobody knows when.
+    """Yield a sample's messages with their times; none of a last value of unknown age that can expire.
 
     Raises:
-        MessageError: If it cannot be read.
+        MessageError: If it cannot be decoded.
     """
     if sample.live:
         yield sample.payload, sample.header.source_time_ns
@@ -61,7 +61,7 @@ def timed(row: Topic, sample: Sample) -> Iterator[Timed]:
             for frame in frames.frames:
                 yield frame.data, frame.source_time_ns
         case _:
-            # A last value may be hours old; of what beats it is a beat old at most.
+            # A last value may be hours old; with a heartbeat it is at most one heartbeat old.
             if row.stale_after_s is None or row.heartbeat_s is not None:
                 yield sample.payload, sample.header.source_time_ns
 
@@ -76,16 +76,16 @@ _LEVELS = {
 
 
 def log_of(event: bytes, robot: str) -> bytes:
-    """An event as Foxglove's log panel has it.
+    """Convert an event to the message of Foxglove's log panel.
 
     Raises:
-        DecodeError: If it is none.
+        DecodeError: If it is not an event.
     """
-    told = schema.Event.FromString(event)
+    decoded = schema.Event.FromString(event)
     log = Log(
-        timestamp=told.timestamp,
-        level=_LEVELS.get(told.severity, Log.UNKNOWN),
-        message=f"{told.text} [{told.code}]",
-        name=f"{robot} {told.source}".strip(),
+        timestamp=decoded.timestamp,
+        level=_LEVELS.get(decoded.severity, Log.UNKNOWN),
+        message=f"{decoded.text} [{decoded.code}]",
+        name=f"{robot} {decoded.source}".strip(),
     )
     return log.SerializeToString()

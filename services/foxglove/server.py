@@ -1,4 +1,4 @@
-"""The service: listens for Foxglove and Lichtblick."""
+"""Foxglove service: serves the mesh to Foxglove and Lichtblick."""
 
 import asyncio
 import logging
@@ -11,14 +11,14 @@ from robomesh.session import Session
 from services.errors import ListenError
 from services.foxglove.bridge import Bridge
 from services.foxglove.commands import Commands
-from services.foxglove.listener import Door, hidden_address
+from services.foxglove.listener import Listener, hidden_address
 from services.foxglove.settings import Settings
 from services.site_file.listen_address import check_reach, is_loopback, split_address
 
 log = logging.getLogger(__name__)
 
 SERVICE = "foxglove"
-# Who comes and goes at the SDK, with or without a farewell, and on which hidden address, is nobody's news.
+# The SDK's log lines of connections show only the proxy and the hidden address.
 _SDK_LOG = "foxglove.websocket"
 
 
@@ -28,18 +28,18 @@ async def serve(
     """Serve until cancelled.
 
     Args:
-        on_ready: Told the address, once clients can attach.
+        on_ready: Called with the address once clients can connect.
 
     Raises:
-        ListenError: If it cannot listen there, or may not.
+        ListenError: If it cannot listen on the address, or is not permitted to.
     """
     host, port = split_address(settings.listen)
     tls = _tls(settings)
     commanded = is_loopback(host)
     if not (commanded or tls or settings.insecure):
         raise ListenError(
-            f"foxglove would listen on {host}, which others can reach, without TLS: give it --certificate "
-            "PEM, listen on 127.0.0.1, or say --insecure"
+            f"foxglove would listen on {host}, which other machines can reach, without TLS: add "
+            "--certificate PEM, listen on 127.0.0.1, or add --insecure"
         )
     if warning := check_reach("foxglove", host, secured=tls is not None, insecure=True):
         log.warning("%s", warning)
@@ -47,8 +47,8 @@ async def serve(
         check_chunk(settings.operator)
         if not commanded:
             raise ListenError(
-                f"foxglove would take commands on {host}, and knows no users: they are offered on loopback "
-                "only; leave --operator away, or listen on 127.0.0.1"
+                f"foxglove would accept commands on {host} but has no sign-in: commands are offered on "
+                "loopback only; omit --operator, or listen on 127.0.0.1"
             )
     bridge = Bridge(session, settings)
     commands = Commands(session, settings.operator, bridge.channels.watches) if commanded else None
@@ -56,10 +56,10 @@ async def serve(
     hidden = hidden_address()
     server = bridge.start(hidden, name=_name(settings, commanded=commanded), commands=commands)
     try:
-        door = Door(hidden, server.port, settings.origins)
-        session.measure("foxglove_clients", "Foxglove clients that are attached", lambda: door.inside)
-        session.measure("foxglove_watched", "Channels that somebody watches", lambda: bridge.channels.watched)
-        async with door.open(host, port, tls) as bound:
+        listener = Listener(hidden, server.port, settings.origins)
+        session.measure("foxglove_clients", "Connected Foxglove clients", lambda: listener.client_count)
+        session.measure("foxglove_watched", "Channels with a client", lambda: bridge.channels.watched)
+        async with listener.open(host, port, tls) as bound:
             shown = f"[{host}]" if ":" in host else host
             address = f"{'ws' if tls is None else 'wss'}://{shown}:{bound}"
             log.info("foxglove %s", address)
@@ -77,7 +77,7 @@ async def serve(
 
 
 def _name(settings: Settings, *, commanded: bool) -> str:
-    """What clients show of the server: what may be asked through it."""
+    """Return the server's name, which shows the user the offered commands."""
     if not commanded:
         return "robomesh (read-only: commands are offered on loopback only)"
     if not settings.operator:
@@ -86,7 +86,7 @@ def _name(settings: Settings, *, commanded: bool) -> str:
 
 
 def _tls(settings: Settings) -> ssl.SSLContext | None:
-    """TLS as the settings have it; None: none.
+    """Return the TLS context of the settings, or None without a certificate.
 
     Raises:
         ListenError: If a file cannot be used.

@@ -1,27 +1,27 @@
-"""What a bridge to Foxglove is told."""
+"""Settings of the Foxglove service."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
-# Where Foxglove's and Lichtblick's own programs come from; a program that is no browser tells none.
+# Origins of Foxglove's and Lichtblick's own applications; other programs send no Origin header.
 ORIGINS = ("https://app.foxglove.dev", "file://")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Where it listens, and what it lets through.
+    """Settings of the Foxglove service.
 
     Attributes:
         listen: `HOST:PORT`; port 0 takes a free one.
-        robots: `robot` or `site/robot`; none: all of the mesh.
-        site: Where it is present itself; empty: at the first site that is seen.
-        metrics: Host and port at which Prometheus may ask; None: nowhere.
-        operator: In whose name commands are asked; empty: none but stop are offered.
-        origins: Of web pages that may attach, beside those of this machine and `ORIGINS`.
-        certificate: PEM, for TLS, with its key in it or in `private_key`.
-        insecure: Beyond loopback without TLS, at one's own risk.
-        gone_after_s: A robot that was away for so long has no channels any more; a restarted service, or
-            router, is back before.
+        robots: Robots to show, as `robot` or `site/robot`; empty for all of the mesh.
+        site: Site of the service's presence; empty for the first site found.
+        metrics: Host and port of the Prometheus endpoint; None for none.
+        operator: Name of the operator that commands carry; if empty, only stop is offered.
+        origins: Origins of permitted web pages, in addition to this machine's and `ORIGINS`.
+        certificate: PEM file for TLS, with its private key or without (`private_key`).
+        insecure: May listen beyond loopback without TLS.
+        gone_after_s: Time offline after which a robot's channels are removed; longer than a restart of a
+            service or a router takes.
     """
 
     listen: str = "127.0.0.1:8765"
@@ -36,5 +36,5 @@ class Settings:
     gone_after_s: float = 30.0
 
     def wants(self, site: str, robot: str) -> bool:
-        """Whether a robot is to be shown."""
+        """Return whether to show a robot."""
         return not self.robots or robot in self.robots or f"{site}/{robot}" in self.robots

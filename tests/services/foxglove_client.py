@@ -1,4 +1,4 @@
-"""A client of Foxglove's WebSocket protocol, written from its specification: knows nothing of robomesh."""
+"""Client of Foxglove's WebSocket protocol, written from its specification and independent of robomesh."""
 
 import asyncio
 import json
@@ -11,7 +11,7 @@ MESSAGE, SERVICE_ANSWER, ASSET = 1, 3, 4
 
 
 class Client:
-    """What one client has been told, and what it asks."""
+    """State of one client, and its requests."""
 
     def __init__(self, websocket):
         self.channels, self.services, self.gone = {}, {}, set()
@@ -26,18 +26,18 @@ class Client:
                 (self._text if isinstance(message, str) else self._binary)(message)
 
     def _text(self, message):
-        told = json.loads(message)
-        match told["op"]:
+        content = json.loads(message)
+        match content["op"]:
             case "serverInfo":
-                self.info = told
+                self.info = content
             case "advertise":
-                self.channels |= {channel["topic"]: channel for channel in told["channels"]}
+                self.channels |= {channel["topic"]: channel for channel in content["channels"]}
             case "unadvertise":
-                self.gone |= set(told["channelIds"])
+                self.gone |= set(content["channelIds"])
             case "advertiseServices":
-                self.services |= {service["name"]: service for service in told["services"]}
+                self.services |= {service["name"]: service for service in content["services"]}
             case "serviceCallFailure":
-                self._answers.pop(told["callId"]).set_exception(RuntimeError(told["message"]))
+                self._answers.pop(content["callId"]).set_exception(RuntimeError(content["message"]))
 
     def _binary(self, message):
         match message[0]:
@@ -53,17 +53,17 @@ class Client:
                 self._answers.pop(request).set_result(data if status == 0 else RuntimeError(text.decode()))
 
     def stop_reading(self):
-        """Take nothing more off the line."""
+        """Stop reading from the socket."""
         self._websocket.transport.pause_reading()
 
     async def until(self, condition, timeout_s=30.0):
         async with asyncio.timeout(timeout_s):
-            while not (met := condition()):
+            while not (result := condition()):
                 await asyncio.sleep(0.01)
-        return met
+        return result
 
     async def subscribe(self, topic):
-        """Watch a topic, once there is one."""
+        """Subscribe to a topic once it is advertised."""
         await self.until(lambda: topic in self.channels)
         self._number += 1
         self._topics[self._number] = topic
@@ -76,13 +76,13 @@ class Client:
         await self._websocket.send(json.dumps({"op": "unsubscribe", "subscriptionIds": [number]}))
 
     async def first(self, topic, schema=None):
-        """The first message of a topic that is watched."""
+        """Return the first message of a subscribed topic."""
         await self.until(lambda: self.got[topic])
         payload = self.got[topic][0][1]
         return payload if schema is None else schema.FromString(payload)
 
     async def call(self, service, **values):
-        """A service's answer, asked in JSON."""
+        """Call a service in JSON and return its answer."""
         await self.until(lambda: service in self.services)
         number, answer = self._waiting()
         head = struct.pack("<BIII", 2, self.services[service]["id"], number, 4) + b"json"
@@ -90,7 +90,7 @@ class Client:
         return await asyncio.wait_for(answer, 30.0)
 
     async def asset(self, uri):
-        """A file's bytes, or the error in their place."""
+        """Fetch a file; return its bytes, or the error."""
         number, answer = self._waiting()
         await self._websocket.send(json.dumps({"op": "fetchAsset", "uri": uri, "requestId": number}))
         return await asyncio.wait_for(answer, 30.0)
@@ -103,7 +103,7 @@ class Client:
 
 @asynccontextmanager
 async def attached(address, **options):
-    """A client that reads what it is sent; gone when the block ends."""
+    """Connect a client that reads its messages during the block."""
     connecting = websockets.connect(
         address, subprotocols=["foxglove.sdk.v1"], max_size=None, close_timeout=0.5, **options
     )

@@ -1,4 +1,4 @@
-"""The mesh in the hands of a client that speaks Foxglove's protocol and knows nothing of ours."""
+"""Foxglove service, tested with an independent client of Foxglove's protocol."""
 
 import asyncio
 import xml.etree.ElementTree as ET
@@ -29,24 +29,24 @@ URDF = """<robot name="arm"><link name="base"/><link name="column"/>
 
 @asynccontextmanager
 async def bridge(mesh, **settings):
-    """The address of a running bridge."""
-    said = asyncio.get_running_loop().create_future()
+    """Run the service; yield its address."""
+    ready = asyncio.get_running_loop().create_future()
     async with open_session(mesh) as session:
         settings = Settings(**{"listen": "127.0.0.1:0", **settings})
-        task = asyncio.create_task(serve(session, settings, on_ready=said.set_result))
-        await asyncio.wait([said, task], return_when=asyncio.FIRST_COMPLETED)
+        task = asyncio.create_task(serve(session, settings, on_ready=ready.set_result))
+        await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
         if task.done():
             await task
         try:
-            yield await said
+            yield await ready
         finally:
             task.cancel()
             await asyncio.gather(task, return_exceptions=True)
 
 
 @asynccontextmanager
-async def hall(mesh, robot="arm"):
-    """A session that is a robot's services: present, and with its meshes."""
+async def robot_session(mesh, robot="arm"):
+    """Open a session that acts as a robot's services, with presence and meshes."""
     async with open_session(mesh) as session:
 
         async def mesh_of(_):
@@ -58,12 +58,12 @@ async def hall(mesh, robot="arm"):
 
 
 def description():
-    told = schema.Description(name="arm", urdf=URDF, base_to_site=np.eye(4).ravel())
-    told.links.add(name="base", mesh="foot")
-    told.links.add(name="column")
-    told.views.add(name="front")
-    told.fixtures.add(name="table", mesh="fixture.table", fixture_to_site=np.eye(4).ravel())
-    return told
+    message = schema.Description(name="arm", urdf=URDF, base_to_site=np.eye(4).ravel())
+    message.links.add(name="base", mesh="foot")
+    message.links.add(name="column")
+    message.views.add(name="front")
+    message.fixtures.add(name="table", mesh="fixture.table", fixture_to_site=np.eye(4).ravel())
+    return message
 
 
 def joints(position):
@@ -74,7 +74,7 @@ def joints(position):
 
 def test_a_client_gets_states_with_their_own_times_and_events_as_logs(mesh):
     async def main():
-        async with hall(mesh) as robot, bridge(mesh) as address, attached(address) as client:
+        async with robot_session(mesh) as robot, bridge(mesh) as address, attached(address) as client:
             publishers = {name: robot.declare_publisher("hall", "arm", name) for name in ("joints", "frames")}
             events = robot.declare_publisher("hall", "arm", "events")
             events.put(schema.Event(severity=schema.Event.ERROR, code="a.b", text="so", source="gateway"))
@@ -86,23 +86,23 @@ def test_a_client_gets_states_with_their_own_times_and_events_as_logs(mesh):
             frames.transforms.add(parent_frame_id="hall", child_frame_id="hall/arm/base")
             publishers["frames"].put(frames)
 
-            told = await client.first(f"{ARM}/joints", JointStates)
-            assert told.joints[0].position == 0.5
+            states = await client.first(f"{ARM}/joints", JointStates)
+            assert states.joints[0].position == 0.5
             assert client.got[f"{ARM}/joints"][0][0] == 1_700_000_000_123_456_789
-            told = await client.first(f"{ARM}/frames", FrameTransforms)
-            assert told.transforms[0].child_frame_id == "hall/arm/base"
-            told = await client.first(f"{ARM}/log", Log)
-            assert (told.level, told.message, told.name) == (Log.ERROR, "so [a.b]", "hall/arm gateway")
+            frames = await client.first(f"{ARM}/frames", FrameTransforms)
+            assert frames.transforms[0].child_frame_id == "hall/arm/base"
+            log = await client.first(f"{ARM}/log", Log)
+            assert (log.level, log.message, log.name) == (Log.ERROR, "so [a.b]", "hall/arm gateway")
             assert client.channels[f"{ARM}/joints"]["schemaName"] == "foxglove.JointStates"
 
     run(main())
 
 
-def test_old_joints_are_not_shown_again_and_old_controller_states_only_as_what_they_are(mesh):
+def test_last_joints_are_not_shown_and_a_last_controller_state_keeps_its_time(mesh):
     async def main():
-        async with hall(mesh) as robot, bridge(mesh) as address, attached(address) as client:
+        async with robot_session(mesh) as robot, bridge(mesh) as address, attached(address) as client:
             states = robot.declare_publisher("hall", "arm", "joints")
-            states.remember(joints(1.0), source_time_ns=5)  # nobody knows how old
+            states.remember(joints(1.0), source_time_ns=5)  # a last value of unknown age
             controller = robot.declare_publisher("hall", "arm", "controller")
             controller.put(schema.ControllerState(fault="f1"), source_time_ns=5)
             for name in ("joints", "controller"):
@@ -116,15 +116,19 @@ def test_old_joints_are_not_shown_again_and_old_controller_states_only_as_what_t
     run(main())
 
 
-def test_a_description_of_all_robots_comes_with_meshes_that_can_be_fetched(mesh):
+def test_the_description_of_all_robots_names_meshes_that_can_be_fetched(mesh):
     async def main():
-        async with hall(mesh) as robot, hall(mesh, "arm-2") as other, bridge(mesh) as address:
-            tellers = [
+        async with (
+            robot_session(mesh) as robot,
+            robot_session(mesh, "arm-2") as other,
+            bridge(mesh) as address,
+        ):
+            publishers = [
                 robot.declare_publisher("hall", "arm", "description"),
                 other.declare_publisher("hall", "arm-2", "description"),
             ]
-            for teller in tellers:
-                teller.put(description())
+            for publisher in publishers:
+                publisher.put(description())
             async with attached(address) as client:
                 await client.subscribe("/robot_description")
                 texts = client.got["/robot_description"]
@@ -135,7 +139,7 @@ def test_a_description_of_all_robots_comes_with_meshes_that_can_be_fetched(mesh)
                     "hall/arm-2/waist",
                 }
                 uris = [each.get("filename") for each in urdf.iter("mesh")]
-                # Two robots of a cell have the same table: it stands there once.
+                # The table of the cell is in both robots' descriptions and shown once.
                 assert len(uris) == 3
                 assert {f"package://robomesh/hall/{name}/foot.glb" for name in ("arm", "arm-2")} < set(uris)
                 assert "hall/table" in {link.get("name") for link in urdf.iter("link")}
@@ -147,9 +151,9 @@ def test_a_description_of_all_robots_comes_with_meshes_that_can_be_fetched(mesh)
     run(main())
 
 
-def test_video_decodes_and_nobody_draws_before_somebody_watches_or_after(mesh):
+def test_video_decodes_and_is_subscribed_only_while_a_client_watches(mesh):
     async def main():
-        encoder, asked = H264Encoder((320, 240), 30, codec="libx264"), []
+        encoder, requests = H264Encoder((320, 240), 30, codec="libx264"), []
 
         def frame(number, *, key_frame):
             picture = np.full((240, 320, 3), 10 * number, dtype=np.uint8)
@@ -157,10 +161,10 @@ def test_video_decodes_and_nobody_draws_before_somebody_watches_or_after(mesh):
             video.put(CompressedVideo(data=packet.data, format="h264"), key_frame=packet.key_frame)
 
         async def key_frame(request):
-            asked.append(request)
+            requests.append(request)
             return schema.KeyFrameAnswer()
 
-        async with hall(mesh) as robot, bridge(mesh) as address, attached(address) as client:
+        async with robot_session(mesh) as robot, bridge(mesh) as address, attached(address) as client:
             robot.declare_publisher("hall", "arm", "description").put(description())
             robot.answer("hall", "arm", "video/*/keyframe/*", key_frame)
             video = robot.declare_publisher("hall", "arm", "video/front")
@@ -171,7 +175,7 @@ def test_video_decodes_and_nobody_draws_before_somebody_watches_or_after(mesh):
             watching = await client.subscribe(f"{ARM}/video/front")
             await client.until(lambda: video.watched)
             got = client.got[f"{ARM}/video/front"]
-            await client.until(lambda: len(got) >= 3)  # since the key frame, which was before
+            await client.until(lambda: len(got) >= 3)  # since the earlier key frame
             frame(3, key_frame=False)
             await client.until(lambda: len(got) >= 4)
             decoder = av.CodecContext.create("h264", "r")
@@ -183,16 +187,16 @@ def test_video_decodes_and_nobody_draws_before_somebody_watches_or_after(mesh):
             assert len(pictures) == 4
             async with attached(address) as second:
                 await second.subscribe(f"{ARM}/video/front")
-                await client.until(lambda: asked)
+                await client.until(lambda: requests)
             await client.unsubscribe(watching)
             await client.until(lambda: not video.watched)
 
     run(main(), timeout_s=60.0)
 
 
-def test_a_client_that_never_reads_keeps_nothing_from_another(mesh):
+def test_a_client_that_never_reads_does_not_delay_another(mesh):
     async def main():
-        async with hall(mesh) as robot, bridge(mesh) as address, attached(address) as client:
+        async with robot_session(mesh) as robot, bridge(mesh) as address, attached(address) as client:
             robot.declare_publisher("hall", "arm", "description").put(description())
             video = robot.declare_publisher("hall", "arm", "video/front")
             states = robot.declare_publisher("hall", "arm", "joints")
@@ -212,9 +216,9 @@ def test_a_client_that_never_reads_keeps_nothing_from_another(mesh):
     run(main(), timeout_s=60.0)
 
 
-def test_who_comes_later_gets_the_events_so_far_and_nobody_gets_them_twice(mesh):
+def test_a_later_client_gets_the_earlier_events_and_no_client_gets_them_twice(mesh):
     async def main():
-        async with hall(mesh) as robot, bridge(mesh) as address, attached(address) as first:
+        async with robot_session(mesh) as robot, bridge(mesh) as address, attached(address) as first:
             events = robot.declare_publisher("hall", "arm", "events")
             events.put(schema.Event(code="one"))
             await first.subscribe(f"{ARM}/log")
@@ -233,12 +237,12 @@ def test_who_comes_later_gets_the_events_so_far_and_nobody_gets_them_twice(mesh)
 
 
 async def called(client, name, **values):
-    """Call a command, again where a busy machine did not renew the bridge's control in time."""
+    """Call a command; retry if a busy machine did not renew the bridge's control in time."""
     while not (answer := await client.call(f"{ARM}/{name}", **values))["accepted"]:
         assert "take control first" in answer["text"], answer
 
 
-def test_commands_are_one_operators_and_end_with_the_client_that_gave_them(mesh, tmp_path):
+def test_commands_are_one_operators_and_control_ends_with_their_client(mesh, tmp_path):
     async def main():
         async with (
             simulator(rate_hz=50) as port,
@@ -249,7 +253,7 @@ def test_commands_are_one_operators_and_end_with_the_client_that_gave_them(mesh,
             async with attached(address) as client, attached(address) as other:
                 answer = await client.call(f"{ARM}/home")
                 assert not answer["accepted"]
-                assert "watches nothing of hall/arm" in answer["text"]
+                assert "is not subscribed to hall/arm" in answer["text"]
                 await client.subscribe(f"{ARM}/joints")
                 await client.first(f"{ARM}/joints")
                 answer = await client.call(f"{ARM}/move_absolute", joint_positions=[1.0, float("nan")])
@@ -262,22 +266,22 @@ def test_commands_are_one_operators_and_end_with_the_client_that_gave_them(mesh,
                 await called(client, "move_absolute", joint_positions=[2.0, 0.5, 0.5, 0.5, 0.5])
                 await client.until(lambda: plant.controller.activity == STATE.MOVING)
                 assert plant.seen["lease"][-1].holder == "li"
-                # Another client is refused, and takes nothing from the one that moves it.
+                # Another client is refused; the first one keeps control.
                 answer = await other.call(f"{ARM}/hold")
                 assert "li is in control with another lease" in answer["text"]
-                # The same control, for as long as it moves.
+                # The client keeps control while the arm moves.
                 assert (await client.call(f"{ARM}/hold"))["accepted"]
                 await client.until(lambda: plant.controller.activity == STATE.HOLDING)
                 assert (await client.call(f"{ARM}/resume"))["accepted"]
                 await client.until(lambda: plant.controller.activity == STATE.MOVING)
-            # The client has gone in mid-motion.
+            # The client disconnected during the motion.
             await client.until(lambda: not plant.seen["lease"][-1].holder)
             await client.until(lambda: plant.controller.HasField("stop"))
 
     run(main(), timeout_s=60.0)
 
 
-def test_without_an_operator_there_is_stop_alone(mesh, tmp_path):
+def test_without_an_operator_only_stop_is_offered(mesh, tmp_path):
     async def main():
         async with (
             simulator(rate_hz=50) as port,
@@ -295,15 +299,15 @@ def test_without_an_operator_there_is_stop_alone(mesh, tmp_path):
     run(main())
 
 
-def test_only_the_robots_that_were_named_are_shown_and_one_alone_keeps_its_joints_names(mesh):
+def test_only_named_robots_are_shown_and_a_single_one_has_plain_joint_names(mesh):
     async def main():
-        async with hall(mesh) as robot, hall(mesh, "arm-2") as other:
-            tellers = [
+        async with robot_session(mesh) as robot, robot_session(mesh, "arm-2") as other:
+            publishers = [
                 robot.declare_publisher("hall", "arm", "description"),
                 other.declare_publisher("hall", "arm-2", "description"),
             ]
-            for teller in tellers:
-                teller.put(description())
+            for publisher in publishers:
+                publisher.put(description())
             async with bridge(mesh, robots=("hall/arm",)) as address, attached(address) as client:
                 await client.subscribe("/robot_description")
                 got = client.got["/robot_description"]
@@ -314,14 +318,14 @@ def test_only_the_robots_that_were_named_are_shown_and_one_alone_keeps_its_joint
     run(main())
 
 
-def test_a_robot_that_goes_takes_its_channels_along_and_has_them_again_when_it_comes(mesh):
+def test_a_robots_channels_are_removed_when_it_goes_offline_and_added_on_return(mesh):
     async def main():
         async with open_session(mesh) as kinematics, bridge(mesh, gone_after_s=0.1) as address:
             kinematics.declare_publisher("hall", "arm", "description").put(description())
             async with attached(address) as client:
                 view = f"{ARM}/video/front"
                 for _ in range(2):
-                    async with hall(mesh):
+                    async with robot_session(mesh):
                         await client.until(lambda: view in client.channels)
                         before = client.channels.pop(view)["id"]
                     await client.until(lambda before=before: before in client.gone)
@@ -329,12 +333,12 @@ def test_a_robot_that_goes_takes_its_channels_along_and_has_them_again_when_it_c
     run(main())
 
 
-def test_names_that_no_key_can_have_are_passed_over(mesh):
+def test_names_that_are_invalid_in_keys_are_ignored(mesh):
     async def main():
-        async with hall(mesh) as robot, bridge(mesh) as address, attached(address) as client:
-            told = description()
-            told.views.add(name="../../x y")
-            robot.declare_publisher("hall", "arm", "description").put(told)
+        async with robot_session(mesh) as robot, bridge(mesh) as address, attached(address) as client:
+            message = description()
+            message.views.add(name="../../x y")
+            robot.declare_publisher("hall", "arm", "description").put(message)
             token = robot.zenoh_session.liveliness().declare_token("robomesh/HALL/a b/alive/gateway/0")
             await client.until(lambda: f"{ARM}/joints" in client.channels)
             states = robot.declare_publisher("hall", "arm", "joints")
@@ -347,12 +351,12 @@ def test_names_that_no_key_can_have_are_passed_over(mesh):
     run(main())
 
 
-def test_after_a_routers_restart_states_come_again_by_themselves():
+def test_states_arrive_again_after_a_routers_restart():
     async def main():
         endpoint = mesh.connect[0]
         router = zenoh.open(router_config((endpoint,)))
         try:
-            async with hall(mesh) as robot, bridge(mesh) as address, attached(address) as client:
+            async with robot_session(mesh) as robot, bridge(mesh) as address, attached(address) as client:
                 states = robot.declare_publisher("hall", "arm", "joints")
                 await client.subscribe(f"{ARM}/joints")
                 await client.until(lambda: states.watched)

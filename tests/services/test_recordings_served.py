@@ -38,15 +38,15 @@ def folder(tmp_path):
 
 @asynccontextmanager
 async def served(mesh, folder, quotas=DEFAULT_QUOTAS, **open_now):
-    """A recorder's answers, and somebody who asks."""
-    async with open_session(mesh) as own, open_session(mesh) as asker:
-        serving = RecordingServer(
+    """Run a recorder's request handlers; yield a client session."""
+    async with open_session(mesh) as own, open_session(mesh) as client:
+        server = RecordingServer(
             own, "site", folder, open_now=lambda: open_now, flight=lambda: True, quotas=quotas
         )
         try:
-            yield asker
+            yield client
         finally:
-            await serving.close()
+            await server.close()
 
 
 def test_a_recorder_with_a_hanging_reader_is_busy_and_answers_later(mesh, folder):

@@ -1,4 +1,4 @@
-"""Who may attach to the Foxglove bridge: pages, addresses, certificates, and how many at once."""
+"""Listener of the Foxglove service: origins, addresses, certificates and limits."""
 
 import asyncio
 import contextlib
@@ -11,16 +11,16 @@ import websockets
 
 from services.errors import ListenError
 from services.foxglove import listener
-from services.foxglove.listener import Door, welcome
+from services.foxglove.listener import Listener, is_allowed_origin
 from services.foxglove.settings import ORIGINS
 from tests.conftest import run
 from tests.services.foxglove_client import attached
-from tests.services.test_foxglove import ARM, bridge, hall
+from tests.services.test_foxglove import ARM, bridge, robot_session
 
-ASKED = b"GET / HTTP/1.1\r\n\r\n"
+REQUEST = b"GET / HTTP/1.1\r\n\r\n"
 
 
-def test_pages_of_others_are_sent_away_and_programs_are_not(mesh):
+def test_foreign_pages_are_refused_and_programs_are_not(mesh):
     async def main():
         async with bridge(mesh, origins=("https://plant.example",)) as address:
             for origin in (None, "http://localhost:8080", ORIGINS[0], "https://plant.example"):
@@ -40,11 +40,11 @@ def test_pages_of_others_are_sent_away_and_programs_are_not(mesh):
     "origin",
     ["https://app.foxglove.dev.evil.example", "null", "", "https://x", "::", "http://[", "http://[bad]"],
 )
-def test_what_is_not_allowed_is_not_welcome(origin):
-    assert not welcome(origin, ORIGINS)
+def test_other_origins_are_not_allowed(origin):
+    assert not is_allowed_origin(origin, ORIGINS)
 
 
-def test_beyond_loopback_it_needs_tls_or_says_insecure_and_takes_no_commands(mesh):
+def test_beyond_loopback_it_needs_tls_or_insecure_and_offers_no_commands(mesh):
     async def main():
         with pytest.raises(ListenError, match="without TLS"):
             async with bridge(mesh, listen="0.0.0.0:0"):
@@ -53,7 +53,7 @@ def test_beyond_loopback_it_needs_tls_or_says_insecure_and_takes_no_commands(mes
             async with bridge(mesh, listen="0.0.0.0:0", insecure=True, operator="li"):
                 pass
         async with (
-            hall(mesh),
+            robot_session(mesh),
             bridge(mesh, listen="0.0.0.0:0", insecure=True) as address,
             attached(address.replace("0.0.0.0", "127.0.0.1")) as client,
         ):
@@ -64,7 +64,7 @@ def test_beyond_loopback_it_needs_tls_or_says_insecure_and_takes_no_commands(mes
     run(main())
 
 
-def test_with_a_certificate_it_speaks_tls(mesh, tmp_path):
+def test_with_a_certificate_it_uses_tls(mesh, tmp_path):
     async def main():
         authority = trustme.CA()
         pem = tmp_path / "foxglove.pem"
@@ -82,39 +82,39 @@ def test_with_a_certificate_it_speaks_tls(mesh, tmp_path):
 
 
 @asynccontextmanager
-async def open_door():
-    """A way to knock at a door, behind which everybody is greeted."""
+async def open_listener():
+    """Run a listener in front of a server that greets; yield a function that connects to it."""
 
-    greeted = []
+    tasks = []
 
     async def greet(reader, writer):
-        greeted.append(asyncio.current_task())
+        tasks.append(asyncio.current_task())
         await reader.readuntil(b"\r\n\r\n")
         writer.write(b"welcome\r\n")
         await reader.read()
         writer.close()
 
-    inside = await asyncio.start_server(greet, "127.0.0.1", 0)
-    before = Door("127.0.0.1", inside.sockets[0].getsockname()[1], ())
-    knocked = []
-    async with before.open("127.0.0.1", 0, None) as port:
+    server = await asyncio.start_server(greet, "127.0.0.1", 0)
+    proxy = Listener("127.0.0.1", server.sockets[0].getsockname()[1], ())
+    connections = []
+    async with proxy.open("127.0.0.1", 0, None) as port:
 
-        async def knock(says, address="127.0.0.1"):
+        async def connect(data, address="127.0.0.1"):
             reader, writer = await asyncio.open_connection("127.0.0.1", port, local_addr=(address, 0))
-            knocked.append((reader, writer))
-            writer.write(says)
+            connections.append((reader, writer))
+            writer.write(data)
             return reader, writer
 
         try:
-            yield knock
+            yield connect
         finally:
-            for reader, writer in knocked:
+            for reader, writer in connections:
                 with contextlib.suppress(OSError):
                     writer.write_eof()
                     await reader.read()
                 writer.close()
-            inside.close()
-            await asyncio.gather(*greeted)
+            server.close()
+            await asyncio.gather(*tasks)
 
 
 async def answer(reader):
@@ -122,62 +122,61 @@ async def answer(reader):
         return (await reader.readline()).strip()
 
 
-def test_a_page_that_says_nonsense_of_itself_is_sent_away_like_any_other():
+def test_a_page_with_an_invalid_origin_is_refused():
     async def main():
-        async with open_door() as knock:
-            reader, _ = await knock(b"GET / HTTP/1.1\r\nOrigin: http://[bad\r\n\r\n")
+        async with open_listener() as connect:
+            reader, _ = await connect(b"GET / HTTP/1.1\r\nOrigin: http://[bad\r\n\r\n")
             assert await answer(reader) == b"HTTP/1.1 403 Forbidden"
 
     run(main())
 
 
-def test_who_says_nothing_keeps_out_himself_alone_and_for_as_long_as_he_stays(monkeypatch):
-    monkeypatch.setattr(listener, "_MOST_CLIENTS", 2)
-    monkeypatch.setattr(listener, "_MOST_OF_ONE", 4)
+def test_silent_connections_block_only_their_own_address(monkeypatch):
+    monkeypatch.setattr(listener, "_MAX_CLIENTS", 2)
+    monkeypatch.setattr(listener, "_MAX_OF_ADDRESS", 4)
 
     async def main():
-        async with open_door() as knock:
-            silent = [await knock(b"") for _ in range(4)]
-            reader, _ = await knock(ASKED)
+        async with open_listener() as connect:
+            silent = [await connect(b"") for _ in range(4)]
+            reader, _ = await connect(REQUEST)
             assert await answer(reader) == b"HTTP/1.1 503 Service Unavailable"
             for address in ("127.0.0.2", "127.0.0.3"):
-                reader, _ = await knock(ASKED, address)
+                reader, _ = await connect(REQUEST, address)
                 assert await answer(reader) == b"welcome"
-            reader, _ = await knock(ASKED, "127.0.0.2")
+            reader, _ = await connect(REQUEST, "127.0.0.2")
             assert await answer(reader) == b"HTTP/1.1 503 Service Unavailable"
             assert await answer(reader) == b"Content-Type: text/plain"
-            silent[0][1].write(ASKED)
+            silent[0][1].write(REQUEST)
             assert await answer(silent[0][0]) == b"HTTP/1.1 503 Service Unavailable"
 
     run(main())
 
 
-def test_places_of_those_who_went_are_free_again(monkeypatch):
-    monkeypatch.setattr(listener, "_MOST_CLIENTS", 1)
-    monkeypatch.setattr(listener, "_MOST_OF_ONE", 2)
+def test_a_client_that_disconnects_makes_room_for_another(monkeypatch):
+    monkeypatch.setattr(listener, "_MAX_CLIENTS", 1)
+    monkeypatch.setattr(listener, "_MAX_OF_ADDRESS", 2)
 
     async def main():
-        async with open_door() as knock:
+        async with open_listener() as connect:
             for _ in range(4):
                 async with asyncio.timeout(30):
                     while True:
-                        reader, writer = await knock(ASKED)
-                        told = await answer(reader)
-                        if told == b"welcome":
+                        reader, writer = await connect(REQUEST)
+                        if await answer(reader) == b"welcome":
                             break
                 writer.close()
 
     run(main())
 
 
-def test_a_door_that_is_closed_ends_its_visits_without_a_word_of_error(caplog):
+def test_a_closed_listener_ends_its_connections_without_an_error(caplog):
     async def main():
-        before = Door("127.0.0.1", 1, ())
-        async with before.open("127.0.0.1", 0, None) as port:
+        proxy = Listener("127.0.0.1", 1, ())
+        async with proxy.open("127.0.0.1", 0, None) as port:
             reader, writer = await asyncio.open_connection("127.0.0.1", port)
-            while not before._open:
+            while not proxy._per_address:
                 await asyncio.sleep(0.01)
-        assert not before._open
+        assert not proxy._per_address
         assert await reader.read() == b""
         writer.close()
 
