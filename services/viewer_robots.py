@@ -15,7 +15,7 @@ def meshes_of(description: Description) -> dict[str, str]:
     return hashes
 
 
-def viewed(site: str, robot: str, description: Description, uri: Callable[[str], str | None]) -> Viewed:
+def viewer_robot(site: str, robot: str, description: Description, uri: Callable[[str], str | None]) -> Viewed:
     """Return a robot with its cell's fixtures, for a viewer.
 
     Args:

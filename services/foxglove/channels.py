@@ -14,7 +14,7 @@ from robomesh.topics import topic
 from robots.urdf.viewers import together
 from services.foxglove.channel_subscriptions import LatchedChannel, TopicChannel
 from services.foxglove.messages import TEXT_SCHEMA, log_of, protobuf_schema, text_message
-from services.viewer_robots import meshes_of, viewed
+from services.viewer_robots import meshes_of, viewer_robot
 
 log = logging.getLogger(__name__)
 
@@ -140,7 +140,7 @@ class Channels:
 
     def _publish_description(self) -> None:
         robots = [
-            viewed(site, robot, description, f"{_ASSETS}{site}/{robot}/{{}}.glb".format)
+            viewer_robot(site, robot, description, f"{_ASSETS}{site}/{robot}/{{}}.glb".format)
             for (site, robot), description in sorted(self._described.items())
             if description.urdf and (site, robot) in self._present
         ]

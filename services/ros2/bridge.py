@@ -20,7 +20,7 @@ from robots.urdf.viewers import WORLD, Viewed, together
 from services.ros2.meshes import Meshes
 from services.ros2.settings import Settings
 from services.ros2.wire import Node, Topic, message
-from services.viewer_robots import viewed
+from services.viewer_robots import viewer_robot
 
 log = logging.getLogger(__name__)
 
@@ -116,7 +116,7 @@ class Bridge:
             assert isinstance(description, Description)
             if description.urdf:
                 uris = await self._meshes.of(site, robot, description)
-                self._described[site, robot] = viewed(site, robot, description, uris.get)
+                self._described[site, robot] = viewer_robot(site, robot, description, uris.get)
                 self._publish_description()
 
     def _publish_description(self) -> None:

@@ -20,9 +20,9 @@ WITHIN_S = 20.0
 @asynccontextmanager
 async def recording_site(mesh, folder, **settings):
     """Run a recorder; yield a session that publishes for robot `arm`."""
-    async with open_session(mesh) as own, open_session(mesh) as gateway:
+    async with open_session(mesh) as service, open_session(mesh) as gateway:
         settings = Settings(site="site", robots=("arm",), folder=folder, **settings)
-        task = asyncio.create_task(recorder.serve(own, settings))
+        task = asyncio.create_task(recorder.serve(service, settings))
         try:
             yield gateway
         finally:

@@ -115,10 +115,10 @@ def test_the_twist_equals_the_tools_numeric_derivative(name):
 @asynccontextmanager
 async def kinematics_service(mesh):
     """Run the service of one arm; yield a client session."""
-    async with open_session(mesh) as own, open_session(mesh) as client:
+    async with open_session(mesh) as service, open_session(mesh) as client:
         settings = kinematics.Settings(site="hall", robots=(arm_alone(),))
-        own.declare_presence("hall", "arm", "kinematics")
-        task = asyncio.create_task(kinematics.serve(own, settings))
+        service.declare_presence("hall", "arm", "kinematics")
+        task = asyncio.create_task(kinematics.serve(service, settings))
         while await client.last("robomesh/hall/arm/description", timeout_s=0.2) is None:
             await asyncio.sleep(0.01)
         try:

@@ -47,12 +47,12 @@ BUILT = build_cell(CELL)
 @asynccontextmanager
 async def cell_service(mesh):
     """Run the service of the cell; yield a session for its gateways and one for a monitor."""
-    async with open_session(mesh) as own, open_session(mesh) as gateway, open_session(mesh) as monitor:
+    async with open_session(mesh) as service, open_session(mesh) as gateway, open_session(mesh) as monitor:
         robots = tuple(
             kinematics.RobotSettings(name=robot.name, cell_description=CELL, cell="a", simulated=True)
             for robot in CELL.robots
         )
-        task = asyncio.create_task(kinematics.serve(own, kinematics.Settings(site="hall", robots=robots)))
+        task = asyncio.create_task(kinematics.serve(service, kinematics.Settings(site="hall", robots=robots)))
         try:
             yield gateway, monitor
         finally:
@@ -128,9 +128,9 @@ def test_clearance_counts_the_other_robot_only_while_it_reports_its_position(mes
             )
             points = [(p.x, p.y, p.z) for p in (state.clearance.first_point, state.clearance.second_point)]
             assert np.subtract(*points) @ np.subtract(*points) == pytest.approx(expected.distance_m**2)
-            own = own_nearest(BUILT, "left", left)
+            nearest = own_nearest(BUILT, "left", left)
             # GJK's result depends on the pose measured before, within its tolerance.
-            assert state.own_clearance.distance == pytest.approx(own.distance_m, abs=1e-6)
+            assert state.own_clearance.distance == pytest.approx(nearest.distance_m, abs=1e-6)
             del poses["right"]
             state = await until(monitor, "kinematics", lambda m: m.not_counted)
             assert list(state.not_counted) == ["right"]

@@ -34,8 +34,8 @@ def test_a_busy_recorder_dates_no_message_before_its_publication(mesh):
             pass
 
     async def main():
-        async with open_session(mesh) as own, open_session(mesh) as other:
-            subscribed = subscriptions.Subscriptions(own.zenoh_session, "site", own.ignored)
+        async with open_session(mesh) as service, open_session(mesh) as other:
+            subscribed = subscriptions.Subscriptions(service.zenoh_session, "site", service.ignored)
             sink, wall_clock = SlowSink(), WallClock()
             try:
                 with subscribed.lock:

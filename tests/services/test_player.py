@@ -27,8 +27,8 @@ OPEN = "robomesh/site/-/player/open"
 @asynccontextmanager
 async def playing_site(mesh, folder):
     """Run a player; yield a monitor's session."""
-    async with open_session(mesh) as own, open_session(mesh) as monitor:
-        task = asyncio.create_task(player.serve(own, player.Settings(site="site", folder=folder)))
+    async with open_session(mesh) as service, open_session(mesh) as monitor:
+        task = asyncio.create_task(player.serve(service, player.Settings(site="site", folder=folder)))
         try:
             yield monitor
         finally:
@@ -91,9 +91,9 @@ def test_a_monitor_receives_each_recorded_state_once_with_its_recorded_time(mesh
 
 def test_a_recorders_file_is_replayed_unchanged(mesh, tmp_path):
     async def main():
-        async with playing_site(mesh, tmp_path) as session, open_session(mesh) as own:
+        async with playing_site(mesh, tmp_path) as session, open_session(mesh) as service:
             settings = recorder.Settings(site="site", robots=("arm",), folder=tmp_path)
-            recording = asyncio.create_task(recorder.serve(own, settings))
+            recording = asyncio.create_task(recorder.serve(service, settings))
             key = "robomesh/site/arm/recorder/request"
             publisher = session.declare_publisher("site", "arm", "joints")
             await session.ask(key, _Record(action=_Record.TRACE_ON, name="real", views=["-"]), timeout_s=15.0)

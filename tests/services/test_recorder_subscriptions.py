@@ -41,12 +41,12 @@ def picture(data):
 
 def test_a_sink_receives_and_counts_as_lost_only_its_own_topics(mesh):
     async def main():
-        async with open_session(mesh) as own, open_session(mesh) as other:
+        async with open_session(mesh) as service, open_session(mesh) as other:
 
             def put(key, number, data=b""):
                 other.zenoh_session.put(key, data, attachment=pack(Header(7, number, number)))
 
-            subscribed = subscriptions.Subscriptions(own.zenoh_session, "site", own.ignored)
+            subscribed = subscriptions.Subscriptions(service.zenoh_session, "site", service.ignored)
             states, all_of_it, later = Sink(), Sink(), Sink()
             try:
                 with subscribed.lock:
@@ -102,7 +102,7 @@ def test_a_recording_continues_after_invalid_messages(mesh, tmp_path):
 
 def test_a_history_with_an_invalid_time_is_skipped_and_later_events_are_taken(mesh):
     async def main():
-        async with open_session(mesh) as own, open_session(mesh) as other:
+        async with open_session(mesh) as service, open_session(mesh) as other:
             event = Event(code="bad")
             event.timestamp.nanos = 2_000_000_000
             list_of = EventList(events=[event]).SerializeToString()
@@ -111,7 +111,10 @@ def test_a_history_with_an_invalid_time_is_skipped_and_later_events_are_taken(me
                 query.reply(EVENTS, list_of, attachment=pack(Header(7, 1, 0)))
 
             queryable = other.zenoh_session.declare_queryable(EVENTS, reply)
-            subscribed, sink = subscriptions.Subscriptions(own.zenoh_session, "site", own.ignored), Sink()
+            subscribed, sink = (
+                subscriptions.Subscriptions(service.zenoh_session, "site", service.ignored),
+                Sink(),
+            )
             try:
                 with subscribed.lock:
                     subscribed.robot("arm").attach(sink, frozenset({"events"}))
@@ -133,8 +136,11 @@ def test_a_failing_sink_ends_no_other_robots_recording(mesh, caplog):
             raise RuntimeError("injected error")
 
     async def main():
-        async with open_session(mesh) as own, open_session(mesh) as other:
-            subscribed, sink = subscriptions.Subscriptions(own.zenoh_session, "site", own.ignored), Sink()
+        async with open_session(mesh) as service, open_session(mesh) as other:
+            subscribed, sink = (
+                subscriptions.Subscriptions(service.zenoh_session, "site", service.ignored),
+                Sink(),
+            )
             try:
                 with subscribed.lock:
                     subscribed.robot("bad").attach(Failing(), frozenset({"joints"}))
@@ -192,14 +198,17 @@ def test_setting_the_clock_during_a_recording_shifts_no_message(tmp_path):
 
 def test_a_live_event_with_a_slow_clock_is_recorded_after_a_history_dated_it_earlier(mesh):
     async def main():
-        async with open_session(mesh) as own, open_session(mesh) as other:
+        async with open_session(mesh) as service, open_session(mesh) as other:
             list_of = EventList(events=[Event(code=f"{number}") for number in (1, 2)]).SerializeToString()
 
             def reply(query):
                 query.reply(EVENTS, list_of, attachment=pack(Header(7, 2, 0)))
 
             queryable = other.zenoh_session.declare_queryable(EVENTS, reply)
-            subscribed, sink = subscriptions.Subscriptions(own.zenoh_session, "site", own.ignored), Sink()
+            subscribed, sink = (
+                subscriptions.Subscriptions(service.zenoh_session, "site", service.ignored),
+                Sink(),
+            )
             try:
                 with subscribed.lock:
                     robot = subscribed.robot("arm")
@@ -224,7 +233,7 @@ def test_a_live_event_with_a_slow_clock_is_recorded_after_a_history_dated_it_ear
 
 def test_a_history_with_events_before_the_first_live_one_is_recorded_whole(mesh):
     async def main():
-        async with open_session(mesh) as own, open_session(mesh) as other:
+        async with open_session(mesh) as service, open_session(mesh) as other:
 
             def reply(query):
                 events = [Event(code=f"{number}") for number in range(2, 8)]
@@ -234,7 +243,10 @@ def test_a_history_with_events_before_the_first_live_one_is_recorded_whole(mesh)
                     EVENTS, EventList(events=events).SerializeToString(), attachment=pack(Header(7, 7, 0))
                 )
 
-            subscribed, sink = subscriptions.Subscriptions(own.zenoh_session, "site", own.ignored), Sink()
+            subscribed, sink = (
+                subscriptions.Subscriptions(service.zenoh_session, "site", service.ignored),
+                Sink(),
+            )
             try:
                 with subscribed.lock:
                     robot = subscribed.robot("arm")

@@ -141,7 +141,7 @@ def test_a_plot_of_too_many_values_shows_the_first_64(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "text"),
     [
         (["out.txt"], "a name ends in .csv (joints and tool), .mp4 (video)"),
         (["out.csv", "--from", "9"], "--from 9: moving.mcap goes from 0 to 2.000 s"),
@@ -153,11 +153,11 @@ def test_a_plot_of_too_many_values_shows_the_first_64(tmp_path):
     ],
 )
 @pytest.mark.slow
-def test_a_refused_export_prints_one_line_and_leaves_no_file(moving, tmp_path, capsys, arguments, words):
+def test_a_refused_export_prints_one_line_and_leaves_no_file(moving, tmp_path, capsys, arguments, text):
     name, *options = arguments
     assert run(["recordings", "export", str(moving), str(tmp_path / name), *options]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert words in line
+    assert text in line
     assert not list(tmp_path.iterdir())
 
 
@@ -214,7 +214,7 @@ def test_a_recording_of_a_site_has_one_name_for_every_command(mesh, router, tmp_
     monkeypatch.setattr("services.command_line.recordings.fetch._MOST_WAIT_S", 0.1)
     refusals = [None, QuotaError("more than one name may have: ask again in 30.0 s", again_s=30.0)]
 
-    def check(asker):
+    def check(client):
         if refusals and (error := refusals.pop(0)):
             raise error
 
@@ -223,10 +223,10 @@ def test_a_recording_of_a_site_has_one_name_for_every_command(mesh, router, tmp_
     source = write_recording(folder / "arm" / "2026_trial.mcap", seconds=0.5)
 
     async def main():
-        async with open_session(mesh) as own:
-            server = RecordingServer(own, "site", folder, open_now=dict, flight=lambda: False)
+        async with open_session(mesh) as service:
+            server = RecordingServer(service, "site", folder, open_now=dict, flight=lambda: False)
             monkeypatch.setattr(server._mebibytes, "check", check)
-            own.declare_presence("site", "-", "recorder")
+            service.declare_presence("site", "-", "recorder")
             try:
                 for recording, command in (
                     ("site/2026_trial", ["info"]),
@@ -256,14 +256,14 @@ def test_a_recording_of_a_site_has_one_name_for_every_command(mesh, router, tmp_
 
 def test_a_silent_recorder_does_not_hide_the_recordings_of_others(mesh, router, capsys):
     async def main():
-        async with open_session(mesh) as own:
+        async with open_session(mesh) as service:
 
             async def list_(_):
                 return schema.RecordingList(recordings=[schema.Recording(name="trial", robot="arm")])
 
-            own.answer("site", "-", "recordings/list", list_)
+            service.answer("site", "-", "recordings/list", list_)
             for site in ("site", "silent"):
-                own.declare_presence(site, "-", "recorder")
+                service.declare_presence(site, "-", "recorder")
             assert await asyncio.to_thread(run, ["recordings", "list", "--connect", router]) == 0
 
     run_async(main())
@@ -277,7 +277,7 @@ def test_a_recorder_cannot_choose_the_folder_of_a_fetched_file(mesh, router, tmp
     folder.mkdir()
 
     async def main():
-        async with open_session(mesh) as own:
+        async with open_session(mesh) as service:
 
             async def list_(_):
                 return schema.RecordingList(recordings=[schema.Recording(name="trial", file="../taken.mcap")])
@@ -285,9 +285,9 @@ def test_a_recorder_cannot_choose_the_folder_of_a_fetched_file(mesh, router, tmp
             async def piece(_):
                 return schema.Piece(data=b"x", total=1, version="1")
 
-            own.answer("site", "-", "recordings/list", list_)
-            own.answer("site", "-", "recordings/piece/*", piece)
-            own.declare_presence("site", "-", "recorder")
+            service.answer("site", "-", "recordings/list", list_)
+            service.answer("site", "-", "recordings/piece/*", piece)
+            service.declare_presence("site", "-", "recorder")
             arguments = ["recordings", "fetch", "trial", str(folder), "--connect", router]
             assert await asyncio.to_thread(run, arguments) == 2
 
@@ -299,7 +299,7 @@ def test_a_recorder_cannot_choose_the_folder_of_a_fetched_file(mesh, router, tmp
 
 def test_the_play_command_ends_when_its_player_goes_offline(mesh, router):
     async def main():
-        async with open_session(mesh) as own:
+        async with open_session(mesh) as service:
 
             async def list_(_):
                 return schema.RecordingList(recordings=[schema.Recording(name="trial", file="trial.mcap")])
@@ -307,9 +307,9 @@ def test_the_play_command_ends_when_its_player_goes_offline(mesh, router):
             async def open_(_):
                 return schema.ReplayState(robot="replay-x", file="trial.mcap")
 
-            own.answer("site", "-", "recordings/list", list_)
-            own.answer("site", "-", "player/open", open_)
-            own.declare_presence("site", "-", "recorder")
+            service.answer("site", "-", "recordings/list", list_)
+            service.answer("site", "-", "player/open", open_)
+            service.declare_presence("site", "-", "recorder")
             playing = await asyncio.create_subprocess_exec(
                 *(sys.executable, "-m", "services.command_line.main"),
                 *("recordings", "play", "trial", "--connect", router),

@@ -39,9 +39,9 @@ def folder(tmp_path):
 @asynccontextmanager
 async def served(mesh, folder, quotas=DEFAULT_QUOTAS, **open_now):
     """Run a recorder's request handlers; yield a client session."""
-    async with open_session(mesh) as own, open_session(mesh) as client:
+    async with open_session(mesh) as service, open_session(mesh) as client:
         server = RecordingServer(
-            own, "site", folder, open_now=lambda: open_now, flight=lambda: True, quotas=quotas
+            service, "site", folder, open_now=lambda: open_now, flight=lambda: True, quotas=quotas
         )
         try:
             yield client
@@ -51,8 +51,8 @@ async def served(mesh, folder, quotas=DEFAULT_QUOTAS, **open_now):
 
 def test_a_recorder_with_a_hanging_reader_is_busy_and_answers_later(mesh, folder):
     async def main():
-        async with open_session(mesh) as own, open_session(mesh) as client:
-            server = RecordingServer(own, "site", folder, open_now=dict, flight=lambda: True)
+        async with open_session(mesh) as service, open_session(mesh) as client:
+            server = RecordingServer(service, "site", folder, open_now=dict, flight=lambda: True)
             try:
                 assert (await client.ask(f"{BASE}/list", timeout_s=50.0)).recordings
                 os.kill(server.pid, signal.SIGSTOP)
