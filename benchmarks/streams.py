@@ -32,7 +32,7 @@ from robomesh.endpoints import router_config
 from robomesh.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
 from robomesh.session import Session, SessionSettings, open_session
 from services import kinematics
-from tests.cells import arm_alone
+from tests.cells import single_arm
 from tests.conftest import free_port
 
 JOINTS = ("waist", "shoulder", "elbow", "wrist", "roll")
@@ -75,7 +75,7 @@ def render(settings: SessionSettings, wanted: service.Settings) -> None:
 
 async def measure(settings: SessionSettings, renderer: int, seconds: float) -> dict[str, Any]:
     async with open_session(settings) as robot, open_session(settings) as monitor:
-        arm = arm_alone(simulated=True)
+        arm = single_arm(simulated=True)
         tasks = [
             asyncio.create_task(kinematics.serve(robot, kinematics.Settings(site="hall", robots=(arm,)))),
             asyncio.create_task(move(robot)),

@@ -6,7 +6,7 @@ from robots.cells import STOP_M, WARNING_M, CellDescription, CellRobot, Fixture
 from services import kinematics
 
 
-def arm_alone(
+def single_arm(
     name: str = "arm",
     model: str = "pt600",
     *,
@@ -15,7 +15,7 @@ def arm_alone(
     warning_m: float = WARNING_M,
     stop_m: float = STOP_M,
 ) -> kinematics.RobotSettings:
-    """A robot of a kinematics service, in a cell of its own."""
+    """Return the settings of a robot that is alone in its cell, for the kinematics service."""
     robot = CellRobot(name=name, model=model, base_to_site=np.eye(4), warning_m=warning_m, stop_m=stop_m)
     return kinematics.RobotSettings(
         name=name, cell_description=CellDescription((robot,), fixtures), simulated=simulated

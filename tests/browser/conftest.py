@@ -23,7 +23,7 @@ from services.kinematics import kinematics
 from services.simulator import simulator
 from services.simulator.fault_requests import Mesh
 from services.watch import watch
-from tests.cells import arm_alone
+from tests.cells import single_arm
 from tests.conftest import free_port
 from web import build_page
 
@@ -155,7 +155,7 @@ class Plant:
                             kinematics.Settings(
                                 site="hall",
                                 robots=tuple(
-                                    arm_alone(name, simulated=True, fixtures=self.fixtures)
+                                    single_arm(name, simulated=True, fixtures=self.fixtures)
                                     for name in self.robots
                                 ),
                             ),

@@ -15,7 +15,7 @@ from renderer.overlay import AMBER
 from renderer.service import Settings
 from robomesh.session import open_session
 from services import kinematics
-from tests.cells import arm_alone
+from tests.cells import single_arm
 from tests.renderer.bodies import context_or_skip
 
 SIZE = (320, 180)
@@ -28,7 +28,7 @@ async def hall(mesh, tmp_path, *, arm=None, **settings):
     """A session, with the kinematics of a pt600 named `arm` and a renderer beside it."""
     context_or_skip().release()
     async with open_session(mesh) as robot, open_session(mesh) as drawing, open_session(mesh) as monitor:
-        arm = arm or arm_alone(simulated=True)
+        arm = arm or single_arm(simulated=True)
         wanted = Settings(site="hall", size=SIZE, folder=tmp_path, **settings)
         tasks = [
             asyncio.create_task(kinematics.serve(robot, kinematics.Settings(site="hall", robots=(arm,)))),

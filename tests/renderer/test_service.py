@@ -20,7 +20,7 @@ from robomesh.session import open_session
 from robots.cells import Fixture
 from services.site_file.fixtures import Fixture as FixtureRow
 from services.site_file.fixtures import fixture_shape
-from tests.cells import arm_alone
+from tests.cells import single_arm
 from tests.conftest import last_value, run
 from tests.renderer.hall import HOME, SIZE, amber, frames, hall, joints, moving, orange, picture
 
@@ -173,7 +173,7 @@ def test_what_stands_around_is_drawn_and_the_line_to_the_nearest_while_it_is_kno
     box = fixture_shape(FixtureRow(cell="a", name="box", box=(200.0, 200.0, 200.0), color=color))
     box_to_site = np.eye(4)
     box_to_site[:3, 3] = 0.55, -0.2, 0.1
-    arm = arm_alone(fixtures=(Fixture("box", (box,), box_to_site, box.color),), warning_m=1.0, stop_m=1.0)
+    arm = single_arm(fixtures=(Fixture("box", (box,), box_to_site, box.color),), warning_m=1.0, stop_m=1.0)
 
     def green(image):
         red, green, blue = (image[60:, :, channel].astype(int) for channel in range(3))

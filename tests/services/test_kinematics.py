@@ -18,7 +18,7 @@ from robots.model import build_model, tool_placement
 from robots.poses import rpy_rotation
 from services import kinematics
 from services.kinematics.states import frames_message, kinematic_state, quaternions
-from tests.cells import arm_alone
+from tests.cells import single_arm
 from tests.conftest import last_value, run
 
 angles = st.floats(-np.pi, np.pi)
@@ -116,7 +116,7 @@ def test_the_twist_equals_the_tools_numeric_derivative(name):
 async def kinematics_service(mesh):
     """Run the service of one arm; yield a client session."""
     async with open_session(mesh) as service, open_session(mesh) as client:
-        settings = kinematics.Settings(site="hall", robots=(arm_alone(),))
+        settings = kinematics.Settings(site="hall", robots=(single_arm(),))
         service.declare_presence("hall", "arm", "kinematics")
         task = asyncio.create_task(kinematics.serve(service, settings))
         while await client.last("robomesh/hall/arm/description", timeout_s=0.2) is None:

@@ -31,7 +31,7 @@ from services.console import app
 from services.pki import Folder, authority
 from services.recorder.settings import Settings as RecorderSettings
 from services.router.router import read_access
-from tests.cells import arm_alone
+from tests.cells import single_arm
 from tests.conftest import free_port
 from tests.renderer.bodies import context_or_skip
 
@@ -91,7 +91,10 @@ def site_settings(folder: Path) -> dict:
             gateway.serve,
             gateway.Settings(site=SITE, audit_folder=folder / "audit", robots=(robot,)),
         ),
-        "kinematics": (kinematics.serve, kinematics.Settings(site=SITE, robots=(arm_alone(simulated=True),))),
+        "kinematics": (
+            kinematics.serve,
+            kinematics.Settings(site=SITE, robots=(single_arm(simulated=True),)),
+        ),
         "recorder": (recorder.serve, RecorderSettings(site=SITE, robots=("arm",), folder=folder / "mcap")),
         "player": (player.serve, player.Settings(site=SITE, folder=folder / "mcap")),
         "watch": (watch.serve, watch.Settings(site=SITE, folder=folder / "watch")),
