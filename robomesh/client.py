@@ -39,7 +39,7 @@ class Answer:
 
 async def ask_all(
     session: zenoh.Session,
-    key: str,
+    key: keys.Key | str,
     payload: bytes,
     *,
     timeout_s: float,
@@ -51,13 +51,13 @@ async def ask_all(
         timeout_s: Time for the owners to answer [s].
         silent_s: Longest gap between the pieces of a long answer [s]; None: `timeout_s`.
     """
-    row = topics.request(keys.parse_expression(key).topic)
+    row, asked = topics.request(keys.parse_expression(key).topic), str(key)
     if row.priority in ON_THE_SECOND_LINK:
         # A thread does not keep the order of requests. No command has such a priority.
         await asyncio.to_thread(settle, session, row.priority)
     priorities = (row.priority, ON_THE_SECOND_LINK[0]) if row.both_links else (row.priority,)
     mark = secrets.token_bytes(MARK_BYTES) if row.both_links else None
-    queries = [_query(session, key, payload, priority, mark, timeout_s) for priority in priorities]
+    queries = [_query(session, asked, payload, priority, mark, timeout_s) for priority in priorities]
     answers: list[_Answer] = []
     for replies in asyncio.as_completed(queries):
         answers = max(answers, await replies, key=len)
@@ -127,7 +127,9 @@ def _refused(words: bytes, encoding: str) -> RefusedError:
     return RefusedError(reason, text=text)
 
 
-async def ask_bytes(session: zenoh.Session, key: str, payload: bytes, *, timeout_s: float) -> bytes:
+async def ask_bytes(
+    session: zenoh.Session, key: keys.Key | str, payload: bytes, *, timeout_s: float
+) -> bytes:
     """Send a request to its one owner and return the answer as bytes.
 
     Repeats the request while the owner is starting or busy, if it dropped a long answer before the transfer
@@ -141,6 +143,7 @@ async def ask_bytes(session: zenoh.Session, key: str, payload: bytes, *, timeout
         NoAnswerError: If no answer arrived in time.
         BrokenAnswerError: If a long answer began and no further piece arrived for `timeout_s`.
     """
+    key = keys.parse_expression(key)
     loop = asyncio.get_running_loop()
     deadline = loop.time() + timeout_s
     again: BusyError | QuotaError | BrokenAnswerError | None = None
@@ -173,7 +176,7 @@ def answer_of(owner: str, answer: bytes | None, refused: BusError | None) -> Ans
         return Answer(owner, None, str(error))
 
 
-def decode_answer(key: str, payload: bytes) -> Message:
+def decode_answer(key: keys.Key | str, payload: bytes) -> Message:
     """Decode an answer by the request table.
 
     Raises:

@@ -98,20 +98,34 @@ def parse_key(key: str) -> Key:
         KeyNameError: If it is not a key of the mesh, or a chunk is invalid.
     """
     parsed = parse_expression(key)
-    robot_key(*parsed)
-    for chunk in parsed.topic.split("/"):
-        check_chunk(chunk, "chunk")
+    check_key(parsed)
     return parsed
 
 
-def parse_expression(key_expr: str) -> Key:
+def check_key(key: Key) -> None:
+    """Check the chunks of a parsed key.
+
+    Raises:
+        KeyNameError: If one is invalid, or is a wildcard.
+    """
+    robot_key(*key)
+    for chunk in key.topic.split("/"):
+        check_chunk(chunk, "chunk")
+
+
+def parse_expression(key_expr: str | Key) -> Key:
     """Return site, robot and topic of a key or key expression; each may have a wildcard.
 
     Does not check the chunks: use `parse_key` for keys received from the mesh.
 
+    Args:
+        key_expr: A parsed key is returned unchanged.
+
     Raises:
         KeyNameError: If it does not have these three parts.
     """
+    if isinstance(key_expr, Key):
+        return key_expr
     root, *rest = key_expr.split("/", 3)
     if root != ROOT or len(rest) != 3 or not all(rest):
         shown = one_line(key_expr, LONGEST_CHUNK)

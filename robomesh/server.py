@@ -228,7 +228,7 @@ class Answerer:
                 return
             encoding = str(query.encoding) if query.encoding is not None else ""
             try:
-                request = self._read(key, query, encoding, received_ns)
+                request = self._read(key, asked, query, encoding, received_ns)
                 answer = await self._handled(request, query)
             except RefusedError as error:
                 self.over_quota += isinstance(error, QuotaError)
@@ -270,19 +270,28 @@ class Answerer:
         begun.set_result(answer)
         return answer
 
-    def _read(self, key: keys.Key, query: zenoh.Query, encoding: str, received_ns: int) -> Request:
-        asked, chunk = str(query.key_expr), _chunk(self._row.name, key.topic)
+    def _read(
+        self, key: keys.Key, asked: str, query: zenoh.Query, encoding: str, received_ns: int
+    ) -> Request:
+        chunk = _chunk(self._row.name, key.topic)
         try:
             if keys.has_wildcard(asked):
                 if not self._row.wildcard:
                     raise RefusedError(codes.WILDCARD(key=asked, request=self._row.name))
-            elif self._ignored.key(REQUEST, asked) is None:
-                keys.parse_key(asked)  # raises the error with the reason
+            else:
+                self._check_key(key, asked)
             payload = query.payload.to_bytes() if query.payload is not None else b""
             message = self._message(payload, encoding)
             return Request(key, message, chunk, received_ns, _within_s(query))
         except (RefusedError, MessageError, KeyNameError) as error:
             self._on_refused(chunk, str(error))
+            raise
+
+    def _check_key(self, key: keys.Key, asked: str) -> None:
+        try:
+            keys.check_key(key)
+        except KeyNameError:
+            self._ignored.note(REQUEST, asked)
             raise
 
     def _message(self, payload: bytes, encoding: str) -> Message | None:

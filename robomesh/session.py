@@ -111,7 +111,9 @@ class Session:
             self._refresher = asyncio.create_task(self._refresh())
         return subscription
 
-    async def ask(self, key: str, request: Message | None = None, *, timeout_s: float = 2.0) -> Message:
+    async def ask(
+        self, key: keys.Key | str, request: Message | None = None, *, timeout_s: float = 2.0
+    ) -> Message:
         """Send a request and return its answer.
 
         Raises:
@@ -119,12 +121,13 @@ class Session:
             RefusedError: If the owner refused; with its sentence.
             NoAnswerError: If no answer arrived in time.
         """
+        key = keys.parse_expression(key)
         payload = b"" if request is None else request.SerializeToString()
         return client.decode_answer(key, await self.ask_bytes(key, payload, timeout_s=timeout_s))
 
-    async def ask_bytes(self, key: str, payload: bytes = b"", *, timeout_s: float = 2.0) -> bytes:
+    async def ask_bytes(self, key: keys.Key | str, payload: bytes = b"", *, timeout_s: float = 2.0) -> bytes:
         """Send a request as bytes and return the answer's bytes; see `ask`."""
-        self._check("query", key)
+        self._check("query", str(key))
         try:
             return await client.ask_bytes(self.zenoh_session, key, payload, timeout_s=timeout_s)
         except NoAnswerError as error:

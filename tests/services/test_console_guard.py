@@ -3,9 +3,9 @@
 import pytest
 
 from robomesh.errors import RefusedError
+from services.console.accounts.rights import parse_request
 from services.console.errors import WatchError
 from services.console.http.guard import refused_host, refused_origin
-from services.console.websocket.page_connection import check_ask
 from services.console.websocket.shared_subscriptions import check_expression
 
 
@@ -74,7 +74,9 @@ def test_anything_else_is_refused_by_name(key):
     ],
 )
 def test_requests_of_the_table_can_be_asked(key):
-    check_ask(key)
+    parsed, row = parse_request(key)
+    assert str(parsed) == key
+    assert row.name.split("/")[0] == parsed.topic.split("/")[0]
 
 
 @pytest.mark.parametrize(
@@ -89,4 +91,4 @@ def test_requests_of_the_table_can_be_asked(key):
 )
 def test_a_page_asks_one_robot_one_request_of_the_table(key):
     with pytest.raises(RefusedError):
-        check_ask(key)
+        parse_request(key)

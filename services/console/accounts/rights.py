@@ -24,30 +24,25 @@ def lacks_right(account: Account, what: str) -> Reason:
     return codes.NEEDS_OPERATOR(account=account.name, role=account.role.value, what=what)
 
 
-def check_ask(key: str) -> topics.Request:
-    """The row of a key that a page may ask on.
+def parse_request(text: str) -> tuple[keys.Key, topics.Request]:
+    """Parse the key of a page's request; return it with its row of the table.
 
     Raises:
-        RefusedError: If it is no request of the table, or has a wildcard.
+        RefusedError: If it is not a request of the table, or has a wildcard.
     """
     try:
-        parsed = keys.parse_key(key)
-        keys.check_name(parsed.site, "site")
-        if parsed.robot != keys.WHOLE_SITE:
-            keys.check_name(parsed.robot, "robot")
-        row = topics.request(parsed.topic)
-        for chunk in parsed.topic.split("/"):
-            keys.check_chunk(chunk)
+        key = keys.parse_key(text)
+        row = topics.request(key.topic)
         if row.in_name:
-            topics.check_operator(chunk)
+            topics.check_operator(_last_chunk(key))
     except BusError as error:
         raise RefusedError(codes.INVALID(detail=error)) from None
     if Role.CONSOLE not in row.askers:
         raise RefusedError(codes.CONSOLE_NO_RIGHT(request=row.name))
-    return row
+    return key, row
 
 
-def check_right(row: topics.Request, key: str, who: SignedIn, site: str) -> None:
+def check_right(row: topics.Request, key: keys.Key, who: SignedIn, site: str) -> None:
     """Whether an account may ask that now.
 
     Raises:
@@ -64,20 +59,20 @@ def check_right(row: topics.Request, key: str, who: SignedIn, site: str) -> None
         raise RefusedError(PASSWORD_AGAIN)
 
 
-def check_own_name(row: topics.Request, key: str, own: str, *, who: str = "this page") -> None:
+def check_own_name(row: topics.Request, key: keys.Key, own: str, *, who: str = "this page") -> None:
     """Whether a request that is made in a name is made in that one.
 
     Raises:
         RefusedError: If it is another's.
     """
-    chunk = key.rpartition("/")[2]
+    chunk = _last_chunk(key)
     if row.in_name and chunk != own:
         raise RefusedError(codes.OWN_NAME_ONLY(who=who, own=own, name=chunk))
 
 
-def in_own_name(key: str, payload: bytes, operator: str) -> bytes:
+def in_own_name(row: topics.Request, payload: bytes, operator: str) -> bytes:
     """A stop with the page's own name, whatever the page says; all else as it is."""
-    if not key.endswith("/stop"):
+    if row.request is not StopRequest:
         return payload
     try:
         stop = StopRequest.FromString(payload)
@@ -85,3 +80,7 @@ def in_own_name(key: str, payload: bytes, operator: str) -> bytes:
         return payload  # a stop that cannot be read is a stop
     stop.by = operator
     return stop.SerializeToString()
+
+
+def _last_chunk(key: keys.Key) -> str:
+    return key.topic.rpartition("/")[2]

@@ -49,13 +49,13 @@ class OperatorPresence:
         return time.monotonic() - self._held_at < _HELD_S
 
     @contextmanager
-    def asking(self, key: str, payload: bytes) -> Iterator[None]:
+    def asking(self, key: keys.Key, payload: bytes) -> Iterator[None]:
         """Around a request: present before control can be had, and no longer once it is not.
 
         Raises:
             RefusedError: If it is asked for a lease with something else.
         """
-        site, robot, topic = keys.parse_key(key)
+        site, robot, topic = key
         action: LeaseRequest.Action | None = None
         if topic.startswith(_REQUEST):
             try:

@@ -23,7 +23,7 @@ from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import FromPage, KeyFrameRequest, ToPage, ViewAnswer, ViewRequest
 from robomesh.session import Session
 from robomesh.topics import History
-from services.console.accounts.rights import check_ask, check_own_name, check_right, in_own_name
+from services.console.accounts.rights import check_own_name, check_right, in_own_name, parse_request
 from services.console.accounts.sessions import SignedIn
 from services.console.errors import WatchError
 from services.console.requested_views import Views
@@ -307,10 +307,11 @@ class Browser:
 
     async def _answer(self, ask: FromPage.Ask) -> None:
         try:
-            asked = self._allowed(ask)
-            with self.operator.asking(ask.key, asked):
+            key, row = parse_request(ask.key)
+            asked = self._allowed(ask, key, row)
+            with self.operator.asking(key, asked):
                 payload = await self._session.ask_bytes(
-                    ask.key, asked, timeout_s=min(ask.timeout_s or 2.0, _LONGEST_ASK_S)
+                    key, asked, timeout_s=min(ask.timeout_s or 2.0, _LONGEST_ASK_S)
                 )
         except (RefusedError, NoAnswerError) as error:
             # To the page a busy owner is a silent one: it asks again while its lease lasts.
@@ -318,28 +319,26 @@ class Browser:
             reason = error.reason if isinstance(error, RefusedError) else None
             self.tell(refusal(ask.id, str(error), reason, no_answer=no_answer))
         else:
-            self._learn_view(ask, payload)
+            if row.request is ViewRequest:
+                self._learn_view(ask, key, payload)
             self.tell(ToPage(answer=ToPage.Answer(id=ask.id, ok=True, payload=payload)))
 
-    def _allowed(self, ask: FromPage.Ask) -> bytes:
+    def _allowed(self, ask: FromPage.Ask, key: keys.Key, row: topics.Request) -> bytes:
         """What is asked, in the page's own name.
 
         Raises:
-            RefusedError: If nobody may ask that from a page, or this account may not.
+            RefusedError: If this account may not.
         """
-        row = check_ask(ask.key)
         if self.who is not None:
-            check_right(row, ask.key, self.who, self._site)
+            check_right(row, key, self.who, self._site)
         elif self.own_name:
-            check_own_name(row, ask.key, self.own_name)
-        return in_own_name(ask.key, ask.payload, self.own_name) if self.own_name else ask.payload
+            check_own_name(row, key, self.own_name)
+        return in_own_name(row, ask.payload, self.own_name) if self.own_name else ask.payload
 
-    def _learn_view(self, ask: FromPage.Ask, payload: bytes) -> None:
+    def _learn_view(self, ask: FromPage.Ask, key: keys.Key, payload: bytes) -> None:
         """What a page was given as a view of its own can be reduced like any other."""
-        site, robot, name = keys.parse_key(ask.key)
-        if topics.request(name).request is ViewRequest:
-            request, answer = ViewRequest.FromString(ask.payload), ViewAnswer.FromString(payload)
-            self._views.learn(f"{keys.ROOT}/{site}/{robot}", request, answer)
+        request, answer = ViewRequest.FromString(ask.payload), ViewAnswer.FromString(payload)
+        self._views.learn(f"{keys.ROOT}/{key.site}/{key.robot}", request, answer)
 
     def _keep(self, work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.create_task(work)
