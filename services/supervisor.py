@@ -33,7 +33,7 @@ _CANNOT_START = 2  # exit status
 _READ_BYTES = 1 << 16
 _LONGEST_LINE = 2000
 _PR_SET_PDEATHSIG = 1
-_FOLLOW_EACH_S = 0.4
+_POLL_S = 0.4
 # A standby is started when its program has run this long, so that it does not slow down the site's start.
 _STANDBY_AFTER_S = 5.0
 _STANDBY = "ROBOMESH_SPARE"
@@ -152,7 +152,7 @@ async def _run_extra(
                 del running[name]
             for key in wanted.keys() - groups.keys():
                 groups[key] = [(each, tasks.create_task(keep(each))) for each in wanted[key]()]
-            await asyncio.sleep(_FOLLOW_EACH_S)
+            await asyncio.sleep(_POLL_S)
 
 
 async def _once(ready: Callable[[], Awaitable[None]]) -> None:

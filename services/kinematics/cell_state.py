@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from robots.collision import Cell, Nearest, outside_clearance, outside_nearest, own_nearest
 from robots.joints import FloatArray
-from services.kinematics.conditions import far_from
+from services.kinematics.conditions import deadband_end
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +94,7 @@ def _outside(
     `was_close` chooses which query runs first, so that a steady state costs one query.
     """
     floor = [cell.floor.warning_m] if cell.floor is not None else []
-    far = far_from(max([*floor, *(arm.warning_m for arm in cell.arms.values())]))
+    far = deadband_end(max([*floor, *(arm.warning_m for arm in cell.arms.values())]))
     close = outside_nearest(cell, robot, positions, others, within_m=far) if was_close else ()
     if close:
         return close[0], close

@@ -95,7 +95,7 @@ def outside_conditions(
         for name, bound, severity in zip(
             ("warning", "stop"), distances(each.pair), (_S.WARNING, _S.ERROR), strict=True
         ):
-            if each.distance_m > far_from(bound):
+            if each.distance_m > deadband_end(bound):
                 continue
             yield Condition(
                 key=f"{name} {obstacle}",
@@ -113,7 +113,7 @@ def outside_conditions(
             yield _touching(obstacle, each, over=f"the arm does not touch {obstacle} any more")
 
 
-def far_from(distance_m: float) -> float:
+def deadband_end(distance_m: float) -> float:
     """Return the distance that ends the deadband of a threshold [m]."""
     return max(_FURTHER * distance_m, distance_m + _FURTHER_M)
 

@@ -203,10 +203,10 @@ class RobotRecorder:
             self.part = following
             await self._end(part, about={"part": str(number)})
 
-    def failed(self, part_of: Capture, error: OSError) -> Part | None:
+    def failed(self, capture: Capture, error: OSError) -> Part | None:
         """End the capture after a disk error; return its part, or None if the file is not this capture's."""
         part = self.part
-        if part is None or part.capture is not part_of:
+        if part is None or part.capture is not capture:
             return None
         self.part = None
         self._files.detach(part)

@@ -160,10 +160,10 @@ class FlightRecorder:
                 await self._next()
                 await asyncio.to_thread(self._remove_old)
 
-    def failed(self, part_of: Capture) -> Part | None:
+    def failed(self, capture: Capture) -> Part | None:
         """Drop the open segment after a disk error; return it, or None if the file is not this recorder's."""
         part = self.part
-        if part is None or part.capture is not part_of:
+        if part is None or part.capture is not capture:
             return None
         self.part, self._retry_at, self.stopped = None, time.monotonic() + _RETRY_S, True
         self._files.detach(part)

@@ -86,7 +86,7 @@ class _Robot:
         if message.action == _Request.SAVE:
             if self.flight is None:
                 raise RefusedError(codes.FLIGHT_NONE())
-            return await self.flight.save("asked for", message.name)
+            return await self.flight.save("requested", message.name)
         if message.action == _Request.TRACE_ON:
             self._check(message.views)
             views = tuple(message.views) or None
@@ -101,13 +101,13 @@ class _Robot:
         await self.recorder.descriptions.wait_for_meshes(self.name, within_s=_MESHES_WITHIN_S)
         return await self.captures.close()
 
-    async def follow(self, state: _State, before: int) -> None:
+    async def on_trace(self, state: _State, previous: int) -> None:
         """Open a capture when the controller's trace is switched on, and close it when it is switched off."""
         part = self.captures.part
         try:
-            if state.trace == _State.YES and before != _State.YES and part is None:
+            if state.trace == _State.YES and previous != _State.YES and part is None:
                 await self.captures.open("", views=None, started_by="trace")
-            elif state.trace == _State.YES and before != _State.YES and part is not None:
+            elif state.trace == _State.YES and previous != _State.YES and part is not None:
                 name = part.capture.about["name"]
                 text = f"the controller's trace is recorded in {name}, which was already open"
                 self.recorder.events.report(self.name, _S.INFO, "recorder.trace_joined", text, recording=name)
@@ -316,7 +316,7 @@ class _Recorder:
                 continue
             assert isinstance(state, _State)
             previous, before[name] = before.get(name, _State.KNOWN_UNSPECIFIED), state.trace
-            await robot.follow(state, previous)
+            await robot.on_trace(state, previous)
 
     async def _tick(self) -> None:
         while True:

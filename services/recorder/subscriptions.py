@@ -102,14 +102,14 @@ class _TopicSubscription:
         self._subscriber = _subscribe(session, key_expr, self.row)
         if self.row.history in (History.LAST_100, History.KEY_FRAME) or self._is_static:
             self._blocked_until = time.monotonic() + _REPLY_TIMEOUT_S
-            self.ask()
+            self.query()
 
     @property
     def _is_static(self) -> bool:
         """True if the topic describes the robot and is published only once, before the recording."""
         return self.row.history is History.LAST and self.row.stale_after_s is None
 
-    def ask(self) -> None:
+    def query(self) -> None:
         """Query the publisher for earlier messages."""
 
         def on_reply(reply: zenoh.Reply) -> None:
@@ -135,15 +135,15 @@ class _TopicSubscription:
     def refresh(self) -> None:
         """Query a service that came online for what it published while the link was down."""
         if self.row.history is History.LAST_100 or self._is_static:
-            self.ask()
+            self.query()
 
     def drain(self, sinks: Iterable[Sink]) -> int:
         """Deliver received messages to the sinks; return the number taken from the ring."""
         blocked = time.monotonic() < self._blocked_until  # read first: the reply arrives before it ends
         while self._replies:
-            answer = self._replies.popleft()
+            reply = self._replies.popleft()
             try:
-                for key, header, payload, received_ns in self._read_reply(answer):
+                for key, header, payload, received_ns in self._read_reply(reply):
                     self._deliver(key, header, payload, received_ns, sinks)
             except (MessageError, ValueError) as error:  # ValueError: an invalid timestamp
                 log.warning("%s: a message is not recorded: %s", self.key_expr, error)
@@ -246,8 +246,8 @@ class _TopicSubscription:
                     found.append((key, each, frame.data, now_ns - (newest_ns - frame.source_time_ns)))
         elif self.row.history is History.LAST_100:
             assert self.row.history_schema is not None
-            answer: Any = decode(self.row.history_schema, payload)
-            ((_, entries),) = answer.ListFields() or ((None, ()),)
+            history: Any = decode(self.row.history_schema, payload)
+            ((_, entries),) = history.ListFields() or ((None, ()),)
             for number, entry in enumerate(entries, header.sequence - len(entries) + 1):
                 time_ns = entry.timestamp.ToNanoseconds()
                 each = Header(header.publisher, number, time_ns)

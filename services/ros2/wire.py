@@ -37,7 +37,7 @@ class Topic:
 
     Attributes:
         name: Name without the first slash.
-        kind: Type, such as `sensor_msgs/msg/JointState`.
+        kind: Type, for example `sensor_msgs/msg/JointState`.
         depth: Number of messages to keep for slow or late subscribers.
         latched: Late subscribers get the last messages (transient local).
     """

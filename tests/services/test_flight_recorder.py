@@ -74,7 +74,7 @@ def test_an_event_saves_the_messages_before_and_after_it(mesh, tmp_path, monkeyp
             # A second save holds only later messages.
             await put_states(joints, range(200, 210), hz=500)
             answer = await session.ask(KEY, Ask(action=Ask.SAVE, name="by-hand"), timeout_s=WITHIN_S)
-            assert (answer.name, answer.cause, answer.open) == ("by-hand", "asked for", True)
+            assert (answer.name, answer.cause, answer.open) == ("by-hand", "requested", True)
             await until(lambda: (tmp_path / "arm" / answer.file).exists())
             await until_indexed(tmp_path / "arm" / answer.file)
             return path, tmp_path / "arm" / answer.file
