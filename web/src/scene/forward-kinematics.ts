@@ -1,4 +1,5 @@
-// Forward kinematics in the page: a description's URDF to placements of its links, thirty times a second.
+// Forward kinematics for drawing: placements of links from a URDF, or from standard D-H rows.
+// The kinematics service's answer counts; these are drawn thirty times a second.
 
 import * as THREE from "three";
 
@@ -56,9 +57,7 @@ function readJoints(urdf: string): Joint[] {
       type: element.getAttribute("type") ?? "fixed",
       parent: read("parent", "link"),
       child: read("child", "link"),
-      origin: new THREE.Matrix4()
-        .makeRotationFromEuler(new THREE.Euler(roll, pitch, yaw, "ZYX")) // about fixed x, then y, then z
-        .setPosition(x, y, z),
+      origin: transformOf([x, y, z], [roll, pitch, yaw]),
       axis: new THREE.Vector3(...numbers("axis", "xyz", "1 0 0")).normalize(),
       mimic: leader
         ? { leader, multiplier: Number(read("mimic", "multiplier") || 1), offset: Number(read("mimic", "offset") || 0) }
@@ -74,4 +73,39 @@ function fromRoot(joints: readonly Joint[]): Joint[] {
   const ordered = joints.filter((joint) => !children.has(joint.parent));
   for (const joint of ordered) ordered.push(...(byParent.get(joint.child) ?? [])); // grows as it goes
   return ordered;
+}
+
+/** Return the transform `Trans(xyz) Rot(z, yaw) Rot(y, pitch) Rot(x, roll)`, in metres and radians. */
+export function transformOf(xyz: Numbers3, [roll, pitch, yaw]: Numbers3): THREE.Matrix4 {
+  return new THREE.Matrix4().makeRotationFromEuler(new THREE.Euler(roll, pitch, yaw, "ZYX")).setPosition(...xyz);
+}
+type Numbers3 = readonly [number, number, number];
+
+/** A joint's D-H row at a position, in metres and radians. */
+export interface DhRow {
+  theta: number;
+  d: number;
+  a: number;
+  alpha: number;
+}
+
+/** Return `Rot(z, theta) Trans(0, 0, d)`: from the joint's axis to the foot of the common normal. */
+export function alongAxis({ theta, d }: DhRow): THREE.Matrix4 {
+  return new THREE.Matrix4().makeRotationZ(theta).setPosition(0, 0, d);
+}
+
+/** Return `Trans(a, 0, 0) Rot(x, alpha)`: from the foot of the common normal to the link's frame. */
+function alongNormal({ a, alpha }: DhRow): THREE.Matrix4 {
+  return new THREE.Matrix4().makeRotationX(alpha).setPosition(a, 0, 0);
+}
+
+/** Return the placement of every link in the base frame [m], base first; `start` is the frame of the first row. */
+export function linkPlacements(start: THREE.Matrix4, rows: readonly DhRow[]): THREE.Matrix4[] {
+  const placements = [new THREE.Matrix4()];
+  let previous = start;
+  for (const row of rows) {
+    previous = previous.clone().multiply(alongAxis(row)).multiply(alongNormal(row));
+    placements.push(previous);
+  }
+  return placements;
 }

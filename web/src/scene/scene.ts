@@ -2,7 +2,7 @@
 
 import { create } from "@bufbuild/protobuf";
 import * as THREE from "three";
-import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import type { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Description, View } from "../gen/robomesh_pb";
 import { View_Projection, ViewSchema } from "../gen/robomesh_pb";
 import { floorOf } from "../mesh/clearance";
@@ -11,13 +11,24 @@ import { Arm, loadOrSay, meshUrl } from "./arm";
 import type { Nearest } from "./lines";
 import { Gap, Path, Trail } from "./lines";
 import { colourEdges, dressedFixture, paint } from "./models";
-import { floor, lights, palette } from "./surroundings";
+import { lights, palette, surround } from "./surroundings";
+import {
+  countFrame,
+  disposeScene,
+  drawsInSoftware,
+  FrameFence,
+  fitToParent,
+  makeRenderer,
+  observeSize,
+  toneMap,
+} from "./viewer";
+import { Viewpoint } from "./viewpoint";
 
-const FIELD_OF_VIEW = 32; // degrees, upright
-const DEAR_MS = 50; // a picture that takes longer costs the rest of the page its time
-const DEAR_ONES = 3; // in a row: the first one of all, and the first after the page was hidden, are dear anywhere
-const REST = 3; // times as long as such a picture took, nothing is drawn
-const LONGEST_REST_MS = 2000;
+const SLOW_FRAME_MS = 50; // a slower frame holds up the rest of the page
+// The first frame, and the first after the page was hidden, are slow on every machine.
+const MANY_SLOW_FRAMES = 3;
+const PAUSE_FACTOR = 3; // pause after a slow frame, in its durations
+const LONGEST_PAUSE_MS = 2000;
 
 /** What somebody else's parts in the picture need: see Program's gizmo. */
 export interface Stage {
@@ -37,10 +48,7 @@ export interface Stage {
 export class RobotScene {
   private readonly renderer: THREE.WebGLRenderer;
   private readonly scene = new THREE.Scene();
-  private readonly perspective = new THREE.PerspectiveCamera(FIELD_OF_VIEW, 1, 0.02, 60);
-  private readonly orthographic = new THREE.OrthographicCamera(-1, 1, 1, -1, 0.02, 60);
-  private camera: THREE.PerspectiveCamera | THREE.OrthographicCamera = this.perspective;
-  private controls: OrbitControls;
+  private readonly viewpoint: Viewpoint;
   private readonly arm: Arm;
   private readonly neighbours = new Set<Arm>();
   private readonly fixtures = new Map<string, THREE.Group>();
@@ -55,10 +63,9 @@ export class RobotScene {
   private dirty = true;
   private framesShown = false;
   private request = 0;
-  private drawnAt = 0;
-  private drawing: WebGLSync | null = null; // until the picture is done
+  private readonly fence: FrameFence;
   private nextAt = 0;
-  private dear = 0;
+  private slowFrames = 0; // in a row
   private disposed = false;
   private readonly observer: ResizeObserver;
 
@@ -69,19 +76,21 @@ export class RobotScene {
     label: HTMLElement,
   ) {
     const software = drawsInSoftware();
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !software, alpha: false });
-    this.renderer.setPixelRatio(software ? 1 : Math.min(devicePixelRatio, 2));
+    this.renderer = makeRenderer(software, canvas);
+    this.fence = new FrameFence(this.renderer, this.frameDrawn);
     this.renderer.shadowMap.enabled = !software;
     this.renderer.shadowMap.type = THREE.PCFShadowMap;
-    this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
-    this.renderer.toneMappingExposure = 1.05;
+    toneMap(this.renderer);
     this.arm = new Arm(this.scene, prefix, "arm", this.changed);
     this.gap = new Gap(label);
     this.scene.add(...lights(), this.trail.line, this.path.line, this.gap.group);
     this.setColours();
-    this.controls = this.makeControls();
-    this.observer = new ResizeObserver(() => this.resize());
-    this.observer.observe(canvas.parentElement ?? canvas);
+    this.viewpoint = new Viewpoint(
+      canvas,
+      { clip: [0.02, 60], distance: [0.2, 12], damping: true, turnsFlat: false, polarMargin: 0.05 },
+      this.changed,
+    );
+    this.observer = observeSize(canvas, () => this.resize());
     this.resize();
     this.request = requestAnimationFrame(this.frame);
   }
@@ -89,16 +98,9 @@ export class RobotScene {
   /** Background, floor and lines after the page's theme. */
   setColours(): void {
     const colours = (this.colours = palette());
-    this.scene.background = new THREE.Color(colours.background);
-    const old = this.scene.getObjectByName("floor");
-    if (old) this.scene.remove(old);
-    if (this.floorAt !== null) {
-      const made = floor(colours);
-      made.name = "floor";
-      // Level in the site's frame, however the robot stands on it.
-      made.position.setFromMatrixPosition(this.base).setZ(this.floorAt);
-      this.scene.add(made);
-    }
+    // Level in the site's frame, whatever the robot's base is tilted by.
+    const floor = surround(this.scene, colours, this.floorAt !== null);
+    floor?.position.setFromMatrixPosition(this.base).setZ(this.floorAt ?? 0);
     this.canvas.dataset.floor = String(this.floorAt);
     this.trail.line.material.color.set(colours.accent);
     this.path.line.material.color.set(colours.accent);
@@ -115,8 +117,8 @@ export class RobotScene {
       scene,
       canvas,
       base: () => this.base,
-      camera: () => this.camera,
-      controls: () => this.controls,
+      camera: () => this.viewpoint.camera,
+      controls: () => this.viewpoint.controls,
       view: () => this.view(),
       changed,
     };
@@ -135,7 +137,7 @@ export class RobotScene {
       this.scene.add(axes);
     }
     // Made when a target is first dragged, a ghost's shader would hold up the page, and with it the lease.
-    const compiled = (ghost: THREE.Group) => this.renderer.compile(ghost, this.camera, this.scene);
+    const compiled = (ghost: THREE.Group) => this.renderer.compile(ghost, this.viewpoint.camera, this.scene);
     await Promise.all([this.arm.load(description, failed, compiled), this.loadFixtures(description, failed)]);
   }
 
@@ -237,27 +239,20 @@ export class RobotScene {
   look(view: View): void {
     const point = (v: { x: number; y: number; z: number } | undefined) =>
       new THREE.Vector3(v?.x ?? 0, v?.y ?? 0, v?.z ?? 0);
-    const eye = point(view.eye).applyMatrix4(this.base);
-    const target = point(view.target).applyMatrix4(this.base);
-    const flat = view.projection === View_Projection.ORTHOGRAPHIC;
-    this.camera = flat ? this.orthographic : this.perspective;
     const up = point(view.up);
-    this.camera.up.copy(up.lengthSq() ? up.transformDirection(this.base) : new THREE.Vector3(0, 0, 1));
-    this.camera.position.copy(eye);
-    this.camera.zoom = 1;
-    this.controls.dispose();
-    this.controls = this.makeControls();
-    this.controls.enableRotate = !flat;
-    this.controls.target.copy(target);
-    this.resize();
-    this.controls.update();
+    this.viewpoint.look({
+      eye: point(view.eye).applyMatrix4(this.base),
+      target: point(view.target).applyMatrix4(this.base),
+      up: up.lengthSq() ? up.transformDirection(this.base) : new THREE.Vector3(0, 0, 1),
+      flat: view.projection === View_Projection.ORTHOGRAPHIC,
+    });
   }
 
   /** The camera as it is now, as a view in the base's frame, for somebody else to draw. */
   view(): View {
-    const camera = this.camera;
+    const { camera, controls, isFlat, fieldOfView, flatHeight } = this.viewpoint;
     const toBase = this.base.clone().invert();
-    const { x, y, z } = this.controls.target.clone().applyMatrix4(toBase);
+    const { x, y, z } = controls.target.clone().applyMatrix4(toBase);
     const eye = camera.position.clone().applyMatrix4(toBase);
     const up = camera.up.clone().transformDirection(toBase);
     const view = create(ViewSchema, {
@@ -266,68 +261,31 @@ export class RobotScene {
       target: { x, y, z },
       up: { x: up.x, y: up.y, z: up.z },
     });
-    if (camera === this.perspective) {
-      view.projection = View_Projection.PERSPECTIVE;
-      view.fieldOfView = THREE.MathUtils.degToRad(this.perspective.fov);
-    } else {
+    if (isFlat) {
       view.projection = View_Projection.ORTHOGRAPHIC;
-      view.height = (this.orthographic.top - this.orthographic.bottom) / this.orthographic.zoom;
+      view.height = flatHeight;
+    } else {
+      view.projection = View_Projection.PERSPECTIVE;
+      view.fieldOfView = THREE.MathUtils.degToRad(fieldOfView);
     }
     return view;
   }
 
-  private makeControls(): OrbitControls {
-    const controls = new OrbitControls(this.camera, this.canvas);
-    controls.enableDamping = !matchMedia("(prefers-reduced-motion: reduce)").matches;
-    controls.dampingFactor = 0.15;
-    controls.minDistance = 0.2;
-    controls.maxDistance = 12;
-    controls.addEventListener("change", () => (this.dirty = true));
-    return controls;
-  }
-
-  /** Turns the free camera by an angle [rad] about the vertical and the horizontal: for the keyboard. */
+  /** Turn the free camera by angles [rad] about the vertical and the horizontal, for the keyboard. */
   turn(azimuth: number, polar: number): void {
-    if (this.camera !== this.perspective) return;
-    const offset = this.camera.position.clone().sub(this.controls.target);
-    const upright = new THREE.Quaternion().setFromUnitVectors(this.camera.up, new THREE.Vector3(0, 1, 0));
-    const spherical = new THREE.Spherical().setFromVector3(offset.applyQuaternion(upright));
-    spherical.theta += azimuth;
-    spherical.phi = THREE.MathUtils.clamp(spherical.phi + polar, 0.05, Math.PI - 0.05);
-    offset.setFromSpherical(spherical).applyQuaternion(upright.invert());
-    this.camera.position.copy(this.controls.target).add(offset);
-    this.controls.update();
-    this.dirty = true;
+    this.viewpoint.turn(azimuth, polar);
   }
 
   private resize(): void {
-    const box = (this.canvas.parentElement ?? this.canvas).getBoundingClientRect();
-    const width = Math.max(1, Math.floor(box.width));
-    const height = Math.max(1, Math.floor(box.height));
-    this.renderer.setSize(width, height, false);
-    this.perspective.aspect = width / height;
-    // A narrow picture needs a wider angle for the same arm.
-    this.perspective.fov = width < height ? FIELD_OF_VIEW * 1.35 : FIELD_OF_VIEW;
-    this.perspective.updateProjectionMatrix();
-    const distance = this.orthographic.position.distanceTo(this.controls.target) || 2.5;
-    const half = distance * Math.tan(THREE.MathUtils.degToRad(FIELD_OF_VIEW / 2));
-    const side = (half * width) / height;
-    Object.assign(this.orthographic, { left: -side, right: side, top: half, bottom: -half });
-    this.orthographic.updateProjectionMatrix();
+    this.viewpoint.resize(fitToParent(this.renderer));
     this.dirty = true;
   }
 
-  /** Whether the last picture is done. After a dear one, drawing rests; after some, shadows are spared. */
-  private isDone(at: number): boolean {
-    if (!this.drawing) return true;
-    const gl = this.renderer.getContext() as WebGL2RenderingContext;
-    if (gl.getSyncParameter(this.drawing, gl.SYNC_STATUS) !== gl.SIGNALED && !gl.isContextLost()) return false;
-    gl.deleteSync(this.drawing);
-    this.drawing = null;
-    const took = at - this.drawnAt;
-    this.dear = took < DEAR_MS ? 0 : this.dear + 1;
-    if (this.dear > 0) this.nextAt = at + Math.min(REST * took, LONGEST_REST_MS);
-    if (this.dear !== DEAR_ONES) return true;
+  /** After a slow frame, pause drawing; after several, drop shadows and extra pixels. */
+  private readonly frameDrawn = (tookMs: number, at: number): void => {
+    this.slowFrames = tookMs < SLOW_FRAME_MS ? 0 : this.slowFrames + 1;
+    if (this.slowFrames > 0) this.nextAt = at + Math.min(PAUSE_FACTOR * tookMs, LONGEST_PAUSE_MS);
+    if (this.slowFrames !== MANY_SLOW_FRAMES) return;
     this.scene.traverse((part) => {
       if (part instanceof THREE.DirectionalLight) part.castShadow = false;
     });
@@ -335,26 +293,23 @@ export class RobotScene {
       this.renderer.setPixelRatio(1);
       this.resize();
     }
-    return true;
-  }
+  };
 
   private readonly frame = (): void => {
     this.request = requestAnimationFrame(this.frame);
     const at = performance.now();
-    if (!this.isDone(at) || at < this.nextAt) return;
+    if (!this.fence.isIdle(at) || at < this.nextAt) return;
     const placements = this.arm.placeAt(at);
     if (placements) this.place(placements);
     for (const neighbour of this.neighbours) if (neighbour.placeAt(at)) this.dirty = true;
-    if (this.controls.enableDamping) this.controls.update();
+    const { camera, controls } = this.viewpoint;
+    if (controls.enableDamping) controls.update();
     if (!this.dirty) return;
     this.dirty = false;
-    this.drawnAt = at;
-    this.renderer.render(this.scene, this.camera);
-    const gl = this.renderer.getContext() as WebGL2RenderingContext;
-    this.gap.placeLabel(this.camera, this.canvas.clientWidth, this.canvas.clientHeight);
-    this.drawing = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
-    gl.flush();
-    this.canvas.dataset.drawn = String(Number(this.canvas.dataset.drawn ?? 0) + 1);
+    this.renderer.render(this.scene, camera);
+    this.gap.placeLabel(camera, this.canvas.clientWidth, this.canvas.clientHeight);
+    this.fence.start(at);
+    countFrame(this.canvas);
   };
 
   private place(placements: ReadonlyMap<string, THREE.Matrix4>): void {
@@ -373,25 +328,8 @@ export class RobotScene {
     this.disposed = true;
     cancelAnimationFrame(this.request);
     this.observer.disconnect();
-    this.controls.dispose();
+    this.viewpoint.dispose();
     for (const arm of [this.arm, ...this.neighbours]) arm.remove();
-    this.scene.traverse((part) => {
-      if (!(part instanceof THREE.Mesh || part instanceof THREE.Line)) return;
-      part.geometry.dispose();
-      for (const material of [part.material].flat()) material.dispose();
-    });
-    this.renderer.dispose();
+    disposeScene(this.scene, this.renderer);
   }
-}
-
-/** Whether the browser draws 3-D without a graphics processor: then every pixel is the main processor's.
- *
- * @throws Error where it draws none. */
-export function drawsInSoftware(): boolean {
-  const context = document.createElement("canvas").getContext("webgl2");
-  if (!context) throw new Error("no WebGL");
-  const names = context.getExtension("WEBGL_debug_renderer_info");
-  const name = names ? String(context.getParameter(names.UNMASKED_RENDERER_WEBGL)) : "";
-  context.getExtension("WEBGL_lose_context")?.loseContext();
-  return /swiftshader|llvmpipe|software|basic render/i.test(name);
 }

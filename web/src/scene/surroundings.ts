@@ -50,8 +50,20 @@ export function lights(): THREE.Object3D[] {
   return [sky, key, fill];
 }
 
+/** Colour a scene's background and replace its floor; return the new floor, null without one. */
+export function surround(scene: THREE.Scene, colours: Palette, hasFloor = true): THREE.Group | null {
+  scene.background = new THREE.Color(colours.background);
+  const old = scene.getObjectByName("floor");
+  if (old) scene.remove(old);
+  if (!hasFloor) return null;
+  const made = floor(colours);
+  made.name = "floor";
+  scene.add(made);
+  return made;
+}
+
 /** A round floor with a grid of 100 mm, stronger each 500 mm, ending at its edge. */
-export function floor(colours: Palette): THREE.Group {
+function floor(colours: Palette): THREE.Group {
   const group = new THREE.Group();
   const disc = new THREE.Mesh(
     new THREE.CircleGeometry(FLOOR_RADIUS, 96),

@@ -1,20 +1,11 @@
-// Where links are: the product of standard D-H rows, for drawing. The server's answer is what counts.
+// Conversions between a draft's units and the metres and radians of its drawing.
 
-import { Euler, Matrix4, Quaternion, Vector3 } from "three";
+import { Euler, type Matrix4, Quaternion, Vector3 } from "three";
+import { type DhRow, transformOf } from "../../scene/forward-kinematics";
 import type { Description, Joint, Pose, Triple, Units } from "./description";
 import { metres, radians, tidy } from "./description";
 
-const UNIT_SCALE = new Vector3(1, 1, 1);
-
-/** A joint's D-H row at a position, in metres and radians. */
-export interface Row {
-  theta: number;
-  d: number;
-  a: number;
-  alpha: number;
-}
-
-export function rowAt(joint: Joint, position: number, units: Units): Row {
+export function rowAt(joint: Joint, position: number, units: Units): DhRow {
   const rotary = joint.type === "rotary";
   return {
     theta: (joint.theta + (rotary ? position : 0)) * radians(units),
@@ -24,33 +15,11 @@ export function rowAt(joint: Joint, position: number, units: Units): Row {
   };
 }
 
-/** `Rot(z, theta) Trans(0, 0, d)`: from the joint's axis to the foot of the common normal. */
-export function alongAxis({ theta, d }: Row): Matrix4 {
-  return new Matrix4().makeRotationZ(theta).setPosition(0, 0, d);
-}
-
-/** `Trans(a, 0, 0) Rot(x, alpha)`: from there to the link's frame. */
-export function alongNormal({ a, alpha }: Row): Matrix4 {
-  return new Matrix4().makeRotationX(alpha).setPosition(a, 0, 0);
-}
-
-/** Placement of every link in the base frame [m], base first; `start` is the frame in which the rows begin. */
-export function linkPlacements(start: Matrix4, rows: readonly Row[]): Matrix4[] {
-  const placements = [new Matrix4()];
-  let previous = start;
-  for (const row of rows) {
-    previous = previous.clone().multiply(alongAxis(row)).multiply(alongNormal(row));
-    placements.push(previous);
-  }
-  return placements;
-}
-
 /** `Trans(xyz) Rot(z, yaw) Rot(y, pitch) Rot(x, roll)` in metres. */
 export function poseMatrix(pose: Pose, units: Units): Matrix4 {
   const [x, y, z] = pose.xyz.map((value) => value * metres(units)) as Triple;
   const [roll, pitch, yaw] = pose.rpy.map((value) => value * radians(units)) as Triple;
-  const turn = new Quaternion().setFromEuler(new Euler(roll, pitch, yaw, "ZYX"));
-  return new Matrix4().compose(new Vector3(x, y, z), turn, UNIT_SCALE);
+  return transformOf([x, y, z], [roll, pitch, yaw]);
 }
 
 /** The pose of a placement, as finely as one would type it: micrometres and thousandths of a degree. */

@@ -1,23 +1,30 @@
 // The picture of a draft: its links where the D-H rows put them, the rows themselves, and a gizmo to place a shape.
 
 import * as THREE from "three";
-import { TransformControls } from "three/addons/controls/TransformControls.js";
+import type { TransformControls } from "three/addons/controls/TransformControls.js";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { toCreasedNormals } from "three/addons/utils/BufferGeometryUtils.js";
-import { drawsInSoftware } from "../../scene/scene";
-import { floor, lights, palette } from "../../scene/surroundings";
-import type { Row } from "./placements";
+import type { DhRow } from "../../scene/forward-kinematics";
+import { makeGizmo } from "../../scene/gizmo";
+import { lights, palette, surround } from "../../scene/surroundings";
+import {
+  countFrame,
+  disposeScene,
+  drawsInSoftware,
+  fitToParent,
+  makeRenderer,
+  observeSize,
+  toneMap,
+} from "../../scene/viewer";
+import { Viewpoint } from "../../scene/viewpoint";
 import { glb } from "./server";
 import { Skeleton } from "./skeleton";
-import { Viewpoint } from "./viewpoint";
 
 const CREASE_ANGLE = 0.6; // rad: sharper edges stay sharp
 const PAINT = "paint"; // the material that a link's colour is for
 const BARE = "#8a8f94";
 const CHOSEN_TINT = 0.55;
 const CLICK_PX = 4;
-const STEP_M = 0.01;
-const STEP_RAD = Math.PI / 12;
 
 export type Dragging = "off" | "translate" | "rotate";
 
@@ -34,7 +41,7 @@ export interface Picture {
   placements: readonly THREE.Matrix4[];
   /** The frame in which the rows begin. */
   start: THREE.Matrix4;
-  rows: readonly Row[];
+  rows: readonly DhRow[];
   shapes: readonly (Shown | null)[];
   /** In the last link's frame. */
   tool: THREE.Matrix4;
@@ -83,35 +90,26 @@ export class DefineScene {
     private readonly canvas: HTMLCanvasElement,
     private readonly heard: Heard,
   ) {
-    const software = drawsInSoftware();
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !software });
-    this.renderer.setPixelRatio(software ? 1 : Math.min(devicePixelRatio, 2));
-    this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
-    this.renderer.toneMappingExposure = 1.05;
-    this.view = new Viewpoint(canvas, () => this.touch());
-    this.gizmo = new TransformControls(this.view.camera, canvas);
-    this.gizmo.setSize(0.8);
-    this.gizmo.setSpace("local");
+    this.renderer = makeRenderer(drawsInSoftware(), canvas);
+    toneMap(this.renderer);
+    this.view = new Viewpoint(
+      canvas,
+      { clip: [0.01, 500], distance: [0.05, 100], damping: false, turnsFlat: true, polarMargin: 0.02 },
+      () => this.touch(),
+    );
+    this.gizmo = makeGizmo(this.view.camera, canvas, this.ending.signal);
     this.listenToGizmo();
     this.scene.add(...lights(), this.skeleton.group, this.tool, this.gizmo.getHelper());
     this.setColours();
     this.listenToPointer();
-    this.observer = new ResizeObserver(() => this.resize());
-    this.observer.observe(canvas.parentElement ?? canvas);
+    this.observer = observeSize(canvas, () => this.resize());
     this.resize();
     this.frame();
   }
 
   /** Background, floor and lines after the page's theme. */
   setColours(): void {
-    const colours = palette();
-    this.scene.background = new THREE.Color(colours.background);
-    const old = this.scene.getObjectByName("floor");
-    if (old) this.scene.remove(old);
-    const made = floor(colours);
-    made.name = "floor";
-    made.scale.setScalar(this.floorScale);
-    this.scene.add(made);
+    surround(this.scene, palette())?.scale.setScalar(this.floorScale);
     if (this.picture) this.paintAll();
     this.touch();
   }
@@ -283,13 +281,6 @@ export class DefineScene {
       if (object === this.tool && last) pose.premultiply(last.clone().invert());
       this.heard.drag(pose);
     });
-    const snap = (on: boolean) => {
-      this.gizmo.setTranslationSnap(on ? STEP_M : null);
-      this.gizmo.setRotationSnap(on ? STEP_RAD : null);
-    };
-    const { signal } = this.ending;
-    addEventListener("keydown", (event) => event.key === "Shift" && snap(true), { signal });
-    addEventListener("keyup", (event) => event.key === "Shift" && snap(false), { signal });
   }
 
   private listenToPointer(): void {
@@ -319,11 +310,7 @@ export class DefineScene {
   }
 
   private resize(): void {
-    const box = (this.canvas.parentElement ?? this.canvas).getBoundingClientRect();
-    const width = Math.max(1, Math.floor(box.width));
-    const height = Math.max(1, Math.floor(box.height));
-    this.renderer.setSize(width, height, false);
-    this.view.resize(width / height);
+    this.view.resize(fitToParent(this.renderer));
     this.touch();
   }
 
@@ -334,7 +321,7 @@ export class DefineScene {
     this.gizmo.camera = this.view.camera;
     this.skeleton.scaleLetters(this.view.letterScale);
     this.renderer.render(this.scene, this.view.camera);
-    this.canvas.dataset.drawn = String(Number(this.canvas.dataset.drawn ?? 0) + 1);
+    countFrame(this.canvas);
   };
 
   dispose(): void {
@@ -345,10 +332,6 @@ export class DefineScene {
     this.gizmo.dispose();
     this.view.dispose();
     this.skeleton.dispose();
-    this.scene.traverse((part) => {
-      if (!(part instanceof THREE.Mesh)) return;
-      for (const material of [part.material].flat() as THREE.Material[]) material.dispose();
-    });
-    this.renderer.dispose();
+    disposeScene(this.scene, this.renderer);
   }
 }

@@ -1,8 +1,7 @@
 // The D-H rows as lines: each joint's axis z, its offset d along it, its common normal a, each link's frame.
 
 import * as THREE from "three";
-import type { Row } from "./placements";
-import { alongAxis } from "./placements";
+import { alongAxis, type DhRow } from "../../scene/forward-kinematics";
 
 const AXIS = "#4f9df0";
 const LETTERS = "#d5e8ff";
@@ -25,7 +24,7 @@ interface Drawn {
   placements: readonly THREE.Matrix4[];
   /** The frame in which the rows begin. */
   start: THREE.Matrix4;
-  rows: readonly Row[];
+  rows: readonly DhRow[];
   frames: readonly { name: string; placement: THREE.Matrix4 }[];
   /** Of the whole arm [m]. */
   size: number;

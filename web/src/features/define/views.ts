@@ -1,10 +1,10 @@
 // A description's cameras: its own, and top, front and left worked out from the arm's reach.
 
 import { Vector3 } from "three";
+import type { Look } from "../../scene/viewpoint";
 import type { Description, Triple, View } from "./description";
 import { metres, tidy } from "./description";
 import { reach } from "./placements";
-import type { Look } from "./viewpoint";
 
 export const USUAL_VIEWS = ["top", "front", "left"] as const;
 // An arm without lengths yet is looked at as if it had these.

@@ -4,8 +4,8 @@ import { effect } from "@preact/signals";
 import * as THREE from "three";
 import type { Description } from "../../gen/robomesh_pb";
 import { floorOf } from "../../mesh/clearance";
-import { drawsInSoftware } from "../../scene/scene";
 import { palette } from "../../scene/surroundings";
+import { countFrame, drawsInSoftware, FrameFence, makeRenderer } from "../../scene/viewer";
 import { theme } from "../../ui/theme";
 import { type Rig, rigOf } from "./rig";
 
@@ -16,9 +16,9 @@ const COLUMNS = 3;
 const FEW = 6; // tiles that are drawn as smoothly as the display goes
 const FEW_EACH_MS = 15;
 const MANY_EACH_MS = 90;
-const DEAR_MS = 12; // a batch that takes longer is made smaller, and followed by as long a rest
+const SLOW_BATCH_MS = 12; // a slower batch becomes smaller, and is followed by as long a pause
 const SCROLLED_MS = 150;
-const REST = 3; // times as long as the page itself was held up
+const PAUSE_FACTOR = 3; // pause after a batch, in the times that it held up the page
 
 /** One tile's picture. */
 export class TilePicture {
@@ -77,7 +77,7 @@ function floorInBase(description: Description): THREE.Matrix4 | null {
 
 class Pictures {
   private readonly software = drawsInSoftware();
-  private readonly renderer = new THREE.WebGLRenderer({ antialias: !this.software, alpha: false });
+  private readonly renderer = makeRenderer(this.software);
   private readonly scene = new THREE.Scene();
   private readonly camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW, 16 / 9, 0.05, 40);
   private readonly floor = new THREE.Mesh(new THREE.CircleGeometry(1, 48), new THREE.MeshBasicMaterial());
@@ -86,11 +86,11 @@ class Pictures {
   private height = 0;
   private atOnce = 2;
   private request = 0;
-  private drawing: WebGLSync | null = null;
-  private began = 0;
+  private readonly fence: FrameFence;
   private nextAt = 0;
 
   constructor() {
+    this.fence = new FrameFence(this.renderer, this.batchDrawn);
     this.camera.up.set(0, 0, 1);
     this.floor.matrixAutoUpdate = false;
     this.renderer.setPixelRatio(1);
@@ -134,24 +134,17 @@ class Pictures {
   private readonly frame = (): void => {
     this.request = this.tiles.size ? requestAnimationFrame(this.frame) : 0;
     const at = performance.now();
-    if (!this.isDone(at) || at < this.nextAt) return;
+    if (!this.fence.isIdle(at) || at < this.nextAt) return;
     const each = this.tiles.size <= FEW ? FEW_EACH_MS : MANY_EACH_MS;
     const due = [...this.tiles].filter((tile) => tile.dirty && tile.ready && at - tile.drawnAt >= each);
     if (due.length) this.draw(due.sort((a, b) => a.drawnAt - b.drawnAt).slice(0, this.atOnce), at);
   };
 
-  private isDone(at: number): boolean {
-    if (!this.drawing) return true;
-    const gl = this.renderer.getContext() as WebGL2RenderingContext;
-    if (gl.getSyncParameter(this.drawing, gl.SYNC_STATUS) !== gl.SIGNALED && !gl.isContextLost()) return false;
-    gl.deleteSync(this.drawing);
-    this.drawing = null;
-    const took = at - this.began;
-    const dear = took > 2 * DEAR_MS; // a display's frame is in it
-    this.atOnce = Math.min(MOST_AT_ONCE, Math.max(1, this.atOnce + (dear ? -1 : 1)));
-    if (dear) this.nextAt = Math.max(this.nextAt, at + took);
-    return true;
-  }
+  private readonly batchDrawn = (tookMs: number, at: number): void => {
+    const slow = tookMs > 2 * SLOW_BATCH_MS; // it includes a frame of the display
+    this.atOnce = Math.min(MOST_AT_ONCE, Math.max(1, this.atOnce + (slow ? -1 : 1)));
+    if (slow) this.nextAt = Math.max(this.nextAt, at + tookMs);
+  };
 
   private draw(tiles: readonly TilePicture[], at: number): void {
     this.fit(tiles);
@@ -174,13 +167,10 @@ class Pictures {
       canvas
         .getContext("2d", { alpha: false })
         ?.drawImage(source, x, y, canvas.width, canvas.height, 0, 0, canvas.width, canvas.height);
-      canvas.dataset.drawn = String(Number(canvas.dataset.drawn ?? 0) + 1);
+      countFrame(canvas);
     });
-    const gl = renderer.getContext() as WebGL2RenderingContext;
-    this.drawing = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
-    gl.flush();
-    this.began = at;
-    this.nextAt = at + REST * (performance.now() - at);
+    this.fence.start(at);
+    this.nextAt = at + PAUSE_FACTOR * (performance.now() - at);
   }
 
   /** Makes the canvases as large as their tiles, and the drawing as some of the largest. */

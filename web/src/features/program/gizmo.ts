@@ -2,26 +2,22 @@
 
 import { effect, signal } from "@preact/signals";
 import { Group, Matrix4, Object3D } from "three";
-import { TransformControls } from "three/addons/controls/TransformControls.js";
+import { makeGizmo } from "../../scene/gizmo";
 import type { Stage } from "../../scene/scene";
 import { aimAtPose, aimPose } from "./aim";
 
 /** What dragging it does; off: it is not there. */
 export const gizmoMode = signal<"off" | "translate" | "rotate">("off");
 
-const STEP_M = 0.01;
-const STEP_RAD = Math.PI / 12;
-
 /** Puts a gizmo on a scene; the returned function takes it away. */
 export function addGizmo(stage: Stage): () => void {
-  const controls = new TransformControls(stage.camera(), stage.canvas);
+  const ending = new AbortController();
+  const controls = makeGizmo(stage.camera(), stage.canvas, ending.signal);
   const helper = controls.getHelper();
   const inBase = new Group();
   const tool = new Object3D();
   inBase.matrixAutoUpdate = false;
   inBase.add(tool);
-  controls.setSize(0.8);
-  controls.setSpace("local");
   // A view has a camera of its own, which the gizmo must be as large as, and be dragged by.
   const update = helper.updateMatrixWorld.bind(helper);
   helper.updateMatrixWorld = (force) => {
@@ -38,14 +34,6 @@ export function addGizmo(stage: Stage): () => void {
     tool.updateMatrix();
     aimAtPose(tool.matrix.clone().transpose().elements);
   });
-  const ending = new AbortController();
-  const snap = (on: boolean) => {
-    controls.setTranslationSnap(on ? STEP_M : null);
-    controls.setRotationSnap(on ? STEP_RAD : null);
-  };
-  addEventListener("keydown", (event) => event.key === "Shift" && snap(true), { signal: ending.signal });
-  addEventListener("keyup", (event) => event.key === "Shift" && snap(false), { signal: ending.signal });
-
   const end = effect(() => {
     const pose = aimPose.value;
     const mode = gizmoMode.value;
