@@ -60,7 +60,7 @@ def free_port() -> int:
     raise AssertionError("unreachable")
 
 
-def run(main: Coroutine[Any, Any, T], *, timeout_s: float = 60.0) -> T:
+def run(main: Coroutine[Any, Any, T], *, timeout_s: float = 120.0) -> T:
     """Run a test's coroutine, with a deadline."""
 
     async def with_deadline() -> T:

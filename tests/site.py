@@ -102,6 +102,19 @@ def running_site(
     """A running site; ended, with all its processes, when the block ends."""
     router, console = f"tcp/127.0.0.1:{free_port()}", f"127.0.0.1:{free_port()}"
     path = site_file(folder, name=name, robots=robots, router=router, console=console, more=more)
+    with running_file(path, router, console) as site:
+        yield site
+
+
+@contextmanager
+def running_file(path: Path, router: str, console: str) -> Iterator[RunningSite]:
+    """Run `robomesh up` with a site file; end it, with all its processes, when the block ends.
+
+    Args:
+        path: The site file.
+        router: The address of the site's router, as the file has it.
+        console: HOST:PORT of the page, as the file has it.
+    """
     process = subprocess.Popen(
         [sys.executable, "-m", "services.command_line.main", "up", str(path)],
         stdout=subprocess.PIPE,
@@ -109,7 +122,7 @@ def running_site(
         text=True,
         start_new_session=True,
     )
-    site = RunningSite(folder, router, f"http://{console}/", process)
+    site = RunningSite(path.parent, router, f"http://{console}/", process)
     ready = threading.Event()
 
     def read() -> None:

@@ -29,6 +29,7 @@ from web import build_page
 
 CHROMIUM = Path("/usr/bin/chromium")
 PATIENCE_MS = 60_000
+LAUNCH_MS = 180_000  # a browser that starts beside four busy processes
 # What an address bar offers is drawn for each page by two processes more, and a third waits for the next one.
 # The last such list counts: the others are Playwright's that could matter here.
 WITHOUT = (
@@ -239,7 +240,7 @@ def chromium(plant):
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS)
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS, timeout=LAUNCH_MS)
         yield browser
         browser.close()
 

@@ -10,7 +10,7 @@ import pytest
 from robots.description import load
 from robots.model import build_model, link_placements
 from robots.urdf.write import to_urdf
-from tests.browser.conftest import ARGUMENTS, CHROMIUM
+from tests.browser.conftest import ARGUMENTS, CHROMIUM, LAUNCH_MS
 from web import build_page
 
 pytestmark = pytest.mark.browser
@@ -75,7 +75,7 @@ def page():
             route.fulfill(body="<!doctype html>", content_type="text/html")
 
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS)
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS, timeout=LAUNCH_MS)
         opened = browser.new_page()
         opened.route(f"{ADDRESS}/**", answer)
         opened.goto(f"{ADDRESS}/")

@@ -7,7 +7,7 @@ import signal
 import pytest
 from playwright.sync_api import expect, sync_playwright
 
-from tests.browser.conftest import ARGUMENTS, CHROMIUM, NO_WEBGL, PATIENCE_MS
+from tests.browser.conftest import ARGUMENTS, CHROMIUM, LAUNCH_MS, NO_WEBGL, PATIENCE_MS
 from tests.browser.robot_page import button, degrees, drag, ready, sent, take, wait_to_move
 from tests.site import kill, robomesh, running_site, wait_until
 
@@ -24,7 +24,7 @@ def site(tmp_path):
 
 def test_home_trace_move_and_stop_from_the_page_reach_the_controller_and_the_recording(site):
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS)
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS, timeout=LAUNCH_MS)
         page = browser.new_page(viewport={"width": 1440, "height": 900})
         page.set_default_timeout(PATIENCE_MS)
         page.goto(f"{site.console}#/test/arm")
@@ -58,7 +58,7 @@ def test_home_trace_move_and_stop_from_the_page_reach_the_controller_and_the_rec
 
 def test_a_gateway_that_answers_no_more_is_told_as_what_it_may_be(site):
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS)
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS, timeout=LAUNCH_MS)
         page = browser.new_page(viewport={"width": 1024, "height": 768})
         page.add_init_script(NO_WEBGL)
         page.goto(f"{site.console}#/test/arm")

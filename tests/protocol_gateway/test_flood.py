@@ -268,7 +268,7 @@ def test_in_a_deluge_a_stop_is_sent_at_once_another_robot_keeps_its_rate_and_all
             await until(lambda: plant.events("link.flooding_ended"))
             assert plant.controller.counters.connections == 1
 
-    run(main(), timeout_s=60.0)
+    run(main(), timeout_s=180.0)
 
 
 def test_of_what_was_held_back_without_a_clock_the_newest_alone_is_published(mesh, tmp_path):

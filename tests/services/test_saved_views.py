@@ -65,7 +65,7 @@ def test_a_view_is_saved_as_video_and_picture_and_one_that_there_is_not_says_so(
             ]
             return told, answers
 
-    told, (snapshot, no_video, no_picture, no_format, small) = run(main(), timeout_s=60.0)
+    told, (snapshot, no_video, no_picture, no_format, small) = run(main(), timeout_s=180.0)
     assert len(pictures(half)) > 1
     frames = pictures(video)
     assert len(frames) == told["pictures"] > 1
