@@ -5,7 +5,6 @@ import json
 import threading
 import time
 
-import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
@@ -13,13 +12,14 @@ from mcap_protobuf.decoder import DecoderFactory
 from mcap_files.capture import Capture
 from mcap_files.files import describe_file
 from mcap_files.reindex import rewrite
-from robomesh.errors import RefusedError
+from robomesh import reason_codes as codes
 from robomesh.header import Header
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.topics import topic
 from services.recorder import flight
 from services.recorder.settings import Flight
 from tests.conftest import run
+from tests.refusals import refused
 from tests.services.recording import (
     KEY,
     WITHIN_S,
@@ -175,7 +175,7 @@ def test_a_failed_save_is_reported_and_retried(mesh, tmp_path, monkeypatch):
             await until(lambda: joints.watched)
             await put_states(joints, range(5))
             for name in ("shift/3", "x" * 300):
-                with pytest.raises(RefusedError, match="at most 81 letters"):
+                with refused(codes.RECORDING_NAME):
                     await session.ask(KEY, Ask(action=Ask.SAVE, name=name), timeout_s=WITHIN_S)
             await session.ask(KEY, Ask(action=Ask.SAVE, name="kept"), timeout_s=WITHIN_S)
             failure = await next_event(events, "recorder.not_saved")
@@ -212,7 +212,7 @@ def test_only_old_segments_are_removed(mesh, tmp_path, monkeypatch):
 def test_without_a_flight_recorder_a_save_is_refused(mesh, tmp_path):
     async def main():
         async with recording_site(mesh, tmp_path) as session:
-            with pytest.raises(RefusedError, match=r"no flight recorder here: \[recorder\] flight"):
+            with refused(codes.FLIGHT_NONE):
                 await session.ask(KEY, Ask(action=Ask.SAVE), timeout_s=WITHIN_S)
 
     run(main())

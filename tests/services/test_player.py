@@ -19,6 +19,7 @@ from services import player, recorder
 from services.command_line.live import listing, monitor
 from tests.conftest import last_value, run
 from tests.recordings import START_NS, Written, joints, write_recording
+from tests.refusals import refused
 
 _Ask, _Record = schema.ReplayRequest, schema.RecorderRequest
 OPEN = "robomesh/site/-/player/open"
@@ -163,7 +164,7 @@ def test_a_seek_publishes_the_state_then_and_video_since_the_key_frame(mesh, fol
             async with asyncio.timeout(40):
                 while len((await last_value(session, f"{robot}/events")).events) > 2:
                     await asyncio.sleep(0.02)
-            with pytest.raises(RefusedError, match=r"position 99 s: from 0 to 3\.990 s is right"):
+            with refused(codes.REPLAY_POSITION, seconds="99", most="3.990"):
                 await ask(session, state, _Ask.SEEK, position_s=99)
             return message, video, events
 
@@ -245,9 +246,9 @@ def test_a_replay_can_be_neither_moved_nor_recorded(mesh, folder):
             }
             refusals = {}
             for name, message in requests.items():
-                with pytest.raises(RefusedError) as refused:
+                with pytest.raises(RefusedError) as caught:
                     await session.ask(f"{robot}/{name}", message)
-                refusals[name] = refused.value.reason.code
+                refusals[name] = caught.value.reason.code
             return refusals
 
     refusals = run(main())
@@ -261,8 +262,8 @@ def test_a_replay_ends_with_its_clients_session(mesh, folder, monkeypatch):
 
     async def main():
         async with playing_site(mesh, folder) as session:
-            with pytest.raises(RefusedError, match="session 'nobody' is not present"):
-                await opened(session, session="nobody")
+            with refused(codes.REPLAY_SESSION, session="absent"):
+                await opened(session, session="absent")
             token = session.declare_presence_of("site", "-", "operator", "tab")
             state = await opened(session, session="tab", loop=True)
             await until_state(session, state, lambda state: state.position_s > 0.1)
@@ -305,20 +306,20 @@ def test_a_replay_ends_when_its_clients_session_ends_during_the_opening(mesh, fo
 def test_a_file_that_cannot_be_played_is_refused(mesh, folder):
     (folder / "arm" / "text.mcap").write_text("no recording")
 
-    async def refused(session, file, **values):
-        with pytest.raises(RefusedError) as error:
-            await session.ask(OPEN, schema.PlayRequest(file=file, **values), timeout_s=10.0)
-        return str(error.value)
+    async def play(session, file, **values):
+        await session.ask(OPEN, schema.PlayRequest(file=file, **values), timeout_s=10.0)
 
     async def main():
         async with playing_site(mesh, folder) as session:
-            assert "no recording 'gone.mcap' here" in await refused(session, "gone.mcap")
-            assert "a file's name is right" in await refused(session, "../arm/trial.mcap")
-            assert "does not begin as one" in await refused(session, "text.mcap")
-            assert "from 0.1 to 100 is right" in await refused(session, "trial.mcap", speed=500.0)
+            for name in ("gone.mcap", "../arm/trial.mcap", "text.mcap"):
+                with refused(codes.RECORDING_UNREADABLE):
+                    await play(session, name)
+            with refused(codes.REPLAY_SPEED, speed="500", least="0.1", most="100"):
+                await play(session, "trial.mcap", speed=500.0)
             for _ in range(8):
                 await opened(session, paused=True)
-            assert "8 recordings are played already" in await refused(session, "trial.mcap")
+            with refused(codes.REPLAY_TOO_MANY, count="8"):
+                await play(session, "trial.mcap")
 
     run(main())
 

@@ -14,9 +14,10 @@ from mcap_files import records
 from mcap_files.capture import Capture
 from mcap_files.files import RecordingError, describe_file
 from mcap_files.recover import State, state_of
-from robomesh.errors import RefusedError
+from robomesh import reason_codes as codes
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
+from tests.refusals import refused
 from tests.services.recording import (
     WITHIN_S,
     next_event,
@@ -191,12 +192,12 @@ def test_an_unfinished_file_is_recovered_but_no_open_or_foreign_one(mesh, tmp_pa
 def test_invalid_requests_are_refused(mesh, tmp_path):
     async def main():
         async with recording_arm(mesh, tmp_path) as (session, _):
-            with pytest.raises(RefusedError, match="not being recorded"):
+            with refused(codes.RECORDING_NOT_OPEN, robot="arm"):
                 await trace_off(session)
-            with pytest.raises(RefusedError, match=r"'\.\./etc'"):
+            with refused(codes.RECORDING_NAME, name="../etc"):
                 await trace_on(session, name="../etc")
             await trace_on(session, name="one")
-            with pytest.raises(RefusedError, match="already, as 'one'"):
+            with refused(codes.RECORDING_OPEN, robot="arm", name="one"):
                 await trace_on(session, name="two")
 
     run(main())
@@ -225,7 +226,7 @@ def test_a_full_disk_ends_the_capture_with_an_event_but_not_the_recorder(mesh, t
             await until(lambda: file.stat().st_size)
             fill_disk_under(tmp_path / "arm")
             await put_states(publisher, range(60))
-            with pytest.raises(RefusedError, match="not being recorded"):
+            with refused(codes.RECORDING_NOT_OPEN, robot="arm"):
                 await trace_off(session)
             await trace_on(session, name="again")
             listed = await session.ask(LIST, timeout_s=20.0)

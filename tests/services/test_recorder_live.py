@@ -8,12 +8,14 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from mcap.reader import make_reader
 
 from mcap_files.files import describe_file
+from robomesh import reason_codes as codes
 from robomesh.endpoints import router_config
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import SessionSettings
 from services.recorder.settings import Marks, Split
 from tests.conftest import free_port, run
+from tests.refusals import refused
 from tests.services.recording import put_states, recording_site, trace_off, trace_on, until, until_indexed
 
 JOINTS, VIDEO = "robomesh/site/arm/joints", "robomesh/site/arm/video/front"
@@ -107,7 +109,7 @@ def test_video_is_subscribed_only_while_it_is_recorded(mesh, tmp_path):
             view = schema.View(name="front")
             description = schema.Description(name="arm", views=[view])
             session.declare_publisher("site", "arm", "description").put(description)
-            with pytest.raises(RefusedError, match="no view 'side' of arm: there are front"):
+            with refused(codes.VIEW_UNKNOWN_OF, view="side", robot="arm", views="front"):
                 await trace_until_refused(session, views=["side"])
 
     run(main())
