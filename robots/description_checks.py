@@ -25,7 +25,7 @@ Step = str | int
 
 # Keys of a body that name a mesh file.
 _MESHES = ("mesh", "collision_mesh")
-# No arm is that long. Such a number is a typing error, or metres in a file of millimetres.
+# No arm is that long. A larger number is a typing error, or metres in a file of millimetres.
 _LONGEST_M = 100.0
 
 

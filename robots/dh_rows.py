@@ -16,7 +16,7 @@ from robots.poses import FloatArray, dh_fixed_part, inverse, rpy_rotation
 from robots.schema import JointType
 
 # Axes within this angle count as parallel [rad]: people write 1.5708 for a right angle, and the common
-# normal of two such lines would be kilometres away.
+# normal of two nearly parallel lines would be kilometres away.
 _PARALLEL = 1e-4
 # Rounding error of a length [m] or a sine that should be zero.
 _ZERO = 1e-10

@@ -219,7 +219,7 @@ def _limit_beyond(position: float, lower: float, upper: float, kind: JointType) 
 
 
 def _text(position: float, kind: JointType) -> str:
-    # Decimals of such a large number mean nothing, and its degrees may overflow.
+    # Decimals mean nothing in a number this large, and its degrees may overflow.
     if abs(position) >= 1e6:
         return f"{position:.3g} {'rad' if kind is JointType.ROTARY else 'm'}"
     return f"{degrees(position):.2f}°" if kind is JointType.ROTARY else f"{position * 1000:.2f} mm"

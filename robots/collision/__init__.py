@@ -1,6 +1,6 @@
-"""What an arm touches, and how near it is: to itself, to fixtures, to the other robots of its cell.
+"""Collisions and clearances of an arm: with itself, fixtures and the other robots of its cell.
 
-Pairs are named "<robot>/<link>" or "<fixture>". Coal stays behind this package.
+The bodies of a pair are named "<robot>/<link>" or "<fixture>". This package wraps coal.
 """
 
 from robots.collision.cell import (

@@ -1,4 +1,4 @@
-"""A cell: arms that are checked against each other, and fixtures that stand around them.
+"""A cell in memory: its arms, fixtures and floor, ready for collision checks.
 
 `build_cell` reads the files that a `robots.cells.CellDescription` names.
 """
@@ -26,16 +26,17 @@ from robots.schema import RobotDescription, UrdfDescription, nearest
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """An arm that can be checked.
+    """An arm, ready for collision checks.
 
     Attributes:
         base_to_site: (4, 4) [m].
-        bodies: What it is made of, each in the frame of its link.
-        names: Of each body's link: "<robot>/<link>".
-        links: (b,) number of each body's link among the model's.
+        bodies: The arm's bodies, each in the frame of its link.
+        names: "<robot>/<link>" of each body.
+        links: (b,) number of each body's link in the model.
         moving: (b,) whether a joint moves the body.
-        balls: They cover the bodies.
-        plan: How it is checked against itself.
+        balls: Balls that cover the bodies.
+        own: The pairs of bodies for the self-collision check.
+        plan: The decisions on these pairs.
     """
 
     name: str
@@ -57,13 +58,13 @@ class Arm:
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """A cell that can be checked. One thread at a time: workspaces are reused by each call.
+    """A cell, ready for collision checks. Not thread-safe: every call uses the same workspaces.
 
     Attributes:
         arms: By name.
-        fixtures: What stands around them.
-        floor: With its height; None: there is none.
-        ignored: Link and fixture that may touch, as `Nearest` names them.
+        fixtures: The bodies of all fixtures.
+        floor: With its height; None without a floor.
+        ignored: Pairs of link and fixture that may touch, named as in `Nearest`.
     """
 
     arms: Mapping[str, Arm]
@@ -73,21 +74,22 @@ class Cell:
 
 
 def build_cell(description: CellDescription, *, exact: bool = False, wait: bool = True) -> Cell:
-    """Read what a cell's checks need.
+    """Read the robots and fixtures of a cell.
 
     Args:
-        exact: Check links as their meshes, not as hulls about them: distances are some hundred times slower.
-        wait: Wait for studies of links whose hulls touch; else they go on, and the cell is `pending`.
+        exact: Check links as meshes instead of hulls: distances are about a hundred times slower.
+        wait: Wait for the studies of links with touching hulls. Otherwise the studies continue and the cell
+            is `pending`.
 
     Raises:
-        DescriptionError: If a robot's description cannot be used.
+        DescriptionError: If a robot's description has a problem.
         MeshError: If a mesh cannot be read, or a fixture has no surface.
     """
     arms = {robot.name: _arm(robot, exact=exact, wait=wait) for robot in description.robots}
     links = {f"{arm.name}/{link}" for arm in arms.values() for link in arm.model.link_names}
     return Cell(
         arms,
-        joined([_standing(fixture, links) for fixture in description.fixtures]),
+        joined([_fixture_obstacles(fixture, links) for fixture in description.fixtures]),
         description.floor and replace(description.floor, height_m=description.floor_m),
         frozenset((link, fixture.name) for fixture in description.fixtures for link in fixture.ignore),
     )
@@ -97,7 +99,7 @@ def build_cell(description: CellDescription, *, exact: bool = False, wait: bool 
 def _read(
     model: str | Path, confined: bool, exact: bool
 ) -> tuple[RobotDescription, tuple[tuple[int, Body], ...]]:
-    """A robot's description, and its links' bodies: a plant has many arms of one kind."""
+    """Read a robot's description and its links' bodies; cached, because a plant has many equal arms."""
     description = load(model, confined=confined)
     bodies_of = exact_bodies if exact else hull_bodies
     links = enumerate(tree_of(description).links)
@@ -133,33 +135,34 @@ def _arm(robot: CellRobot, *, exact: bool, wait: bool) -> Arm:
     )
 
 
-def _standing(fixture: Fixture, links: set[str]) -> Obstacles:
-    what = f"fixture {fixture.name}"
+def _fixture_obstacles(fixture: Fixture, links: set[str]) -> Obstacles:
+    source = f"fixture {fixture.name}"
     for link in fixture.ignore:
         if link not in links:
-            raise MeshError(what, f"ignore {link!r}: no such link in its cell{nearest(link, sorted(links))}")
+            hint = nearest(link, sorted(links))
+            raise MeshError(source, f"ignore {link!r}: no such link in its cell{hint}")
     bodies = (exact_bodies if fixture.exact else piece_bodies)(fixture.shapes)
     if not bodies:
-        raise MeshError(what, "has no surface: nothing could be checked against it")
+        raise MeshError(source, "has no surface, so it cannot be checked for collisions")
     placements = np.tile(np.asarray(fixture.fixture_to_site, dtype=np.float64), (len(bodies), 1, 1))
     return Obstacles((fixture.name,) * len(bodies), bodies, placements, np.zeros(len(bodies), dtype=np.bool_))
 
 
 def pending(cell: Cell) -> tuple[str, ...]:
-    """Arms of a cell whose own links are still being studied."""
+    """Return the arms of a cell of which the links are still being studied."""
     return tuple(name for name, arm in cell.arms.items() if arm.plan.pending)
 
 
 def unshaped(cell: Cell, robot: str) -> tuple[str, ...]:
-    """Links of an arm that no check covers, for they have no shape.
+    """Return the links of an arm without a shape, which no check covers.
 
-    A bare frame on a link that has one is none of them, unless files of meshes are missing: it may be theirs.
+    A frame on a link with a shape does not count, unless mesh files are missing: one may be its mesh.
     """
     return tuple(cell.arms[robot].tree.links[number].name for number in _bare(cell, robot))
 
 
 def unshaped_moving(cell: Cell, robot: str) -> tuple[str, ...]:
-    """Those of the `unshaped` links that a joint moves: the check cannot say that a motion is free."""
+    """Return the `unshaped` links that a joint moves: no check can prove their motion free of collisions."""
     links = cell.arms[robot].tree.links
     return tuple(links[number].name for number in _bare(cell, robot) if links[number].joint != BASE)
 
@@ -173,15 +176,15 @@ def _bare(cell: Cell, robot: str) -> tuple[int, ...]:
 
 
 def missing_meshes(cell: Cell, robot: str) -> tuple[str, ...]:
-    """Mesh files of an arm that were not found, as its description names them: no check covers them."""
+    """Return the mesh files of an arm that were not found, as its description names them."""
     description = cell.arms[robot].description
     return description.robot.unchecked if isinstance(description, UrdfDescription) else ()
 
 
 def distances(cell: Cell, pair: tuple[str, str]) -> tuple[float, float]:
-    """Warning and stop distance of two that stand apart, as `Nearest` names them [m].
+    """Return the warning and stop distance of a pair that is named as in `Nearest` [m].
 
-    For two robots the larger of both counts; the floor has its own.
+    For two robots, the larger distances apply. The floor has separate distances.
     """
     if FLOOR in pair:
         return (cell.floor.warning_m, cell.floor.stop_m) if cell.floor is not None else (0.0, 0.0)

@@ -1,8 +1,8 @@
-"""How near an arm gets, along a whole path, to itself and to what stands around it.
+"""Clearances of an arm to itself and to the obstacles around it, on a whole path.
 
-Two that are a distance apart cannot touch before they have come that far: at most samples of a path most
-pairs need no measuring, and yet nothing is left out. Where two may have met between one sample and the next,
-what is between is looked at too.
+Two bodies cannot touch before they have travelled the distance between them. So most pairs need no
+measurement at most samples, and no contact is missed. If two bodies may have touched between two samples, the
+interval is searched too.
 """
 
 from collections.abc import Iterator, Mapping
@@ -24,21 +24,21 @@ from robots.collision.path import placements_along, travelled
 from robots.collision.swept_volumes import Sweep, least_of_sweep, passed_along, sweeps_of
 from robots.joints import FloatArray
 
-# What touches, and what coal's distances may be wrong by [m].
+# Distance at which bodies touch, and the error of coal's distances [m].
 _TOLERANCE_M = 2 * TOUCH_M
 _Points = tuple[FloatArray, FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
 class Encounter:
-    """Two that come near each other along a path.
+    """Two bodies that come near each other on a path.
 
     Attributes:
-        pair: Each "<robot>/<link>", "<fixture>" or FLOOR; the arm's own first.
-        own: Both are links of the arm.
+        pair: The bodies: "<robot>/<link>", "<fixture>" or FLOOR; the arm's link first.
+        own: Whether both are links of the arm.
         samples: (k,) numbers of the path's samples at which they are near, ascending.
-        distances: (k,) [m]; 0 where they touch; below the floor negative: so far below.
-        points: (k, 2, 3) where they are nearest, on each, in the site's frame [m].
+        distances: (k,) [m]; 0 if they touch; negative below the floor.
+        points: (k, 2, 3) the nearest point on each, in the site's frame [m].
     """
 
     pair: tuple[str, str]
@@ -50,11 +50,11 @@ class Encounter:
 
 @dataclass(frozen=True, eq=False)
 class Along:
-    """What an arm comes near to along a path.
+    """Clearances and encounters of an arm on a path.
 
     Attributes:
-        clearances: (m,) distance to what is nearest around at each sample [m]; infinite: nothing is around.
-        encounters: One a pair, in the order in which they begin.
+        clearances: (m,) distance to the nearest obstacle at each sample [m]; infinite without obstacles.
+        encounters: One per pair, in the order of their first samples.
     """
 
     clearances: FloatArray
@@ -70,48 +70,49 @@ def near_along(
     within_m: float,
     far: bool = True,
 ) -> Along:
-    """What an arm comes near to along a path: fixtures, other robots, the floor, links of its own.
+    """Find the fixtures, other robots, floor and own links that an arm comes near to on a path.
 
-    Between two samples it may be nearer by half of what it moves there; where it may even touch, and moves
-    no more than SAMPLE_M (else a path begins anew there), that is looked for, and told of the second sample.
-    What it does not move (its base) is checked against its own links only: its motion changes nothing there.
+    Between two samples, a distance may be smaller by half of the arm's travel there. If two bodies may touch
+    there, the interval is searched, and a contact is reported at the second sample. It is not searched if the
+    arm travels more than SAMPLE_M, because then a new path begins. The arm's base is checked only against its
+    own links.
 
     Args:
         positions: (m, n) samples of the path, m at least 1 [rad] or [m].
-        others: Straight joint path (k, n) of each other robot of the cell that counts, from where it is to
-            where it has been told to go (k = 1: it stands); the arm is checked against all of it, whenever.
-        within_m: From this distance on two are near; links of its own only when they touch, the floor from
-            its own warning distance on.
-        far: Whether clearances beyond that are asked for, too; else they may be told as infinite, sooner.
+        others: Straight joint path (k, n) of each other robot to check against, from its position to its
+            commanded target (k = 1: it does not move). The arm is checked against all of it at any time.
+        within_m: Pairs within this distance are near. The arm's own links are near only if they touch; the
+            floor has its own warning distance.
+        far: Return exact clearances beyond `within_m` too; otherwise they may be infinite, which is faster.
     """
     arm = cell.arms[robot]
     places = placements_along(arm, positions)
-    come = travelled(arm.bodies, places)
+    travel = travelled(arm.bodies, places)
     gauge = Gauge()
     reach = np.inf if far else within_m + _TOLERANCE_M
     sweeps = sweeps_of(cell, robot, others, passed=passed_along(arm, places), within_m=reach)
-    around = _Around(cell, arm, places[0], sweeps, within_m, reach)
-    own = _Own(arm, come)
+    outside = _OutsidePairs(cell, arm, places[0], sweeps, within_m, reach)
+    own = _OwnPairs(arm, travel)
     clearances = np.full(len(positions), np.inf)
     found: dict[tuple[str, str], dict[int, _Near]] = {}
     for sample, row in enumerate(places):
         last = max(sample - 1, 0)
-        at = Placed(row, places[last], come[sample] - come[last])
-        clearances[sample], near = around.measured(gauge, at, come[sample])
+        at = Placed(row, places[last], travel[sample] - travel[last])
+        clearances[sample], near = outside.measured(gauge, at, travel[sample])
         for each in (*near, *own.measured(gauge, at, sample)):
             found.setdefault(each.pair, {})[sample] = each
     encounters = [_encounter(arm, samples) for samples in found.values()]
     if cell.floor is not None:
-        heights = heights_along(cell.floor, arm, positions, places, come)
-        encounters += _floored(cell.floor, arm, heights)
+        heights = heights_along(cell.floor, arm, positions, places, travel)
+        encounters += _floor_encounters(cell.floor, arm, heights)
         if cell.floor.warning_m > 0.0:
             lowest = heights.heights.min(axis=1, initial=np.inf)
             clearances = np.minimum(clearances, np.maximum(lowest, 0.0))
     return Along(clearances, tuple(encounters))
 
 
-def _floored(floor: Floor, arm: Arm, found: Heights) -> Iterator[Encounter]:
-    """The links that come near the floor or below it."""
+def _floor_encounters(floor: Floor, arm: Arm, found: Heights) -> Iterator[Encounter]:
+    """Yield the encounters of links near or below the floor."""
     names = [arm.names[number] for number in found.bodies.tolist()]
     for name in dict.fromkeys(names):
         columns = [column for column, each in enumerate(names) if each == name]
@@ -143,8 +144,8 @@ class _Near(NamedTuple):
     points: _Points
 
 
-class _Met(NamedTuple):
-    """A body of the arm and the nearest place of a sweep."""
+class _Measured(NamedTuple):
+    """A body of the arm and the nearest placement of a sweep."""
 
     distance: float
     body: Body
@@ -153,16 +154,18 @@ class _Met(NamedTuple):
     place: int
 
 
-class _Around:
-    """Pairs of the arm's bodies and what is around: `_known` less the way come since is no more than a
-    pair's distance."""
+class _OutsidePairs:
+    """Pairs of the arm's bodies and the sweeps around it.
+
+    `_known` less the body's travelled distance is a lower bound of each pair's distance.
+    """
 
     def __init__(
         self, cell: Cell, arm: Arm, first: FloatArray, sweeps: list[Sweep], within_m: float, reach_m: float
     ) -> None:
         self._arm, self._sweeps = arm, sweeps
         self._limit, self._reach = within_m + _TOLERANCE_M, reach_m
-        # Together: what is told as one pair.
+        # Body and sweep numbers of each named pair, which is reported as one.
         together: dict[tuple[str, str], list[tuple[int, int]]] = {}
         for one in np.flatnonzero(arm.moving).tolist():
             for other, sweep in enumerate(sweeps):
@@ -181,31 +184,32 @@ class _Around:
             least = least_distances(arm.balls, first[None], boxes)[0]
             self._known = least[tuple(np.array(self._pairs).T)]
 
-    def measured(self, gauge: Gauge, at: Placed, come: FloatArray) -> tuple[float, list[_Near]]:
-        """The least distance of all pairs, and the pairs that are near."""
+    def measured(self, gauge: Gauge, at: Placed, travel: FloatArray) -> tuple[float, list[_Near]]:
+        """Return the least distance of all pairs, and the pairs that are near."""
         nearest = np.inf
         near: list[_Near] = []
-        moved = come[self._bodies]
+        moved = travel[self._bodies]
         bounds = self._known - moved
         if not len(bounds):
             return nearest, near
         close = np.flatnonzero(np.minimum.reduceat(bounds, self._starts) < self._limit)
         for names, here in [self._groups[group] for group in close.tolist()]:
-            found: _Met | None = None
-            # What was nearest at the last sample often is again: its distance spares measuring others.
+            found: _Measured | None = None
+            # Start with the nearest of the last sample: it often is the nearest again, so that others need no
+            # measurement.
             number = self._nearest.get(names, here.start)
             if bounds[number] >= self._limit:
                 number = here.start + int(bounds[here].argmin())
             while True:
                 cutoff = self._limit if found is None else found.distance
-                # Nobody is nearer than touching, whatever the bound.
+                # A bound may be negative, a distance may not.
                 if max(bounds[number], 0.0) >= cutoff:
                     break
-                met = self._measured(gauge, at, number, bounds[number], moved[number], cutoff)
-                # Beyond the cutoff it is a bound, too, and may be measured again below.
-                bounds[number] = np.inf if met.distance <= cutoff else met.distance
-                if met.distance < cutoff:
-                    found, self._nearest[names] = met, number
+                measured = self._measured(gauge, at, number, bounds[number], moved[number], cutoff)
+                # Beyond the cutoff, the distance is another bound and may be measured again below.
+                bounds[number] = np.inf if measured.distance <= cutoff else measured.distance
+                if measured.distance < cutoff:
+                    found, self._nearest[names] = measured, number
                 number = here.start + int(bounds[here].argmin())
             if found is not None:
                 nearest = min(nearest, found.distance)
@@ -215,19 +219,19 @@ class _Around:
             cutoff = min(nearest, self._reach)
             if max(bounds[number], 0.0) >= cutoff:
                 break
-            met = self._measured(gauge, at, number, bounds[number], moved[number], cutoff)
+            measured = self._measured(gauge, at, number, bounds[number], moved[number], cutoff)
             bounds[number] = np.inf
-            nearest = min(nearest, met.distance)
+            nearest = min(nearest, measured.distance)
         return (nearest if nearest <= self._reach else np.inf), near
 
     def _measured(
         self, gauge: Gauge, at: Placed, number: int, bound: float, moved: float, cutoff_m: float
-    ) -> _Met:
-        """How near a pair is; exact, or more than the cutoff.
+    ) -> _Measured:
+        """Measure a pair; the distance is exact up to the cutoff, and a lower bound beyond.
 
         Args:
-            bound: What the pair's distance is no less than.
-            moved: The way that the arm's body has come.
+            bound: Lower bound of the pair's distance.
+            moved: Distance that the arm's body has travelled.
         """
         one, other = self._pairs[number]
         body, sweep = self._arm.bodies[one], self._sweeps[other]
@@ -238,33 +242,33 @@ class _Around:
         if at.joined and before > TOUCH_M and 0.0 < distance < step:
 
             def measure(share: float) -> float:
-                return least_of_sweep(gauge, body, at.on_the_way(one, share), sweep, step)[0]
+                return least_of_sweep(gauge, body, at.interpolated(one, share), sweep, step)[0]
 
             share = touching_share(measure, before, distance, step)
             if share >= 0.0:
-                there = at.on_the_way(one, share)
-                return _Met(0.0, body, there, sweep, least_of_sweep(gauge, body, there, sweep, 0.0)[1])
-        return _Met(distance, body, at[one], sweep, place)
+                there = at.interpolated(one, share)
+                return _Measured(0.0, body, there, sweep, least_of_sweep(gauge, body, there, sweep, 0.0)[1])
+        return _Measured(distance, body, at[one], sweep, place)
 
-    def _points(self, gauge: Gauge, met: _Met) -> _Points:
-        there = met.sweep.place(met.place)
-        gauge.distance(met.body, met.at, met.sweep.body, there)
-        return gauge.points(met.body, met.at, met.sweep.body, there)
+    def _points(self, gauge: Gauge, measured: _Measured) -> _Points:
+        there = measured.sweep.place(measured.place)
+        gauge.distance(measured.body, measured.at, measured.sweep.body, there)
+        return gauge.points(measured.body, measured.at, measured.sweep.body, there)
 
 
-class _Own:
-    """Pairs of the arm's own bodies; near is what touches. Each is measured when it may touch again."""
+class _OwnPairs:
+    """Pairs of the arm's own bodies, near if they touch. Each is measured when it may touch again."""
 
-    def __init__(self, arm: Arm, come: FloatArray) -> None:
+    def __init__(self, arm: Arm, travel: FloatArray) -> None:
         self._arm = arm
         ones, others = np.array(arm.own.pairs, dtype=np.int64).reshape(-1, 2).T
-        self._ways = np.ascontiguousarray((come[:, ones] + come[:, others]).T)
+        self._ways = np.ascontiguousarray((travel[:, ones] + travel[:, others]).T)
         self._due = [(0, number) for number in range(len(ones))]  # a heap, by sample
-        # Less the way come since, each is no more than a pair's distance.
+        # Less the travelled distance, each is a lower bound of a pair's distance.
         self._known = np.zeros(len(ones))
 
     def measured(self, gauge: Gauge, at: Placed, sample: int) -> Iterator[_Near]:
-        """The pairs that touch."""
+        """Yield the pairs that touch."""
         names = self._arm.names
         while self._due and self._due[0][0] <= sample:
             number = self._due[0][1]
@@ -277,9 +281,9 @@ class _Own:
             heapreplace(self._due, (max(due, sample + 1), number))
             there = at[one], at[other]
             if at.joined and before > TOUCH_M and 0.0 < distance < at.steps[one] + at.steps[other]:
-                share = self._met(gauge, at, number, before, distance)
+                share = self._touching_share(gauge, at, number, before, distance)
                 if share >= 0.0:
-                    there = at.on_the_way(one, share), at.on_the_way(other, share)
+                    there = at.interpolated(one, share), at.interpolated(other, share)
                     distance = self._distance(gauge, *there, number)
             if distance == 0.0:
                 bodies = self._arm.own.measured[number]
@@ -290,14 +294,16 @@ class _Own:
         one, other = self._arm.own.measured[number]
         return gauge.bound(one, one_at, other, other_at)
 
-    def _met(self, gauge: Gauge, at: Placed, number: int, before_m: float, after_m: float) -> float:
-        """As `_Around._met`."""
+    def _touching_share(
+        self, gauge: Gauge, at: Placed, number: int, before_m: float, after_m: float
+    ) -> float:
+        """Return the `touching_share` of a pair between the previous sample and this one."""
         one, other = self._arm.own.pairs[number]
 
         def measure(share: float) -> float:
-            return self._distance(gauge, at.on_the_way(one, share), at.on_the_way(other, share), number)
+            return self._distance(gauge, at.interpolated(one, share), at.interpolated(other, share), number)
 
-        # Of two that go along together, the one hardly moves as the other sees it.
+        # Use the relative travel: it is small for two bodies that move together.
         return touching_share(
             measure, before_m, after_m, at.way(one, other, self._arm.own.measured[number][1])
         )

@@ -1,4 +1,4 @@
-"""How near an arm is to itself and to what stands around it, in one position."""
+"""Distances of an arm to itself and to the obstacles around it, in one position."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -20,12 +20,12 @@ from robots.model import link_placements
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """Two that are near each other.
+    """Two bodies and their distance.
 
     Attributes:
-        pair: Each "<robot>/<link>", "<fixture>" or FLOOR.
-        distance_m: 0 where they touch.
-        points: (3,) on each, in the site's frame [m]: where they touch, or are nearest.
+        pair: The bodies: "<robot>/<link>", "<fixture>" or FLOOR.
+        distance_m: 0 if they touch.
+        points: (3,) the contact point or nearest point on each, in the site's frame [m].
     """
 
     pair: tuple[str, str]
@@ -34,24 +34,24 @@ class Nearest:
 
 
 class Gauge:
-    """Measures two bodies; keeps coal's workspace."""
+    """Distance measurement of two bodies, with coal's workspace."""
 
     def __init__(self) -> None:
         self._request = coal.DistanceRequest()
         self._result = coal.DistanceResult()
 
     def distance(self, one: Body, one_at: Any, other: Body, other_at: Any) -> float:
-        """How far apart two bodies are [m]; 0 where they touch.
+        """Return the distance of two bodies [m]; 0 if they touch.
 
         Args:
-            one_at, other_at: Their placements as coal has them.
+            one_at, other_at: Coal's form of their placements.
         """
         self._result.clear()
         found = coal.distance(one.geometry, one_at, other.geometry, other_at, self._request, self._result)
         return 0.0 if found <= TOUCH_M else float(found)
 
     def bound(self, one: Body, one_at: Any, other: Body, other_at: Any) -> float:
-        """As `distance`, or less where hulls about two meshes are apart: it is 0 only where they touch."""
+        """Return a lower bound of `distance`, from the hulls of two meshes; 0 only if the meshes touch."""
         if one.hull is not None and other.hull is not None:
             self._result.clear()
             found = coal.distance(one.hull, one_at, other.hull, other_at, self._request, self._result)
@@ -60,10 +60,10 @@ class Gauge:
         return self.distance(one, one_at, other, other_at)
 
     def points(self, one: Body, one_at: Any, other: Body, other_at: Any) -> tuple[FloatArray, FloatArray]:
-        """Where the two bodies of the last `distance` are nearest, or touch: (3,) on each [m]."""
+        """Return the contact or nearest point (3,) on each of the bodies of the last `distance` call [m]."""
         found = self._result
         if found.min_distance <= TOUCH_M:
-            # Of meshes that touch, a distance tells no point.
+            # Coal's distance gives no points for meshes that touch.
             contact = coal.CollisionResult()
             request = coal.CollisionRequest(coal.CONTACT, 1)
             if coal.collide(one.geometry, one_at, other.geometry, other_at, request, contact):
@@ -71,7 +71,7 @@ class Gauge:
         return np.array(found.getNearestPoint1()), np.array(found.getNearestPoint2())
 
     def nearest(self, some: Obstacles, one: int, others: Obstacles, other: int) -> Nearest:
-        """Two bodies by their numbers, measured."""
+        """Measure two bodies, given by their numbers."""
         bodies = some.bodies[one], others.bodies[other]
         places = transform(some.placements[one]), transform(others.placements[other])
         distance = self.distance(bodies[0], places[0], bodies[1], places[1])
@@ -79,8 +79,8 @@ class Gauge:
         return Nearest((some.names[one], others.names[other]), distance, points)
 
 
-def one_a_pair(found: Iterable[Nearest]) -> tuple[Nearest, ...]:
-    """The nearest of each pair, nearest first."""
+def nearest_per_pair(found: Iterable[Nearest]) -> tuple[Nearest, ...]:
+    """Return the nearest result of each pair, nearest first."""
     pairs: dict[tuple[str, str], Nearest] = {}
     for each in sorted(found, key=lambda each: each.distance_m):
         pairs.setdefault(each.pair, each)
@@ -88,7 +88,7 @@ def one_a_pair(found: Iterable[Nearest]) -> tuple[Nearest, ...]:
 
 
 def arm_obstacles(arm: Arm, positions: FloatArray) -> Obstacles:
-    """The bodies of an arm in their places.
+    """Return the bodies of an arm with their placements.
 
     Raises:
         JointCountError: If there is not one value per joint.
@@ -98,7 +98,7 @@ def arm_obstacles(arm: Arm, positions: FloatArray) -> Obstacles:
 
 
 def checked(cell: Cell, at: Obstacles, around: Obstacles) -> NDArray[np.bool_]:
-    """Which bodies are checked against which: (a, b)."""
+    """Return which pairs of bodies are checked: (a, b)."""
     moves: NDArray[np.bool_] = at.moving[:, None] | around.moving
     if cell.ignored:
         moves &= [[(one, other) not in cell.ignored for other in around.names] for one in at.names]
@@ -106,7 +106,7 @@ def checked(cell: Cell, at: Obstacles, around: Obstacles) -> NDArray[np.bool_]:
 
 
 def own_contacts(cell: Cell, robot: str, positions: FloatArray) -> tuple[Nearest, ...]:
-    """Links of an arm that touch each other; neighbours and ignored pairs are left out.
+    """Return the links of an arm that touch each other, except neighbours and ignored pairs.
 
     Args:
         positions: (n,) joint positions [rad] or [m].
@@ -116,11 +116,11 @@ def own_contacts(cell: Cell, robot: str, positions: FloatArray) -> tuple[Nearest
     """
     arm = cell.arms[robot]
     touching = touching_pairs(arm.own, arm.model, positions)
-    return one_a_pair(_own(arm, number, 0.0, points) for number, points in touching.items())
+    return nearest_per_pair(_self_pair(arm, number, 0.0, points) for number, points in touching.items())
 
 
 def own_nearest(cell: Cell, robot: str, positions: FloatArray) -> Nearest | None:
-    """The two links of an arm that are nearest each other, of those that are checked; None: there are none.
+    """Return the nearest pair of an arm's links; None if no pair is checked.
 
     Args:
         positions: (n,) joint positions [rad] or [m].
@@ -133,11 +133,11 @@ def own_nearest(cell: Cell, robot: str, positions: FloatArray) -> Nearest | None
     if found is None:
         return None
     if found[1] <= TOUCH_M and (touching := own_contacts(cell, robot, positions)):
-        return touching[0]  # of meshes that touch, a distance tells no point
-    return _own(arm, *found)
+        return touching[0]  # coal's distance gives no points for meshes that touch
+    return _self_pair(arm, *found)
 
 
-def _own(arm: Arm, number: int, distance_m: float, points: tuple[FloatArray, FloatArray]) -> Nearest:
+def _self_pair(arm: Arm, number: int, distance_m: float, points: tuple[FloatArray, FloatArray]) -> Nearest:
     one, other = arm.own.pairs[number]
     rotation, origin = arm.base_to_site[:3, :3], arm.base_to_site[:3, 3]
     in_site = rotation @ points[0] + origin, rotation @ points[1] + origin
@@ -152,38 +152,37 @@ def outside_nearest(
     *,
     within_m: float | None = None,
 ) -> tuple[Nearest, ...]:
-    """What an arm is near to: fixtures, and links of other robots; one a pair, nearest first.
+    """Return the distances of an arm to fixtures and other robots' links; one per pair, nearest first.
 
-    The floor is among them where it has a warning distance.
-
-    What does not move is not checked against what does not move either: base links and fixtures.
+    The floor is included if it has a warning distance. Two bodies that do not move (base links and fixtures)
+    are not checked against each other.
 
     Args:
         positions: (n,) joint positions [rad] or [m].
-        others: Positions of each other robot of the cell that counts; the rest are left out.
-        within_m: Pairs that are farther apart are left out: they cost nothing.
+        others: Positions of the other robots of the cell to check against; the rest are left out.
+        within_m: Leave out pairs that are farther apart; they cost nothing.
 
     Raises:
         JointCountError: If there is not one value per joint.
     """
-    at, around, least = _surveyed(cell, robot, positions, others)
+    at, around, least = _distance_bounds(cell, robot, positions, others)
     gauge = Gauge()
     reach = np.inf if within_m is None else within_m
     pairs = np.argwhere((least <= reach) & np.isfinite(least)).tolist()
-    met = [gauge.nearest(at, one, around, other) for one, other in pairs]
-    found = one_a_pair([*met, *_above_floor(cell, robot, at)])
+    measured = [gauge.nearest(at, one, around, other) for one, other in pairs]
+    found = nearest_per_pair([*measured, *_above_floor(cell, robot, at)])
     return tuple(each for each in found if each.distance_m <= reach)
 
 
 def outside_clearance(
     cell: Cell, robot: str, positions: FloatArray, others: Mapping[str, FloatArray]
 ) -> Nearest | None:
-    """The nearest pair of `outside_nearest`, sooner than all of them; None: nothing is around.
+    """Return the first result of `outside_nearest`, faster than all of them; None without obstacles.
 
     Raises:
         JointCountError: If there is not one value per joint.
     """
-    at, around, least = _surveyed(cell, robot, positions, others)
+    at, around, least = _distance_bounds(cell, robot, positions, others)
     gauge = Gauge()
     found = min(_above_floor(cell, robot, at), key=lambda each: each.distance_m, default=None)
     for number in least.argsort(axis=None).tolist():
@@ -197,7 +196,7 @@ def outside_clearance(
 
 
 def _above_floor(cell: Cell, robot: str, at: Obstacles) -> list[Nearest]:
-    """How far the moving bodies of an arm are above the floor; nothing without a warning distance to it."""
+    """Return the heights of an arm's moving bodies above the floor; empty without a warning distance."""
     if cell.floor is None or cell.floor.warning_m <= 0.0:
         return []
     found = heights_above(cell.floor, cell.arms[robot], at.placements[None])
@@ -211,10 +210,10 @@ def _above_floor(cell: Cell, robot: str, at: Obstacles) -> list[Nearest]:
     ]
 
 
-def _surveyed(
+def _distance_bounds(
     cell: Cell, robot: str, positions: FloatArray, others: Mapping[str, FloatArray]
 ) -> tuple[Obstacles, Obstacles, FloatArray]:
-    """An arm, what is around it, and their least distances (a, b): infinite for what is not checked."""
+    """Return an arm, its obstacles and lower bounds of their distances (a, b): infinite if unchecked."""
     at = arm_obstacles(cell.arms[robot], positions)
     around = joined(
         [

@@ -1,6 +1,6 @@
-"""Shapes as what coal checks: one convex hull a link, one a piece of a fixture, or the meshes themselves.
+"""Coal's geometry of shapes: one convex hull per link, one per piece of a fixture, or exact meshes.
 
-A hull misses no collision of its mesh, and a distance between hulls costs a hundredth of one between meshes.
+A hull misses no collision of its mesh, and the distance of two hulls takes 1 % of the time of two meshes.
 """
 
 import contextlib
@@ -16,30 +16,30 @@ from robots.joints import FloatArray
 from robots.kinematic_tree import Shape
 from robots.meshes.mesh import IndexArray, Mesh
 
-# Two this near touch: coal's search may end so far from the origin in bodies that overlap by millimetres.
+# Bodies within this distance touch: coal may return so much for bodies that overlap by millimetres.
 TOUCH_M = 1e-5
-# What is flat becomes a plate of this thickness: a hull needs a volume.
+# Flat shapes become plates of this thickness, because a hull needs a volume.
 _THINNEST_M = 1e-4
-# More points than these are joggled at once.
+# For more points than this, qhull is called only with joggling.
 _MOST_EXACT = 2_000
-# What coal's hulls cannot be made of is rounded to cells of this share of its extent, then to larger ones.
+# If coal rejects a hull, the points are rounded to cells of this share of the extent, then to larger cells.
 _FINEST_CELL = 1e-3
-# A box longer than wide is covered by several balls, at most so many.
+# Largest number of balls that cover a long box.
 _MOST_BALLS = 6
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A hull or a mesh, in the frame of the link or fixture that it is a part of [m].
+    """A hull or a mesh, in the frame of its link or fixture [m].
 
     Attributes:
-        geometry: Coal's.
-        center, half: (3,) of the box about it, along the axes of its frame.
+        geometry: Coal's geometry.
+        center, half: (3,) of the bounding box, along the axes of the frame.
         balls: (k, 3) centres of balls that cover the box.
-        radius: Of each ball.
-        corners: (n, 3) of its hull.
-        hull: Coal's, about a mesh: never farther from another body than the mesh, and faster; None: there is
-            none, or the geometry is one.
+        radius: The radius of each ball.
+        corners: (n, 3) of the hull.
+        hull: Coal's hull of a mesh, for fast lower bounds of its distances; None if there is none or the
+            geometry is a hull.
     """
 
     geometry: Any
@@ -52,7 +52,7 @@ class Body:
 
 
 def hull_bodies(shapes: Sequence[Shape]) -> tuple[Body, ...]:
-    """One hull about all shapes; none about nothing.
+    """Return one hull of all shapes; empty if they have no vertices.
 
     Raises:
         MeshError: If a mesh file cannot be read.
@@ -62,7 +62,7 @@ def hull_bodies(shapes: Sequence[Shape]) -> tuple[Body, ...]:
 
 
 def piece_bodies(shapes: Sequence[Shape]) -> tuple[Body, ...]:
-    """One hull about each piece of the shapes that hangs together.
+    """Return one hull for each connected piece of the shapes.
 
     Raises:
         MeshError: If a mesh file cannot be read.
@@ -72,7 +72,7 @@ def piece_bodies(shapes: Sequence[Shape]) -> tuple[Body, ...]:
 
 
 def exact_bodies(shapes: Sequence[Shape]) -> tuple[Body, ...]:
-    """The triangles themselves: a surface, which what is wholly inside it does not touch.
+    """Return the triangles as one body: a surface, so a body completely inside it does not touch it.
 
     Raises:
         MeshError: If a mesh file cannot be read.
@@ -82,7 +82,7 @@ def exact_bodies(shapes: Sequence[Shape]) -> tuple[Body, ...]:
 
 
 def exact_body(triangles: FloatArray) -> Body:
-    """The triangles themselves, by their corners (n, 3, 3), n at least 1."""
+    """Return triangles, given by their corners (n, 3, 3), n at least 1, as a body."""
     vertices, numbers = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     geometry = coal.BVHModelOBBRSS()
     geometry.beginModel(len(triangles), len(vertices))
@@ -93,7 +93,7 @@ def exact_body(triangles: FloatArray) -> Body:
 
 
 def surface(shapes: Sequence[Shape]) -> FloatArray:
-    """The triangles of shapes by their corners: (n, 3, 3) [m].
+    """Return the triangles of shapes by their corners: (n, 3, 3) [m].
 
     Raises:
         MeshError: If a mesh file cannot be read.
@@ -103,24 +103,24 @@ def surface(shapes: Sequence[Shape]) -> FloatArray:
 
 
 def piece_points(triangles: FloatArray) -> Iterator[FloatArray]:
-    """The points (k, 3) of each piece of some triangles (n, 3, 3) that hangs together."""
+    """Return the points (k, 3) of each connected piece of triangles (n, 3, 3)."""
     vertices, numbers = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     return _pieces(vertices, numbers.reshape(-1, 3))
 
 
 def hull_body(points: FloatArray) -> Body:
-    """The convex hull of (n, 3) points, n at least 1."""
+    """Return the convex hull of (n, 3) points, n at least 1."""
     hull = _convex(_with_volume(points))
     return _body(hull, np.array(hull.points()))
 
 
 def _convex(points: FloatArray) -> Any:
-    """Coal's hull of points, or the least coarse hull about it that coal takes.
+    """Return coal's hull of points, or the finest hull around it that coal accepts.
 
-    Coal raises RuntimeError for a vertex of more than 255 neighbours. Qhull makes one of a flat, round face,
-    as whose triangles it takes a fan (Qt), in a time that grows with the square of its corners. Where it
-    joggles the points by 1e-10 of their extent (QJ), it does not, but keeps more points of flat faces.
-    The tip of a round cone has as many neighbours as its rim has points: those are rounded outwards.
+    Coal raises RuntimeError for a vertex with more than 255 neighbours. With option Qt, qhull creates such a
+    vertex in a flat, round face, which it triangulates as a fan, in a time quadratic in the corners. Option
+    QJ joggles the points by 1e-10 of their extent. It avoids this, but keeps more points of flat faces. The
+    tip of a round cone has as many neighbours as its rim has points; these points are rounded outwards.
     """
     for options in ("Qt", "QJ") if len(points) <= _MOST_EXACT else ("QJ",):
         with contextlib.suppress(RuntimeError):
@@ -128,7 +128,7 @@ def _convex(points: FloatArray) -> Any:
     cell = _FINEST_CELL * float(np.ptp(points, axis=0).max())
     while True:
         with contextlib.suppress(RuntimeError):
-            return _qhull(_about(points, cell), "Qt")
+            return _qhull(_grid_cover(points, cell), "Qt")
         cell *= 2
 
 
@@ -139,15 +139,15 @@ def _qhull(points: FloatArray, options: str) -> Any:
     return coal.Convex.convexHull(vertices, False, options)
 
 
-def _about(points: FloatArray, cell_m: float) -> FloatArray:
-    """The corners of all cells of a grid that hold a point: they are about the points, and far fewer."""
+def _grid_cover(points: FloatArray, cell_m: float) -> FloatArray:
+    """Return the corners of all grid cells that contain a point: far fewer points with a hull around them."""
     cells = np.unique(np.floor(points / cell_m), axis=0)
     corners = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1]), axis=-1).reshape(-1, 3)
     return np.unique((cells[:, None] + corners).reshape(-1, 3), axis=0) * cell_m
 
 
-def wider(body: Body, points: FloatArray) -> Body:
-    """A body whose box and balls hold some points (n, 3), too."""
+def enlarged(body: Body, points: FloatArray) -> Body:
+    """Return a body with box and balls enlarged to contain points (n, 3)."""
     corners = np.array([body.center - body.half, body.center + body.half])
     return _body(body.geometry, np.concatenate([points, corners]))
 
@@ -167,7 +167,7 @@ def _body(geometry: Any, points: FloatArray) -> Body:
 
 
 def _solid(mesh: Mesh) -> tuple[FloatArray, IndexArray]:
-    """All parts as one: vertices, and triangles that share those at the same place."""
+    """Join all parts: return vertices, and triangles that share equal vertices."""
     parts = [part for part in mesh.parts if len(part.vertices)]
     if not parts:
         return np.empty((0, 3)), np.empty((0, 3), dtype=np.int64)
@@ -180,13 +180,13 @@ def _solid(mesh: Mesh) -> tuple[FloatArray, IndexArray]:
 
 
 def _pieces(vertices: FloatArray, triangles: IndexArray) -> Iterator[FloatArray]:
-    """The vertices of each piece whose triangles hang together."""
+    """Yield the vertices of each connected piece."""
     labels = np.arange(len(vertices))
     while True:
         least = labels[triangles].min(axis=1)
         lower = labels.copy()
         np.minimum.at(lower, triangles.reshape(-1), np.repeat(least, 3))
-        # A label is a vertex of the same piece, whose own label may be lower yet.
+        # A label is the number of a vertex in the same piece, which may have a lower label itself.
         lower = lower[lower]
         if (lower == labels).all():
             break
@@ -196,7 +196,7 @@ def _pieces(vertices: FloatArray, triangles: IndexArray) -> Iterator[FloatArray]
 
 
 def _with_volume(points: FloatArray) -> FloatArray:
-    """The points, doubled along each direction in which they have no extent."""
+    """Return the points, duplicated along each direction in which they have no extent."""
     points = np.unique(points, axis=0)
     centred = points - points.mean(axis=0)
     for direction in np.linalg.eigh(centred.T @ centred)[1].T:
@@ -208,5 +208,5 @@ def _with_volume(points: FloatArray) -> FloatArray:
 
 
 def transform(placement: FloatArray) -> Any:
-    """Coal's form of a (4, 4) placement."""
+    """Convert a (4, 4) placement to coal's form."""
     return coal.Transform3s(placement[:3, :3], placement[:3, 3])

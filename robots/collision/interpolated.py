@@ -1,4 +1,4 @@
-"""Whether two touch between one sample of a motion and the next, where neither sample shows it."""
+"""Search for a contact between two samples of a motion, if neither sample shows one."""
 
 from collections.abc import Callable
 from typing import Any
@@ -10,24 +10,24 @@ from robots.collision.geometry import Body, transform
 from robots.collision.path import SAMPLE_M, corners_along
 from robots.joints import FloatArray
 
-# Between two looks nobody comes farther than this, where the two may touch.
+# The search ends at intervals in which the bodies travel less than this.
 FINEST_M = 1e-4
-# Over so short a way, what goes round is longer than straight by no more than this.
+# Largest ratio of arc length to chord for so short a way.
 ROUND = 1.01
 
 
 class Placed:
-    """An arm's bodies in one position, and on the way there, as coal has them; only those that are asked for.
+    """Coal's transforms of an arm's bodies at a sample and on the way to it, made on request.
 
     Args:
         placements: (b, 4, 4) to the site [m].
-        before: (b, 4, 4) at the sample before; its own at the first.
-        steps: (b,) how far each has come since then [m].
+        before: (b, 4, 4) at the previous sample; at the first sample, equal to `placements`.
+        steps: (b,) distance that each body travelled since then [m].
     """
 
     def __init__(self, placements: FloatArray, before: FloatArray, steps: FloatArray) -> None:
         self.steps = steps
-        # Where somebody comes farther, a path begins anew: nobody goes from there to here.
+        # After a larger step a new path begins: the arm does not move from the previous sample to this one.
         self.joined = bool(steps.max(initial=0.0) <= SAMPLE_M * ROUND)
         self._placements, self._before = placements, before
         self._transforms: dict[int, Any] = {}
@@ -38,16 +38,17 @@ class Placed:
             found = self._transforms[body] = transform(self._placements[body])
         return found
 
-    def on_the_way(self, body: int, share: float) -> Any:
-        """A body's placement between the sample before (0) and this one (1)."""
+    def interpolated(self, body: int, share: float) -> Any:
+        """Return a body's placement between the previous sample (0) and this one (1)."""
         ends = pin.SE3(self._before[body]), pin.SE3(self._placements[body])
         return transform(pin.SE3.Interpolate(*ends, share).homogeneous)
 
     def way(self, one: int, other: int, body: Body) -> float:
-        """How far a body comes as another sees it, since the sample before [m].
+        """Return how far a body travelled since the previous sample, relative to another body [m].
 
         Args:
-            other: The number of `body`.
+            one: Number of the body that is the reference.
+            other: Number of `body`.
         """
         seen = np.array(
             [np.linalg.solve(at[one], at[other])[None] for at in (self._before, self._placements)]
@@ -57,18 +58,18 @@ class Placed:
 
 
 def touching_share(measure: Callable[[float], float], before_m: float, after_m: float, way_m: float) -> float:
-    """The share of the way at which two touch; negative: they do not, as far as looks within FINEST_M tell.
+    """Return the share of the way at which two bodies touch; negative if no contact is found.
 
     Args:
-        measure: Their distance at a share of the way [m], or less, if it is above 0; 0: they touch.
+        measure: Returns a lower bound of their distance at a share of the way [m]; 0 only if they touch.
         before_m, after_m: The same at the shares 0 and 1.
-        way_m: How far they come, the one as the other sees it, in all.
+        way_m: Distance that one body travels relative to the other in all.
     """
     left = [(0.0, 1.0, before_m, after_m)]
     while left:
         first, last, before_m, after_m = left.pop()
         way = (last - first) * way_m
-        # Who is some way off at both ends, and comes no farther than both together, does not get there.
+        # To touch in between, the bodies must travel at least the sum of the distances at both ends.
         if before_m + after_m > way * ROUND or way < FINEST_M:
             continue
         middle = (first + last) / 2

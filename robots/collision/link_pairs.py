@@ -1,4 +1,4 @@
-"""Which pairs of an arm's own links are checked, how, and why the others are not."""
+"""Plan of an arm's self-collision check: which pairs of links are checked, how, and why not the others."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from robots.collision.geometry import Body, exact_body, hull_bodies, hull_body, surface, wider
+from robots.collision.geometry import Body, enlarged, exact_body, hull_bodies, hull_body, surface
 from robots.collision.pair_study import (
     FEWEST_FALSE,
     MEMORY_LIMIT,
@@ -17,7 +17,7 @@ from robots.collision.pair_study import (
     TIME_LIMIT_S,
     Case,
     Found,
-    studied,
+    study_results,
 )
 from robots.collision.sampling import SAMPLES, allowed_positions
 from robots.collision.self_collision import OwnPairs, Pairs, own_pairs, touching_pairs
@@ -30,7 +30,7 @@ from robots.schema import RobotDescription, UrdfDescription
 
 Bodies = tuple[tuple[int, Body], ...]
 Links = tuple[str, str]
-# What the texts of verdicts name.
+# Parameters of the verdicts' texts.
 _VALUES: dict[Kind, dict[str, str | int]] = {
     Kind.ALWAYS: {"positions": SAMPLES},
     Kind.NOT_STUDIED: {"seconds": round(TIME_LIMIT_S), "gigabytes": MEMORY_LIMIT >> 30},
@@ -40,14 +40,14 @@ _VALUES: dict[Kind, dict[str, str | int]] = {
 
 @dataclass(frozen=True, eq=False)
 class PairPlan:
-    """How an arm is checked against itself.
+    """The self-collision check of an arm.
 
     Attributes:
-        bodies: Hulls, each with the number of its link; the box of one that is checked as what is drawn
-            holds that, too.
-        pairs: Numbers of two bodies, and what is checked of them.
-        verdicts: Of every two links with a shape.
-        pending: The study of pairs whose hulls touch goes on; until it ends they are checked as hulls.
+        bodies: Hulls, each with the number of its link; the box of a hull contains the link's visual mesh
+            too if that is checked.
+        pairs: Numbers of two bodies, and the bodies to check for them.
+        verdicts: One for every two links with a shape.
+        pending: The study of pairs with touching hulls is still running; until it ends, hulls are checked.
     """
 
     bodies: Bodies
@@ -57,23 +57,23 @@ class PairPlan:
 
     @property
     def ignored(self) -> tuple[tuple[Links, str], ...]:
-        """Pairs that are not checked, and the reason."""
+        """The unchecked pairs, and the reasons."""
         return tuple((each.links, each.text) for each in self.verdicts if each.kind in IGNORED)
 
     @property
     def refined(self) -> tuple[tuple[Links, str], ...]:
-        """Pairs that touch at home as hulls, and as what they are checked."""
+        """Pairs of which the hulls touch at home, and how they are checked."""
         others = IGNORED | {Kind.APART} | ELSEWHERE
         return tuple((each.links, each.text) for each in self.verdicts if each.kind not in others)
 
     @property
     def elsewhere(self) -> tuple[tuple[Links, str], ...]:
-        """Pairs that are apart at home and often touch elsewhere as hulls, and as what they are checked."""
+        """Pairs of which the hulls are apart at home and often touch elsewhere, and how they are checked."""
         return tuple((each.links, each.text) for each in self.verdicts if each.kind in ELSEWHERE)
 
 
 def ignored_pairs(description: RobotDescription, tree: Tree) -> dict[frozenset[str], Verdict]:
-    """Pairs of links with a shape that are ignored without a study."""
+    """Return the pairs of links with a shape that are ignored without a study."""
     found: dict[frozenset[str], Verdict] = {}
     if isinstance(description, UrdfDescription):
         for links, file in description.robot.ignored:
@@ -88,47 +88,47 @@ def ignored_pairs(description: RobotDescription, tree: Tree) -> dict[frozenset[s
 
 
 def plan_pairs(model: str | Path, confined: bool, *, wait: bool) -> PairPlan:
-    """Decide how an arm is checked against itself.
+    """Plan an arm's self-collision check.
 
     Args:
-        model, confined: As `robots.description.load` takes them.
-        wait: Else a study that takes time goes on elsewhere, and the plan is pending.
+        model, confined: For `robots.description.load`.
+        wait: Wait for the study. Otherwise it continues in its process, and the plan is pending.
 
     Raises:
         MeshError: If a mesh cannot be read.
     """
-    return _planned(_start(model, confined), wait=wait)
+    return _with_study(_prepare_model(model, confined), wait=wait)
 
 
 def plan_of(description: RobotDescription) -> PairPlan:
-    """Decide how an arm is checked against itself, and wait for the study.
+    """Plan an arm's self-collision check, and wait for the study.
 
     Raises:
         MeshError: If a mesh cannot be read.
     """
-    return _planned(_begun(description), wait=True)
+    return _with_study(_prepare(description), wait=True)
 
 
-def _planned(start: "_Start", *, wait: bool) -> PairPlan:
+def _with_study(start: "_Preparation", *, wait: bool) -> PairPlan:
     if start.case is None:
         return start.plan
-    found = studied(start.case, wait=wait)
+    found = study_results(start.case, wait=wait)
     if found is None:
         return replace(start.plan, pending=True)
     if found not in start.refined:
-        start.refined[found] = _refined(start, found)
+        start.refined[found] = _refine(start, found)
     return start.refined[found]
 
 
 @dataclass(frozen=True, eq=False)
-class _Start:
-    """What is known without a study.
+class _Preparation:
+    """A plan before its study.
 
     Attributes:
-        plan: With hulls alone.
-        numbers: Which of its pairs are studied.
-        case: A study of those; None: there is none.
-        refined: The plan with what a study found: a plant has many arms of one kind.
+        plan: The plan with hulls only.
+        numbers: Numbers of the pairs to study.
+        case: The study of these pairs; None if there are none.
+        refined: Refined plans by the study's results; cached, because a plant has many equal arms.
     """
 
     plan: PairPlan
@@ -138,11 +138,11 @@ class _Start:
 
 
 @lru_cache(maxsize=8)
-def _start(model: str | Path, confined: bool) -> _Start:
-    return _begun(load(model, confined=confined))
+def _prepare_model(model: str | Path, confined: bool) -> _Preparation:
+    return _prepare(load(model, confined=confined))
 
 
-def _begun(description: RobotDescription) -> _Start:
+def _prepare(description: RobotDescription) -> _Preparation:
     tree, built = tree_of(description), build_model(description)
     bodies = tuple(
         (number, body) for number, link in enumerate(tree.links) for body in hull_bodies(link.checked)
@@ -159,18 +159,18 @@ def _begun(description: RobotDescription) -> _Start:
     positions = allowed_positions(built.joints, SURVEYED)
     touching = _touching(own_pairs(tree, bodies, pairs), built, positions)
     if not touching:
-        return _Start(plan)
+        return _Preparation(plan)
     case = _case(
         [tree.links[number] for number, _ in bodies],
         built,
         [(pairs[number][:2], samples) for number, samples in touching.items()],
         positions,
     )
-    return _Start(plan, tuple(touching), case)
+    return _Preparation(plan, tuple(touching), case)
 
 
 def _touching(own: OwnPairs, model: RobotModel, positions: FloatArray) -> dict[int, list[int]]:
-    """Numbers of the pairs whose hulls touch at home or often, and of the positions in which they do.
+    """Return the pairs of which the hulls touch at home or often, with the positions in which they touch.
 
     Args:
         positions: (m, n) joint positions [rad] or [m], home first.
@@ -192,10 +192,10 @@ def _case(
     pairs: Sequence[tuple[tuple[int, int], Sequence[int]]],
     positions: FloatArray,
 ) -> Case:
-    """A study of pairs of links.
+    """Make the case for a study of pairs of links.
 
     Args:
-        pairs: Numbers of two of the links, and of the positions in which their hulls touch.
+        pairs: Numbers of two links, and of the positions in which their hulls touch.
         positions: (m, n) joint positions [rad] or [m], home first.
     """
     used = sorted({number for pair, _ in pairs for number in pair})
@@ -208,15 +208,15 @@ def _case(
     return Case(
         tuple((used.index(one), used.index(other)) for (one, other), _ in pairs),
         tuple(surface(links[number].checked) for number in used),
-        # Only pairs that touch at home may be checked as what is drawn.
+        # Only pairs that touch at home may be checked as visual meshes.
         tuple(surface(links[number].shapes if number in at_home else ()) for number in used),
         np.stack([link_placements(model, each)[frames] for each in positions]),
         tuple(np.array([] if samples[0] == 0 else samples, np.int64) + first for _, samples in pairs),
     )
 
 
-def _refined(start: _Start, found: tuple[Found, ...]) -> PairPlan:
-    """The plan with what a study found."""
+def _refine(start: _Preparation, found: tuple[Found, ...]) -> PairPlan:
+    """Return the plan with the results of its study."""
     assert start.case is not None
     case, bodies, verdicts, pairs = start.case, list(start.plan.bodies), [], []
 
@@ -245,6 +245,6 @@ def _refined(start: _Start, found: tuple[Found, ...]) -> PairPlan:
             measured = exact(first, kind is Kind.VISUAL_MESHES), exact(second, kind is Kind.VISUAL_MESHES)
             if kind is Kind.VISUAL_MESHES:
                 for body, mesh in zip((one, other), measured, strict=True):
-                    bodies[body] = bodies[body][0], wider(bodies[body][1], mesh.corners)
+                    bodies[body] = bodies[body][0], enlarged(bodies[body][1], mesh.corners)
         pairs.append((one, other, measured))
     return PairPlan(tuple(bodies), tuple(pairs), tuple(verdicts))

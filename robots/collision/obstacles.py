@@ -1,4 +1,4 @@
-"""What an arm keeps clear of, and a first, cheap answer to how far away it is at least."""
+"""Obstacles for an arm, and a cheap lower bound of their distances."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ from robots.joints import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class Obstacles:
-    """Bodies, each in its place.
+    """Bodies with their placements.
 
     Attributes:
-        names: Of each: "<robot>/<link>" or "<fixture>".
+        names: "<robot>/<link>" or "<fixture>" of each body.
         placements: (b, 4, 4) body to site [m].
-        moving: (b,) whether a joint moves it.
+        moving: (b,) whether a joint moves the body.
     """
 
     names: tuple[str, ...]
@@ -30,7 +30,7 @@ class Obstacles:
 
 
 def joined(parts: Sequence[Obstacles]) -> Obstacles:
-    """All of them, in order."""
+    """Concatenate obstacles."""
     return Obstacles(
         tuple(name for part in parts for name in part.names),
         tuple(body for part in parts for body in part.bodies),
@@ -55,7 +55,7 @@ class Boxes:
 
 
 def boxes_of(bodies: Sequence[Body], placements: FloatArray) -> Boxes:
-    """The box about each body in its place.
+    """Return the bounding box of each placed body.
 
     Args:
         placements: (b, 4, 4) body to site [m].
@@ -69,7 +69,7 @@ def boxes_of(bodies: Sequence[Body], placements: FloatArray) -> Boxes:
 
 
 def box_about(boxes: Boxes) -> Boxes:
-    """One box about all, along the site's axes."""
+    """Return the bounding box of all boxes, along the site's axes."""
     reach = np.einsum("bij,bj->bi", np.abs(boxes.axes), boxes.halves)
     low, high = (boxes.centers - reach).min(axis=0), (boxes.centers + reach).max(axis=0)
     return Boxes(((low + high) / 2)[None], np.eye(3)[None], ((high - low) / 2)[None])
@@ -82,7 +82,7 @@ class Balls:
     Attributes:
         centers: (k, 3).
         radii: (k,).
-        owners: (k,) number of the body that each covers.
+        owners: (k,) number of the body that each ball covers.
         starts: (b,) number of each body's first ball.
     """
 
@@ -93,7 +93,7 @@ class Balls:
 
 
 def balls_of(bodies: Sequence[Body]) -> Balls:
-    """The balls that cover each body."""
+    """Return the balls that cover each body."""
     counts = np.array([len(body.balls) for body in bodies], dtype=np.int64)
     return Balls(
         np.concatenate([np.empty((0, 3)), *(body.balls for body in bodies)]),
@@ -104,17 +104,17 @@ def balls_of(bodies: Sequence[Body]) -> Balls:
 
 
 def least_distances(balls: Balls, placements: FloatArray, boxes: Boxes) -> FloatArray:
-    """No body is nearer to what is in a box than this [m].
+    """Return a lower bound of the distance of each body to the content of each box [m].
 
     Args:
-        placements: (m, a, 4, 4) of the bodies that the balls cover, m times, to the site.
+        placements: (m, a, 4, 4) of the bodies that the balls cover, at m samples, to the site.
 
     Returns:
-        (m, a, b), 0 where they may touch.
+        (m, a, b), 0 where a body and a content may touch.
     """
     of_balls = placements[:, balls.owners]
     centers = np.einsum("mkij,kj->mki", of_balls[..., :3, :3], balls.centers) + of_balls[..., :3, 3]
-    # In each box's own axes, one by one: less memory than all three at once.
+    # One axis of the boxes at a time needs less memory than all three together.
     squares = np.zeros((*centers.shape[:2], len(boxes.centers)))
     for axis in range(3):
         along = boxes.axes[:, :, axis]
@@ -129,7 +129,7 @@ def least_distances(balls: Balls, placements: FloatArray, boxes: Boxes) -> Float
 
 
 def joined_boxes(parts: Sequence[Boxes]) -> Boxes:
-    """All of them, in order."""
+    """Concatenate boxes."""
     return Boxes(
         np.concatenate([part.centers for part in parts]),
         np.concatenate([part.axes for part in parts]),

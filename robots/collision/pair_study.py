@@ -1,10 +1,10 @@
-"""Pairs of an arm's links whose hulls touch at home or often: which may be ignored, which checked as meshes.
+"""Study of link pairs with hulls that touch at home or often: which to ignore, which to check as meshes.
 
-    python -m robots.collision.pair_study KEPT.json < CASE.npz      in a process of its own, with limits
+    python -m robots.collision.pair_study RESULT.json < CASE.npz      in a separate process, with limits
 
-A pair that touches in all sampled positions, as exact meshes too, is ignored. A pair is checked as meshes if
-only its hulls touch at home, or if it is apart there and only its hulls touch in at least 1 % of positions.
-What is found is kept in the user's cache by its content; a failure is not.
+A pair is ignored if its exact meshes touch in all sampled positions. A pair is checked as meshes if only its
+hulls touch at home, or if it is apart there and only its hulls touch in at least 1 % of positions. Results
+are in the user's cache, keyed by the case's content; failures are not.
 """
 
 import fcntl
@@ -36,33 +36,33 @@ from robots.meshes.mesh import IndexArray
 
 log = logging.getLogger(__name__)
 
-# Part of each name in the cache: counts up when the same case is to give another result.
+# Part of each cache key. Increment it when the same case should give another result.
 _VERSION = 4
 TIME_LIMIT_S = 120.0
 MEMORY_LIMIT = 4 << 30
-# Positions in which hulls are tried, and the fewest in which they must touch without their meshes: 1 %.
+# Positions in which hulls are tested, and the least number in which only the hulls touch: 1 %.
 SURVEYED, FEWEST_FALSE = 400, 4
-# After this share of the time, pairs that are apart at home stay hulls: a study over its limit loses all.
+# After this share of the time limit, pairs that are apart at home stay hulls, so that the study can finish.
 _SURVEY_ENDS = 0.75
-# Two meshes with more triangles together would make each check too slow.
+# Largest sum of the triangles of two meshes; more would make each check too slow.
 MOST_TRIANGLES = 50_000
-# A study that failed is tried again after so long [s], then after twice that, and so on.
-_AGAIN_S, _LATEST_AGAIN_S = 30.0, 3600.0
-# After so many failures also a caller that does not wait gets hulls.
+# Delay before a failed study is repeated; doubled after each failure, up to the maximum.
+_RETRY_S, _LONGEST_RETRY_S = 30.0, 3600.0
+# After this number of failures, a caller that does not wait gets hulls too.
 _TRIES = 4
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """What a study is made of.
+    """The input of a study.
 
     Attributes:
         pairs: Numbers of two links each.
-        checked, drawn: Of each link the triangles (n, 3, 3) of its geometry in its frame [m]; what is drawn
-            only of links that touch another at home.
+        checked, drawn: Each link's triangles (n, 3, 3) for checks and for drawing, in its frame [m]; those
+            for drawing only if the link touches another at home.
         placements: (samples, links, 4, 4) of the links, home first.
-        touching: Of each pair that is apart at home, (k,) numbers of the placements in which its hulls touch;
-            empty for a pair whose hulls touch at home.
+        touching: For each pair that is apart at home, (k,) numbers of the placements in which its hulls
+            touch; empty for a pair with hulls that touch at home.
     """
 
     pairs: tuple[tuple[int, int], ...]
@@ -73,72 +73,72 @@ class Case:
 
 
 class Found(NamedTuple):
-    """What a study found of a pair: its kind, and the share of positions that the kind's text names."""
+    """A study's result for a pair: its kind, and the share of positions for the kind's text."""
 
     kind: Kind
     share: float = 0.0
 
 
-def studied(case: Case, *, wait: bool = True) -> tuple[Found, ...] | None:
-    """What is found of each pair of a case, from the cache where it was studied before.
+def study_results(case: Case, *, wait: bool = True) -> tuple[Found, ...] | None:
+    """Return the result for each pair of a case, from the cache or from a new study.
 
     Args:
-        wait: Else a study that takes time goes on in its own process, and None is returned until it has found
-            something. One that failed is tried again later: until then waiting gives hulls.
+        wait: Wait for a running study. Otherwise return None until it has ended. A failed study is repeated
+            after a delay; until then, a caller that waits gets hulls.
     """
     path = cache_folder().parent / "collision" / f"{_key(case)}.json"
     with _lock:
-        found = _kept(path, case)
+        found = _cached_results(path, case)
         if found is not None:
             return found
-        failures, again_s = _failed.get(path, (0, 0.0))
+        failures, retry_at_s = _failed.get(path, (0, 0.0))
         running = _running.get(path)
-        if running is None and time.monotonic() >= again_s:
+        if running is None and time.monotonic() >= retry_at_s:
             running = _running[path] = _Study(case, path)
     if running is not None:
         if not wait and not running.ended:
             return None
         running.join()
         with _lock:
-            found = _kept(path, case)
-            # Several threads may wait for one study: the first of them counts its failure.
+            found = _cached_results(path, case)
+            # Several threads may wait for one study; only the first counts its failure.
             if _running.get(path) is running:
                 del _running[path]
-                _count(path, failed=found is None)
+                _record_outcome(path, failed=found is None)
             failures, _ = _failed.get(path, (0, 0.0))
         if found is not None:
             return found
     if not wait and failures < _TRIES:
         return None
-    # A pair that is apart at home is checked as hulls anyway.
+    # The hulls of a pair that is apart at home are checked anyway.
     return tuple(Found(Kind.APART if len(each) else Kind.NOT_STUDIED) for each in case.touching)
 
 
-def _count(path: Path, *, failed: bool) -> None:
+def _record_outcome(path: Path, *, failed: bool) -> None:
     if not failed:
         _failed.pop(path, None)
         return
     failures, _ = _failed.get(path, (0, 0.0))
-    pause_s = min(_AGAIN_S * 2**failures, _LATEST_AGAIN_S)
+    pause_s = min(_RETRY_S * 2**failures, _LONGEST_RETRY_S)
     _failed[path] = failures + 1, time.monotonic() + pause_s
-    log.warning("the study of links whose hulls touch failed; it is tried again in %.0f s", pause_s)
+    log.warning("the study of links with touching hulls failed; the next attempt is in %.0f s", pause_s)
 
 
 class _Study:
-    """A process that studies a case, and ends when it takes too long."""
+    """A process that studies a case, with a time limit."""
 
     def __init__(self, case: Case, path: Path) -> None:
-        with tempfile.TemporaryFile() as given:
-            given.write(_stored(case))
-            given.seek(0)
+        with tempfile.TemporaryFile() as file:
+            file.write(_encode_case(case))
+            file.seek(0)
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "robots.collision.pair_study", str(path)],
-                stdin=given,
+                stdin=file,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
             )
 
-        # Its processor time is limited inside; a process that waits or swaps is ended here.
+        # The process limits its CPU time; this limit kills a process that waits or swaps.
         self._until_s = time.monotonic() + 3 * TIME_LIMIT_S
 
     @property
@@ -146,7 +146,7 @@ class _Study:
         return self._process.poll() is not None or time.monotonic() > self._until_s
 
     def join(self) -> None:
-        """Wait until the process has ended; end it when its time is over."""
+        """Wait until the process has ended; kill it at its time limit."""
         try:
             self._process.wait(max(self._until_s - time.monotonic(), 0.0))
         except subprocess.TimeoutExpired:
@@ -154,15 +154,15 @@ class _Study:
             self._process.wait()
 
 
-# Held for both dictionaries, not while a study is waited for.
+# Protects both dictionaries; released while a thread waits for a study.
 _lock = threading.Lock()
 _running: dict[Path, _Study] = {}
-# How many times a study failed, and when it is tried again.
+# Number of failures of a study, and the time of the next attempt.
 _failed: dict[Path, tuple[int, float]] = {}
 
 
 def study(case: Case) -> tuple[Found, ...]:
-    """Study each pair of a case, those whose hulls touch at home first."""
+    """Study each pair of a case, first those with hulls that touch at home."""
     touch = Touch()
     checked, drawn = ([Surface(each) for each in some] for some in (case.checked, case.drawn))
     found: dict[int, Found] = {}
@@ -183,8 +183,8 @@ def _touching_at_home(places: FloatArray, levels: Sequence[tuple[Surface, Surfac
     """Decide how to check a pair whose hulls touch at home.
 
     Args:
-        places: (k, 4, 4) of the second in the first's frame, home first.
-        levels: Both surfaces of the collision geometry, then of the visual one.
+        places: (k, 4, 4) of the second link in the first's frame, home first.
+        levels: Both surfaces of the collision geometry, then both of the visual geometry.
     """
     checked = levels[0]
     if not all(len(surface.triangles) for surface in checked):
@@ -200,10 +200,10 @@ def _touching_at_home(places: FloatArray, levels: Sequence[tuple[Surface, Surfac
 def _apart_at_home(places: FloatArray, one: Surface, other: Surface, touch: Touch) -> Found:
     """Decide how to check a pair that is apart at home.
 
-    Visual meshes do not count: if the collision geometry touches, its author may have widened it on purpose.
+    Visual meshes do not count: the author of the collision geometry may have enlarged it on purpose.
 
     Args:
-        places: (k, 4, 4) of the second in the first's frame where their hulls touch.
+        places: (k, 4, 4) of the second link in the first's frame where their hulls touch.
     """
     triangles = len(one.triangles), len(other.triangles)
     if not all(triangles):
@@ -217,7 +217,7 @@ def _apart_at_home(places: FloatArray, one: Surface, other: Surface, touch: Touc
         if touch.surfaces(one, other, place):
             continue
         if touch.inside(one, other, place):
-            # A check of surfaces would miss it.
+            # A check of the surfaces would miss this contact.
             return Found(Kind.APART)
         false += 1
     return Found(Kind.FALSE_CONTACTS, false / SURVEYED) if false >= FEWEST_FALSE else Found(Kind.APART)
@@ -225,14 +225,14 @@ def _apart_at_home(places: FloatArray, one: Surface, other: Surface, touch: Touc
 
 def _key(case: Case) -> str:
     digest = hashlib.sha256(f"{_VERSION} {case.pairs} {case.placements.shape}".encode())
-    # Rounded: another processor's last digit is no other robot.
+    # Rounded, because the last digit may differ between processors.
     for array in (*case.checked, *case.drawn, case.placements[:8], *case.touching):
         digest.update(f"{array.shape}".encode())
         digest.update((np.round(array, 9) + 0.0).tobytes())
     return digest.hexdigest()
 
 
-def _stored(case: Case) -> bytes:
+def _encode_case(case: Case) -> bytes:
     arrays: dict[str, Any] = {"pairs": np.array(case.pairs), "placements": case.placements}
     for name, some in (("checked", case.checked), ("drawn", case.drawn), ("touching", case.touching)):
         arrays |= {f"{name}{number}": each for number, each in enumerate(some)}
@@ -241,7 +241,7 @@ def _stored(case: Case) -> bytes:
     return buffer.getvalue()
 
 
-def _given(data: bytes) -> Case:
+def _decode_case(data: bytes) -> Case:
     with np.load(io.BytesIO(data)) as arrays:
         count = arrays["placements"].shape[1]
         checked, drawn = (
@@ -252,12 +252,12 @@ def _given(data: bytes) -> Case:
         return Case(pairs, checked, drawn, arrays["placements"], touching)
 
 
-def _saved(found: Sequence[Found]) -> bytes:
+def _encode_results(found: Sequence[Found]) -> bytes:
     return json.dumps(found).encode()
 
 
-def _kept(path: Path, case: Case) -> tuple[Found, ...] | None:
-    """What was found of each pair before; None: nothing, or the file is damaged."""
+def _cached_results(path: Path, case: Case) -> tuple[Found, ...] | None:
+    """Read the result of an earlier study; None if there is none or the file is damaged."""
     try:
         found = tuple(Found(Kind(kind), float(share)) for kind, share in json.loads(path.read_bytes()))
     except (OSError, ValueError, TypeError):
@@ -266,18 +266,18 @@ def _kept(path: Path, case: Case) -> tuple[Found, ...] | None:
 
 
 def main() -> None:
-    """Study the case on standard input, unless another process just did; what is found goes to the file."""
+    """Study the case on standard input and write the result file, unless another process just did."""
     path = Path(sys.argv[1])
     path.parent.mkdir(parents=True, exist_ok=True)
     os.nice(5)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_LIMIT, MEMORY_LIMIT))
     resource.setrlimit(resource.RLIMIT_CPU, (int(TIME_LIMIT_S), int(TIME_LIMIT_S)))
-    # The services of a site ask for the same study at the same time.
+    # The services of a site start the same study at the same time.
     with path.with_suffix(".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        case = _given(sys.stdin.buffer.read())
-        if _kept(path, case) is None:
-            write_atomically(path, _saved(study(case)))
+        case = _decode_case(sys.stdin.buffer.read())
+        if _cached_results(path, case) is None:
+            write_atomically(path, _encode_results(study(case)))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""Where the bodies of an arm are at many positions at once, and how far they get from one to the next.
+"""Placements of an arm's bodies at many positions, and how far they travel between them.
 
-Pinocchio answers for one position a call; a path has thousands.
+Vectorized, because Pinocchio computes one position per call and a path has thousands.
 """
 
 from collections.abc import Iterator
@@ -14,29 +14,29 @@ from robots.joints import FloatArray, JointType
 from robots.kinematic_tree import BASE, Tree
 from robots.poses import axis_rotation
 
-# No body moves farther between two samples of a path.
+# Largest distance that a body travels between two samples of a path.
 SAMPLE_M = 0.005
-# No joint goes farther on a piece of a line [rad] or [m]: none turns once round, and seems to stand.
+# Largest change of a joint on a piece of a line [rad] or [m]. A full turn in one piece would look like rest.
 _PIECE = 0.1
-# In how many parts a piece is cut at first.
+# Initial number of intervals of a piece.
 _FEWEST = 4
-# So many pieces are sampled together.
+# Pieces per batch.
 _TOGETHER = 200
 _CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
 
 
 def placements_along(arm: Arm, positions: FloatArray) -> FloatArray:
-    """(m, bodies, 4, 4) of an arm's bodies to the site [m].
+    """Return the (m, bodies, 4, 4) of an arm's bodies to the site [m].
 
     Args:
         positions: (m, n) [rad] or [m].
     """
     tree = arm.tree
-    everywhere = _everywhere(tree, positions)
+    all_joints = _all_joints(tree, positions)
     to_site: list[FloatArray] = []
     for number, joint in enumerate(tree.joints):
         motion = np.tile(np.eye(4), (len(positions), 1, 1))
-        along = everywhere[:, number]
+        along = all_joints[:, number]
         if joint.type is JointType.ROTARY:
             motion[:, :3, :3] = axis_rotation(np.tile(joint.axis, (len(positions), 1)), along)
         else:
@@ -50,19 +50,19 @@ def placements_along(arm: Arm, positions: FloatArray) -> FloatArray:
     return placements
 
 
-def _everywhere(tree: Tree, positions: FloatArray) -> FloatArray:
-    """(m, all) positions of all joints, also of those that follow others."""
-    everywhere = np.empty((len(positions), len(tree.joints)))
-    everywhere[:, list(tree.free)] = positions
+def _all_joints(tree: Tree, positions: FloatArray) -> FloatArray:
+    """Return the (m, all) positions of all joints, including mimic joints."""
+    all_joints = np.empty((len(positions), len(tree.joints)))
+    all_joints[:, list(tree.free)] = positions
     for number, joint in enumerate(tree.joints):
         if joint.mimic is not None:
-            leader = everywhere[:, joint.mimic.leader]
-            everywhere[:, number] = joint.mimic.multiplier * leader + joint.mimic.offset
-    return everywhere
+            leader = all_joints[:, joint.mimic.leader]
+            all_joints[:, number] = joint.mimic.multiplier * leader + joint.mimic.offset
+    return all_joints
 
 
 def corners_along(bodies: tuple[Body, ...], placements: FloatArray) -> FloatArray:
-    """(m, bodies, 8, 3) the corners of each body's box, in the site's frame [m]."""
+    """Return the (m, bodies, 8, 3) corners of each body's box, in the site's frame [m]."""
     found = np.empty((*placements.shape[:2], len(_CORNERS), 3))
     for number, body in enumerate(bodies):
         corners = body.center + _CORNERS * body.half
@@ -72,22 +72,22 @@ def corners_along(bodies: tuple[Body, ...], placements: FloatArray) -> FloatArra
 
 
 def travelled(bodies: tuple[Body, ...], placements: FloatArray) -> FloatArray:
-    """(m, bodies) how far each body has come since the first sample, at most, at its fastest point [m].
+    """Return the (m, bodies) upper bound of the distance that a point of each body has travelled [m].
 
-    What is between two samples is farther from neither than half of their difference.
+    Between two samples, a body is within half of their difference from one of them.
     """
     steps = np.zeros(placements.shape[:2])
-    # A body moves rigidly: no point of its box moves farther than its corners do.
+    # In a rigid motion, no point of a box travels farther than its corners.
     moved = np.diff(corners_along(bodies, placements), axis=0)
     steps[1:] = np.sqrt((moved * moved).sum(axis=3).max(axis=2))
     return np.cumsum(steps, axis=0)
 
 
 def pieces_of(lines: FloatArray) -> FloatArray:
-    """Straight joint lines cut into short pieces.
+    """Cut straight joint lines into short pieces.
 
     Args:
-        lines: (k, 2, n) their ends [rad] or [m].
+        lines: (k, 2, n) the lines' ends [rad] or [m].
 
     Returns:
         (p, 2, n) the pieces' ends.
@@ -101,19 +101,19 @@ def pieces_of(lines: FloatArray) -> FloatArray:
 
 
 def boxes_of_pieces(arm: Arm, pieces: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """What holds each body on each piece, along the site's axes.
+    """Return the bounding box of each body on each piece, along the site's axes.
 
     Args:
-        pieces: (p, 2, n) as of `pieces_of`.
+        pieces: (p, 2, n) from `pieces_of`.
 
     Returns:
         (p, bodies, 3) lowest and highest corners [m].
     """
     ends = [corners_along(arm.bodies, placements_along(arm, pieces[:, end])) for end in (0, 1)]
-    moves = np.abs(_everywhere(arm.tree, pieces[:, 1]) - _everywhere(arm.tree, pieces[:, 0])).sum(axis=1)
+    moves = np.abs(_all_joints(arm.tree, pieces[:, 1]) - _all_joints(arm.tree, pieces[:, 0])).sum(axis=1)
     farthest = max(np.linalg.norm(at - arm.base_to_site[:3, 3], axis=3).max(initial=0.0) for at in ends)
-    # Where a point is bends by no more than its distance from the joint that turns it (or by 1 m for each
-    # metre of a sliding one): so far it may leave the straight line between both ends.
+    # A point's second derivative is at most its distance from the rotating joint (or 1 m per metre of a
+    # prismatic one). This bounds its deviation from the straight line between both ends.
     bulges = (max(2 * farthest, 1.0) * moves**2 / 8)[:, None, None]
     low = np.minimum(*(at.min(axis=2) for at in ends)) - bulges
     high = np.maximum(*(at.max(axis=2) for at in ends)) + bulges
@@ -121,13 +121,13 @@ def boxes_of_pieces(arm: Arm, pieces: FloatArray) -> tuple[FloatArray, FloatArra
 
 
 def sampled_pieces(arm: Arm, pieces: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Pieces of straight joint lines, sampled so that no body moves more than SAMPLE_M between two samples.
+    """Sample pieces of straight joint lines so that no body travels more than SAMPLE_M between two samples.
 
     Args:
-        pieces: (p, 2, n) as of `pieces_of`.
+        pieces: (p, 2, n) from `pieces_of`.
 
-    Returns:
-        Of each piece (m, bodies, 4, 4) of the bodies to the site, and (m, bodies) how far they have come [m].
+    Yields:
+        For each piece, (m, bodies, 4, 4) of the bodies to the site, and (m, bodies) travelled distances [m].
     """
     for begin in range(0, len(pieces), _TOGETHER):
         part = pieces[begin : begin + _TOGETHER]
@@ -141,12 +141,12 @@ def sampled_pieces(arm: Arm, pieces: FloatArray) -> Iterator[tuple[FloatArray, F
                 for number, share in zip(wanted, shares, strict=True)
             ]
             placements = placements_along(arm, np.concatenate(lines))
-            come = travelled(arm.bodies, placements)
+            travel = travelled(arm.bodies, placements)
             first = 0
             for number, line in zip(wanted, lines, strict=True):
                 here = slice(first, first + len(line))
                 first += len(line)
-                way = come[here] - come[here][0]
+                way = travel[here] - travel[here][0]
                 farthest = np.diff(way, axis=0).max(initial=0.0)
                 if farthest <= SAMPLE_M:
                     found[number] = placements[here], way
@@ -156,13 +156,13 @@ def sampled_pieces(arm: Arm, pieces: FloatArray) -> Iterator[tuple[FloatArray, F
 
 
 def sampled_path(arm: Arm, path: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """A path of straight joint lines, sampled so that no body moves more than SAMPLE_M between two samples.
+    """Sample a path of straight joint lines so that no body travels more than SAMPLE_M between two samples.
 
     Args:
         path: (k, n) the lines' ends [rad] or [m].
 
     Returns:
-        (m, bodies, 4, 4) of the bodies to the site, and (m, bodies) how far they have come [m].
+        (m, bodies, 4, 4) of the bodies to the site, and (m, bodies) travelled distances [m].
     """
     lines = np.stack([path[:-1], path[1:]], axis=1)
     pieces = [placements[1:] for placements, _ in sampled_pieces(arm, pieces_of(lines))]

@@ -1,4 +1,4 @@
-"""What a check of an arm covers of itself, in words: for `robot check`."""
+"""Report on the coverage of an arm's self-collision check, for `robot check`."""
 
 from typing import Any
 
@@ -10,23 +10,23 @@ from robots.description import load
 from robots.joints import FloatArray
 from robots.kinematic_tree import tree_of
 
-# Visual geometry that stands out by less is rounding [m].
+# Visual geometry that protrudes by less is not reported [m].
 _STANDS_OUT_M = 0.005
-# Directions in which that is measured.
+# Directions to measure in.
 _DIRECTIONS = 400
 
 
 def collision_report(model: str) -> dict[str, Any]:
-    """What of an arm is not checked against itself, and what its collision geometry leaves out.
+    """Return the unchecked link pairs of an arm, and gaps in its collision geometry.
 
     Args:
-        model: As `robots.description.load` takes it.
+        model: Source for `robots.description.load`.
 
     Returns:
-        `not_checked`: pairs of links and the reason. `touch_at_home`: pairs that touch at home as hulls, and
-        how they are checked. `touch_elsewhere`: the same of pairs that touch only in other positions, but
-        often. `stands_out`: by link, how far its visual geometry stands out of the hull of its
-        collision geometry [m], if by more than 5 mm.
+        `not_checked`: link pairs and the reason. `touch_at_home`: pairs of which the hulls touch at home, and
+        how they are checked. `touch_elsewhere`: the same for pairs of which the hulls often touch in other
+        positions. `stands_out`: by link, the distance [m] by which its visual geometry protrudes from the
+        hull of its collision geometry, if over 5 mm.
 
     Raises:
         MeshError: If a mesh cannot be read.
@@ -43,7 +43,7 @@ def collision_report(model: str) -> dict[str, Any]:
 
 
 def _beyond(drawn: FloatArray, checked: FloatArray) -> float:
-    """How far one surface stands out of the hull of another, in some hundred directions [m]."""
+    """Return by how much one surface protrudes from the hull of another, over _DIRECTIONS directions [m]."""
     directions = np.random.default_rng(0).standard_normal((_DIRECTIONS, 3))
     directions = np.concatenate([np.eye(3), -np.eye(3), directions])
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)

@@ -1,24 +1,24 @@
-"""Random joint positions that a robot's limits allow."""
+"""Random joint positions within a robot's limits."""
 
 import numpy as np
 
 from robots.joints import FloatArray, Joints, constraint_values
 
-# A pair that touches in a thousandth of all positions is missed once in 22,000 times.
+# A pair that touches in 0.1 % of all positions is missed with a probability of 1 in 22,000.
 SAMPLES = 10_000
-# Walks among coupled limits: rounds of so many steps a joint, each round after the shape that the last found.
+# Walks within coupled limits: rounds, and steps per joint in each. A round uses the shape from the previous.
 _ROUNDS, _STEPS_A_JOINT = 4, 12
 
 
 def allowed_positions(joints: Joints, samples: int, seed: int = 0) -> FloatArray:
-    """Home, then random joint positions that every limit allows, evenly spread: (count, n) [rad] or [m].
+    """Return home, then uniformly distributed joint positions within all limits: (count, n) [rad] or [m].
 
-    Fewer than asked for only where the constraints hold the robot at home.
+    Only home is returned if the constraints leave no other position.
 
-    Coupled limits make the box of the limits a polytope, which may be as thin as one likes. Each position
-    is the end of a walk of its own from home: a random direction, a random point of the line within the
-    polytope, and so on. Directions are stretched as the polytope is (Dikin's ellipsoid about the mean of
-    all walks so far), so that a thin one is walked along as fast as any.
+    Coupled limits cut the box of the limits to a polytope, which may be very thin. Each position is the end
+    of a separate walk from home; each step goes to a random point on a line in a random direction, within the
+    polytope. Directions are scaled by the polytope's shape (Dikin's ellipsoid about the mean of all walks so
+    far), so that the walks are as fast in a thin polytope.
 
     Source: Smith 1984 (hit and run); Kannan, Narayanan 2012 (Dikin walks).
     """
@@ -55,7 +55,7 @@ def _step(
     stretch: FloatArray,
     random: np.random.Generator,
 ) -> FloatArray:
-    """Each position (count, n) moved to a random point of a line through it, within all walls."""
+    """Move each position (count, n) to a random point of a line through it, within all walls."""
     directions = random.standard_normal(positions.shape) @ stretch.T
     towards = directions @ normals.T
     slack = np.maximum(heights - positions @ normals.T, 0.0)

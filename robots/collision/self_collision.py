@@ -1,4 +1,4 @@
-"""Does an arm touch itself: pairs of its links, all in one call of Pinocchio's."""
+"""Self-collision of an arm: all pairs of its links in one call of Pinocchio."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,12 +17,12 @@ Points = tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class OwnPairs:
-    """Bodies of one arm that are checked against each other.
+    """Pairs of one arm's bodies that are checked against each other.
 
     Attributes:
         pairs: Numbers of both bodies among the arm's, in the order of Pinocchio's results.
-        measured: What is checked of each pair: the hulls, or the exact meshes.
-        geometry, workspace: Pinocchio's, of what is measured.
+        measured: The checked bodies of each pair: hulls or exact meshes.
+        geometry, workspace: Pinocchio's models of the measured bodies.
         hulls, hulls_workspace: The same with hulls instead of meshes, for the pairs `meshes`.
     """
 
@@ -39,11 +39,11 @@ Pairs = Sequence[tuple[int, int, tuple[Body, Body]]]
 
 
 def own_pairs(tree: Tree, bodies: Sequence[tuple[int, Body]], pairs: Pairs) -> OwnPairs:
-    """The workspace for checks of an arm's own pairs.
+    """Prepare the self-collision check of an arm.
 
     Args:
         bodies: Each with the number of its link.
-        pairs: Numbers of two bodies, and what is checked of them: themselves, or their exact meshes.
+        pairs: Numbers of two bodies, and the bodies to check: themselves or their exact meshes.
     """
     geometry, hulls = pin.GeometryModel(), pin.GeometryModel()
     numbers: dict[tuple[int, int], int] = {}
@@ -77,7 +77,7 @@ def own_pairs(tree: Tree, bodies: Sequence[tuple[int, Body]], pairs: Pairs) -> O
 
 
 def touching_pairs(own: OwnPairs, model: RobotModel, positions: FloatArray) -> dict[int, Points]:
-    """Numbers of the pairs that touch, and where: (3,) on each, in the base frame [m].
+    """Return the touching pairs by number, with a contact point (3,) on each body, in the base frame [m].
 
     Raises:
         JointCountError: If there is not one value per joint.
@@ -95,7 +95,7 @@ def touching_pairs(own: OwnPairs, model: RobotModel, positions: FloatArray) -> d
 
 
 def nearest_pair(own: OwnPairs, model: RobotModel, positions: FloatArray) -> tuple[int, float, Points] | None:
-    """Number of the pair that is nearest, its distance [m], and where, as `touching_pairs`; None: no pairs.
+    """Return the number of the nearest pair, its distance [m] and its points; None without pairs.
 
     Raises:
         JointCountError: If there is not one value per joint.
@@ -108,7 +108,7 @@ def nearest_pair(own: OwnPairs, model: RobotModel, positions: FloatArray) -> tup
     results = list(own.hulls_workspace.distanceResults)
     distances = np.array([result.min_distance for result in results])
     pin.updateGeometryPlacements(inner, data, own.geometry, own.workspace)
-    # No mesh is nearer than its hull: only pairs whose hulls are nearest are measured as meshes.
+    # A mesh is never nearer than its hull, so measure as meshes only the pairs with the nearest hulls.
     left = set(own.meshes)
     while (number := int(distances.argmin())) in left:
         left.remove(number)

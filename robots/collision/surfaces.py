@@ -1,4 +1,4 @@
-"""Surfaces of links as triangles: do two touch, or is one inside the other?"""
+"""Contact test for two links' surfaces, including one inside the other."""
 
 from functools import cached_property
 from typing import Any
@@ -9,7 +9,7 @@ import numpy as np
 from robots.collision.geometry import TOUCH_M, exact_body, piece_points, transform
 from robots.joints import FloatArray
 
-# A closed surface goes around a point inside it once, around one in a hollow of it not at all.
+# The winding number of a closed surface is 1 for a point inside it, and 0 for a point in a cavity.
 _INSIDE = 0.9
 
 
@@ -21,23 +21,23 @@ class Surface:
 
     @cached_property
     def exact(self) -> Any:
-        """Coal's mesh of it."""
+        """Coal's mesh of the surface."""
         return exact_body(self.triangles).geometry
 
     @cached_property
     def points(self) -> FloatArray:
-        """A corner of each piece that hangs together: (k, 3)."""
+        """A corner of each connected piece: (k, 3)."""
         return np.array([points[0] for points in piece_points(self.triangles)])
 
-    def holds(self, points: FloatArray) -> bool:
-        """Return whether one of some points (k, 3) is inside; an open surface holds none."""
+    def contains_any(self, points: FloatArray) -> bool:
+        """Return whether one of the points (k, 3) is inside; false for an open surface."""
         low, high = self.triangles.min(axis=(0, 1)), self.triangles.max(axis=(0, 1))
         within = points[((points > low) & (points < high)).all(axis=1)]
-        return any(abs(turns_around(self.triangles, point)) > _INSIDE for point in within)
+        return any(abs(winding_number(self.triangles, point)) > _INSIDE for point in within)
 
 
-def turns_around(triangles: FloatArray, point: FloatArray) -> float:
-    """How many times a surface goes around a point: the solid angles of its triangles.
+def winding_number(triangles: FloatArray, point: FloatArray) -> float:
+    """Return the winding number of a surface around a point, from the solid angles of its triangles.
 
     Source: Van Oosterom, Strackee 1983; Jacobson, Kavan, Sorkine-Hornung 2013.
     """
@@ -51,14 +51,18 @@ def turns_around(triangles: FloatArray, point: FloatArray) -> float:
 
 
 class Touch:
-    """Says whether two surfaces touch, or one is inside the other; keeps coal's workspace."""
+    """Contact test of two surfaces, with coal's workspace."""
 
     def __init__(self) -> None:
         self._request, self._result = coal.CollisionRequest(), coal.CollisionResult()
         self._request.security_margin = 2 * TOUCH_M
 
     def __call__(self, one: Surface, other: Surface, other_to_one: FloatArray) -> bool:
-        """Return whether they touch, with the (4, 4) placement of the other in the one's frame."""
+        """Return whether the surfaces touch or one is inside the other.
+
+        Args:
+            other_to_one: (4, 4) placement of the second in the first's frame.
+        """
         return self.surfaces(one, other, other_to_one) or self.inside(one, other, other_to_one)
 
     def surfaces(self, one: Surface, other: Surface, other_to_one: FloatArray) -> bool:
@@ -68,10 +72,12 @@ class Touch:
         return bool(coal.collide(one.exact, _HERE, other.exact, there, self._request, self._result))
 
     def inside(self, one: Surface, other: Surface, other_to_one: FloatArray) -> bool:
-        """Return whether a piece of one is inside the other, of two whose triangles are apart."""
+        """Return whether a piece of one surface is inside the other; their triangles must not touch."""
         rotation, origin = other_to_one[:3, :3], other_to_one[:3, 3]
-        # A piece is then wholly inside, or wholly outside.
-        return one.holds(other.points @ rotation.T + origin) or other.holds((one.points - origin) @ rotation)
+        # A piece is completely inside or outside, so one of its corners is enough.
+        if one.contains_any(other.points @ rotation.T + origin):
+            return True
+        return other.contains_any((one.points - origin) @ rotation)
 
 
 _HERE = coal.Transform3s(np.eye(3), np.zeros(3))

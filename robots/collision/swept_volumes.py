@@ -1,7 +1,7 @@
-"""What an arm keeps clear of on its way: bodies that stand, and bodies that may be anywhere along a path.
+"""Obstacles on an arm's path: bodies at rest, and bodies that may be anywhere on a path of their robot.
 
-Another robot's way may be as long as a program. It is first looked at in coarse pieces, each line of it once;
-only the pieces that are near what the arm itself passes are sampled.
+Another robot's path may be as long as a program. It is cut into coarse pieces, each line once, and only the
+pieces near the volume that the checked arm sweeps are sampled.
 """
 
 from collections.abc import Mapping
@@ -27,30 +27,30 @@ from robots.collision.path import (
 )
 from robots.joints import FloatArray
 
-# An arm's own path is looked at in so many parts.
+# Number of boxes for the volume that an arm sweeps.
 _WINDOWS = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """A body in one place, or in some that it passes one after the other.
+    """A body at rest, or at consecutive samples of a path.
 
     Attributes:
         name: "<robot>/<link>" or "<fixture>".
         placements: (s, 4, 4) to the site [m].
-        come: (s,) how far it has come [m].
-        box: About all of it; (1, ...).
+        travel: (s,) distance that the body has travelled [m].
+        box: Bounding box of the sweep; (1, ...).
     """
 
     name: str
     body: Body
     placements: FloatArray
-    come: FloatArray
+    travel: FloatArray
     box: Boxes
     _transforms: dict[int, Any] = field(default_factory=dict)
 
     def place(self, number: int) -> Any:
-        """A placement as coal has it."""
+        """Return coal's form of a placement."""
         found = self._transforms.get(number)
         if found is None:
             found = self._transforms[number] = transform(self.placements[number])
@@ -58,13 +58,13 @@ class Sweep:
 
     @cached_property
     def between_m(self) -> float:
-        """Between two places it is no farther than this from one of them."""
-        return float(np.diff(self.come).max(initial=0.0)) / 2
+        """Largest distance of the body, between two samples, from the nearer of them [m]."""
+        return float(np.diff(self.travel).max(initial=0.0)) / 2
 
 
 @dataclass(frozen=True, eq=False)
 class Passed:
-    """Boxes along the site's axes that hold all that an arm's moving bodies pass [m].
+    """Boxes along the site's axes that contain the volume that an arm's moving bodies sweep [m].
 
     Attributes:
         low, high: (w, 3).
@@ -74,7 +74,7 @@ class Passed:
     high: FloatArray
 
     def near(self, low: FloatArray, high: FloatArray, within_m: float) -> NDArray[np.bool_]:
-        """Which of some boxes (..., 3) come this near: (...)."""
+        """Return which of the boxes (..., 3) are within a distance: (...)."""
         found = np.zeros(low.shape[:-1], dtype=np.bool_)
         for own_low, own_high in zip(self.low, self.high, strict=True):
             gaps = np.maximum(np.maximum(low - own_high, own_low - high), 0.0)
@@ -83,33 +83,33 @@ class Passed:
 
 
 def passed_along(arm: Arm, placements: FloatArray) -> Passed:
-    """What an arm's moving bodies pass.
+    """Return the boxes that an arm's moving bodies sweep.
 
     Args:
-        placements: (m, bodies, 4, 4) at samples of its path, to the site [m].
+        placements: (m, bodies, 4, 4) at samples of the arm's path, to the site [m].
     """
     corners = corners_along(arm.bodies, placements)[:, arm.moving]
     parts = [part for part in np.array_split(corners, _WINDOWS) if len(part)]
     low = np.concatenate([part.min(axis=(0, 2)) for part in parts])
     high = np.concatenate([part.max(axis=(0, 2)) for part in parts])
-    # What is between two samples is no farther from one of them than this.
+    # Between two samples, a body is within this distance of one of them.
     return Passed(low - SAMPLE_M, high + SAMPLE_M)
 
 
 def sweeps_of(
     cell: Cell, robot: str, others: Mapping[str, FloatArray], *, passed: Passed, within_m: float
 ) -> list[Sweep]:
-    """The fixtures of a cell, and what the other robots sweep.
+    """Return the sweeps of a cell's fixtures and of the other robots.
 
     Args:
-        others: As `near_along`.
-        passed: By the arm that is checked.
-        within_m: What comes no nearer to that is left out, if it moves.
+        others: See `near_along`.
+        passed: The boxes that the checked arm sweeps.
+        within_m: Leave out moving bodies that are farther than this from these boxes.
     """
     found = []
-    standing = cell.fixtures
-    for name, body, placement in zip(standing.names, standing.bodies, standing.placements, strict=True):
-        found.append(_standing(name, body, placement))
+    fixtures = cell.fixtures
+    for name, body, placement in zip(fixtures.names, fixtures.bodies, fixtures.placements, strict=True):
+        found.append(_at_rest(name, body, placement))
     for other, path in others.items():
         if other == robot:
             continue
@@ -120,7 +120,7 @@ def sweeps_of(
         lines = {key: line for key, line in lines.items() if key[0] != key[1]}
         (places,) = placements_along(arm, path[:1])
         found += [
-            _standing(name, body, place)
+            _at_rest(name, body, place)
             for name, body, place, moves in zip(arm.names, arm.bodies, places, arm.moving, strict=True)
             if not (moves and lines)
         ]
@@ -129,12 +129,12 @@ def sweeps_of(
     return found
 
 
-def _standing(name: str, body: Body, placement: FloatArray) -> Sweep:
+def _at_rest(name: str, body: Body, placement: FloatArray) -> Sweep:
     return Sweep(name, body, placement[None], np.zeros(1), boxes_of([body], placement[None]))
 
 
 def _swept(arm: Arm, lines: FloatArray, passed: Passed, within_m: float) -> list[Sweep]:
-    """What an arm's moving bodies sweep on (k, 2, n) straight lines."""
+    """Return the sweeps of an arm's moving bodies on (k, 2, n) straight lines."""
     pieces = pieces_of(lines)
     low, high = boxes_of_pieces(arm, pieces)
     near = passed.near(low, high, within_m) & arm.moving
@@ -142,25 +142,25 @@ def _swept(arm: Arm, lines: FloatArray, passed: Passed, within_m: float) -> list
     centers, halves = (low + high) / 2, (high - low) / 2
     found = []
     sampled = sampled_pieces(arm, pieces[wanted])
-    for piece, (placements, come) in zip(wanted.tolist(), sampled, strict=True):
+    for piece, (placements, travel) in zip(wanted.tolist(), sampled, strict=True):
         for number in np.flatnonzero(near[piece]).tolist():
             box = Boxes(centers[piece, number][None], np.eye(3)[None], halves[piece, number][None])
-            places, way = placements[:, number], come[:, number]
+            places, way = placements[:, number], travel[:, number]
             found.append(Sweep(arm.names[number], arm.bodies[number], places, way, box))
     return found
 
 
 def least_of_sweep(gauge: Gauge, body: Body, at: Any, sweep: Sweep, cutoff_m: float) -> tuple[float, int]:
-    """The distance of a body to a sweep [m], and the number of the nearest place.
+    """Return the distance of a body to a sweep [m], and the number of the nearest placement.
 
-    Only one that is no more than `cutoff_m` is exact; a greater one says that no place is nearer than it.
-    One that is no more than what a sweep's places leave out between them counts as touching.
+    The distance is exact up to `cutoff_m`; a larger value is a lower bound. A distance up to the sweep's
+    `between_m` counts as contact.
 
     Args:
-        at: The body's placement as coal has it.
+        at: Coal's form of the body's placement.
     """
     between = sweep.between_m
-    least = _least(gauge, body, at, sweep, 0, len(sweep.come), max(cutoff_m, between))
+    least = _least(gauge, body, at, sweep, 0, len(sweep.travel), max(cutoff_m, between))
     return (0.0, least[1]) if least[0] <= between else least
 
 
@@ -171,8 +171,8 @@ def _least(
     distance = gauge.distance(body, at, sweep.body, sweep.place(middle))
     if end - first == 1:
         return distance, middle
-    come = sweep.come
-    spread = max(float(come[end - 1] - come[middle]), float(come[middle] - come[first]))
+    travel = sweep.travel
+    spread = max(float(travel[end - 1] - travel[middle]), float(travel[middle] - travel[first]))
     if distance - spread > cutoff_m:
         return distance - spread, middle
     least = distance, middle

@@ -1,4 +1,4 @@
-"""How a pair of an arm's own links is checked, or why it is not: the kinds, and their English text."""
+"""Verdicts on the pairs of an arm's links: how a pair is checked, or why not, with English texts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,18 +6,18 @@ from enum import StrEnum
 
 
 class Kind(StrEnum):
-    """Why a pair is not checked (the first four), or as what it is checked and why."""
+    """The reason why a pair is not checked (the first four), or the geometry that is checked and why."""
 
     ADJACENT = "adjacent"
     DESCRIPTION = "description"
     SRDF = "srdf"
     ALWAYS = "always"
-    # Hulls that are apart at home, and touch elsewhere too seldom to matter, or as the meshes do.
+    # The hulls are apart at home. Elsewhere they seldom touch, or the meshes touch too.
     APART = "apart"
-    # Hulls that are apart at home, and touch in many other positions.
+    # The hulls are apart at home and touch in many other positions.
     FALSE_CONTACTS = "false_contacts"
     TOO_LARGE = "too_large"
-    # Hulls that touch at home.
+    # The hulls touch at home.
     COLLISION_MESHES = "collision_meshes"
     VISUAL_MESHES = "visual_meshes"
     TOUCHING = "touching"
@@ -26,9 +26,9 @@ class Kind(StrEnum):
 
 
 IGNORED = frozenset({Kind.ADJACENT, Kind.DESCRIPTION, Kind.SRDF, Kind.ALWAYS})
-# What is checked as exact meshes.
+# Kinds that are checked with exact meshes.
 EXACT = frozenset({Kind.FALSE_CONTACTS, Kind.COLLISION_MESHES, Kind.VISUAL_MESHES})
-# Hulls are apart at home; the texts name a share of the positions.
+# The hulls are apart at home; the texts give a share of the positions.
 ELSEWHERE = frozenset({Kind.FALSE_CONTACTS, Kind.TOO_LARGE})
 
 _TEXTS: Mapping[Kind, str] = {
@@ -52,10 +52,10 @@ _TEXTS: Mapping[Kind, str] = {
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is decided of a pair of links.
+    """The decision on how to check a pair of links.
 
     Attributes:
-        values: What the text names: the file, the number or share of positions, limits of the study.
+        values: The text's parameters: the file, the number or share of positions, limits of the study.
     """
 
     links: tuple[str, str]

@@ -1,4 +1,4 @@
-"""Inverse kinematics: joint positions for a tool's pose, each put back through the forward kinematics."""
+"""Inverse kinematics: joint positions for a tool pose, each verified by forward kinematics."""
 
 from robots.inverse.solver import InverseResult, InverseSolver, build_solver, follow, solve
 from robots.inverse.tasks import Task, natural_task, tool_pose

@@ -1,4 +1,4 @@
-"""The joints that move a tool, without all that hangs beside them, in Pinocchio's terms."""
+"""Pinocchio model of only the joints that move the tool."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -16,20 +16,20 @@ from robots.schema import JointType, RobotDescription
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """The joints between the base and the tool. One thread at a time: its workspace is reused.
+    """The joints between the base and the tool. Not thread-safe: every call uses the same workspace.
 
-    `x` below is (m,): positions of those of the robot's joints that move the tool, [rad] or [m].
+    In this module, `x` is (m,): positions of the robot's joints that move the tool, [rad] or [m].
 
     Attributes:
-        joints: All of the robot's.
-        moving: (m,) numbers of those that move the tool, in the robot's order.
+        joints: All joints of the robot.
+        moving: (m,) numbers of the joints that move the tool, in the robot's order.
         lower, upper, home: (m,).
-        limits: Lower and upper limit of each, and the weight of its squared difference: 1 / range^2.
-        rotary: Whether all of the chain turn.
-        serial: Whether each joint of the chain is one of the robot's own: none follows another.
-        axes, origins: (c, 3) of the chain's joints in the base frame, all positions 0, [m].
-        tool_to_base: (4, 4) with all positions 0.
-        reach: How far from the first joint the tool can be at most, its limits aside where they turn [m].
+        limits: Lower and upper limit of each joint, and the weight of its squared difference: 1 / range^2.
+        rotary: Whether all joints of the chain are rotary.
+        serial: Whether the chain has no mimic joint.
+        axes, origins: (c, 3) of the chain's joints in the base frame, at position zero [m].
+        tool_to_base: (4, 4) at position zero.
+        reach: Upper bound of the tool's distance from the first joint, ignoring rotary limits [m].
     """
 
     joints: Joints
@@ -53,14 +53,14 @@ class Chain:
 
 
 def build_chain(description: RobotDescription) -> Chain:
-    """The chain of a description's tool."""
+    """Build the chain of a description's tool."""
     tree, joints = tree_of(description), joints_of(description)
     on_link, tool_to_link = tool_frame(description)
     link = next(link for link in tree.links if link.name == on_link)
     numbers = chain_to(tree, link.joint)
     factors, offsets = (each[list(numbers)] for each in position_factors(tree))
-    own = np.flatnonzero((factors != 0).any(axis=0))
-    factors = factors[:, own]
+    moving = np.flatnonzero((factors != 0).any(axis=0))
+    factors = factors[:, moving]
     model = pin.Model()
     parent = 0
     for joint in (tree.joints[number] for number in numbers):
@@ -71,7 +71,7 @@ def build_chain(description: RobotDescription) -> Chain:
     pin.framesForwardKinematics(model, data, np.zeros(len(numbers)))
     placed = [np.array(data.oMi[row + 1].homogeneous) for row in range(len(numbers))]
     tool_to_base = np.array(data.oMf[frame].homogeneous)
-    lower, upper = joints.lower[own], joints.upper[own]
+    lower, upper = joints.lower[moving], joints.upper[moving]
     origins = np.array([placement[:3, 3] for placement in placed]).reshape(-1, 3)
     rotary = np.array([tree.joints[number].type is JointType.ROTARY for number in numbers], dtype=bool)
     strokes = np.abs(factors) @ np.maximum(np.abs(lower), np.abs(upper)) + np.abs(offsets)
@@ -80,10 +80,10 @@ def build_chain(description: RobotDescription) -> Chain:
     weights = 1.0 / np.maximum(upper - lower, 1e-9) ** 2
     return Chain(
         joints=joints,
-        moving=own,
+        moving=moving,
         lower=lower,
         upper=upper,
-        home=joints.home[own],
+        home=joints.home[moving],
         limits=tuple(zip(lower.tolist(), upper.tolist(), weights.tolist(), strict=True)),
         rotary=bool(rotary.all()),
         serial=serial,
@@ -103,11 +103,11 @@ def build_chain(description: RobotDescription) -> Chain:
 
 
 def placement_misses(chain: Chain, x: FloatArray, target: Any, rows: int) -> tuple[float, float]:
-    """How far the tool is from a target at x: [m] and [rad].
+    """Return the tool's deviation from a target at x: [m] and [rad].
 
     Args:
         target: A pin.SE3, tool to base.
-        rows: What counts, as `misses` has it.
+        rows: See `misses`.
     """
     q = x if chain._factors is None else chain._factors @ x + chain._offsets
     pin.framesForwardKinematics(chain._model, chain._data, q)

@@ -1,4 +1,4 @@
-"""Every way to hold the arm, in closed form, for the families of arms that EAIK knows.
+"""All solutions in closed form, for the families of arms that EAIK supports.
 
 Source: Ostermeier, Kuelz, Althoff 2025, "Automatic geometric decomposition for analytical inverse
 kinematics".
@@ -18,9 +18,9 @@ from robots.inverse.tasks import Task
 from robots.joints import FloatArray
 
 _TURN = 2 * pi
-# A limit met but for rounding [rad].
+# Tolerance of limits for rounding [rad].
 _ROUNDING = 1e-9
-# What an exact solution may miss by [m] and [rad]; worse ones are no solutions, or made better first.
+# Largest deviation of an exact solution [m] and [rad]; others are refined or dropped.
 EXACT = 1e-9
 _TRIALS = 8
 
@@ -29,11 +29,11 @@ Windows = tuple[tuple[float, float, float, float], ...]
 
 @dataclass(frozen=True, eq=False)
 class ClosedForm:
-    """An arm whose solutions are known in closed form.
+    """The closed-form solution of an arm.
 
     Attributes:
-        rolls: The last joint turns about the tool's own z axis: the five-dimensional task leaves it free.
-        from_home: Its windows about home.
+        rolls: The last joint rotates about the tool's z axis, so the 5d task leaves it free.
+        from_home: The `windows` about home.
     """
 
     chain: Chain
@@ -42,12 +42,12 @@ class ClosedForm:
     _eaik: Any
 
     def covers(self, task: Task) -> bool:
-        """Whether it tells all solutions of a task."""
+        """Return whether the closed form gives all solutions of a task."""
         return task is Task.POSE_6D or (task is Task.POSITION_AND_AXIS_5D and self.rolls)
 
 
 def closed_form(chain: Chain) -> ClosedForm | None:
-    """The closed form of a chain; None: there is none, or it does not stand a trial."""
+    """Return the closed form of a chain; None if the arm is unsupported or verification fails."""
     if not (chain.serial and chain.rotary and len(chain.moving) in (5, 6)):
         return None
     joints_and_tool = np.vstack([np.zeros(3), chain.origins, chain.tool_to_base[:3, 3]])
@@ -55,18 +55,18 @@ def closed_form(chain: Chain) -> ClosedForm | None:
     if not arm.has_known_decomposition():
         return None
     axis, away = chain.tool_to_base[:3, 2], chain.tool_to_base[:3, 3] - chain.origins[-1]
-    beside = np.abs([*np.cross(chain.axes[-1], axis), *np.cross(axis, away)]).max()
-    form = ClosedForm(chain, bool(beside < 1e-9), windows(chain, chain.home), arm)
+    off_axis = np.abs([*np.cross(chain.axes[-1], axis), *np.cross(axis, away)]).max()
+    form = ClosedForm(chain, bool(off_axis < 1e-9), windows(chain, chain.home), arm)
     random = np.random.default_rng(0)
     return (
         form
-        if all(_proves(form, random.uniform(-np.pi, np.pi, len(chain.moving))) for _ in range(_TRIALS))
+        if all(_recovers(form, random.uniform(-np.pi, np.pi, len(chain.moving))) for _ in range(_TRIALS))
         else None
     )
 
 
-def _proves(form: ClosedForm, x: FloatArray) -> bool:
-    """Whether it finds its way back to x."""
+def _recovers(form: ClosedForm, x: FloatArray) -> bool:
+    """Return whether the closed form finds x again from its tool pose."""
     placement_misses(form.chain, x, pin.SE3.Identity(), 6)
     exact, _ = candidates(form, np.array(form.chain._placement.homogeneous))
     apart = [np.abs(np.remainder(found - x + np.pi, _TURN) - np.pi).max() for found in exact]
@@ -74,7 +74,7 @@ def _proves(form: ClosedForm, x: FloatArray) -> bool:
 
 
 def candidates(form: ClosedForm, tool_to_base: FloatArray) -> tuple[list[list[float]], list[list[float]]]:
-    """Positions (m,) [rad], limits aside, turns as they come: solutions, and nearest guesses."""
+    """Return positions (m,) [rad], ignoring limits, with arbitrary turns: solutions, and approximations."""
     found = form._eaik.calculate_IK(tool_to_base)
     exact: list[list[float]] = []
     guesses: list[list[float]] = []
@@ -84,11 +84,11 @@ def candidates(form: ClosedForm, tool_to_base: FloatArray) -> tuple[list[list[fl
 
 
 def windows(chain: Chain, start: FloatArray) -> Windows:
-    """For each joint the whole turn within limits that has start in its middle, as far as limits let it.
+    """Return for each joint the full turn within limits that is centred on the start, as far as limits allow.
 
     Returns:
-        Where it begins and the upper limit [rad], both with room for rounding, start, and the weight of a
-        squared difference from it.
+        Its beginning and the upper limit [rad], both with a tolerance for rounding; the start; and the weight
+        of a squared difference from the start.
     """
     return tuple(
         (
@@ -101,10 +101,11 @@ def windows(chain: Chain, start: FloatArray) -> Windows:
     )
 
 
-def turned(found: Sequence[list[float]], within: Windows) -> Iterator[list[float]]:
-    """Those that are within limits but for rounding, each joint by the turn that is nearest to start's.
+def within_limits(found: Sequence[list[float]], within: Windows) -> Iterator[list[float]]:
+    """Yield the solutions within limits, with each joint at the turn nearest to the start's.
 
-    The nearest first, before the others are looked at: squared differences, as shares of the joints' ranges.
+    The nearest comes first, before the others are examined. The distance is the sum of squared differences,
+    as shares of the joints' ranges.
     """
     nearer = _inside(found, within, nearer_only=True)
     if nearer:
@@ -118,9 +119,12 @@ def turned(found: Sequence[list[float]], within: Windows) -> Iterator[list[float
 def _inside(
     found: Sequence[list[float]], within: Windows, *, nearer_only: bool
 ) -> list[tuple[float, list[float]]]:
-    """Those within limits, with their distance from start; or only each that is nearer than all before it.
+    """Return solutions within limits with their distance from the start.
 
-    In plain numbers, because for so few an array's every operation costs as much as all of this.
+    Uses Python numbers: for so few, one array operation takes as long as this function.
+
+    Args:
+        nearer_only: Return only solutions that are nearer than all before them.
     """
     kept = []
     least_distance = inf
@@ -128,7 +132,7 @@ def _inside(
         here, distance = [], 0.0
         for position, (least, most, middle, weight) in zip(each, within):  # noqa: B905, a tenth of the time
             turn = (position - least) % _TURN + least
-            if not turn <= most:  # nor is it a number
+            if not turn <= most:  # true for NaN too
                 break
             here.append(turn)
             turn -= middle

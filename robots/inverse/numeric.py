@@ -1,7 +1,7 @@
-"""Joint positions by trying: Levenberg-Marquardt from one start after another.
+"""Numeric inverse kinematics: Levenberg-Marquardt from several starts.
 
-Each step solves (J^T J + w E) dx = J^T e, E = |e|^2 / 2: the damping fades with the error, so that the
-last steps are Newton's own.
+Each step solves (J^T J + w E) dx = J^T e, E = |e|^2 / 2. The damping decreases with the error, so the last
+steps are Newton steps.
 
 Source: Sugihara 2011, "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method".
 """
@@ -19,22 +19,22 @@ from robots.inverse.chain import Chain, placement_misses
 from robots.inverse.tasks import TOLERANCE_M, TOLERANCE_RAD
 from robots.joints import FloatArray
 
-# Steps of one descent, and the weight of its damping; found by trying on UR5, Panda and Puma 560.
+# Steps of one descent, and the weight of its damping; tuned on UR5, Panda and Puma 560.
 _STEPS = 60
 _DAMPING = 0.02
-# A squared error [m^2 + rad^2] that rounding alone explains.
+# Squared errors [m^2 + rad^2] at the level of rounding: the end of a descent, and an exact result.
 _EXACT = 1e-24
 _AS_EXACT = 1e-18
-# What a radian counts, in metres, where the place counts first.
+# Weight of a radian in metres if the position has priority.
 _ORIENTATION = 3e-3
-# A descent is given up where so many steps have not halved its squared error.
+# A descent ends if this number of steps has not halved its squared error.
 _PATIENCE = 6
 _LOCAL = pin.ReferenceFrame.LOCAL
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Where a descent ended: x (m,) [rad] or [m], and how far the tool is from its target there."""
+    """The end of a descent: x (m,) [rad] or [m], and the tool's deviation from its target there."""
 
     x: FloatArray
     residual_m: float
@@ -42,31 +42,31 @@ class Found:
 
     @property
     def near_enough(self) -> bool:
-        """Within what counts as a solution."""
+        """True if the deviation is within the tolerances of a solution."""
         return self.residual_m <= TOLERANCE_M and self.residual_rad <= TOLERANCE_RAD
 
     @property
     def exact(self) -> bool:
-        """As near as rounding lets it be."""
+        """True if the deviation is at the level of rounding."""
         return self.squared < _AS_EXACT
 
     @property
     def squared(self) -> float:
-        """[m^2 + rad^2]: what a search makes small."""
+        """Squared error [m^2 + rad^2], which the search minimizes."""
         return self.residual_m**2 + self.residual_rad**2
 
 
 def descend(
     chain: Chain, target: Any, rows: int, x: FloatArray, *, limited: bool = True, place_first: bool = False
 ) -> Found:
-    """The nearest place to a target that can be walked to from x.
+    """Minimize the deviation from a target, from a start.
 
     Args:
         target: A pin.SE3, tool to base.
-        rows: What counts: 6 for the pose, 5 for position and axis, 3 for the position alone.
-        x: (m,) where to begin.
+        rows: Compared rows: 6 for the pose, 5 for position and axis, 3 for the position.
+        x: (m,) the start.
         limited: Stay within limits.
-        place_first: Where not all can be had, the place counts before the orientation.
+        place_first: Give the position priority over the orientation.
     """
     model, data, frame, placement = chain._model, chain._data, chain._frame, chain._placement
     factors, offsets = chain._factors, chain._offsets
@@ -91,14 +91,14 @@ def descend(
             patience -= 1
             if not patience:
                 break
-        # Pinocchio gives a 1-D array for one joint.
+        # Pinocchio returns a 1-D array for one joint.
         jacobian = jacobian.reshape(6, -1)[:rows]
         if factors is not None:
             jacobian = jacobian @ factors
         if place_first:
             jacobian = jacobian * np.where(np.arange(rows) < 3, 1.0, _ORIENTATION)[:, None]
         if stopped:
-            # Whom a limit stops takes no part in the step: else all steps of the others are too short.
+            # Exclude joints that a limit stops: otherwise the steps of the other joints are too short.
             pull = np.dot(error, jacobian)
             jacobian = jacobian * ~(((x >= chain.upper) & (pull > 0)) | ((x <= chain.lower) & (pull < 0)))
         damping = (_DAMPING * squared + 1e-14) * identity
@@ -108,32 +108,32 @@ def descend(
             step = x + np.dot(turned, factor.solve(error))
         else:
             factor.compute(np.dot(turned, jacobian) + damping)
-            # As in the Jacobian, one joint is a case of its own.
+            # The solver too returns a different shape for one joint.
             step = x + factor.solve(np.dot(turned, error)).reshape(-1)
         x = clipped(chain, step) if limited else step
-        stopped = limited and x.tolist() != step.tolist()  # a quarter of what asking the arrays costs
+        stopped = limited and x.tolist() != step.tolist()  # a quarter of the time of comparing the arrays
     return Found(x, *placement_misses(chain, x, target, rows))
 
 
 def clipped(chain: Chain, x: FloatArray) -> FloatArray:
-    """x with each position within its limits."""
+    """Clip each position of x to its limits."""
     return np.minimum(np.maximum(x, chain.lower), chain.upper)
 
 
 def _axis_error(away: Any) -> FloatArray:
-    """What is left of position and of the tool's z axis: (5,) in the tool's frame."""
+    """Return the error of the position and the tool's z axis: (5,) in the tool's frame."""
     x, y, z = away.translation.tolist()
     sideways, upwards, along = away.rotation[:, 2].tolist()
     across = hypot(sideways, upwards)
     if across < 1e-300:
-        # Straight ahead, or straight behind, where every turn is as good: one about x.
+        # The axes are parallel or opposite. For opposite axes any rotation axis will do: take x.
         return np.array((x, y, z, 0.0 if along > 0 else pi, 0.0))
     turn = atan2(across, along) / across
     return np.array((x, y, z, -upwards * turn, sideways * turn))
 
 
 def starts(chain: Chain, seed: int) -> Iterator[FloatArray]:
-    """Where to begin: at home, then anywhere within limits, the same for the same seed."""
+    """Yield starts of a search: home, then random positions within limits, reproducible by the seed."""
     yield chain.home
     random = np.random.default_rng(seed)
     while True:

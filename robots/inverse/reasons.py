@@ -1,4 +1,4 @@
-"""Why there is no solution: out of reach, limits, not this orientation."""
+"""Reasons for a pose without a solution: out of reach, limits, orientation."""
 
 from collections.abc import Sequence
 from itertools import islice
@@ -14,7 +14,7 @@ from robots.joints import FloatArray, violations
 from robots.schema import JointType
 
 _TRIES = 30
-# An orientation is sought along with its place, which then is missed by this at most.
+# Tolerated position error in the search for the best orientation at the position.
 _AT_PLACE_M = 1e-4
 
 
@@ -27,29 +27,28 @@ def reason_for_none(
     around: FloatArray,
     seed: int,
 ) -> tuple[str, Found]:
-    """Why no joint positions put the tool at a target, for people: in degrees and millimetres.
+    """Return why no joint positions put the tool at a target, in degrees and millimetres.
 
     Args:
         target: A pin.SE3, tool to base.
-        beyond: What `solutions_beyond` found.
-        nearest: What came nearest, within limits.
-        around: (n,) where the joints are that do not move the tool.
+        beyond: The result of `solutions_beyond`.
+        nearest: The nearest result within limits.
+        around: (n,) positions of the joints that do not move the tool.
 
     Returns:
-        The reason, and what comes nearest in that light.
+        The reason, and the nearest result with respect to it.
     """
     if beyond:
-        return f"limits: found only with {_forbidden(chain, beyond, around)}", nearest
+        return f"limits: found only with {_violated_limits(chain, beyond, around)}", nearest
     if beyond_reach(chain, target):
         away, reach = _mm(_distance(chain, target)), _mm(chain.reach)
-        said = f"{away} from the first joint, and the tool gets no further away than {reach}"
-        return f"out of reach: {said}", nearest
+        return f"out of reach: {away} from the first joint; the tool reaches at most {reach}", nearest
     begins = [nearest.x, *islice(starts(chain, seed), _TRIES)]
     there = [descend(chain, target, Task.POSITION_3D.rows, begin) for begin in begins]
     closest = min(there, key=lambda each: each.residual_m)
     if not closest.near_enough:
-        said = f"within its limits the tool comes no nearer to this place than {_mm(closest.residual_m)}"
-        return f"out of reach: {said}", nearest
+        gap = _mm(closest.residual_m)
+        return f"out of reach: within its limits the tool stays at least {gap} from this position", nearest
     posed = [
         Found(each.x, *placement_misses(chain, each.x, target, task.rows))
         for each in there
@@ -58,42 +57,42 @@ def reason_for_none(
     turned = [descend(chain, target, task.rows, each.x, place_first=True) for each in posed]
     at_place = [each for each in (*posed, *turned) if each.residual_m < _AT_PLACE_M]
     nearest = min(at_place, key=lambda each: each.residual_rad)
-    what = "orientation" if task is Task.POSE_6D else "axis"
-    said = f"the tool can be there, but its {what} would be {degrees(nearest.residual_rad):.2f}° off at best"
-    return f"not this orientation: {said}", nearest
+    aspect = "orientation" if task is Task.POSE_6D else "axis"
+    off = f"{degrees(nearest.residual_rad):.2f}°"
+    return f"not this orientation: at this position, the tool's {aspect} is at least {off} off", nearest
 
 
 def solutions_beyond(
     chain: Chain, target: Any, task: Task, known: Sequence[Sequence[float]], nearest: Found, seed: int
 ) -> list[FloatArray]:
-    """Solutions (m,) where there were no limits, each rotary joint by the turn that is nearest to its own.
+    """Return solutions (m,) that ignore limits, with each rotary joint at the turn nearest to its limits.
 
     Args:
         target: A pin.SE3, tool to base.
-        known: Those in closed form; where there are none, they are searched for.
-        nearest: What came nearest, within limits.
+        known: Solutions in closed form; without any, solutions are searched for.
+        nearest: The nearest result within limits.
     """
     placed = [np.array(x) for x in known]
     found = [Found(x, *placement_misses(chain, x, target, task.rows)) for x in placed]
     if not any(each.near_enough for each in found) and not beyond_reach(chain, target):
         begins = [nearest.x, *islice(starts(chain, seed), _TRIES)]
         found = [descend(chain, target, task.rows, begin, limited=False) for begin in begins]
-    return [_turned(chain, each.x) for each in found if each.near_enough]
+    return [_nearest_turns(chain, each.x) for each in found if each.near_enough]
 
 
 def beyond_reach(chain: Chain, target: Any) -> bool:
-    """Whether a target, a pin.SE3, is further away than all links in a row."""
+    """Return whether a target, a pin.SE3, is further away than the stretched arm reaches."""
     return _distance(chain, target) > chain.reach + TOLERANCE_M
 
 
 def _distance(chain: Chain, target: Any) -> float:
-    # A tool that no joint moves has a first joint where it is itself.
+    # Without a joint that moves the tool, measure from the tool.
     first = chain.origins[0] if len(chain.origins) else chain.tool_to_base[:3, 3]
     return float(np.linalg.norm(target.translation - first))
 
 
-def _turned(chain: Chain, x: FloatArray) -> FloatArray:
-    """Rotary positions by the turn that is nearest to the middle of their limits."""
+def _nearest_turns(chain: Chain, x: FloatArray) -> FloatArray:
+    """Shift rotary positions by whole turns to the nearest to the middle of their limits."""
     middle = (chain.lower + chain.upper) / 2
     types = [chain.joints.types[number] for number in chain.moving]
     turns = np.round((x - middle) / (2 * np.pi)) * [kind is JointType.ROTARY for kind in types]
@@ -101,28 +100,26 @@ def _turned(chain: Chain, x: FloatArray) -> FloatArray:
     return turned
 
 
-def _forbidden(chain: Chain, solutions: Sequence[FloatArray], around: FloatArray) -> str:
-    """What forbids the solution that is least forbidden."""
+def _violated_limits(chain: Chain, solutions: Sequence[FloatArray], around: FloatArray) -> str:
+    """Return the limits that the solution closest to them violates."""
 
     def excess(x: FloatArray) -> float:
         return float(np.maximum(np.maximum(chain.lower - x, x - chain.upper), 0.0).sum())
 
     x = min(solutions, key=excess)
     joints = chain.joints
-    said = []
+    violated = []
     for number, position in zip(chain.moving.tolist(), x.tolist(), strict=True):
         lower, upper = float(joints.lower[number]), float(joints.upper[number])
         if not lower <= position <= upper:
             of = joints.types[number]
             limits = f"{_position(lower, of)} to {_position(upper, of)}"
-            said.append(
-                f"joint {joints.names[number]} at {_position(position, of)}, which can be at {limits}"
-            )
-    if not said:
+            violated.append(f"joint {joints.names[number]} at {_position(position, of)}, limits {limits}")
+    if not violated:
         positions = around.copy()
         positions[chain.moving] = x
-        said = [str(each) for each in violations(joints, positions)]
-    return " and ".join(said)
+        violated = [str(each) for each in violations(joints, positions)]
+    return " and ".join(violated)
 
 
 def _position(position: float, of: JointType) -> str:

@@ -1,4 +1,4 @@
-"""Joint positions for a tool's pose: in closed form where there is one, otherwise by search."""
+"""Solver for joint positions of a tool pose: in closed form if the arm has one, otherwise by search."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -12,33 +12,33 @@ from numpy.typing import ArrayLike
 
 from robots.errors import PoseError
 from robots.inverse.chain import Chain, build_chain, placement_misses
-from robots.inverse.closed_form import EXACT, ClosedForm, candidates, closed_form, turned, windows
+from robots.inverse.closed_form import EXACT, ClosedForm, candidates, closed_form, windows, within_limits
 from robots.inverse.numeric import Found, clipped, descend, starts
 from robots.inverse.reasons import beyond_reach, reason_for_none, solutions_beyond
 from robots.inverse.tasks import Task, tool_pose
 from robots.joints import FloatArray, as_positions
 from robots.schema import RobotDescription
 
-# Descents until a search gives up, and of one for all solutions.
+# Descents until a search gives up, and solutions that are enough in a search for all.
 _TRIES = 300
 _SAMPLE = 100
-# Descents where a solution is unlikely, or where one is known that might be better.
+# Descents if a solution is unlikely, or if one is known and a better one may exist.
 _FEW_TRIES = 20
-# So many solutions are found for the nearest to be chosen, unless the walk from `near` itself ends at one.
+# Solutions to find before the nearest is chosen, unless the descent from `near` already gives one.
 _FEW = 3
-# Nearer than this, two solutions are one [rad] or [m].
+# Solutions within this distance are equal [rad] or [m].
 _SAME = 1e-6
-# Whoever moves further between two places of a line is on another branch [rad] or [m].
+# A larger joint step between two poses of a line leads to another branch [rad] or [m].
 _BRANCH = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class InverseSolver:
-    """What solving needs to know of a robot. One thread at a time: its workspace is reused.
+    """Inverse kinematics of a robot. Not thread-safe: every call uses the same workspace.
 
     Attributes:
         chain: The joints that move the tool.
-        closed: None where there is no closed form.
+        closed: The closed form; None without one.
     """
 
     chain: Chain
@@ -47,15 +47,15 @@ class InverseSolver:
 
 @dataclass(frozen=True, eq=False)
 class InverseResult:
-    """What came of solving.
+    """The result of inverse kinematics.
 
     Attributes:
-        solutions: (k, n) joint positions [rad] or [m], the nearest first; none is a guess.
-        residual_m: How far the tool is from its target, of the worst solution; where there is none,
-            at the nearest place that was found.
-        residual_rad: The same, of its orientation, or of its axis.
-        reason: Why there is none; empty where there is one.
-        analytic: In closed form: every branch is known, each by the turns that are nearest.
+        solutions: (k, n) joint positions [rad] or [m], the nearest first; all verified.
+        residual_m: The tool's distance from its target at the worst solution; without a solution, at the
+            nearest position found.
+        residual_rad: The same for the orientation or axis.
+        reason: The reason for no solution; empty with a solution.
+        analytic: The solutions are in closed form and cover every branch, each at the nearest turns.
     """
 
     solutions: FloatArray
@@ -66,7 +66,7 @@ class InverseResult:
 
 
 def build_solver(description: RobotDescription) -> InverseSolver:
-    """A solver for a description's tool."""
+    """Build a solver for a description's tool."""
     chain = build_chain(description)
     return InverseSolver(chain, closed_form(chain))
 
@@ -80,55 +80,55 @@ def solve(
     all_solutions: bool = False,
     seed: int = 0,
 ) -> InverseResult:
-    """Joint positions within limits that put the tool there: the nearest to `near`, or all.
+    """Find the joint positions within limits that put the tool at a pose: the nearest to `near`, or all.
 
-    The same for the same arguments, always. Where a search has to find them, "the nearest" and "all"
-    are of those that it found.
+    Deterministic: equal arguments give equal results. In a search, "the nearest" and "all" refer to the
+    solutions that it found.
 
     Args:
         tool_to_base: (4, 4) or 16 numbers by rows [m].
-        near: (n,) joint positions [rad] or [m]; none: home. Joints that do not move the tool stay there.
-        seed: Of the search's starts.
+        near: (n,) joint positions [rad] or [m]; None: home. Joints that do not move the tool stay there.
+        seed: Seed of the search's starts.
 
     Raises:
-        PoseError: If the pose is none, or `near` holds a number that is not finite.
+        PoseError: If the pose is invalid, or `near` holds a number that is not finite.
         JointCountError: If `near` does not have one value per joint.
     """
     chain, closed = solver.chain, solver.closed
     pose = tool_pose(tool_to_base)
     target = pin.SE3(pose)
-    around = chain.joints.home if near is None else _within(chain, near)
+    around = chain.joints.home if near is None else _clipped_start(chain, near)
     wanted = None if all_solutions else 1
     exact: list[list[float]] = []
     guesses: list[list[float]] = []
     if closed is not None and closed.covers(task):
-        exact, nearly = candidates(closed, pose)
+        exact, approximate = candidates(closed, pose)
         start = around[chain.moving]
         if task is Task.POSITION_AND_AXIS_5D:
             for x in exact:
                 x[-1] = float(start[-1])
         within = closed.from_home if near is None else windows(chain, start)
-        found = list(islice(_verified(chain, turned(exact, within), target, task, around), wanted))
+        found = list(islice(_verified(chain, within_limits(exact, within), target, task, around), wanted))
         if found:
             return _answer(chain, found, around, analytic=True)
-        guesses = list(turned(nearly, within))
+        guesses = list(within_limits(approximate, within))
     enough = _SAMPLE if all_solutions else 1 if near is None else _FEW
-    found, nearest = _searched(
+    found, nearest = _search(
         chain,
         target,
         task,
-        _begins(chain, target, around, exact, guesses, seed),
+        _search_starts(chain, target, around, exact, guesses, seed),
         around,
         enough=enough,
-        # Whoever guesses in closed form has guessed every branch.
+        # The approximations of the closed form cover every branch.
         soon=1 + len(guesses) if guesses else max(enough, _FEW_TRIES),
     )
     if found:
         return _answer(chain, found[:wanted], around, analytic=False)
-    # What limits forbid may be allowed close by: a corner of them is hard to walk into.
+    # A corner of the limits is hard to reach by descent: start from solutions beyond limits, clipped to them.
     beyond = solutions_beyond(chain, target, task, exact, nearest, seed)
     corners = [nearest.x, *(clipped(chain, x) for x in beyond)]
-    found, nearest = _searched(chain, target, task, corners, around, enough=enough, soon=len(corners))
+    found, nearest = _search(chain, target, task, corners, around, enough=enough, soon=len(corners))
     if found:
         return _answer(chain, found[:wanted], around, analytic=False)
     reason, nearest = reason_for_none(chain, target, task, beyond, nearest, around, seed)
@@ -139,17 +139,17 @@ def solve(
 def follow(
     solver: InverseSolver, tool_to_base: ArrayLike, *, task: Task, near: ArrayLike
 ) -> FloatArray | None:
-    """The joint positions (n,) that the arm comes to from `near` without changing its branch.
+    """Return the joint positions (n,) of a pose on the branch of `near`.
 
     Returns:
-        None: there are none close by: a joint would have to move by more than 0.5 rad or m.
+        None if there are none close by: a joint would have to move by more than 0.5 rad or m.
 
     Raises:
-        PoseError, JointCountError: As `solve`.
+        PoseError, JointCountError: See `solve`.
     """
     chain = solver.chain
     target = pin.SE3(tool_pose(tool_to_base))
-    around = _within(chain, near)
+    around = _clipped_start(chain, near)
     found = descend(chain, target, task.rows, around[chain.moving])
     moved = np.abs(found.x - around[chain.moving])
     if not found.near_enough or moved.max(initial=0.0) > _BRANCH or not _allowed(chain, found.x, around):
@@ -157,31 +157,31 @@ def follow(
     return _positions(chain, found.x, around)
 
 
-def _within(chain: Chain, near: ArrayLike) -> FloatArray:
+def _clipped_start(chain: Chain, near: ArrayLike) -> FloatArray:
     positions = as_positions(chain.joints, near)
     if not np.isfinite(positions).all():
-        raise PoseError(f"is asked for near {positions.tolist()}, where a number is not finite")
+        raise PoseError(f"was requested near {positions.tolist()}, which has a number that is not finite")
     return np.minimum(np.maximum(positions, chain.joints.lower), chain.joints.upper)
 
 
 def _verified(
     chain: Chain, found: Iterable[list[float]], target: Any, task: Task, around: FloatArray
 ) -> Iterator[Found]:
-    """Those that put the tool there, made better where rounding spoilt them; each once."""
-    told: list[FloatArray] = []
+    """Yield each solution that puts the tool at the target once, refined if rounding made it inexact."""
+    known: list[FloatArray] = []
     for each in found:
         x = clipped(chain, np.array(each))
         here = Found(x, *placement_misses(chain, x, target, task.rows))
         if here.residual_m > EXACT or here.residual_rad > EXACT:
             here = descend(chain, target, task.rows, x)
-        if not here.near_enough or (told and any(np.abs(here.x - other).max() < _SAME for other in told)):
+        if not here.near_enough or (known and any(np.abs(here.x - other).max() < _SAME for other in known)):
             continue
         if _allowed(chain, here.x, around):
-            told.append(here.x)
+            known.append(here.x)
             yield here
 
 
-def _begins(
+def _search_starts(
     chain: Chain,
     target: Any,
     around: FloatArray,
@@ -189,13 +189,13 @@ def _begins(
     guesses: list[list[float]],
     seed: int,
 ) -> Iterator[FloatArray]:
-    """Where a search begins: where the arm is, at guesses, at home, anywhere."""
+    """Return the starts of a search: the arm's position, approximations, home, random positions."""
     first = [around[chain.moving], *map(np.array, guesses)]
-    in_vain = bool(exact) or beyond_reach(chain, target)
-    return islice(joined(first, starts(chain, seed)), len(first) + (_FEW_TRIES if in_vain else _TRIES))
+    unlikely = bool(exact) or beyond_reach(chain, target)
+    return islice(joined(first, starts(chain, seed)), len(first) + (_FEW_TRIES if unlikely else _TRIES))
 
 
-def _searched(
+def _search(
     chain: Chain,
     target: Any,
     task: Task,
@@ -205,11 +205,11 @@ def _searched(
     enough: int,
     soon: int,
 ) -> tuple[list[Found], Found]:
-    """Solutions that are found from one of `begins`, the nearest first; and what came nearest to one.
+    """Search from each of `begins`; return the solutions, nearest first, and the best descent.
 
     Args:
-        enough: So many will do.
-        soon: After so many descents one will do; and one that the search could not make exact.
+        enough: Number of solutions at which the search ends.
+        soon: Number of descents after which one solution is enough, even one that is not exact.
     """
     found: list[Found] = []
     rough: list[Found] = []
@@ -233,7 +233,7 @@ def _searched(
 
 
 def _allowed(chain: Chain, x: FloatArray, around: FloatArray) -> bool:
-    """Whether coupled limits allow what each joint's own do."""
+    """Return whether the coupled limits allow x, which is within each joint's limits."""
     constraints = chain.joints.constraints
     if not constraints:
         return True

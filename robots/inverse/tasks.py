@@ -1,4 +1,4 @@
-"""What is asked of the tool, which pose counts as one, and how near is there."""
+"""Tasks of the tool, validation of poses, and the tolerances of a solution."""
 
 from enum import StrEnum
 from math import atan2, hypot, sqrt
@@ -10,19 +10,19 @@ from robots.errors import PoseError
 from robots.joints import Joints
 from robots.poses import FloatArray, inverse
 
-# What two decimals leave of degrees and millimetres, which is all that controllers of the paper's kind are
-# told: nearer than this, a solution is one. What can be reached at all is reached far closer.
+# Tolerances of a solution: the rounding error of two decimals in degrees and millimetres, which is the
+# resolution of the paper's controllers. Reachable poses are reached with much smaller errors.
 TOLERANCE_M = 1e-5
 TOLERANCE_RAD = 2e-4
 
-# Written by hand with four decimals, a rotation is not quite one.
+# A rotation written by hand with four decimals is not exactly orthonormal.
 _ROUNDING = 2e-3
 _EXACT = 1e-12
 _FARTHEST_M = 1e6
 
 
 class Task(StrEnum):
-    """What of the tool's pose counts; for the five, its roll about its own z axis is free."""
+    """The constrained part of the tool's pose; 5d leaves the roll about the tool's z axis free."""
 
     POSE_6D = "6d"
     POSITION_AND_AXIS_5D = "5d"
@@ -30,23 +30,23 @@ class Task(StrEnum):
 
     @property
     def rows(self) -> int:
-        """How many numbers it fixes."""
+        """The number of constrained degrees of freedom."""
         return int(self[0])
 
 
 def natural_task(joints: Joints) -> Task:
-    """What an arm of that many joints can do anywhere: the whole pose from six joints on."""
+    """Return the task that suits the number of joints: the full pose from six joints on."""
     return Task.POSE_6D if len(joints) >= 6 else Task.POSITION_AND_AXIS_5D
 
 
 def tool_pose(values: ArrayLike) -> FloatArray:
-    """A tool's pose as (4, 4), its rotation made exact.
+    """Return a tool pose as (4, 4) with an exact rotation.
 
     Args:
         values: (4, 4), or its 16 numbers by rows: tool to base [m].
 
     Raises:
-        PoseError: If it is none: the text says what is wrong.
+        PoseError: If the values are not a pose; the text says why.
     """
     try:
         pose = np.array(values, dtype=np.float64)
@@ -56,8 +56,8 @@ def tool_pose(values: ArrayLike) -> FloatArray:
         has = f"{pose.size} numbers" if pose.ndim == 1 else f"numbers of shape {pose.shape}"
         raise PoseError(f"has {has}; 16 are right, 4 rows of 4")
     pose = pose.reshape(4, 4)
-    # Most poses come from programs and are exact, and this is half of the time that an answer may take.
-    return pose if _exact(pose.ravel().tolist()) else _mended(pose)
+    # Most poses come from programs and are exact. The full validation would double the time of an answer.
+    return pose if _exact(pose.ravel().tolist()) else _orthonormalized(pose)
 
 
 def _exact(numbers: list[float]) -> bool:
@@ -75,9 +75,9 @@ def _exact(numbers: list[float]) -> bool:
     )
 
 
-def _mended(pose: FloatArray) -> FloatArray:
+def _orthonormalized(pose: FloatArray) -> FloatArray:
     if not np.isfinite(pose).all():
-        raise PoseError(f"holds {pose[~np.isfinite(pose)][0]}; every number is to be finite")
+        raise PoseError(f"holds {pose[~np.isfinite(pose)][0]}; every number must be finite")
     if pose[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
         raise PoseError(f"has the last row {' '.join(f'{x:g}' for x in pose[3])}; 0 0 0 1 is right")
     if np.abs(pose[:3, 3]).sum() >= _FARTHEST_M:
@@ -86,7 +86,7 @@ def _mended(pose: FloatArray) -> FloatArray:
     if np.abs(rotation).max() > 2 or np.abs(rotation @ rotation.T - np.eye(3)).max() > _ROUNDING:
         lengths = " ".join(f"{length:.4g}" for length in np.hypot.reduce(rotation, axis=1))
         raise PoseError(
-            "has no rotation in its first 3 rows and columns: the rows are to be of length 1 and at right "
+            "has no rotation in its first 3 rows and columns: the rows must have length 1 and be at right "
             f"angles, these have the lengths {lengths}"
         )
     if np.linalg.det(rotation) < 0:
@@ -97,16 +97,16 @@ def _mended(pose: FloatArray) -> FloatArray:
 
 
 def tool_misses(tool: FloatArray, wanted: FloatArray, task: Task) -> tuple[float, float]:
-    """How far a tool (4, 4) is from where it is wanted: [m] and [rad]."""
+    """Return the deviation of a tool (4, 4) from the wanted pose: [m] and [rad]."""
     return misses((inverse(tool) @ wanted).ravel().tolist(), task.rows)
 
 
 def misses(placement: list[float], rows: int) -> tuple[float, float]:
-    """How far a target is from the tool: [m] and [rad].
+    """Return the deviation of a target from the tool: [m] and [rad].
 
     Args:
         placement: The 16 numbers of target to tool, by rows.
-        rows: What counts: 6 for the pose, 5 for position and axis, 3 for the position alone.
+        rows: Compared rows: 6 for the pose, 5 for position and axis, 3 for the position.
     """
     xx, xy, xz, x, yx, yy, yz, y, zx, zy, zz, z, *_ = placement
     away = sqrt(x * x + y * y + z * z)

@@ -1,4 +1,4 @@
-"""Teach programs: their text, the motion that they come to, and its check before it is made.
+"""Teach programs: text, motion plan, and the check of a motion before it is executed.
 
-Nothing is imported here: whoever only passes steps on needs no coal and no Pinocchio.
+This file imports nothing, so a process that only forwards steps needs no coal and no Pinocchio.
 """

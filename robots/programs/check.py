@@ -1,4 +1,4 @@
-"""A motion is gone through before it is made: how long it takes, and all that is wrong with it."""
+"""Check of a motion before it is executed: its duration and its violations."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ from robots.joints import FloatArray, Joints, as_positions, violations
 from robots.motion import HOMING_REST_S, HOMING_SPEED, straight_motion
 from robots.programs.path import PathSamples
 from robots.programs.plan import plan_program
-from robots.programs.segments import Looker, Stretch
+from robots.programs.segments import Segment, SegmentChecker
 from robots.programs.steps import (
     INTERPOLATION,
     CheckResult,
@@ -29,9 +29,9 @@ from robots.programs.steps import (
 from robots.programs.text import parse_program
 from robots.programs.violations import Runs
 
-# Timings of different motions: what a repeat comes to again is not timed again.
+# Size of the cache of motions' timings.
 _MOST_KEPT = 1_000
-# Times at which a motion's progress is tabled, closer where it is slow: at its ends.
+# Shares of a motion's duration at which its progress is tabulated, denser at its slow ends.
 _TABLE = (1 - np.cos(np.linspace(0.0, np.pi, 129))) / 2
 
 
@@ -45,12 +45,12 @@ def check_program(
     solver: InverseSolver | None = None,
     far: bool = True,
 ) -> CheckResult:
-    """Read, plan and check a program; a text that cannot be read gets violations of kind "program".
+    """Parse, plan and check a program; a text that cannot be read gets violations of kind "program".
 
     Args:
-        start: (n,) where the arm stands [rad] or [m].
-        others, far: As of `check_plan`.
-        solver: Of this arm; built unless given.
+        start: (n,) the arm's position [rad] or [m].
+        others, far: See `check_plan`.
+        solver: The arm's solver; by default a new one.
 
     Raises:
         JointCountError: If some positions do not have one value per joint.
@@ -60,12 +60,12 @@ def check_program(
     try:
         program = parse_program(text, arm.joints)
     except ProgramError as error:
-        return _unread(error, start)
+        return _unreadable(error, start)
     solver = build_solver(arm.description) if solver is None else solver
     plan = plan_program(program, arm, solver, start)
-    # A plan begins with the speed that it counts on.
+    # Every plan begins with a SPEED step.
     if not plan.violations and all(step.kind is StepKind.SPEED for step in plan.steps):
-        return _unread(ProgramError([(1, "the program has no statement that does anything")]), start)
+        return _unreadable(ProgramError([(1, "the program has no statement that does anything")]), start)
     return check_plan(cell, robot, start, plan, others={} if others is None else others, far=far)
 
 
@@ -78,15 +78,14 @@ def check_plan(
     others: Mapping[str, FloatArray],
     far: bool = True,
 ) -> CheckResult:
-    """Check steps against limits, promises, the arm itself and all that is around it.
+    """Check steps against limits, tool speeds, self-collisions and the obstacles of the cell.
 
     Args:
-        start: (n,) where the arm stands, at rest [rad] or [m].
+        start: (n,) the arm's position at rest [rad] or [m].
         plan: A plan, or its steps; before the first SPEED the arm moves at 100 %.
-        others: (k, n) straight joint path of each other robot of the cell that counts, from where it is to
-            where it has been told to go (k = 1: it stands): the whole of it, whenever the robot passes.
-        far: Whether the path's clearances are asked for also where nothing is near; without them a check is
-            sooner done.
+        others: (k, n) straight joint path of each other robot to check against, from its position to its
+            commanded target (k = 1: it does not move). The arm is checked against all of it at any time.
+        far: Compute exact clearances far from obstacles too, which takes longer.
 
     Raises:
         JointCountError: If some positions do not have one value per joint.
@@ -100,13 +99,13 @@ def check_plan(
         plan = Plan(tuple(plan))
     checker = _Checker(arm.joints)
     ways = {name: np.atleast_2d(way) for name, way in others.items() if name != robot}
-    looker = Looker(cell, robot, ways, far=far)
-    for step, stretch in looker.stretches(start, (*plan.steps, _standing(start, plan.steps))):
-        checker.take(step, stretch)
+    segment_checker = SegmentChecker(cell, robot, ways, far=far)
+    for step, segment in segment_checker.segments(start, (*plan.steps, _final_step(start, plan.steps))):
+        checker.take(step, segment)
     ends = [replace(each, time_s=checker.time_s, until_s=checker.time_s) for each in plan.violations]
     found = (*_start_violations(arm.joints, start), *checker.limits, *checker.runs.violations())
     notes = (*_cover_notes(cell, robot, others), *_floor_notes(cell, found))
-    notes = (*notes, *_untold(checker.runs), *plan.notes)
+    notes = (*notes, *_unreported(checker.runs), *plan.notes)
     result = _result(
         checker.time_s,
         (*sorted(found, key=lambda each: each.time_s), *ends),
@@ -119,7 +118,7 @@ def check_plan(
 
 @dataclass(frozen=True, eq=False)
 class _Timing:
-    """When a stretch's samples are reached [s], and how fast its shares pass then [1/s]."""
+    """Times of a segment's samples [s], and the rate of its share there [1/s]."""
 
     duration_s: float
     times_s: FloatArray
@@ -127,7 +126,7 @@ class _Timing:
 
 
 class _Checker:
-    """Goes through the steps; keeps time, and what was found."""
+    """Accumulator of the time and the findings of consecutive steps."""
 
     def __init__(self, joints: Joints) -> None:
         self.time_s = 0.0
@@ -140,7 +139,7 @@ class _Checker:
         self._line, self._line_began = 0, 0
         self._timings: dict[tuple[bytes, bytes, float], _Timing] = {}
 
-    def take(self, step: Step, stretch: Stretch | None) -> None:
+    def take(self, step: Step, segment: Segment | None) -> None:
         match step.kind:
             case StepKind.SPEED:
                 assert step.percent is not None
@@ -149,24 +148,24 @@ class _Checker:
                 assert step.seconds is not None
                 self.time_s += step.seconds
             case StepKind.MOVE | StepKind.HOME:
-                assert stretch is not None
+                assert segment is not None
                 homing = step.kind is StepKind.HOME
-                self._go(step, stretch, self._speed * (HOMING_SPEED if homing else 1.0))
+                self._go(step, segment, self._speed * (HOMING_SPEED if homing else 1.0))
                 self.time_s += HOMING_REST_S if homing else 0.0
             case StepKind.TRACE:
                 pass
 
-    def _go(self, step: Step, stretch: Stretch, speed: float) -> None:
-        timing = self._timing(stretch, speed)
+    def _go(self, step: Step, segment: Segment, speed: float) -> None:
+        timing = self._timing(segment, speed)
         if step.line != self._line:
             self._line, self._line_began = step.line, self._sample
         times = self.time_s + timing.times_s
-        speeds = stretch.rates * timing.rates
-        self.path.add(times, stretch.positions, stretch.tools, speeds, stretch.clearances, step.line)
-        if stretch.limits and timing.duration_s > 0:
-            self.limits.append(_beyond(step.line, stretch.limits, self.time_s, times[-1]))
-        for index, finding in stretch.findings:
-            self.runs.met(
+        speeds = segment.rates * timing.rates
+        self.path.add(times, segment.positions, segment.tools, speeds, segment.clearances, step.line)
+        if segment.limits and timing.duration_s > 0:
+            self.limits.append(_limit_violation(step.line, segment.limits, self.time_s, times[-1]))
+        for index, finding in segment.findings:
+            self.runs.add(
                 line=step.line,
                 sample=self._sample + index,
                 time_s=float(times[index]),
@@ -178,15 +177,15 @@ class _Checker:
                 stops=finding.stops,
             )
         if step.tool_speed is not None:
-            self._promise(step, speeds, times, step.tool_speed)
+            self._check_tool_speed(step, speeds, times, step.tool_speed)
         self._sample += len(times) - 1
         self.time_s = float(times[-1])
 
-    def _promise(self, step: Step, speeds: FloatArray, times: FloatArray, most: float) -> None:
-        # Rounding alone breaks no promise. A line's parts each begin and end at rest: that is one violation.
+    def _check_tool_speed(self, step: Step, speeds: FloatArray, times: FloatArray, most: float) -> None:
+        # Tolerate rounding. The parts of a line each begin and end at rest, but count as one violation.
         for index in np.flatnonzero(speeds > most * (1 + 1e-6)).tolist():
             sample = self._sample + index
-            self.runs.met(
+            self.runs.add(
                 line=step.line,
                 sample=sample,
                 time_s=float(times[index]),
@@ -196,25 +195,25 @@ class _Checker:
                 within=max(sample - self._line_began, 1),
             )
 
-    def _timing(self, stretch: Stretch, speed: float) -> _Timing:
-        start, target = stretch.positions[0], stretch.positions[-1]
+    def _timing(self, segment: Segment, speed: float) -> _Timing:
+        start, target = segment.positions[0], segment.positions[-1]
         key = (start.tobytes(), target.tobytes(), speed)
         timing = self._timings.get(key)
         if timing is None:
-            timing = _timing(self._joints, start, target, speed, len(stretch.positions))
+            timing = _timing(self._joints, start, target, speed, len(segment.positions))
             if len(self._timings) < _MOST_KEPT:
                 self._timings[key] = timing
         return timing
 
 
-def _standing(start: FloatArray, steps: Sequence[Step]) -> Step:
-    """The end: where the arm stands after the last step, for no time."""
+def _final_step(start: FloatArray, steps: Sequence[Step]) -> Step:
+    """Return a motion of length 0 at the final position, so that the end is checked."""
     ends = [step.target for step in steps if step.target is not None]
     line = steps[-1].line if steps else 0
     return Step(line=line, kind=StepKind.MOVE, target=ends[-1] if ends else start)
 
 
-def _beyond(line: int, limits: Sequence[Reason], begin_s: float, until_s: float) -> Violation:
+def _limit_violation(line: int, limits: Sequence[Reason], begin_s: float, until_s: float) -> Violation:
     return Violation(
         line=line,
         time_s=begin_s,
@@ -236,7 +235,7 @@ def _timing(joints: Joints, start: FloatArray, target: FloatArray, speed: float,
 
 
 def _start_violations(joints: Joints, start: FloatArray) -> tuple[Violation, ...]:
-    """An arm that stands beyond a limit may go back: that warns."""
+    """Return a warning if the arm starts beyond a limit; it may move back."""
     found = violations(joints, start)
     if not found:
         return ()
@@ -250,19 +249,19 @@ def _cover_notes(cell: Cell, robot: str, others: Mapping[str, FloatArray]) -> tu
     notes = []
     for name in (robot, *(other for other in others if other != robot)):
         if bare := unshaped(cell, name):
-            whose = "" if name == robot else f" of {name}"
-            notes.append(f"without a shape, so never found to touch anything: {', '.join(bare)}{whose}")
+            owner = "" if name == robot else f" of {name}"
+            notes.append(f"not checked for collisions, because they have no shape: {', '.join(bare)}{owner}")
     if robot in pending(cell):
         notes.append("links whose hulls touch are not studied yet; until then they are checked as hulls")
     notes += [
-        f"{name} is left out: nobody knows where it is now"
+        f"{name} is left out: its position is unknown"
         for name in cell.arms
         if name != robot and name not in others
     ]
     if not len(cell.fixtures) and len(cell.arms) == 1:
-        what = "nothing stands" if cell.floor is None else "only the floor is"
+        obstacles = "no obstacle" if cell.floor is None else "only the floor"
         also = ", no floor" if cell.floor is None else ""
-        notes.append(f"{what} around the arm: its cell has no fixture{also} and no other robot")
+        notes.append(f"{obstacles} around the arm: its cell has no fixture{also} and no other robot")
     return tuple(notes)
 
 
@@ -273,11 +272,11 @@ def _floor_notes(cell: Cell, found: Sequence[Violation]) -> tuple[str, ...]:
     return (floor_advice(cell.floor, min(heights)),)
 
 
-def _untold(runs: Runs) -> tuple[str, ...]:
-    return (f"{runs.untold} more violations are not told",) if runs.untold else ()
+def _unreported(runs: Runs) -> tuple[str, ...]:
+    return (f"{runs.unreported} more violations are not listed",) if runs.unreported else ()
 
 
-def _unread(error: ProgramError, start: FloatArray) -> CheckResult:
+def _unreadable(error: ProgramError, start: FloatArray) -> CheckResult:
     found = tuple(
         Violation(
             line=line,
@@ -288,7 +287,7 @@ def _unread(error: ProgramError, start: FloatArray) -> CheckResult:
         for line, text in error.problems
     )
     more = error.found - len(found)
-    notes = (f"{more} more problems are not told",) if more else ()
+    notes = (f"{more} more problems are not listed",) if more else ()
     return _result(0.0, found, (), notes, PathSamples(len(start)))
 
 

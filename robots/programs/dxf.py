@@ -1,4 +1,4 @@
-"""A drawing's curves as a program of lines: the paper's way from CAD to motion.
+"""Conversion of a drawing's curves to a program of lines, as in the paper's path from CAD to motion.
 
 LWPOLYLINE, POLYLINE    with their arcs
 LINE, ARC, CIRCLE, ELLIPSE, SPLINE
@@ -25,24 +25,24 @@ from robots.schema import nearest
 
 _CURVES = {"LINE", "LWPOLYLINE", "POLYLINE", "CIRCLE", "ARC", "ELLIPSE", "SPLINE"}
 _MOST_CURVES = 5_000
-# A curve of so many points is no drawing that a person made; and far more than a program takes.
+# Far more points of a curve than a program can hold.
 _MOST_POINTS = 100_000
-# Ends nearer than this are one place.
+# Ends within this distance are joined.
 _JOINED_MM = 0.01
 
 
 @dataclass(frozen=True)
 class DxfPath:
-    """Which curves, and where they lie.
+    """Selection of curves, and their placement.
 
     Attributes:
-        layer: All curves of this layer; or empty.
-        handle: The one curve of this handle; or empty.
-        frame: Of the drawing in the arm's base frame: x y z [mm], roll pitch yaw [deg].
+        layer: Take all curves of this layer, unless empty.
+        handle: Take the curve with this handle, unless empty.
+        frame: Pose of the drawing in the arm's base frame: x y z [mm], roll pitch yaw [deg].
         tool: Roll, pitch and yaw of the tool in that frame [deg].
-        approach_mm: How far above the curves, along the frame's z, the tool comes and goes.
-        tolerance_mm: How far a curve may be from the straight parts that stand for it.
-        unit_mm: The drawing's unit, where it does not say it itself; 0: refuse it then.
+        approach_mm: Height above the curves, along the frame's z, at which the tool approaches and departs.
+        tolerance_mm: Largest deviation of a curve from its straight parts.
+        unit_mm: The drawing's unit if the file does not state it; 0: reject such a file.
     """
 
     layer: str = ""
@@ -54,93 +54,91 @@ class DxfPath:
     unit_mm: float = 0.0
 
 
-def program_from_dxf(path: Path, asked: DxfPath) -> str:
-    """The text of a program that follows curves of a drawing, one after the other as they are drawn.
+def program_from_dxf(path: Path, selection: DxfPath) -> str:
+    """Return the text of a program that follows curves of a drawing, in the drawing's order.
 
     Raises:
-        MeshError: If it is no DXF file, has no such curves, or they come to more than a program holds.
+        MeshError: If the file is not DXF, does not have such curves, or they exceed the size of a program.
     """
     content(path)
     try:
         drawing, _ = open_drawing(path)
-        unit_mm = UNITS_M.get(int(drawing.header.get("$INSUNITS", 0) or 0), 0.0) * 1000 or asked.unit_mm
+        unit_mm = UNITS_M.get(int(drawing.header.get("$INSUNITS", 0) or 0), 0.0) * 1000 or selection.unit_mm
         if not unit_mm:
-            raise MeshError(path, "does not say its unit ($INSUNITS): give it with --unit, in mm")
-        entities = _entities(path, drawing, asked)
-        curves = [_flattened(path, each, asked.tolerance_mm / unit_mm) * unit_mm for each in entities]
+            raise MeshError(path, "does not state its unit ($INSUNITS); give it with --unit, in mm")
+        entities = _entities(path, drawing, selection)
+        curves = [_flattened(path, each, selection.tolerance_mm / unit_mm) * unit_mm for each in entities]
     except MeshError:
         raise
     except MemoryError as error:
-        raise MeshError(path, "needs more memory than there is") from error
-    # ezdxf raises whatever its code runs into on broken files.
+        raise MeshError(path, "needs more memory than is available") from error
+    # ezdxf raises arbitrary exceptions on damaged files.
     except Exception as error:
         first = next(iter(str(error).splitlines()), "")[:200]
-        raise MeshError(path, f"is no DXF that can be read: {first or type(error).__name__}") from error
+        raise MeshError(path, f"cannot be read as DXF: {first or type(error).__name__}") from error
     chains = [_distinct(chain) for chain in _joined(curves)]
     chains = [chain for chain in chains if len(chain) > 1]
     if not chains:
         raise MeshError(path, "its curves have no length")
-    which = f"curve {asked.handle}" if asked.handle else f"layer {asked.layer}"
+    which = f"curve {selection.handle}" if selection.handle else f"layer {selection.layer}"
     what = f"{path.name}, {which}: {len(chains)} path{'s' if len(chains) > 1 else ''}"
-    comment = f"# {what}, curves flattened to {number(asked.tolerance_mm)} mm"
-    # A name may hold a line break.
-    lines = [" ".join(comment.split()), *_lines(chains, asked)]
+    comment = f"# {what}, curves flattened to {number(selection.tolerance_mm)} mm"
+    # A file or layer name may contain a line break.
+    lines = [" ".join(comment.split()), *_lines(chains, selection)]
     text = "".join(f"{line}\n" for line in lines)
     if len(text.encode()) > MOST_BYTES or len(lines) > MOST_LINES:
         count = sum(len(chain) for chain in chains)
         raise MeshError(
-            path, f"comes to {count} points, more than a program holds: take a larger tolerance, or one curve"
+            path, f"gives {count} points, more than a program can hold: use a larger tolerance, or one curve"
         )
     return text
 
 
-def _entities(path: Path, drawing: Any, asked: DxfPath) -> list[Any]:
-    """The curves that are asked for, in the order of the drawing."""
+def _entities(path: Path, drawing: Any, selection: DxfPath) -> list[Any]:
+    """Return the selected curves, in the drawing's order."""
     curves = [entity for entity in drawing.modelspace() if entity.dxftype() in _CURVES]
-    if asked.handle:
-        found = [each for each in curves if str(each.dxf.handle).lower() == asked.handle.lower()]
+    if selection.handle:
+        found = [each for each in curves if str(each.dxf.handle).lower() == selection.handle.lower()]
         if not found:
-            raise MeshError(path, f"has no curve of handle {asked.handle!r} in its model space")
+            raise MeshError(path, f"has no curve of handle {selection.handle!r} in its model space")
         return found
     layers = Counter(str(each.dxf.layer) for each in curves)
-    if not asked.layer:
-        there = ", ".join(f"{name} ({count})" for name, count in sorted(layers.items())[:20])
-        raise MeshError(
-            path, f"which curves? Name a layer or a handle; there are curves on {there or 'none'}"
-        )
-    found = [each for each in curves if str(each.dxf.layer).lower() == asked.layer.lower()]
+    if not selection.layer:
+        known = ", ".join(f"{name} ({count})" for name, count in sorted(layers.items())[:20])
+        raise MeshError(path, f"no curves selected. Name a layer or a handle; curves: {known or 'none'}")
+    found = [each for each in curves if str(each.dxf.layer).lower() == selection.layer.lower()]
     if not found:
-        hint = nearest(asked.layer, sorted(layers)) if layers else "; it has none at all"
-        raise MeshError(path, f"has no curve on layer {asked.layer!r}{hint}")
+        hint = nearest(selection.layer, sorted(layers)) if layers else "; it has no curves"
+        raise MeshError(path, f"has no curve on layer {selection.layer!r}{hint}")
     if len(found) > _MOST_CURVES:
         raise MeshError(
-            path, f"has {len(found)} curves on layer {asked.layer!r}; up to {_MOST_CURVES} are read"
+            path, f"has {len(found)} curves on layer {selection.layer!r}; up to {_MOST_CURVES} are read"
         )
     return found
 
 
 def _flattened(path: Path, entity: Any, tolerance: float) -> FloatArray:
-    """(m, 3) corners of the straight parts of a curve, in the drawing's unit."""
+    """Return the (m, 3) corners of a curve's straight parts, in the drawing's unit."""
     curve = importlib.import_module("ezdxf.path").make_path(entity)
     corners = np.array([(v.x, v.y, v.z) for v in curve.control_vertices()], dtype=np.float64).reshape(-1, 3)
-    what = f"{entity.dxftype()} {entity.dxf.handle}"
-    # Flattened by halves until it is near enough: that never ends where nothing is near.
+    name = f"{entity.dxftype()} {entity.dxf.handle}"
+    # ezdxf halves a curve until the parts are within the tolerance, which never ends for such values.
     if not np.isfinite(corners).all() or not len(corners):
-        raise MeshError(path, f"{what} has a point that is not finite")
+        raise MeshError(path, f"{name} has a point that is not finite")
     size = float(np.ptp(corners, axis=0).max())
     if size / max(tolerance, 1e-300) > 1e9:
-        raise MeshError(path, f"{what} is {size:.3g} units large: too large for its tolerance")
+        raise MeshError(path, f"{name} is {size:.3g} units large: too large for its tolerance")
     points = []
     for piece in _pieces(entity, max(tolerance, size * 1e-6)):
         points.append(np.array([(point[0], point[1], point[2]) for point in piece], dtype=np.float64))
         if sum(map(len, points)) > _MOST_POINTS:
-            raise MeshError(path, f"{what} comes to more than {_MOST_POINTS} points: take a larger tolerance")
-    # An arc is drawn one way round, whichever way its polyline goes.
+            raise MeshError(path, f"{name} gives more than {_MOST_POINTS} points: use a larger tolerance")
+    # The arcs of a polyline always run counter-clockwise, even where the polyline runs clockwise.
     return next(_joined(points, near=size * 1e-6))
 
 
 def _pieces(entity: Any, tolerance: float) -> Iterator[Sequence[Any]]:
-    """The parts of a curve as points, none farther from it than the tolerance; arcs are none of Bézier's."""
+    """Yield the parts of a curve as points, within the tolerance; arcs are not replaced by Bézier curves."""
     match entity.dxftype():
         case "LINE":
             yield [entity.dxf.start, entity.dxf.end]
@@ -152,22 +150,22 @@ def _pieces(entity: Any, tolerance: float) -> Iterator[Sequence[Any]]:
 
 
 def _joined(curves: Sequence[FloatArray], *, near: float = _JOINED_MM) -> Iterator[FloatArray]:
-    """Curves that begin where another ends, as one; each way round."""
+    """Join curves that meet at their ends, reversing them where necessary."""
     rest = [curve for curve in curves if len(curve)]
     while rest:
         chain = rest.pop(0)
-        # First what goes on from its end, then what leads to its beginning.
+        # Extend the end, reverse the chain, then extend the beginning.
         for _ in range(2):
             while (found := _at_end(chain[-1], rest, near)) is not None:
-                index, turned = found
+                index, reverse = found
                 more = rest.pop(index)
-                chain = np.concatenate([chain, more[::-1] if turned else more])
+                chain = np.concatenate([chain, more[::-1] if reverse else more])
             chain = chain[::-1]
         yield chain
 
 
 def _at_end(end: FloatArray, curves: Sequence[FloatArray], near: float) -> tuple[int, bool] | None:
-    """The first curve that begins at a place, or ends there and is to be turned round."""
+    """Return the first curve that begins or ends at a position, and whether to reverse it."""
     if not curves:
         return None
     begins = np.array([curve[0] for curve in curves])
@@ -178,18 +176,18 @@ def _at_end(end: FloatArray, curves: Sequence[FloatArray], near: float) -> tuple
 
 
 def _distinct(chain: FloatArray) -> FloatArray:
-    """Without points that stand where the one before does."""
+    """Remove points that equal the previous one."""
     apart = np.linalg.norm(np.diff(chain, axis=0), axis=1) > _JOINED_MM / 10
     kept: FloatArray = chain[np.concatenate([[True], apart])]
     return kept
 
 
-def _lines(chains: Sequence[FloatArray], asked: DxfPath) -> Iterator[str]:
-    """Definitions of all points, then the moves."""
-    x, y, z, roll, pitch, yaw = asked.frame
+def _lines(chains: Sequence[FloatArray], selection: DxfPath) -> Iterator[str]:
+    """Yield the definitions of all points, then the moves."""
+    x, y, z, roll, pitch, yaw = selection.frame
     frame_to_base = pose_of(x, y, z, roll, pitch, yaw)
-    tool = rpy_rotation(*np.radians(asked.tool).tolist())
-    above = np.array([0.0, 0.0, asked.approach_mm])
+    tool = rpy_rotation(*np.radians(selection.tool).tolist())
+    above = np.array([0.0, 0.0, selection.approach_mm])
 
     def point(name: str, place_mm: FloatArray) -> str:
         pose = np.eye(4)

@@ -1,4 +1,4 @@
-"""A straight line of the tool, cut into joint moves that keep to it."""
+"""Straight lines of the tool, cut into joint moves within a tolerance."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,25 +13,26 @@ from robots.model import RobotModel, tool_jacobian, tool_placement
 from robots.poses import axis_rotation
 from robots.programs.steps import LINE_DEG, LINE_M
 
-# Between those the tool is looked at, of each joint move; and so much is kept in hand for what lies between.
-_LOOKS = (0.25, 0.5, 0.75)
-_IN_HAND = 0.9
-# Halving a line so often ends below 0.1 mm for lines of up to 1.6 m: what cannot be followed there is a jump.
+# Shares of a joint move at which the tool is compared with the line, and the used part of the tolerance: the
+# rest is a margin for the intervals.
+_SHARES = (0.25, 0.5, 0.75)
+_USED_TOLERANCE = 0.9
+# After this number of halvings, a line of 1.6 m has parts below 0.1 mm. A part that fails then is a jump.
 _MOST_HALVINGS = 14
-# How far an arm of five joints may hold its tool's axis from an even turn between a line's ends.
+# Largest deviation of the tool's axis of a five-joint arm from a uniform rotation between a line's ends.
 BENT_DEG = 15.0
-# Its search: steps, and what a metre from the line weighs in radians of the axis.
+# Search for this axis: steps, and the weight of a metre off the line in radians of the axis.
 _STEPS = 12
 _PLACE_WEIGHT = 1000.0
 
 
 class UnreachableError(Exception):
-    """A place that the arm cannot get to.
+    """A pose on a line that the arm cannot reach.
 
     Attributes:
-        reason: Why, in words.
-        place: (3,) where in the base frame [m].
-        done_m: How far along the line.
+        reason: The reason, as text.
+        place: (3,) its position in the base frame [m].
+        done_m: Length of the line that can be followed.
     """
 
     def __init__(self, reason: str, place: FloatArray, done_m: float) -> None:
@@ -41,13 +42,13 @@ class UnreachableError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A tool's way: its origin straight and evenly, turning about one axis, evenly too.
+    """A tool's straight, uniform translation, with a uniform rotation about one axis.
 
     Attributes:
         begin: (4, 4) tool to base [m].
         way: (3,) [m].
         turn: (3,) axis times angle [rad], in the base frame.
-        task: Of the tool, what counts.
+        task: The constrained part of the tool's pose.
     """
 
     begin: FloatArray
@@ -57,18 +58,18 @@ class Line:
 
     @property
     def length_m(self) -> float:
-        """Of the origin's way."""
+        """Length of the translation."""
         return float(np.linalg.norm(self.way))
 
     def pose(self, share: float) -> FloatArray:
-        """(4, 4) where the tool is to be at a share of the way, 0 to 1."""
+        """Return the tool's pose (4, 4) at a share of the line, 0 to 1."""
         pose = self.begin.copy()
         pose[:3, 3] += share * self.way
         pose[:3, :3] = axis_rotation(self.turn, share * float(np.linalg.norm(self.turn))) @ pose[:3, :3]
         return pose
 
     def share_of(self, tool: FloatArray, otherwise: float) -> float:
-        """The share of the way that a tool (4, 4) is abreast of; otherwise, where there is no way to go."""
+        """Return the share of the line nearest to a tool (4, 4); `otherwise` for a line of length 0."""
         if self.length_m < 1e-6:
             return otherwise
         along = float((tool[:3, 3] - self.begin[:3, 3]) @ self.way) / self.length_m**2
@@ -76,7 +77,7 @@ class Line:
 
 
 def line_to(begin: FloatArray, end: FloatArray, task: Task) -> Line:
-    """The line from one pose of the tool to another; of five-dimensional tasks the roll does not count."""
+    """Return the line from one tool pose to another; a 5d task ignores the roll."""
     if task is Task.POSITION_AND_AXIS_5D:
         turn = _turn_of_axis(begin[:3, 2], end[:3, 2])
     else:
@@ -85,12 +86,12 @@ def line_to(begin: FloatArray, end: FloatArray, task: Task) -> Line:
 
 
 def _turn_of_axis(one: FloatArray, other: FloatArray) -> FloatArray:
-    """The shortest turn (3,) of one direction to another [rad]."""
+    """Return the smallest rotation (3,) of one direction to another [rad]."""
     across = np.cross(one, other)
     sine = float(np.linalg.norm(across))
     angle = float(np.arctan2(sine, one @ other))
     if sine < 1e-9:
-        # Right about: any axis across will do.
+        # The directions are parallel or opposite: any perpendicular axis will do.
         across = np.cross(one, np.eye(3)[int(np.abs(one).argmin())])
         sine = float(np.linalg.norm(across))
     turn: FloatArray = across / sine * angle
@@ -98,7 +99,7 @@ def _turn_of_axis(one: FloatArray, other: FloatArray) -> FloatArray:
 
 
 def _turn(rotation: FloatArray) -> FloatArray:
-    """Axis times angle (3,) of a (3, 3) rotation [rad]."""
+    """Return axis times angle (3,) of a (3, 3) rotation [rad]."""
     vector = np.array(
         [rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]]
     )
@@ -107,7 +108,7 @@ def _turn(rotation: FloatArray) -> FloatArray:
     if sine > 1e-6:
         turned: FloatArray = vector / (2 * sine) * angle
         return turned
-    # Next to no turn, or half a one: then the axis is what the rotation leaves as it is.
+    # The angle is nearly 0 or 180 degrees: take the direction that the rotation leaves unchanged.
     column = np.eye(3) + rotation
     axis = column[:, int(np.linalg.norm(column, axis=0).argmax())]
     half: FloatArray = axis / np.linalg.norm(axis) * angle
@@ -119,8 +120,8 @@ class Followed:
     """A line as joint moves.
 
     Attributes:
-        ends: Where each move ends, (n,) [rad] or [m]; the last at the line's end.
-        bent_rad: How far the tool's axis leaves its even turn, for the arm cannot hold it there.
+        ends: End of each move, (n,) [rad] or [m]; the last is the line's end.
+        bent_rad: Largest deviation of the tool's axis from a uniform rotation, which the arm cannot follow.
     """
 
     ends: tuple[FloatArray, ...]
@@ -128,16 +129,16 @@ class Followed:
 
 
 def follow_line(model: RobotModel, solver: InverseSolver, line: Line, start: FloatArray) -> Followed:
-    """The joint moves that stand for a line.
+    """Approximate a line by joint moves.
 
-    An arm of five joints can hold its tool's axis only some ways at each place: between the line's ends the
-    axis then stands as near to where an even turn has it as the arm gets, up to BENT_DEG from there.
+    At each position, a five-joint arm can reach only some directions of the tool's axis. Between the line's
+    ends, the axis is then as near as possible to a uniform rotation, within BENT_DEG.
 
     Args:
-        start: (n,) joint positions at its beginning.
+        start: (n,) joint positions at the line's beginning.
 
     Raises:
-        UnreachableError: If the arm cannot get to the end, or would have to jump to another posture.
+        UnreachableError: If the arm cannot reach the end, or would have to jump to another posture.
     """
     for bent in (False, True) if line.task is Task.POSITION_AND_AXIS_5D else (False,):
         follower = _Follower(model, solver, line, bent=bent)
@@ -149,7 +150,7 @@ def follow_line(model: RobotModel, solver: InverseSolver, line: Line, start: Flo
 
 
 class _StuckError(Exception):
-    """No joint move leads on from a share of the line, where the arm is at some positions."""
+    """No joint move continues from a share of the line, with the arm at given positions."""
 
     def __init__(self, begin: float, end: float, at: FloatArray) -> None:
         self.begin, self.end, self.at = begin, end, at
@@ -162,7 +163,7 @@ class _Follower:
         self._model, self._solver, self._line, self._bent = model, solver, line, bent
 
     def ends(self, start: FloatArray) -> Iterator[FloatArray]:
-        """Cut by halves until each part keeps to the line."""
+        """Yield the ends of joint moves, halving the line until each part is within the tolerance."""
         at, begin = start, 0.0
         ahead = [(1.0, _MOST_HALVINGS)]
         while ahead:
@@ -179,7 +180,7 @@ class _Follower:
                 ahead.append(((begin + end) / 2, halvings - 1))
 
     def _at(self, share: float, near: FloatArray) -> FloatArray | None:
-        """Joint positions at a share of the line, on the branch of those near; None: there are none."""
+        """Return joint positions at a share of the line, on the branch of `near`; None if there are none."""
         line = self._line
         if not self._bent or share == 1.0:
             return follow(self._solver, line.pose(share), task=line.task, near=near)
@@ -191,15 +192,15 @@ class _Follower:
         return positions
 
     def _keeps_to(self, one: FloatArray, other: FloatArray, begin: float, end: float) -> bool:
-        """Whether the tool stays by the line on a straight joint motion."""
-        for look in _LOOKS:
-            positions = one + look * (other - one)
+        """Return whether the tool stays within the tolerance of the line on a straight joint motion."""
+        for share in _SHARES:
+            positions = one + share * (other - one)
             tool = tool_placement(self._model, positions)
-            wanted = self._line.pose(self._line.share_of(tool, begin + look * (end - begin)))
+            wanted = self._line.pose(self._line.share_of(tool, begin + share * (end - begin)))
             if self._bent:
                 wanted = tool_placement(self._model, nearest_axis(self._model, wanted, positions))
             away, angle = tool_misses(tool, wanted, self._line.task)
-            if away > LINE_M * _IN_HAND or angle > radians(LINE_DEG) * _IN_HAND:
+            if away > LINE_M * _USED_TOLERANCE or angle > radians(LINE_DEG) * _USED_TOLERANCE:
                 return False
         return True
 
@@ -216,7 +217,7 @@ def _unreachable(
 def _reason(
     model: RobotModel, solver: InverseSolver, line: Line, pose: FloatArray, stuck: _StuckError
 ) -> str:
-    """Why the arm does not get to a pose of the line."""
+    """Return why the arm cannot reach a pose of the line."""
     end = solve(solver, line.pose(1.0), task=line.task, near=stuck.at)
     if not len(end.solutions):
         return f"its end cannot be reached: {end.reason}"
@@ -224,7 +225,7 @@ def _reason(
     if len(result.solutions):
         leaps = np.abs(result.solutions[0] - stuck.at) / (model.joints.upper - model.joints.lower)
         first = model.joints.names[int(leaps.argmax())]
-        return f"the arm would have to jump to another posture there, joint {first} most of all"
+        return f"the arm would have to jump to another posture there, with joint {first} moving most"
     if line.task is Task.POSITION_AND_AXIS_5D:
         bent = _bent_problem(model, pose, nearest_axis(model, pose, stuck.at))
         return bent or result.reason
@@ -232,17 +233,17 @@ def _reason(
 
 
 def nearest_axis(model: RobotModel, pose: FloatArray, near: FloatArray) -> FloatArray:
-    """Joint positions (n,) that have the tool at a place, its axis as near to the pose's as the arm gets.
+    """Find joint positions (n,) with the tool at a pose's position, and its axis as near as possible.
 
     Args:
-        near: (n,) where to begin; the answer is what can be walked to from there, limits or not.
+        near: (n,) start of the descent, which ignores limits.
     """
     positions = near
     for _ in range(_STEPS):
         tool, jacobian = tool_placement(model, positions), tool_jacobian(model, positions)
         axis = tool[:3, 2]
         turn = _turn_of_axis(axis, pose[:3, 2])
-        across = np.eye(3) - np.outer(axis, axis)  # a roll about the axis turns no axis
+        across = np.eye(3) - np.outer(axis, axis)  # ignore the roll about the axis
         rows = np.vstack([jacobian[:3] * _PLACE_WEIGHT, across @ jacobian[3:]])
         off = np.concatenate([(pose[:3, 3] - tool[:3, 3]) * _PLACE_WEIGHT, turn])
         step = np.linalg.lstsq(rows, off, rcond=1e-6)[0]
@@ -253,13 +254,13 @@ def nearest_axis(model: RobotModel, pose: FloatArray, near: FloatArray) -> Float
 
 
 def _bent_problem(model: RobotModel, pose: FloatArray, positions: FloatArray) -> str:
-    """Why joint positions will not do for a pose on a line with the axis bent; or nothing."""
+    """Return why joint positions do not fit a pose on a line with a deviating axis; empty if they do."""
     beyond = violations(model.joints, positions)
     if beyond:
         return "; ".join(map(str, beyond))
     away, off = tool_misses(tool_placement(model, positions), pose, Task.POSITION_AND_AXIS_5D)
     if away > LINE_M / 100:
-        return f"the tool gets no nearer than {away * 1000:.1f} mm from here"
+        return f"the tool stays {away * 1000:.1f} mm away from it"
     if off > radians(BENT_DEG):
-        return f"the arm cannot hold its tool's axis within {BENT_DEG:g}° of an even turn there"
+        return f"the arm cannot keep its tool's axis within {BENT_DEG:g}° of a uniform rotation there"
     return ""

@@ -1,4 +1,4 @@
-"""The samples of a motion, thinned as they come: however long it is, a bounded number is kept."""
+"""Downsampled samples of a motion: a bounded number for a motion of any length."""
 
 import numpy as np
 
@@ -9,10 +9,10 @@ MOST_SAMPLES = 20_000
 
 
 class PathSamples:
-    """Takes samples in order; keeps each, then each second, each fourth, and so on.
+    """Collector of samples in order; keeps all, then every second, every fourth, and so on.
 
     Args:
-        joints: How many.
+        joints: Number of joints.
     """
 
     def __init__(self, joints: int) -> None:
@@ -32,10 +32,10 @@ class PathSamples:
         clearances: FloatArray,
         line: int,
     ) -> None:
-        """More samples: (m,), (m, n), (m, 3), (m,), (m,), and the line that they belong to."""
+        """Add samples: (m,), (m, n), (m, 3), (m,), (m,), and their program line."""
         lines = np.full(len(times_s), float(line))
         rows = np.column_stack([times_s, positions, tools, speeds, clearances, lines])
-        # A copy: a view would keep all the rest, too.
+        # Copy, because a view would keep all rows in memory.
         kept = rows[-self._count % self._stride :: self._stride].copy()
         self._count += len(rows)
         if len(kept):
@@ -47,7 +47,7 @@ class PathSamples:
             self._rows, self._kept, self._stride = [whole], len(whole), self._stride * 2
 
     def sampled(self) -> SampledPath:
-        """What was kept, and the last sample in any case."""
+        """Return the kept samples, always including the last."""
         n = self._joints
         rows = np.concatenate([np.zeros((0, n + 7)), *self._rows])
         if self._last is not None and (not len(rows) or (rows[-1] != self._last).any()):

@@ -1,4 +1,4 @@
-"""From a program to the steps that a controller takes: repeats unrolled, lines cut into joint moves."""
+"""Planner from a program to steps for a controller: unrolls repeats, cuts lines into joint moves."""
 
 from collections.abc import Mapping, Sequence
 from math import degrees, radians
@@ -29,20 +29,20 @@ from robots.programs.statements import (
 from robots.programs.steps import LINE_DEG, Plan, Step, StepKind, Violation, ViolationKind
 from robots.programs.text import MOST_STEPS
 
-# Positions are planned to 1e-9 rad and m: what a repeat comes back to is then the same to the last bit.
+# Positions are rounded to 1e-9 rad and m, so that a repeat returns to bit-identical positions.
 _DECIMALS = 9
-# Of different lines: those that come again are not cut again.
+# Size of the cache of cut lines.
 _MOST_KEPT = 1_000
 
 
 def plan_program(program: Program, arm: Arm, solver: InverseSolver | None, start: FloatArray) -> Plan:
-    """The steps of a program from where the arm stands.
+    """Plan the steps of a program from the arm's position.
 
-    It begins with a SPEED step, of 100 % unless the program says otherwise: what a controller was set to
-    before is nothing that a check could know. It ends where a place cannot be reached.
+    The plan begins with a SPEED step, of 100 % unless the program sets the speed, because a check cannot know
+    the controller's current setting. It ends at a pose that cannot be reached.
 
     Args:
-        solver: Of this arm; None will do for a program without poses and lines.
+        solver: The arm's solver; may be None for a program without poses and lines.
         start: (n,) joint positions [rad] or [m].
     """
     planner = _Planner(arm, solver, start)
@@ -50,9 +50,9 @@ def plan_program(program: Program, arm: Arm, solver: InverseSolver | None, start
     notes: tuple[str, ...] = ()
     try:
         planner.take(program.statements)
-    except _CannotGoOnError as end:
+    except _PlanEndsError as end:
         violations = (end.violation,)
-        notes = (f"nothing behind line {end.violation.line} is checked: the program cannot get there",)
+        notes = (f"nothing after line {end.violation.line} is checked: the program cannot get there",)
     return Plan(tuple(planner.steps), violations, (*_bent_notes(planner.bent), *notes))
 
 
@@ -61,11 +61,11 @@ def _bent_notes(bent: Mapping[int, float]) -> tuple[str, ...]:
         return ()
     lines = ", ".join(str(line) for line in sorted(bent)[:10]) + (", ..." if len(bent) > 10 else "")
     most = degrees(max(bent.values()))
-    what = f"between its ends the tool's axis is up to {most:.1f}° from an even turn"
-    return (f"line{'s' if len(bent) > 1 else ''} {lines}: {what}: this arm cannot hold it there",)
+    text = f"between its ends the tool's axis is up to {most:.1f}° from a uniform rotation"
+    return (f"line{'s' if len(bent) > 1 else ''} {lines}: {text}: this arm cannot follow it",)
 
 
-class _CannotGoOnError(Exception):
+class _PlanEndsError(Exception):
     """The plan ends here."""
 
     def __init__(self, violation: Violation) -> None:
@@ -80,7 +80,7 @@ class _Planner:
         self._arm, self._solver = arm, solver
         self._task = natural_task(arm.joints)
         self._at = start
-        self._speed_told = False
+        self._speed_set = False
         self._tool_speed: float | None = None
         self._cut: dict[tuple[bytes, bytes], list[FloatArray]] = {}
 
@@ -97,7 +97,7 @@ class _Planner:
                     for positions in self._line(line, self._pose(target)):
                         self._move(line, positions, along_line=True)
                 case Speed(line, percent):
-                    self._speed_told = True
+                    self._speed_set = True
                     self._add(Step(line=line, kind=StepKind.SPEED, percent=percent))
                 case ToolSpeed(most=most):
                     self._tool_speed = most
@@ -110,17 +110,19 @@ class _Planner:
                         self.take(body)
 
     def _add(self, step: Step) -> None:
-        # One more: the speed that it begins with.
+        # One more than the limit, for the initial SPEED step.
         if len(self.steps) > MOST_STEPS:
-            text = f"the program comes to more than {MOST_STEPS} steps here, its lines cut"
-            raise _CannotGoOnError(_violation(step.line, ViolationKind.PROGRAM, text))
+            text = (
+                f"the program has more than {MOST_STEPS} steps here, including those that lines are cut into"
+            )
+            raise _PlanEndsError(_violation(step.line, ViolationKind.PROGRAM, text))
         self.steps.append(step)
 
     def _move(
         self, line: int, target: FloatArray, *, kind: StepKind = StepKind.MOVE, along_line: bool = False
     ) -> None:
-        if not self._speed_told:
-            self._speed_told = True
+        if not self._speed_set:
+            self._speed_set = True
             self._add(Step(line=line, kind=StepKind.SPEED, percent=100.0))
         self._add(
             Step(line=line, kind=kind, target=target, along_line=along_line, tool_speed=self._tool_speed)
@@ -128,7 +130,7 @@ class _Planner:
         self._at = target
 
     def _solved(self, line: int, target: PoseTarget) -> FloatArray:
-        """Joint positions of a pose, those nearest to where the arm stands."""
+        """Return the joint positions of a pose, nearest to the arm's position."""
         assert self._solver is not None
         result = solve(self._solver, target.tool_to_base, task=self._task, near=self._at)
         if not len(result.solutions):
@@ -150,10 +152,10 @@ class _Planner:
         try:
             followed = follow_line(self._arm.model, self._solver, line, self._at)
         except UnreachableError as error:
-            what = "the line cannot be followed"
+            problem = "the line cannot be followed"
             if line.length_m > 1e-6:
-                what += f" beyond {error.done_m * 1000:.1f} of its {line.length_m * 1000:.1f} mm"
-            raise self._unreachable(number, what, error.reason, error.place) from None
+                problem += f" beyond {error.done_m * 1000:.1f} of its {line.length_m * 1000:.1f} mm"
+            raise self._unreachable(number, problem, error.reason, error.place) from None
         if followed.bent_rad > radians(LINE_DEG):
             self.bent[number] = max(followed.bent_rad, self.bent.get(number, 0.0))
         ends = [_rounded(each) for each in followed.ends]
@@ -161,10 +163,10 @@ class _Planner:
             self._cut[key] = ends
         return ends
 
-    def _unreachable(self, line: int, what: str, reason: str, place: FloatArray) -> _CannotGoOnError:
+    def _unreachable(self, line: int, problem: str, reason: str, place: FloatArray) -> _PlanEndsError:
         in_site = self._arm.base_to_site[:3, :3] @ place + self._arm.base_to_site[:3, 3]
-        return _CannotGoOnError(
-            _violation(line, ViolationKind.UNREACHABLE, f"{what}: {reason}", in_site[None])
+        return _PlanEndsError(
+            _violation(line, ViolationKind.UNREACHABLE, f"{problem}: {reason}", in_site[None])
         )
 
 

@@ -1,4 +1,4 @@
-"""A check as a picture: joints, tool speed and clearance over time, with what is wrong marked."""
+"""Plot of a check: joints, tool speed and clearance over time, with violations marked."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,11 +13,11 @@ from robots.programs.steps import CheckResult, Violation, ViolationKind
 
 FORMATS = (".png", ".svg")
 
-# The page's colours, by day: a picture is looked at on paper too.
+# The page's colours of the light theme, because plots are printed too.
 _TEXT, _DIM, _LINE = "#1d2124", "#525a60", "#cbd0d3"
 _CURVES = ("#1462a8", "#8a6a1f", "#2b7a4b", "#93456f", "#5a51a8", "#5b6369", "#9a5426")
 _ALARM, _WARNING = "#b3261e", "#b37400"
-# Samples that a curve is drawn from; the rest would lie on the same pixels.
+# Samples per curve; more would fall on the same pixels.
 _DRAWN = 4_000
 _MOST_BANDS = 40
 _MOST_LINE_NUMBERS = 24
@@ -27,13 +27,13 @@ def plot_check(result: CheckResult, joints: Joints, target: Path, *, title: str)
     """Draw a check's motion over time as PNG or SVG.
 
     Args:
-        title: Which program of which robot.
+        title: The program and the robot.
 
     Raises:
-        SaveError: If the file's ending is another, or it cannot be written.
+        SaveError: If the file has another suffix or cannot be written.
     """
     if target.suffix.lower() not in FORMATS:
-        raise SaveError(target, f"a picture's name ends in {' or '.join(FORMATS)}")
+        raise SaveError(target, f"a picture's name must end in {' or '.join(FORMATS)}")
     try:
         import matplotlib as mpl
         from matplotlib.figure import Figure
@@ -117,7 +117,7 @@ def _joints(axes: Any, joints: Joints, times: FloatArray, positions: FloatArray)
 
 
 def _statements(axes: Any, times: FloatArray, lines: NDArray[np.int64]) -> None:
-    """Where each statement begins, with its line's number above; fewer numbers where they would touch."""
+    """Mark where each statement begins, with its line number above; leave out marks that would touch."""
     if not len(lines):
         return
     begins = np.concatenate([[0], np.flatnonzero(np.diff(lines)) + 1])
@@ -136,7 +136,7 @@ def _statements(axes: Any, times: FloatArray, lines: NDArray[np.int64]) -> None:
 
 
 def _violations(all_axes: Sequence[Any], violations: Sequence[Violation]) -> None:
-    """Bands over the curve that each is about: red where the motion is refused, amber for a warning."""
+    """Draw a band for each violation on its panel: red if the motion is refused, amber for a warning."""
     concerned = {ViolationKind.SPEED: 1, ViolationKind.COLLISION: 2, ViolationKind.CLEARANCE: 2}
     bands: dict[tuple[int, ViolationKind, bool], list[tuple[float, float]]] = {}
     for each in violations:
@@ -146,7 +146,7 @@ def _violations(all_axes: Sequence[Any], violations: Sequence[Violation]) -> Non
         [span for key, spans in bands.items() if key[0] == panel and key[2] for span in spans]
         for panel in range(len(all_axes))
     ]
-    # Refusals last: over the warnings.
+    # Draw refusals last, over the warnings.
     for (panel, kind, refuses), spans in sorted(bands.items(), key=lambda item: item[0][2]):
         color = _ALARM if refuses else _WARNING
         for begin, until in _united(spans)[:_MOST_BANDS]:
@@ -154,8 +154,8 @@ def _violations(all_axes: Sequence[Any], violations: Sequence[Violation]) -> Non
             axes.axvspan(begin, until, facecolor=color, alpha=0.16, linewidth=0)
             axes.axvline(begin, color=color, linewidth=0.9)
             if not refuses and any(other[0] <= until and begin <= other[1] for other in refused[panel]):
-                continue  # there is worse to read there
-            # One under the other, so that a collision is read beside the clearance that leads to it.
+                continue  # a refusal's label is there
+            # Lower, so that a collision's label does not cover that of the clearance before it.
             down = 18 if kind is ViolationKind.COLLISION else 9
             axes.annotate(
                 str(kind) if refuses else f"{kind} (warning)", (begin, 1.0), xytext=(2, -down),
@@ -164,7 +164,7 @@ def _violations(all_axes: Sequence[Any], violations: Sequence[Violation]) -> Non
 
 
 def _united(spans: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Spans that overlap as one."""
+    """Merge overlapping spans."""
     united: list[tuple[float, float]] = []
     for begin, until in sorted(spans):
         if united and begin <= united[-1][1]:

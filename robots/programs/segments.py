@@ -1,4 +1,4 @@
-"""What is met on straight joint motions, however fast they are made: each is looked at once."""
+"""Checks of straight joint motions for collisions, clearances and singularities, at any speed."""
 
 from bisect import bisect_left
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,31 +16,30 @@ from robots.programs.steps import Step, ViolationKind
 from robots.programs.tool_chain import samples_between, tool_chain, tools_and_jacobians
 from robots.singularity import singularity_margins
 
-# Along a line of the tool the arm is to be no nearer to a singular position: the smallest singular value of
-# the tool's Jacobian, lengths counted in the arm's reach.
+# Least singularity margin on a line of the tool; see `robots.singularity`.
 SINGULAR = 0.02
 
-# Motions are looked at together up to so many samples: what is far away then is measured once for many.
+# Samples of several motions that are checked together, so that far obstacles are measured once for many.
 _TOGETHER = 4_000
-# Samples of motions that are kept, should they come again.
-_KEPT = 100_000
-# Where a target is far beyond its limits, nobody goes: so many samples show enough.
+# Samples of cached motions, which may be repeated.
+_CACHED = 100_000
+# Samples of a motion to a target beyond its limits, which is refused anyway.
 _MOST_BEYOND = 500
-# A stretch's start and target, to the last bit, and whether it is part of a line.
+# A segment's start and target, bit for bit, and whether it is part of a line.
 _Key: TypeAlias = tuple[bytes, bytes, bool]
 
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """Something met at a sample.
+    """A problem at a sample.
 
     Attributes:
         kind: COLLISION, CLEARANCE or SINGULARITY.
-        pair: That it is about; empty for none.
-        value: How bad it is, the smaller the worse: a distance [m], negative below the floor, or a margin.
-        limit: What it should not be below.
+        pair: The names of the pair; empty for SINGULARITY.
+        value: The smaller the worse: a distance [m], negative below the floor, or a margin.
+        limit: Lower limit of the value.
         points: (k, 3) in the site's frame [m].
-        stops: Whether the motion is refused for it.
+        stops: Whether the motion is refused.
     """
 
     kind: ViolationKind
@@ -52,16 +51,16 @@ class Finding:
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
-    """A straight joint motion at samples between which no link moves more than 5 mm.
+class Segment:
+    """A straight joint motion, sampled so that no link moves more than 5 mm between samples.
 
     Attributes:
-        positions: (m, n) [rad] or [m]; one only where it goes nowhere.
+        positions: (m, n) [rad] or [m]; only one for a motion of length 0.
         tools: (m, 3) in the base frame [m].
-        rates: (m,) how far the tool would go in all at its pace there [m].
+        rates: (m,) the tool's speed per share of the motion [m].
         clearances: (m,) [m].
         findings: Each with its sample's number, ascending.
-        limits: What its target violates.
+        limits: Limits that the target violates.
     """
 
     positions: FloatArray
@@ -73,8 +72,8 @@ class Stretch:
 
 
 @dataclass(frozen=True, eq=False)
-class _Wanted:
-    """A stretch that is to be looked at."""
+class _Request:
+    """A segment to check."""
 
     start: FloatArray
     target: FloatArray
@@ -82,25 +81,25 @@ class _Wanted:
     positions: FloatArray
 
 
-class Looker:
-    """Looks along the motions of one arm among what is around it.
+class SegmentChecker:
+    """Checks of one arm's motions in its cell, with a cache of repeated ones.
 
     Args:
-        others: (k, n) straight joint path of each other robot of the cell that counts.
-        far: Whether clearances are asked for also where nothing is near.
+        others: (k, n) straight joint path of each other robot to check against.
+        far: Compute exact clearances far from obstacles too.
     """
 
     def __init__(self, cell: Cell, robot: str, others: Mapping[str, FloatArray], *, far: bool = True) -> None:
         self._cell, self._robot, self._others, self._far = cell, robot, others, far
         self._chain = tool_chain(cell.arms[robot])
-        self._kept: dict[_Key, Stretch] = {}
+        self._cached: dict[_Key, Segment] = {}
         self._samples = 0
 
-    def stretches(self, start: FloatArray, steps: Sequence[Step]) -> Iterator[tuple[Step, Stretch | None]]:
-        """Each step, and what is met on its motion if it has one."""
+    def segments(self, start: FloatArray, steps: Sequence[Step]) -> Iterator[tuple[Step, Segment | None]]:
+        """Yield each step, with the checked segment of its motion if it has one."""
         at = start
         group: list[tuple[Step, _Key | None]] = []
-        wanted: dict[_Key, _Wanted] = {}
+        requests: dict[_Key, _Request] = {}
         samples = 0
         for step in steps:
             if step.target is None:
@@ -108,16 +107,16 @@ class Looker:
                 continue
             key = (at.tobytes(), step.target.tobytes(), step.along_line)
             group.append((step, key))
-            if key not in self._kept and key not in wanted:
-                wanted[key] = self._wanted(at, step)
-                samples += len(wanted[key].positions)
+            if key not in self._cached and key not in requests:
+                requests[key] = self._request(at, step)
+                samples += len(requests[key].positions)
             at = step.target
             if samples >= _TOGETHER:
-                yield from self._looked_at(group, wanted)
-                group, wanted, samples = [], {}, 0
-        yield from self._looked_at(group, wanted)
+                yield from self._checked(group, requests)
+                group, requests, samples = [], {}, 0
+        yield from self._checked(group, requests)
 
-    def _wanted(self, start: FloatArray, step: Step) -> _Wanted:
+    def _request(self, start: FloatArray, step: Step) -> _Request:
         assert step.target is not None
         parts = samples_between(self._chain, start, step.target) if (start != step.target).any() else 0
         if parts > _MOST_BEYOND and violations(self._cell.arms[self._robot].joints, step.target):
@@ -125,44 +124,44 @@ class Looker:
         shares = np.linspace(0.0, 1.0, parts + 1)[:, None]
         positions = start + shares * (step.target - start)
         positions[-1] = step.target
-        return _Wanted(start, step.target, step.along_line, positions)
+        return _Request(start, step.target, step.along_line, positions)
 
-    def _looked_at(
+    def _checked(
         self,
         group: Sequence[tuple[Step, _Key | None]],
-        wanted: Mapping[_Key, _Wanted],
-    ) -> Iterator[tuple[Step, Stretch | None]]:
-        if wanted:
-            found = dict(zip(wanted, self._look([*wanted.values()]), strict=True))
-            self._samples += sum(len(stretch.positions) for stretch in found.values())
-            self._kept |= found
+        requests: Mapping[_Key, _Request],
+    ) -> Iterator[tuple[Step, Segment | None]]:
+        if requests:
+            found = dict(zip(requests, self._check([*requests.values()]), strict=True))
+            self._samples += sum(len(segment.positions) for segment in found.values())
+            self._cached |= found
         for step, key in group:
-            yield step, None if key is None else self._kept[key]
-        if self._samples > _KEPT:
-            self._kept.clear()
+            yield step, None if key is None else self._cached[key]
+        if self._samples > _CACHED:
+            self._cached.clear()
             self._samples = 0
 
-    def _look(self, wanted: Sequence[_Wanted]) -> Iterator[Stretch]:
+    def _check(self, requests: Sequence[_Request]) -> Iterator[Segment]:
         arm = self._cell.arms[self._robot]
-        positions = np.concatenate([each.positions for each in wanted])
-        ends = np.cumsum([len(each.positions) for each in wanted]).tolist()
+        positions = np.concatenate([each.positions for each in requests])
+        ends = np.cumsum([len(each.positions) for each in requests]).tolist()
         near_m = max(self._cell.arms[name].warning_m for name in (self._robot, *self._others))
         along = near_along(self._cell, self._robot, positions, self._others, within_m=near_m, far=self._far)
-        met = [found for each in along.encounters for found in self._findings(each)]
-        met.sort(key=itemgetter(0))
-        numbers = [number for number, _ in met]
+        numbered = [found for each in along.encounters for found in self._findings(each)]
+        numbered.sort(key=itemgetter(0))
+        numbers = [number for number, _ in numbered]
         tools, jacobians = tools_and_jacobians(self._chain, positions)
         begin = 0
-        for each, end in zip(wanted, ends, strict=True):
+        for each, end in zip(requests, ends, strict=True):
             here = slice(begin, end)
             findings = [
                 (number - begin, finding)
-                for number, finding in met[bisect_left(numbers, begin) : bisect_left(numbers, end)]
+                for number, finding in numbered[bisect_left(numbers, begin) : bisect_left(numbers, end)]
             ]
             if each.along_line:
                 types, reach = arm.joints.types, self._chain.reach_m
                 findings += _singular(singularity_margins(jacobians[here], types, reach=reach))
-            yield Stretch(
+            yield Segment(
                 positions=each.positions,
                 tools=tools[here, :3, 3],
                 rates=np.linalg.norm(jacobians[here, :3] @ (each.target - each.start), axis=1),

@@ -1,4 +1,4 @@
-"""What a teach program says, in SI: its statements, nested as they were written."""
+"""Statements of a teach program, in SI, nested as in the text."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from robots.joints import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class JointTarget:
-    """Where the joints are to be: (n,) [rad] or [m]; the name of the point, if it is one."""
+    """Target joint positions: (n,) [rad] or [m], with the name of the point if it has one."""
 
     positions: FloatArray
     name: str = ""
@@ -17,7 +17,7 @@ class JointTarget:
 
 @dataclass(frozen=True, eq=False)
 class PoseTarget:
-    """Where the tool is to be: (4, 4), tool to base [m]; the name of the point, if it is one."""
+    """Target tool pose: (4, 4), tool to base [m], with the name of the point if it has one."""
 
     tool_to_base: FloatArray
     name: str = ""
@@ -28,14 +28,14 @@ Target: TypeAlias = JointTarget | PoseTarget
 
 @dataclass(frozen=True)
 class Home:
-    """Go to the home position, as slowly as homing is."""
+    """Move to the home position at homing speed."""
 
     line: int
 
 
 @dataclass(frozen=True, eq=False)
 class MoveJoints:
-    """Go to a target, straight between the joint positions."""
+    """Move to a target on a straight line in joint space."""
 
     line: int
     target: Target
@@ -43,7 +43,7 @@ class MoveJoints:
 
 @dataclass(frozen=True, eq=False)
 class MoveLine:
-    """Go to a target, the tool on a straight line and turning evenly."""
+    """Move to a target with the tool on a straight line, rotating uniformly."""
 
     line: int
     target: Target
@@ -51,7 +51,7 @@ class MoveLine:
 
 @dataclass(frozen=True)
 class Speed:
-    """Percent of the joints' greatest speeds from here on, 1 to 100."""
+    """Set the speed to a percentage of the joints' maximum speeds, 1 to 100."""
 
     line: int
     percent: float
@@ -59,7 +59,7 @@ class Speed:
 
 @dataclass(frozen=True)
 class ToolSpeed:
-    """A promise that the tool is no faster from here on [m/s]."""
+    """Assert a limit of the tool's speed for the following moves [m/s]; the check verifies it."""
 
     line: int
     most: float
@@ -67,7 +67,7 @@ class ToolSpeed:
 
 @dataclass(frozen=True)
 class Wait:
-    """Stand for some seconds."""
+    """Wait for some seconds."""
 
     line: int
     seconds: float
@@ -83,7 +83,7 @@ class Trace:
 
 @dataclass(frozen=True, eq=False)
 class Repeat:
-    """Do some statements several times."""
+    """Repeat statements several times."""
 
     line: int
     count: int

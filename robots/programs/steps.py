@@ -1,4 +1,4 @@
-"""What a program comes to: steps that a controller takes one after the other; and what a check finds."""
+"""Steps of a planned program, and results of its check."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from robomesh.reasons import Reason
 from robots.joints import FloatArray
 
-# How far the tool may leave the line between the joint moves that stand for it.
+# Largest deviation of the tool from a line that is approximated by joint moves.
 LINE_M = 0.001
 LINE_DEG = 0.5
 
@@ -22,7 +22,7 @@ INTERPOLATION = (
 
 
 class StepKind(StrEnum):
-    """What a step asks of the controller."""
+    """The command of a step."""
 
     HOME = "home"
     MOVE = "move"
@@ -36,13 +36,13 @@ class Step:
     """One command, or a wait.
 
     Attributes:
-        line: Of the program, from 1.
-        target: (n,) where HOME and MOVE end [rad] or [m].
-        percent: Of SPEED: of the joints' greatest speeds, 1 to 100.
-        seconds: Of WAIT.
-        on: Of TRACE.
-        along_line: Of MOVE: a part of a line of the tool.
-        tool_speed: Of HOME and MOVE: what the program promises that the tool does not exceed [m/s].
+        line: The program's line, from 1.
+        target: HOME and MOVE: (n,) end of the motion [rad] or [m].
+        percent: SPEED: percentage of the joints' maximum speeds, 1 to 100.
+        seconds: WAIT: duration.
+        on: TRACE: on or off.
+        along_line: MOVE: part of a straight line of the tool.
+        tool_speed: HOME and MOVE: the program's limit of the tool's speed [m/s].
     """
 
     line: int
@@ -56,7 +56,7 @@ class Step:
 
 
 class ViolationKind(StrEnum):
-    """What may be wrong with a program."""
+    """The kind of a violation."""
 
     PROGRAM = "program"
     LIMIT = "limit"
@@ -69,16 +69,16 @@ class ViolationKind(StrEnum):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Violation:
-    """Something that is wrong with a program, from one moment to another.
+    """A violation in a program, with its duration.
 
     Attributes:
-        line: Of the program, from 1; 0: of the start.
-        time_s, until_s: From the program's start.
-        pair: Two of "<robot>/<link>" and fixtures' names; empty where no two are concerned.
-        points: (k, 3) in the site's frame [m]: nearest points of the pair; where on a line.
-        distance_m: The smallest; 0: they touch; None where it is no matter of distance.
-        reason: What it is, in degrees and millimetres.
-        refuses: Whether a gateway that requires checks refuses the motion for it; else it warns.
+        line: The program's line, from 1; 0 for the start position.
+        time_s, until_s: Since the program's start.
+        pair: Two names "<robot>/<link>" or "<fixture>"; empty for other kinds.
+        points: (k, 3) in the site's frame [m]: nearest points of the pair, or the unreachable position.
+        distance_m: The smallest distance; 0 if the pair touches; None for other kinds.
+        reason: Code and parameters, in degrees and millimetres.
+        refuses: Whether a gateway that requires checks refuses the motion; otherwise this is a warning.
     """
 
     line: int
@@ -99,11 +99,11 @@ class Violation:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """The steps of a program, repeats unrolled and lines cut.
+    """The steps of a program, with repeats unrolled and lines cut.
 
     Attributes:
-        violations: Why it ends before the program does: a place that cannot be reached, too many steps.
-        notes: What of the program it leaves out.
+        violations: Why the plan ends before the program: an unreachable pose, too many steps.
+        notes: Parts of the program that the plan leaves out.
     """
 
     steps: tuple[Step, ...]
@@ -113,16 +113,16 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class SampledPath:
-    """A motion at some times, the first at its start and the last at its end.
+    """Samples of a motion, the first at its start and the last at its end.
 
     Attributes:
         times_s: (m,) from the start.
         joint_positions: (m, n) [rad] or [m].
         tool_positions: (m, 3) in the base frame [m].
         tool_speeds: (m,) [m/s].
-        clearances: (m,) to what stands around the arm [m]; infinite where nothing does. Far from everything
-            not every sample is measured: those between are interpolated.
-        lines: (m,) of the program.
+        clearances: (m,) distance to the nearest obstacle [m]; infinite without obstacles. Far from all
+            obstacles, only some samples are measured and the others interpolated.
+        lines: (m,) the program's lines.
     """
 
     times_s: FloatArray
@@ -135,14 +135,14 @@ class SampledPath:
 
 @dataclass(frozen=True, eq=False)
 class CheckResult:
-    """What a check found.
+    """The result of a check.
 
     Attributes:
         ok: There is no violation.
-        duration_s: Of the motions, of homing's rest and of the waits.
-        interpolation: How the controller is assumed to move, in words.
-        notes: What the check could not cover, in words.
-        alone: Only the arm itself was checked: around it are no floor, no fixture and no other robot.
+        duration_s: Total of the motions, homing's rest and the waits.
+        interpolation: The assumed interpolation of the controller, as text.
+        notes: Gaps in the check's coverage, as texts.
+        alone: Only self-collisions were checked: the cell has no floor, no fixture and no other robot.
     """
 
     ok: bool
@@ -156,5 +156,5 @@ class CheckResult:
 
     @property
     def refused(self) -> bool:
-        """Whether a gateway that requires checks refuses it: some violation is more than a warning."""
+        """True if a gateway that requires checks refuses the motion: a violation is not only a warning."""
         return any(violation.refuses for violation in self.violations)

@@ -1,13 +1,13 @@
-"""The text of a teach program: plain lines that people read, diff and teach.
+"""Parser of teach programs: plain lines that are easy to read, diff and write.
 
     program    = line *( newline line )
     line       = [ definition | statement ] [ "#" comment ]
     definition = "point" name "=" ( "joints" n*number | "pose" 6*number )
     statement  = "home"
-               | "move_joints" target          joints straight to their positions
-               | "move_line" target            the tool on a straight line
-               | "speed" number                percent of the joints' greatest speeds, 1 to 100
-               | "tool_speed" number           mm/s: a promise, from here on
+               | "move_joints" target          straight line in joint space
+               | "move_line" target            straight line of the tool
+               | "speed" number                percent of the joints' maximum speeds, 1 to 100
+               | "tool_speed" number           mm/s: asserted limit for the following moves
                | "wait" number                 seconds
                | "trace" ( "on" | "off" )
                | "repeat" count newline *line "end"
@@ -17,7 +17,7 @@
                                                the tool in the base frame
     name       = a-z *( a-z | 0-9 | "_" | "-" )
 
-Words are parted by blanks. Roll, pitch and yaw turn about the fixed x, y and z axes, in this order.
+Words are separated by blanks. Roll, pitch and yaw rotate about the fixed x, y and z axes, in this order.
 """
 
 import re
@@ -57,18 +57,18 @@ _LONGEST_NAME = 64
 _STATEMENTS = ("home", "move_joints", "move_line", "point", "speed", "tool_speed", "wait", "trace", "repeat")
 _NAME = re.compile(r"[a-z][a-z0-9_-]*")
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
-# Beyond any arm: what is larger is a slip of the hand, and sums of it might not be finite.
+# Beyond any arm. A larger number is a typing error, and sums of such numbers may overflow.
 _FARTHEST = 100_000.0
 _POSE_WORDS = ("x", "y", "z", "roll", "pitch", "yaw")
 
 
-class _Wrong(Exception):
+class _LineError(Exception):
     """A line that cannot be read; the text says why."""
 
 
 @dataclass
 class _Block:
-    """A repeat that is still open, or the program itself (line 0)."""
+    """An open repeat, or the program itself (line 0)."""
 
     line: int
     count: int
@@ -77,13 +77,13 @@ class _Block:
 
 
 def parse_program(text: str, joints: Joints) -> Program:
-    """The program that a text says.
+    """Parse a program's text.
 
     Args:
-        joints: Of the arm that it is for: how many, and which are prismatic.
+        joints: The arm's joints: their number, and which are prismatic.
 
     Raises:
-        ProgramError: If something cannot be read; it tells every problem of the text.
+        ProgramError: If the text has a problem; the error lists all problems.
     """
     return _Parser(joints).program(text)
 
@@ -100,7 +100,7 @@ class _Parser:
         size = len(text.encode("utf-8", "replace"))
         if size > MOST_BYTES:
             raise ProgramError([(1, f"the program has {size} bytes; up to {MOST_BYTES} are read")])
-        # Only what editors count as lines.
+        # Not str.splitlines(), which splits at characters that editors do not count as line breaks.
         lines = [
             line.partition("#")[0].split()
             for line in text.removeprefix("\ufeff").replace("\r\n", "\n").split("\n")
@@ -113,38 +113,38 @@ class _Parser:
         for handle in (self._define, self._take):
             for number, words in enumerate(lines, start=1):
                 if words and (words[0] == "point") == (handle == self._define):
-                    self._guarded(handle, number, words)
+                    self._collect_problems(handle, number, words)
         for block in self._blocks[1:]:
             self._problems.append((block.line, "'repeat' has no 'end'"))
         if self._problems:
             raise ProgramError(sorted(self._problems)[:_MOST_PROBLEMS], found=len(self._problems))
         return Program(tuple(self._blocks[0].body), self._points)
 
-    def _guarded(
+    def _collect_problems(
         self, handle: Callable[[int, Sequence[str]], None], number: int, words: Sequence[str]
     ) -> None:
         try:
             handle(number, words)
-        except _Wrong as wrong:
+        except _LineError as wrong:
             self._problems.append((number, str(wrong)))
 
     # ----------------------------------------------------------------- definitions
 
     def _define(self, line: int, words: Sequence[str]) -> None:
         if len(words) < 4 or words[2] != "=" or words[3] not in ("joints", "pose"):
-            raise _Wrong("a point is defined as 'point NAME = joints ...' or 'point NAME = pose ...'")
+            raise _LineError("write a definition as 'point NAME = joints ...' or 'point NAME = pose ...'")
         name = words[1]
         if not _NAME.fullmatch(name) or len(name) > _LONGEST_NAME:
-            raise _Wrong(
-                f"{_quoted(name)} is no name for a point: small letters, digits, _ and -, a letter first, "
+            raise _LineError(
+                f"{_quoted(name)} is not a valid point name: small letters, digits, _ and -, a letter first, "
                 f"up to {_LONGEST_NAME}"
             )
         if name in (*_STATEMENTS, "end"):
-            raise _Wrong(f"{name!r} is a statement and no name for a point: take another")
-        # A point whose numbers are wrong is defined all the same: its users are not.
+            raise _LineError(f"{name!r} is a statement and not a valid point name: choose another")
+        # A point with wrong numbers counts as defined, so that its uses are not reported too.
         before = self._defined.setdefault(name, line)
         if before != line:
-            raise _Wrong(f"point {name!r} is defined in line {before} already")
+            raise _LineError(f"point {name!r} is already defined in line {before}")
         if words[3] == "joints":
             self._points[name] = replace(self._joint_target("joints", words[4:]), name=name)
         else:
@@ -158,11 +158,11 @@ class _Parser:
             case "repeat":
                 self._open(line, rest)
             case "end":
-                _nothing_behind(word, rest)
+                _no_arguments(word, rest)
                 self._close()
             case _:
                 statement = self._statement(line, word, rest)
-                # What a point that could not be read is for is no problem of its own.
+                # The use of a point that could not be read is not reported as another problem.
                 if statement is not None:
                     self._blocks[-1].body.append(statement)
                     self._count(self._blocks[-1], 1, line)
@@ -170,7 +170,7 @@ class _Parser:
     def _statement(self, line: int, word: str, rest: Sequence[str]) -> Statement | None:
         match word:
             case "home":
-                _nothing_behind(word, rest)
+                _no_arguments(word, rest)
                 return Home(line)
             case "move_joints" | "move_line":
                 target = self._target(word, rest)
@@ -185,17 +185,17 @@ class _Parser:
                 return Wait(line, _one_number(word, rest, 0.0, 3600.0, "seconds"))
             case "trace":
                 if list(rest) not in (["on"], ["off"]):
-                    said = _quoted(" ".join(rest)) if rest else "nothing"
-                    raise _Wrong(f"'trace' takes on or off, not {said}")
+                    found = _quoted(" ".join(rest)) if rest else "nothing"
+                    raise _LineError(f"'trace' takes on or off, not {found}")
                 return Trace(line, rest[0] == "on")
-        raise _Wrong(f"{_quoted(word)} is no statement{nearest(word.lower(), (*_STATEMENTS, 'end'))}")
+        raise _LineError(f"{_quoted(word)} is not a statement{nearest(word.lower(), (*_STATEMENTS, 'end'))}")
 
     def _target(self, word: str, rest: Sequence[str]) -> Target | None:
         if len(rest) == 1 and not _NUMBER.fullmatch(rest[0]):
             name = rest[0]
             if name not in self._defined:
                 hint = nearest(name.lower(), self._defined) if self._defined else "; none is defined"
-                raise _Wrong(f"{word}: there is no point {_quoted(name)}{hint}")
+                raise _LineError(f"{word}: there is no point {_quoted(name)}{hint}")
             return self._points.get(name)
         if word == "move_joints":
             return self._joint_target(word, rest)
@@ -211,17 +211,17 @@ class _Parser:
         try:
             count = _one_number("repeat", rest, 1, MOST_STEPS, "times")
             if count != int(count):
-                raise _Wrong(f"'repeat' takes a whole number, not {rest[0]}")
+                raise _LineError(f"'repeat' takes a whole number, not {rest[0]}")
             if len(self._blocks) > MOST_DEPTH:
-                raise _Wrong(f"'repeat' is nested more than {MOST_DEPTH} deep")
-        except _Wrong:
-            self._blocks.append(_Block(line, 1))  # its 'end' is right
+                raise _LineError(f"'repeat' is nested more than {MOST_DEPTH} deep")
+        except _LineError:
+            self._blocks.append(_Block(line, 1))  # so that its 'end' is not reported
             raise
         self._blocks.append(_Block(line, int(count)))
 
     def _close(self) -> None:
         if len(self._blocks) == 1:
-            raise _Wrong("'end' ends nothing: there is no open 'repeat' above")
+            raise _LineError("'end' ends nothing: there is no open 'repeat' above")
         block = self._blocks.pop()
         self._blocks[-1].body.append(Repeat(block.line, block.count, tuple(block.body)))
         self._count(self._blocks[-1], block.steps * block.count, block.line)
@@ -229,12 +229,12 @@ class _Parser:
     def _count(self, block: _Block, steps: int, line: int) -> None:
         block.steps += steps
         if block.steps > MOST_STEPS:
-            block.steps = 0  # said once
-            raise _Wrong(f"the program comes to more than {MOST_STEPS} steps here, its repeats counted")
+            block.steps = 0  # report this once
+            raise _LineError(f"the program has more than {MOST_STEPS} steps here, including repeats")
 
 
 def joint_scales(joints: Joints) -> FloatArray:
-    """(n,) SI units in what programs count in: radians in a degree, metres in a millimetre."""
+    """Return the (n,) SI values of a program's units: radians per degree, metres per millimetre."""
     return np.array([radians(1.0) if kind is JointType.ROTARY else 0.001 for kind in joints.types])
 
 
@@ -244,7 +244,7 @@ def _pose_target(word: str, rest: Sequence[str]) -> PoseTarget:
 
 
 def pose_of(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> FloatArray:
-    """(4, 4) in metres of a pose in mm and degrees."""
+    """Return the (4, 4) [m] of a pose in mm and degrees."""
     pose = np.eye(4)
     pose[:3, :3] = rpy_rotation(radians(roll), radians(pitch), radians(yaw))
     pose[:3, 3] = np.array([x, y, z]) / 1000
@@ -252,38 +252,38 @@ def pose_of(x: float, y: float, z: float, roll: float, pitch: float, yaw: float)
 
 
 def _numbers(word: str, rest: Sequence[str], names: Sequence[str], units: str) -> list[float]:
-    """A number for each name."""
+    """Parse one number for each name."""
     wrong = [each for each in rest if not _NUMBER.fullmatch(each)]
     if wrong:
-        raise _Wrong(f"'{word}': {_quoted(wrong[0])} is no number")
+        raise _LineError(f"'{word}': {_quoted(wrong[0])} is not a number")
     if len(rest) != len(names):
-        raise _Wrong(
+        raise _LineError(
             f"'{word}' takes {len(names)} number{'s' if len(names) > 1 else ''} "
             f"({' '.join(names)}: {units}), not {len(rest)}"
         )
     values = [float(each) for each in rest]
-    for name, value, said in zip(names, values, rest, strict=True):
+    for name, value, text in zip(names, values, rest, strict=True):
         if not abs(value) <= _FARTHEST:
-            raise _Wrong(
-                f"'{word}': {name} is {said[:40]}; from -{_FARTHEST:.0f} to {_FARTHEST:.0f} is right"
+            raise _LineError(
+                f"'{word}': {name} is {text[:40]}; must be between -{_FARTHEST:.0f} and {_FARTHEST:.0f}"
             )
     return values
 
 
 def _one_number(word: str, rest: Sequence[str], lowest: float, highest: float, unit: str) -> float:
     if len(rest) != 1 or not _NUMBER.fullmatch(rest[0]):
-        raise _Wrong(
+        raise _LineError(
             f"'{word}' takes one number ({unit}), not {_quoted(' '.join(rest)) if rest else 'nothing'}"
         )
     value = float(rest[0])
     if not lowest <= value <= highest:
-        raise _Wrong(f"'{word}' is {rest[0][:40]}; from {lowest:g} to {highest:g} {unit} is right")
+        raise _LineError(f"'{word}' is {rest[0][:40]}; must be between {lowest:g} and {highest:g} {unit}")
     return value
 
 
-def _nothing_behind(word: str, rest: Sequence[str]) -> None:
+def _no_arguments(word: str, rest: Sequence[str]) -> None:
     if rest:
-        raise _Wrong(f"'{word}' stands alone, not with {_quoted(' '.join(rest))}")
+        raise _LineError(f"'{word}' takes no argument, not {_quoted(' '.join(rest))}")
 
 
 def _quoted(words: str) -> str:

@@ -1,6 +1,6 @@
-"""An arm at many joint positions at once: where its tool is, how it moves, how far any link may get.
+"""Tool poses, Jacobians and travel bounds of an arm at many joint positions.
 
-Pinocchio answers for one position a call; a program asks for tens of thousands.
+Vectorized, because Pinocchio computes one position per call and a program has tens of thousands.
 """
 
 from dataclasses import dataclass
@@ -17,28 +17,28 @@ from robots.singularity import reach_of
 
 @dataclass(frozen=True, eq=False)
 class ToolChain:
-    """The joints between base and tool, and what is needed of their arm.
+    """The joints between base and tool, with bounds of the arm's travel.
 
     Attributes:
-        reach_m: The length of the arm stretched out.
-        travel: (b, n) how far any point of a body of the arm, or of its tool, may move with each joint:
-            [m/rad] or [m/m], however the arm stands.
+        reach_m: The length of the stretched arm.
+        travel: (b, n) upper bound of the travel of any point of a body or the tool per joint, in any
+            position: [m/rad] or [m/m].
     """
 
     reach_m: float
     travel: FloatArray
-    # Of the joints between base and tool: (4, 4) each at position 0 in the one before, axes, kinds.
+    # Joints between base and tool: (4, 4) placement of each in the previous at position 0, axes, types.
     _placements: FloatArray
     _axes: FloatArray
     _rotary: tuple[bool, ...]
     _tool_to_joint: FloatArray
-    # Positions of those joints from the robot's own.
+    # From the robot's joint positions to those of these joints.
     _factors: FloatArray
     _offsets: FloatArray
 
 
 def tool_chain(arm: Arm) -> ToolChain:
-    """The chain of an arm's tool, worked out once."""
+    """Build the chain of an arm's tool."""
     tree = tree_of(arm.description)
     on_link, tool_to_link = tool_frame(arm.description)
     link = next(link for link in tree.links if link.name == on_link)
@@ -63,17 +63,17 @@ def tool_chain(arm: Arm) -> ToolChain:
 
 
 def _strokes(arm: Arm, tree: Tree, factors: FloatArray, offsets: FloatArray) -> FloatArray:
-    """(all joints,) how far each prismatic joint may move what it carries from its frame [m]."""
+    """Return the (all joints,) largest stroke of each prismatic joint [m]; 0 for rotary joints."""
     farthest = np.abs(factors) @ np.maximum(np.abs(arm.joints.lower), np.abs(arm.joints.upper))
     prismatic = [joint.type is JointType.PRISMATIC for joint in tree.joints]
     return np.where(prismatic, farthest + np.abs(offsets), 0.0)
 
 
 def _travel(tree: Tree, link: TreeLink, center: FloatArray, radius: float, strokes: FloatArray) -> FloatArray:
-    """(all joints,) bound of the movement of a ball on a link with each joint: its farthest point's.
+    """Return the (all joints,) upper bound of the travel of a ball's farthest point per joint.
 
-    The way from a joint to the ball is no longer than its parts; of the first part, which the joint
-    turns as a whole, only what is across the axis counts.
+    The distance from a joint to the ball is at most the sum of the parts between them. Of the first part,
+    which rotates rigidly with the joint, only the component across the axis counts.
     """
     travel = np.zeros(len(tree.joints))
     beyond = radius
@@ -88,13 +88,13 @@ def _travel(tree: Tree, link: TreeLink, center: FloatArray, radius: float, strok
 
 
 def samples_between(chain: ToolChain, start: FloatArray, target: FloatArray) -> int:
-    """In how many equal parts to cut a straight joint motion: no link moves more than SAMPLE_M in one."""
+    """Return the number of equal parts of a motion, so that no link moves more than SAMPLE_M in one."""
     farthest = float((chain.travel @ np.abs(target - start)).max())
     return max(int(np.ceil(farthest / SAMPLE_M)), 1)
 
 
 def tools_and_jacobians(chain: ToolChain, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Where the tool is, and how it moves with the joints.
+    """Return the tool's poses and Jacobians.
 
     Args:
         positions: (m, n) [rad] or [m].

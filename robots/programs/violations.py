@@ -1,4 +1,4 @@
-"""From what is met sample by sample to violations that last: adjacent samples of the same are one."""
+"""Collector of violations: merges findings at adjacent samples to violations with a duration."""
 
 from dataclasses import dataclass, field
 
@@ -10,18 +10,18 @@ from robots.cells import FLOOR
 from robots.joints import FloatArray
 from robots.programs.steps import Violation, ViolationKind
 
-# What is told; the rest is counted.
+# Reported violations; the rest is counted.
 MOST_VIOLATIONS = 1_000
-# What an arm that retreats may come nearer by meanwhile: what distances may be wrong by, and no more.
+# Tolerance of a retreat's approach between samples: the error of distances.
 _ROUNDED_M = 1e-5
-# Nearer than at the start it may not come at all: the next motion would begin there, and so on.
+# Tolerance of a retreat's approach since its start. It is small, because the next motion could continue it.
 _SAME_M = 1e-9
 _NO_POINTS: FloatArray = np.zeros((0, 3))
 
 
 @dataclass
 class _Run:
-    """A violation that may go on."""
+    """A violation that may continue."""
 
     line: int
     kind: ViolationKind
@@ -33,13 +33,13 @@ class _Run:
     points: FloatArray
     limit: float
     stops: bool
-    # Of a clearance: the pair touches before, meanwhile or behind; then that is told, and not this.
+    # Of a clearance: the pair also collides before, during or after it, so only the collision is reported.
     touches: bool = False
 
 
 @dataclass
 class _Retreat:
-    """A pair that has come no nearer since the start: the last sample, its distances at first and at most."""
+    """A pair that has not come nearer since the start: its last sample, first and largest distance."""
 
     sample: int
     start_m: float
@@ -48,19 +48,19 @@ class _Retreat:
 
 @dataclass
 class Runs:
-    """Violations of a motion, as its samples are gone through.
+    """Violations of a motion, collected sample by sample.
 
     Attributes:
-        untold: How many there are beyond those that are kept.
+        unreported: Number of violations beyond MOST_VIOLATIONS.
     """
 
-    untold: int = 0
+    unreported: int = 0
     _open: dict[tuple[int, ViolationKind, tuple[str, ...]], _Run] = field(default_factory=dict)
     _all: list[_Run] = field(default_factory=list)
-    # Pairs nearer than allowed at the start, and since then not nearer.
+    # Pairs that were too near at the start and have not come nearer since.
     _retreats: dict[tuple[str, ...], _Retreat] = field(default_factory=dict)
 
-    def met(
+    def add(
         self,
         *,
         line: int,
@@ -74,41 +74,41 @@ class Runs:
         stops: bool = True,
         within: int = 1,
     ) -> None:
-        """Something is wrong at a sample; samples come in order, and count from 0 through the whole motion.
+        """Add a finding at a sample; samples are in order and count from 0 through the whole motion.
 
         Args:
-            value: How bad, the smaller the worse: a distance [m], a margin, a speed with its sign turned.
-            limit: What it should have been.
-            within: So many samples on it is still the same violation.
+            value: The measured value, the smaller the worse: a distance [m], a margin, a negated speed.
+            limit: The limit of the value.
+            within: Largest gap in samples within one violation.
         """
-        # How far two are in each other is not known, but how far one is below the floor: it may come up.
+        # A retreat from below the floor is allowed, because its depth is known; that of a collision is not.
         measured = kind is ViolationKind.CLEARANCE or FLOOR in pair
         if pair and self._retreating(pair, sample, value) and measured:
             return
         key = (line, kind, pair)
         other = ViolationKind.COLLISION if kind is ViolationKind.CLEARANCE else ViolationKind.CLEARANCE
-        beside = self._open.get((line, other, pair)) if pair else None
-        if beside is not None and sample - beside.sample > within:
-            beside = None
-        if beside is not None and kind is ViolationKind.COLLISION:
-            # Who comes near, touches and goes again was near all the while.
-            beside.sample, beside.until_s, beside.touches = sample, time_s, True
+        related = self._open.get((line, other, pair)) if pair else None
+        if related is not None and sample - related.sample > within:
+            related = None
+        if related is not None and kind is ViolationKind.COLLISION:
+            # A pair that comes near, touches and separates is near all the time.
+            related.sample, related.until_s, related.touches = sample, time_s, True
         run = self._open.get(key)
         if run is None or sample - run.sample > within:
             run = _Run(line, kind, pair, time_s, time_s, sample, value, points, limit, stops)
-            run.touches = beside is not None and kind is ViolationKind.CLEARANCE
+            run.touches = related is not None and kind is ViolationKind.CLEARANCE
             self._open[key] = run
             if len(self._all) < MOST_VIOLATIONS:
                 self._all.append(run)
             else:
-                self.untold += 1
+                self.unreported += 1
         if value < run.value:
             run.value, run.limit, run.points = value, limit, points
         run.stops = run.stops or stops
         run.until_s, run.sample = time_s, sample
 
     def _retreating(self, pair: tuple[str, ...], sample: int, distance_m: float) -> bool:
-        """Whether a pair was too near at the start and has come no nearer."""
+        """Return whether a pair was too near at the start and has not come nearer."""
         if sample == 0:
             self._retreats[pair] = _Retreat(0, distance_m, distance_m)
             return True
@@ -123,9 +123,9 @@ class Runs:
         return True
 
     def violations(self) -> tuple[Violation, ...]:
-        """All that were found, by time."""
-        told = [run for run in self._all if not run.touches]
-        runs = sorted(told, key=lambda run: (run.begin_s, run.line))
+        """Return all reported violations, by time."""
+        reported = [run for run in self._all if not run.touches]
+        runs = sorted(reported, key=lambda run: (run.begin_s, run.line))
         return tuple(
             Violation(
                 line=run.line,

@@ -1,4 +1,4 @@
-"""Programs, and what a plan makes of them, as text again."""
+"""Writer of programs and of a plan's steps as program text."""
 
 from collections.abc import Iterator, Sequence
 from math import degrees
@@ -24,13 +24,13 @@ from robots.programs.text import joint_scales
 
 
 def program_text(program: Program, joints: Joints) -> str:
-    """The text that says a program, points first; without the comments that there may have been."""
+    """Return a program's text, points first, without comments."""
     points = (_definition(target, joints) for target in program.points.values())
     return "".join(f"{line}\n" for line in (*points, *_written(program.statements, joints, "")))
 
 
 def steps_text(steps: Sequence[Step], joints: Joints) -> str:
-    """The text of a program that asks for the same steps: joint moves, nothing nested."""
+    """Return the text of a program with the same steps: joint moves, nothing nested."""
     return "".join(f"{_step_words(step, joints)}\n" for step in steps)
 
 
@@ -86,12 +86,12 @@ def _definition(target: Target, joints: Joints) -> str:
 
 
 def joint_words(positions: FloatArray, joints: Joints) -> str:
-    """Joint positions [rad] or [m] as a program says them."""
+    """Format joint positions [rad] or [m] for a program."""
     return " ".join(number(value) for value in (positions / joint_scales(joints)).tolist())
 
 
 def pose_words(tool_to_base: FloatArray) -> str:
-    """A pose (4, 4) [m] as a program says it."""
+    """Format a pose (4, 4) [m] for a program."""
     millimetres = (tool_to_base[:3, 3] * 1000).tolist()
     return " ".join(
         number(value) for value in (*millimetres, *map(degrees, rotation_rpy(tool_to_base[:3, :3])))
@@ -99,5 +99,5 @@ def pose_words(tool_to_base: FloatArray) -> str:
 
 
 def number(value: float) -> str:
-    """A number in as few digits as tell it: to 1e-6 degrees or millimetres."""
+    """Format a number in as few digits as possible, to 1e-6 degrees or millimetres."""
     return f"{round(value, 6) + 0.0:.6f}".rstrip("0").rstrip(".")

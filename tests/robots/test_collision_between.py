@@ -111,7 +111,7 @@ def test_of_a_long_way_only_what_is_near_is_sampled_and_each_line_once(mates: Ce
 
     def sampled(way: list[list[float]]) -> int:
         sweeps = sweeps_of(mates, "arm", {"mate": np.array(way)}, passed=passed, within_m=0.05)
-        return sum(len(sweep.come) for sweep in sweeps if len(sweep.come) > 1)
+        return sum(len(sweep.travel) for sweep in sweeps if len(sweep.travel) > 1)
 
     assert sampled([[0.0, 0.0], aside]) == 0
     once = sampled([aside, across])

@@ -127,8 +127,7 @@ def test_without_a_floor_and_fixtures_only_the_arm_itself_was_checked() -> None:
     assert bare.ok
     assert bare.alone
     assert (
-        bare.notes[-1]
-        == "nothing stands around the arm: its cell has no fixture, no floor and no other robot"
+        bare.notes[-1] == "no obstacle around the arm: its cell has no fixture, no floor and no other robot"
     )
     table = block("table", (0.1, 0.1, 0.1), placed(3.0))
     assert not checked(pt600(floor=None, fixtures=(table,)), "move_joints 10 0 0 0 0\n").alone

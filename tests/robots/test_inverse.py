@@ -236,7 +236,7 @@ HERE = np.eye(4)
         (np.eye(3), r"has numbers of shape \(3, 3\); 16 are right"),
         ("nonsense", "takes 16 numbers"),
         ([[1, 0], [0]], "takes 16 numbers"),
-        (HERE * np.nan, "holds nan; every number is to be finite"),
+        (HERE * np.nan, "holds nan; every number must be finite"),
         (np.where(HERE == 0, np.inf, HERE), "holds inf"),
         (np.diag([1.0, 1.0, -1.0, 1.0]), "is mirrored"),
         (np.diag([2.0, 1.0, 1.0, 1.0]), "has no rotation .* these have the lengths 2 1 1"),

@@ -15,7 +15,7 @@ from robots.cells import CellDescription, CellRobot
 from robots.collision import build_cell, near_along, own_contacts, own_nearest, pair_study, pending
 from robots.collision.cell import Cell
 from robots.collision.link_pairs import plan_of
-from robots.collision.surfaces import turns_around
+from robots.collision.surfaces import winding_number
 from robots.collision.verdicts import Kind
 from robots.description import load
 from robots.importing import import_robot
@@ -141,7 +141,9 @@ def test_meshes_too_large_to_check_and_a_study_that_failed_leave_hulls(
     assert cell.arms["arm"].plan.elsewhere == cell.arms["arm"].plan.refined == ()
     assert touching(cell, 0.0, 0.21) == [("arm/base", "arm/hand")]
     monkeypatch.setattr(pair_study, "MOST_TRIANGLES", 30)
-    monkeypatch.setattr("robots.collision.link_pairs.studied", lambda case, *, wait: pair_study.study(case))
+    monkeypatch.setattr(
+        "robots.collision.link_pairs.study_results", lambda case, *, wait: pair_study.study(case)
+    )
     ((links, text),) = plan_of(load(model)).elsewhere
     assert links == ("base", "hand")
     assert "hulls are checked, for the exact meshes have over" in text
@@ -199,7 +201,7 @@ def test_threads_that_ask_for_the_same_study_share_it(
     none = np.empty((0, 3, 3))
     case = pair_study.Case(((0, 1),), (none, none), (none, none), np.eye(4)[None, None], (np.empty(0, int),))
     with ThreadPoolExecutor(2) as threads:
-        asked = [threads.submit(pair_study.studied, case) for _ in range(2)]
+        asked = [threads.submit(pair_study.study_results, case) for _ in range(2)]
         for _ in asked:
             assert waiting.acquire(timeout=60.0)
         ended.set()
@@ -283,9 +285,9 @@ def test_a_link_wholly_inside_another_touches_it_and_one_in_a_hollow_does_not(tm
     outer = vertices[triangles]
     shell = np.concatenate([outer, 0.9 * outer[:, ::-1]])
     middle, wall = np.array([0.01, 0.02, 0.03]), np.array([0.01, 0.02, 0.95])
-    assert abs(turns_around(outer, middle)) == pytest.approx(1.0)
-    assert turns_around(shell, middle) == pytest.approx(0.0, abs=1e-9)
-    assert abs(turns_around(shell, wall)) == pytest.approx(1.0)
+    assert abs(winding_number(outer, middle)) == pytest.approx(1.0)
+    assert winding_number(shell, middle) == pytest.approx(0.0, abs=1e-9)
+    assert abs(winding_number(shell, wall)) == pytest.approx(1.0)
 
 
 def test_only_a_pair_that_touches_everywhere_as_meshes_too_is_ignored(tmp_path: Path) -> None:

@@ -108,7 +108,7 @@ def test_links_of_the_arm_itself_are_kept_apart_too(alone: Cell) -> None:
     assert touch.kind is ViolationKind.COLLISION
     assert set(touch.pair) == {"arm/base", "arm/elbow"}
     assert np.isinf(result.path.clearances).all()
-    assert result.notes == ("only the floor is around the arm: its cell has no fixture and no other robot",)
+    assert result.notes == ("only the floor around the arm: its cell has no fixture and no other robot",)
 
 
 def test_each_pass_is_one_violation_of_its_own(shelf: Cell) -> None:
@@ -221,12 +221,14 @@ def test_another_robot_counts_wherever_it_may_be_on_its_way(tmp_path: Path) -> N
     assert check_plan(near, "arm", STRETCHED, plan, others={"other": quarter[:1]}).ok
     unknown = check_plan(near, "arm", STRETCHED, plan, others={})
     assert unknown.ok
-    assert unknown.notes == ("other is left out: nobody knows where it is now",)
+    assert unknown.notes == ("other is left out: its position is unknown",)
 
 
 def test_links_without_a_shape_are_named(tmp_path: Path) -> None:
     cell = build_cell(cell_of({"arm": (bar_arm(tmp_path, bare=("base", "elbow")), placed(0))}))
-    assert "without a shape, so never found to touch anything: base, elbow" in checked(cell, "home\n").notes
+    assert (
+        "not checked for collisions, because they have no shape: base, elbow" in checked(cell, "home\n").notes
+    )
 
 
 def test_a_text_that_cannot_be_read_is_violations_with_lines(alone: Cell) -> None:
@@ -238,7 +240,7 @@ def test_a_text_that_cannot_be_read_is_violations_with_lines(alone: Cell) -> Non
 def test_a_long_program_is_told_in_bounded_numbers(shelf: Cell) -> None:
     result = checked(shelf, "repeat 700\n move_joints 36 0\n move_joints 0 0\nend\n")
     assert len(result.violations) == MOST_VIOLATIONS
-    assert result.notes == ("400 more violations are not told",)
+    assert result.notes == ("400 more violations are not listed",)
     assert 10_000 <= len(result.path.times_s) <= 20_001
     assert result.path.times_s[-1] == pytest.approx(result.duration_s)
     assert (np.diff(result.path.times_s) >= 0).all()
@@ -247,7 +249,7 @@ def test_a_long_program_is_told_in_bounded_numbers(shelf: Cell) -> None:
 def test_samples_that_follow_are_one_violation_and_its_worst_is_kept() -> None:
     runs = Runs()
     for sample, value in ((5, 0.04), (6, 0.008), (7, 0.02), (9, 0.03)):
-        runs.met(
+        runs.add(
             line=3,
             sample=sample,
             time_s=sample / 10,

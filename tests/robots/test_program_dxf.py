@@ -92,7 +92,9 @@ def test_one_curve_is_chosen_by_its_handle(tmp_path: Path) -> None:
 def test_the_drawings_unit_counts(tmp_path: Path) -> None:
     found = moves(program_from_dxf(drawn(tmp_path, unit=1), ASKED))
     assert found[2][1][0, 3] == pytest.approx(2.54)
-    with pytest.raises(MeshError, match=r"does not say its unit \(\$INSUNITS\): give it with --unit, in mm"):
+    with pytest.raises(
+        MeshError, match=r"does not state its unit \(\$INSUNITS\); give it with --unit, in mm"
+    ):
         program_from_dxf(drawn(tmp_path, unit=0), ASKED)
     found = moves(program_from_dxf(drawn(tmp_path, unit=0), replace(ASKED, unit_mm=2.0)))
     assert found[2][1][0, 3] == pytest.approx(0.2)
@@ -104,12 +106,12 @@ def test_the_drawings_unit_counts(tmp_path: Path) -> None:
         (replace(ASKED, layer="ct"), "has no curve on layer 'ct'; did you mean 'cut'?"),
         (
             replace(ASKED, layer=""),
-            r"which curves\? Name a layer or a handle; there are curves on cut \(1\), hole \(1\), seam \(3\)",
+            r"no curves selected. Name a layer or a handle; curves: cut \(1\), hole \(1\), seam \(3\)",
         ),
         (replace(ASKED, handle="FFFF"), "has no curve of handle 'FFFF' in its model space"),
         (
             replace(ASKED, layer="hole", tolerance_mm=1e-5),
-            "more than a program holds: take a larger tolerance",
+            "more than a program can hold: use a larger tolerance",
         ),
     ],
 )

@@ -62,7 +62,7 @@ def test_a_line_out_of_reach_ends_the_plan_where_it_is_and_says_why() -> None:
     assert (violation.kind, violation.line) == (ViolationKind.UNREACHABLE, 2)
     assert violation.text.startswith("the line cannot be followed beyond ")
     assert " of its 1000.0 mm: its end cannot be reached: out of reach: " in violation.text
-    assert plan.notes == ("nothing behind line 2 is checked: the program cannot get there",)
+    assert plan.notes == ("nothing after line 2 is checked: the program cannot get there",)
     assert {step.line for step in plan.steps} == {1}
     ((x, y, z),) = violation.points
     assert 0.4 < x < 0.65
@@ -81,7 +81,7 @@ def test_an_arm_of_five_joints_says_how_far_its_tool_leans_on_a_line() -> None:
     assert not plan.violations
     (note,) = plan.notes
     assert note.startswith("line 2: between its ends the tool's axis is up to ")
-    assert note.endswith("° from an even turn: this arm cannot hold it there")
+    assert note.endswith("° from a uniform rotation: this arm cannot follow it")
 
 
 def test_a_repeated_line_comes_to_the_same_moves_to_the_last_bit() -> None:

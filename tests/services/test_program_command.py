@@ -47,7 +47,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_program_with_nothing_wrong_is_told_so_for_people(folder: Path, capsys) -> None:
     assert run(["program", "check", "good", "--robot", "pt600"]) == 0
     out = capsys.readouterr().out.splitlines()
-    assert out[0] == "note: only the floor is around the arm: its cell has no fixture and no other robot"
+    assert out[0] == "note: only the floor around the arm: its cell has no fixture and no other robot"
     assert out[1].startswith("good: ")
     assert out[1].endswith(" s, nothing wrong")
     assert out[2].startswith("assumed of the controller: joint moves: straight between the joint positions")
@@ -76,11 +76,11 @@ def test_json_is_one_object_of_the_contract(folder: Path, capsys) -> None:
 def test_a_program_that_cannot_be_read_gets_its_lines_and_status_1(folder: Path, capsys) -> None:
     assert run(["program", "check", "wrong"]) == 1
     assert capsys.readouterr().out.splitlines() == [
-        "wrong: line 2: 'speed' is 0; from 1 to 100 percent is right",
+        "wrong: line 2: 'speed' is 0; must be between 1 and 100 percent",
         "wrong: 1 error in the text",
     ]
     assert run(["program", "plan", "wrong"]) == 1
-    assert capsys.readouterr().err == "wrong: line 2: 'speed' is 0; from 1 to 100 percent is right\n"
+    assert capsys.readouterr().err == "wrong: line 2: 'speed' is 0; must be between 1 and 100 percent\n"
 
 
 @pytest.mark.parametrize("text", ["", "# nothing yet\n", "speed 50\ntool_speed 100\n", "repeat 9\nend\n"])
