@@ -1,4 +1,4 @@
-"""Arms that tests of inverse kinematics share, and the free ways to ask them."""
+"""Arms for the tests of inverse kinematics, and random positions within their limits."""
 
 from functools import cache
 from pathlib import Path
@@ -13,7 +13,7 @@ from robots.schema import RobotDescription
 
 LIMIT = '<limit lower="-2.5" upper="2.5" velocity="3" effort="1"/>'
 LIFT = '<limit lower="0" upper="0.3" velocity="0.2" effort="1"/>'
-# A lift of two stages, the second after the first; and a finger that moves no tool.
+# A lift of two stages, the second a mimic joint; and a finger that does not move the tool.
 TELESCOPE = f"""<robot name="telescope">
 <link name="foot"/><link name="column"/><link name="boom"/><link name="stage"/><link name="tip"/>
 <link name="hand"/><link name="tool0"/><link name="finger"/>
@@ -35,7 +35,7 @@ TELESCOPE = f"""<robot name="telescope">
 
 
 def dh_arm(name: str, rows: list[tuple[float, float, float, float]], limits: tuple[float, float]) -> str:
-    """A robot.toml of rotary joints: theta offset [deg], d [mm], a [mm], alpha [deg] each."""
+    """Return a robot.toml of rotary joints: theta offset [deg], d [mm], a [mm], alpha [deg] each."""
     return f'name = "{name}"\n' + "".join(
         f"""[[joint]]
 name = "j{number}"
@@ -52,7 +52,7 @@ max_jerk = 4000.0
     )
 
 
-# As a Puma's, but each joint counts from elsewhere, and may turn nearly twice around.
+# Like a Puma, but with joint offsets and nearly two turns per joint.
 OFFSETS = dh_arm(
     "offsets",
     [
@@ -65,7 +65,7 @@ OFFSETS = dh_arm(
     ],
     (-350.0, 350.0),
 )
-# No two axes meet or run side by side: no closed form.
+# No two axes intersect or are parallel: no closed form.
 CROOKED = dh_arm(
     "crooked",
     [
@@ -81,7 +81,7 @@ CROOKED = dh_arm(
 
 
 def telescope(folder: Path) -> RobotDescription:
-    """A lift of two stages between two joints that turn; written into a folder."""
+    """Write a lift of two stages between two rotary joints to a folder."""
     (folder / "arm.urdf").write_text(TELESCOPE)
     (folder / "robot.toml").write_text('name = "telescope"\nurdf = "arm.urdf"\n[tool]\nlink = "tool0"\n')
     return load(folder)
@@ -89,14 +89,14 @@ def telescope(folder: Path) -> RobotDescription:
 
 @cache
 def arm(name: str) -> tuple[RobotDescription, RobotModel, InverseSolver]:
-    """An arm of the library, an example robot, or one of this file."""
+    """Return an arm of the library, an example robot, or one of this file."""
     made = {"offsets": OFFSETS, "crooked": CROOKED}
     description = parse(made[name], Path("robot.toml")) if name in made else load(name)
     return description, build_model(description), build_solver(description)
 
 
 def allowed_positions(model: RobotModel, count: int, seed: int = 4) -> list[np.ndarray]:
-    """Random joint positions that no limit forbids."""
+    """Return random joint positions within all limits."""
     random, found = np.random.default_rng(seed), []
     while len(found) < count:
         positions = random.uniform(model.joints.lower, model.joints.upper)
@@ -106,6 +106,6 @@ def allowed_positions(model: RobotModel, count: int, seed: int = 4) -> list[np.n
 
 
 def reached(model: RobotModel, positions: np.ndarray, target: np.ndarray, *, roll: bool) -> float:
-    """The largest difference of the tool's pose from a target, its roll left out or not."""
+    """Return the largest deviation of the tool's pose from a target, with or without the roll."""
     apart = np.abs(tool_placement(model, positions) - target)[:3]
     return float(apart.max() if roll else apart[:, 2:].max())

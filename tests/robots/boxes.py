@@ -1,4 +1,4 @@
-"""Cells of boxes whose distances are known: a post, and two bars that turn in the plane above it."""
+"""Cells of boxes with known distances: a post, and two bars that rotate in the plane above it."""
 
 from pathlib import Path
 
@@ -30,10 +30,10 @@ _LOOK = 'link = {{ mesh = "{file}", mesh_scale = 1.0 }}\n'
 
 
 def bar_arm(folder: Path, more: str = "", *, bare: tuple[str, ...] = ()) -> Path:
-    """The arm's description file: links base, shoulder and elbow.
+    """Write the arm's description file: links base, shoulder and elbow.
 
     Args:
-        bare: Links that look like nothing.
+        bare: Links without a shape.
     """
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "post.wrl").write_text(f"#VRML V2.0 utf8\n{_POST}\n")
@@ -49,7 +49,7 @@ def bar_arm(folder: Path, more: str = "", *, bare: tuple[str, ...] = ()) -> Path
 
 
 def placed(x: float, y: float = 0.0, z: float = 0.0, *, yaw: float = 0.0) -> FloatArray:
-    """(4, 4) [m], [rad]."""
+    """Return a (4, 4) placement from [m], [rad]."""
     placement = np.eye(4)
     placement[:3, :3] = rpy_rotation(0.0, 0.0, yaw)
     placement[:3, 3] = x, y, z
@@ -57,24 +57,24 @@ def placed(x: float, y: float = 0.0, z: float = 0.0, *, yaw: float = 0.0) -> Flo
 
 
 def shape(*solids: Solid) -> Shape:
-    """Solids as one shape, in metres."""
+    """Join solids to one shape, in metres."""
     parts = tuple(Part("", Material(), points, np.zeros_like(points), faces) for points, faces in solids)
     return Shape(Mesh(parts=parts), np.eye(4))
 
 
 def block(name: str, size: tuple[float, float, float], at: FloatArray, **more: object) -> Fixture:
-    """A box with its middle at a placement."""
+    """Return a box with its centre at a placement."""
     half = np.array(size) / 2
     return Fixture(name, (shape(box(-half, half)),), at, **more)  # type: ignore[arg-type]
 
 
 def globe(name: str, radius: float, at: FloatArray) -> Fixture:
-    """A sphere."""
+    """Return a sphere."""
     return Fixture(name, (shape(ball(radius, 64)),), at)
 
 
 def bracket(name: str, at: FloatArray, *, exact: bool) -> Fixture:
-    """A U of one piece that is open to -x: two cheeks 0.2 m apart, and a back at x = 0."""
+    """Return a connected U that is open to -x: two cheeks 0.2 m apart, and a back at x = 0."""
     outline = np.array([[-0.5, -0.12], [0.02, -0.12], [0.02, 0.12], [-0.5, 0.12], [-0.5, 0.1], [0.0, 0.1],
                         [0.0, -0.1], [-0.5, -0.1]])  # fmt: skip
     low, high = (np.column_stack([outline, np.full(8, z)]) for z in (-0.1, 0.1))
@@ -86,7 +86,7 @@ def bracket(name: str, at: FloatArray, *, exact: bool) -> Fixture:
 
 
 def two_cheeks(name: str, at: FloatArray) -> Fixture:
-    """Two plates 0.2 m apart, in one mesh."""
+    """Return two plates 0.2 m apart, in one mesh."""
     plate = box(np.array([-0.5, -0.01, -0.1]), np.array([0.0, 0.01, 0.1]))
     return Fixture(name, (shape(moved(plate, placed(0, 0.11)), moved(plate, placed(0, -0.11))),), at)
 
@@ -94,5 +94,5 @@ def two_cheeks(name: str, at: FloatArray) -> Fixture:
 def cell_of(
     models: dict[str, tuple[Path | str, FloatArray]], fixtures: tuple[Fixture, ...] = ()
 ) -> CellDescription:
-    """A cell of robots: name, model and where its base is."""
+    """Return a cell of robots: name, model and placement of the base."""
     return CellDescription(tuple(CellRobot(name, *how) for name, how in models.items()), fixtures)

@@ -1,4 +1,4 @@
-"""TOML of strangers: what would cost its parser gigabytes is refused before it is parsed."""
+"""TOML from untrusted sources: text that would need gigabytes to parse is refused before parsing."""
 
 import resource
 import tomllib
@@ -32,7 +32,7 @@ DEEP = {
 
 @contextmanager
 def little_memory() -> Iterator[None]:
-    """Let this process take 300 MB more than it has."""
+    """Limit this process to 300 MB more memory than it uses."""
     before = resource.getrlimit(resource.RLIMIT_DATA)
     status = Path("/proc/self/status").read_text()
     taken = int(status.split("VmData:")[1].split()[0]) * 1024
@@ -44,7 +44,7 @@ def little_memory() -> Iterator[None]:
 
 
 @pytest.mark.parametrize("text", DEEP.values(), ids=DEEP)
-def test_deep_toml_is_refused_in_one_line_before_it_costs_anything(text: str, tmp_path: Path) -> None:
+def test_deep_toml_is_refused_in_one_line_before_parsing(text: str, tmp_path: Path) -> None:
     file = tmp_path / "robot.toml"
     file.write_text(text)
     with little_memory():
@@ -55,7 +55,7 @@ def test_deep_toml_is_refused_in_one_line_before_it_costs_anything(text: str, tm
     assert len(str(refused.value).splitlines()) == 1
 
 
-def test_toml_that_is_too_long_is_refused_unread(tmp_path: Path) -> None:
+def test_too_long_toml_is_refused_without_parsing(tmp_path: Path) -> None:
     file = tmp_path / "robot.toml"
     with file.open("wb") as sparse:
         sparse.truncate(2_000_000_000)
@@ -66,7 +66,7 @@ def test_toml_that_is_too_long_is_refused_unread(tmp_path: Path) -> None:
             read_toml(file)
 
 
-def test_dots_and_brackets_in_texts_and_comments_are_no_depth() -> None:
+def test_dots_and_brackets_in_texts_and_comments_do_not_count_as_depth() -> None:
     dots, brackets = ".".join(["a"] * 99), "[{" * 99
     text = (
         f'a = "{dots} {brackets} \\" {dots}" # {dots} {brackets} "\n'
@@ -76,7 +76,7 @@ def test_dots_and_brackets_in_texts_and_comments_are_no_depth() -> None:
     assert parse_toml(text) == tomllib.loads(text)
 
 
-def test_toml_as_deep_as_is_read_is_read() -> None:
+def test_toml_of_the_greatest_depth_is_read() -> None:
     key = ".".join(["a"] * MOST_DEPTH) + " = 1"
     lists = "b = " + "[" * MOST_DEPTH + "]" * MOST_DEPTH
     for text in (key, lists):
@@ -84,7 +84,7 @@ def test_toml_as_deep_as_is_read_is_read() -> None:
 
 
 @given(st.text(alphabet="ab.\"'\\\n#[]{}= ,", max_size=60))
-def test_any_text_is_parsed_as_python_does_or_refused(text: str) -> None:
+def test_any_text_is_parsed_like_tomllib_or_refused(text: str) -> None:
     try:
         expected = tomllib.loads(text)
     except tomllib.TOMLDecodeError:
@@ -94,7 +94,7 @@ def test_any_text_is_parsed_as_python_does_or_refused(text: str) -> None:
         assert parse_toml(text) == expected
 
 
-def test_number_of_too_many_digits_is_an_error_of_toml() -> None:
+def test_number_with_too_many_digits_is_a_toml_error() -> None:
     with pytest.raises(tomllib.TOMLDecodeError, match="digits"):
         parse_toml("a = " + "9" * 5000)
 

@@ -36,7 +36,7 @@ def by_pair(found: tuple[Nearest, ...]) -> dict[tuple[str, str], float]:
     return {each.pair: each.distance_m for each in found}
 
 
-def test_a_wall_is_as_far_as_the_arm_does_not_reach(tmp_path: Path) -> None:
+def test_distance_to_a_wall_is_what_the_arm_does_not_reach(tmp_path: Path) -> None:
     cell = build_cell(alone(tmp_path, block("wall", (0.1, 2.0, 2.0), placed(1.05))))
     found = outside_nearest(cell, "arm", STRETCHED, {})
     assert [each.pair for each in found] == [("arm/elbow", "wall"), ("arm/shoulder", "wall")]
@@ -49,7 +49,7 @@ def test_a_wall_is_as_far_as_the_arm_does_not_reach(tmp_path: Path) -> None:
     assert np.linalg.norm(on_wall - on_bar) == pytest.approx(0.22, abs=1e-6)
 
 
-def test_a_ball_beside_a_bar_is_measured_to_its_surface(tmp_path: Path) -> None:
+def test_distance_to_a_ball_is_measured_to_its_surface(tmp_path: Path) -> None:
     cell = build_cell(alone(tmp_path, globe("ball", 0.1, placed(0.6, 0.3, 0.01))))
     nearest = outside_clearance(cell, "arm", STRETCHED, {})
     assert nearest is not None
@@ -58,7 +58,7 @@ def test_a_ball_beside_a_bar_is_measured_to_its_surface(tmp_path: Path) -> None:
     assert nearest.points[1] == pytest.approx([0.6, 0.2, 0.01], abs=1e-6)
 
 
-def test_what_is_farther_than_asked_for_is_left_out(tmp_path: Path) -> None:
+def test_pairs_beyond_the_requested_distance_are_left_out(tmp_path: Path) -> None:
     cell = build_cell(alone(tmp_path, block("wall", (0.1, 2.0, 2.0), placed(1.05))))
     assert by_pair(outside_nearest(cell, "arm", STRETCHED, {}, within_m=0.3)) == {
         ("arm/elbow", "wall"): pytest.approx(0.22, abs=1e-6)
@@ -66,7 +66,7 @@ def test_what_is_farther_than_asked_for_is_left_out(tmp_path: Path) -> None:
     assert outside_nearest(cell, "arm", STRETCHED, {}, within_m=0.2) == ()
 
 
-def test_a_fold_back_touches_the_post_from_the_angle_at_which_geometry_has_it(tmp_path: Path) -> None:
+def test_folded_arm_touches_its_post_from_the_geometric_angle_on(tmp_path: Path) -> None:
     cell = build_cell(alone(tmp_path))
     # The post's corner at (0.1, 0.1) meets the bar's flank, 0.02 m beside its middle; elbow at (0.4, 0).
     reach = np.hypot(0.3, 0.1)
@@ -84,20 +84,20 @@ def test_a_fold_back_touches_the_post_from_the_angle_at_which_geometry_has_it(tm
     assert before.points[0][:2] == pytest.approx([0.1, 0.1], abs=1e-6)
 
 
-def test_neighbours_and_ignored_pairs_are_no_contacts(tmp_path: Path) -> None:
+def test_neighbours_and_ignored_pairs_are_not_contacts(tmp_path: Path) -> None:
     ignored = '[collision]\nignore = [["elbow", "base"]]\n'
     cell = build_cell(alone(tmp_path, more=ignored))
     assert own_contacts(cell, "arm", np.array([0.0, pi])) == ()
     assert own_nearest(cell, "arm", np.array([0.0, pi])) is None
 
 
-def test_a_fixture_in_the_base_is_none_of_the_arms_affair(tmp_path: Path) -> None:
+def test_fixture_inside_the_base_is_ignored(tmp_path: Path) -> None:
     floor = block("floor", (0.5, 0.5, 0.2), placed(0.0, 0.0, -0.2))
     cell = build_cell(alone(tmp_path, floor))
     assert ("arm/base", "floor") not in by_pair(outside_nearest(cell, "arm", STRETCHED, {}))
 
 
-def test_a_fixture_that_a_link_may_touch_is_not_near_it(tmp_path: Path) -> None:
+def test_fixture_that_a_link_may_touch_is_ignored(tmp_path: Path) -> None:
     wall = replace(block("wall", (0.1, 2.0, 2.0), placed(0.8)), ignore=("arm/elbow",))
     cell = build_cell(alone(tmp_path, wall))
     assert by_pair(outside_nearest(cell, "arm", STRETCHED, {})) == {
@@ -105,7 +105,7 @@ def test_a_fixture_that_a_link_may_touch_is_not_near_it(tmp_path: Path) -> None:
     }
 
 
-def test_two_arms_that_face_each_other_are_as_near_from_either_side(tmp_path: Path) -> None:
+def test_distance_of_two_arms_is_symmetric(tmp_path: Path) -> None:
     path = bar_arm(tmp_path)
     facing = {"one": (path, ORIGIN), "two": (path, placed(1.8, yaw=pi))}
     cell = build_cell(cell_of(facing))
@@ -114,7 +114,7 @@ def test_two_arms_that_face_each_other_are_as_near_from_either_side(tmp_path: Pa
     assert one[0].pair == ("one/elbow", "two/elbow")
     assert one[0].distance_m == pytest.approx(0.24, abs=1e-6)
     assert {(b, a): pytest.approx(d, abs=1e-6) for (a, b), d in by_pair(one).items()} == by_pair(two)
-    # Bases stand still, and are not measured against each other.
+    # Bases do not move and are not measured against each other.
     assert len(one) == 8
     assert outside_nearest(cell, "one", STRETCHED, {}) == ()
     nearer = build_cell(cell_of({**facing, "two": (path, placed(1.7, yaw=pi))}))
@@ -132,7 +132,7 @@ def test_the_larger_distance_of_two_robots_counts(tmp_path: Path) -> None:
     assert distances(cell, ("one/elbow", "ball")) == (0.05, 0.01)
 
 
-def test_a_cell_moved_as_a_whole_is_the_same_cell(tmp_path: Path) -> None:
+def test_moving_the_whole_cell_changes_no_distance(tmp_path: Path) -> None:
     path = bar_arm(tmp_path)
     here = cell_of(
         {"one": (path, ORIGIN), "two": (path, placed(1.5, 0.2, yaw=pi))},
@@ -150,12 +150,12 @@ def test_a_cell_moved_as_a_whole_is_the_same_cell(tmp_path: Path) -> None:
     again = outside_nearest(build_cell(there), "one", at, {"two": other})
     assert len(found) == 10
     assert by_pair(again) == {pair: pytest.approx(d, abs=1e-6) for pair, d in by_pair(found).items()}
-    # The nearest is a corner's, whose points are the only ones.
+    # The nearest point is a corner, so it is unique.
     first = found[0].points[0]
     assert again[0].points[0] == pytest.approx(moved[:3, :3] @ first + moved[:3, 3], abs=1e-5)
 
 
-def test_a_hull_fills_a_bracket_that_an_exact_mesh_leaves_open(tmp_path: Path) -> None:
+def test_hull_fills_a_bracket_that_the_exact_mesh_leaves_open(tmp_path: Path) -> None:
     def nearest(*, exact: bool) -> Nearest:
         # The elbow's bar ends 0.02 m before the back, 0.08 m from each cheek.
         cell = build_cell(alone(tmp_path, bracket("bracket", placed(0.8), exact=exact)))
@@ -168,14 +168,14 @@ def test_a_hull_fills_a_bracket_that_an_exact_mesh_leaves_open(tmp_path: Path) -
     assert nearest(exact=True).points[1][0] == pytest.approx(0.8, abs=1e-6)
 
 
-def test_pieces_of_a_mesh_that_do_not_hang_together_are_hulls_of_their_own(tmp_path: Path) -> None:
+def test_disconnected_pieces_of_a_mesh_become_separate_hulls(tmp_path: Path) -> None:
     cell = build_cell(alone(tmp_path, two_cheeks("cheeks", placed(0.8))))
     found = outside_clearance(cell, "arm", STRETCHED, {})
     assert found is not None
     assert found.distance_m == pytest.approx(0.08, abs=1e-6)
 
 
-def test_links_as_meshes_measure_boxes_as_hulls_do(tmp_path: Path) -> None:
+def test_exact_meshes_and_hulls_of_boxes_measure_the_same(tmp_path: Path) -> None:
     description = alone(
         tmp_path, globe("ball", 0.1, placed(0.6, 0.4)), block("b", (0.1,) * 3, placed(0.2, 0.3))
     )
@@ -186,7 +186,7 @@ def test_links_as_meshes_measure_boxes_as_hulls_do(tmp_path: Path) -> None:
         assert fine == {pair: pytest.approx(distance, abs=1e-5) for pair, distance in rough.items()}
 
 
-def test_links_that_look_like_nothing_are_told_as_not_covered(tmp_path: Path) -> None:
+def test_links_without_shapes_are_reported_as_not_covered(tmp_path: Path) -> None:
     description = cell_of(
         {
             "seen": (bar_arm(tmp_path / "a"), ORIGIN),
@@ -204,7 +204,7 @@ def test_links_that_look_like_nothing_are_told_as_not_covered(tmp_path: Path) ->
     assert outside_clearance(cell, "seen", STRETCHED, {"bare": STRETCHED}) is None
 
 
-def test_bare_frames_are_not_told_unless_a_mesh_is_missing(tmp_path: Path) -> None:
+def test_bare_frames_are_not_reported_unless_a_mesh_is_missing(tmp_path: Path) -> None:
     look = "<visual><geometry>{}</geometry></visual>"
     text = """<robot name="stick">
 <link name="foot">{foot}</link><link name="flange"/><link name="stick">{stick}</link>
@@ -220,7 +220,7 @@ def test_bare_frames_are_not_told_unless_a_mesh_is_missing(tmp_path: Path) -> No
         assert unshaped(build_cell(cell_of({"arm": (path, ORIGIN)})), "arm") == bare
 
 
-def test_a_cell_goes_to_another_process_and_says_the_same_there(tmp_path: Path) -> None:
+def test_pickled_cell_gives_the_same_distances(tmp_path: Path) -> None:
     description = alone(tmp_path, block("wall", (0.1, 2.0, 2.0), placed(1.05)))
     sent = pickle.loads(pickle.dumps(description))
     here, there = (outside_clearance(build_cell(each), "arm", STRETCHED, {}) for each in (description, sent))
@@ -230,7 +230,7 @@ def test_a_cell_goes_to_another_process_and_says_the_same_there(tmp_path: Path) 
     assert np.array_equal(here.points, there.points)
 
 
-def test_a_fixture_that_cannot_be_checked_is_refused_in_words(tmp_path: Path) -> None:
+def test_fixture_that_cannot_be_checked_is_refused_with_a_reason(tmp_path: Path) -> None:
     (tmp_path / "broken.wrl").write_text("#VRML V2.0 utf8\nShape {")
     broken = Fixture("jig", (Shape(tmp_path / "broken.wrl", ORIGIN),), ORIGIN)
     with pytest.raises(MeshError, match=r"broken\.wrl"):

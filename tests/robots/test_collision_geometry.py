@@ -1,4 +1,4 @@
-"""What of a robot is checked: its collision geometry, whole, wherever the robot goes."""
+"""The checked geometry of a robot: its complete collision geometry, also after import and export."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ needs_real_robots = pytest.mark.skipif(not REAL.is_dir(), reason="no ../shared/t
 IRB2400 = REAL / "abb_irb2400_support" / "urdf" / "irb2400_12_155.urdf"
 GP8 = REAL / "motoman_gp8_support" / "urdf" / "gp8.urdf"
 
-# The arm reaches to x = 0.5 m as it looks, to 0.6 m as it is to be checked.
+# The visual geometry reaches to x = 0.5 m, the collision geometry to 0.6 m.
 PADDED = """<robot name="padded">
 <link name="root"><visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual></link>
 <link name="arm">
@@ -37,13 +37,13 @@ def cell_of(model: Path) -> CellDescription:
 
 
 def corners(model: Path, link: str) -> tuple[FloatArray, FloatArray]:
-    """Of the box about what is checked of a link."""
+    """Return the corners of the bounding box of a link's checked geometry."""
     (found,) = (each for each in tree_of(load(model)).links if each.name == link)
     vertices = np.concatenate([part.vertices for part in link_mesh(found.checked).parts])
     return vertices.min(axis=0), vertices.max(axis=0)
 
 
-def test_a_wall_is_as_far_as_the_collision_geometry_does_not_reach(tmp_path: Path) -> None:
+def test_distance_is_measured_from_the_collision_geometry(tmp_path: Path) -> None:
     arm = tmp_path / "padded.urdf"
     arm.write_text(PADDED)
     (found,) = outside_nearest(build_cell(cell_of(arm)), "arm", np.zeros(1), {})
@@ -59,7 +59,7 @@ def test_an_imported_robot_keeps_its_collision_geometry(tmp_path: Path, options:
     imported = tmp_path / "out" / "robot.toml"
     (found,) = outside_nearest(build_cell(cell_of(imported)), "arm", np.zeros(1), {})
     assert found.distance_m == pytest.approx(0.05, abs=1e-6)
-    # An import of the import does, too.
+    # An import of the import has it too.
     assert run(["robot", "import", str(imported), str(tmp_path / "again"), *options]) == 0
     again = tmp_path / "again" / "robot.toml"
     np.testing.assert_allclose(corners(again, "arm"), corners(imported, "arm"), atol=1e-6)
@@ -74,7 +74,7 @@ def test_an_exported_robot_keeps_its_collision_geometry(tmp_path: Path) -> None:
 
 
 @needs_real_robots
-def test_of_a_real_robot_the_collision_files_are_checked_and_the_visual_files_drawn() -> None:
+def test_real_robots_collision_files_are_checked_and_visual_files_drawn() -> None:
     links = {link.name: link for link in tree_of(load(IRB2400)).links if link.shapes}
     assert len(links) == 9
     for link in links.values():
@@ -96,7 +96,7 @@ def round_points(count: int, z: float) -> FloatArray:
 
 
 @pytest.mark.parametrize("count", [100, 300, 5_000])
-def test_round_faces_and_tips_of_any_fineness_become_hulls_that_hold_them(count: int) -> None:
+def test_hulls_contain_round_faces_and_tips_of_any_resolution(count: int) -> None:
     disc = np.concatenate([round_points(count, 0.0), round_points(count, 0.05)])
     cone = np.concatenate([round_points(count, 0.0), [[0.0, 0.0, 0.2]]])
     for points in (disc, cone):
@@ -105,5 +105,5 @@ def test_round_faces_and_tips_of_any_fineness_become_hulls_that_hold_them(count:
         for direction in np.random.default_rng(0).standard_normal((200, 3)):
             direction /= np.linalg.norm(direction)
             beyond = (vertices @ direction).max() - (points @ direction).max()
-            # Not less than the points, and at most a few cells more.
+            # The hull contains the points, and is at most a few cells larger.
             assert -1e-9 <= beyond < 2e-3

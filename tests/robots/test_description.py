@@ -1,4 +1,4 @@
-"""Description files: what they give, and what a wrong one is told."""
+"""Description files: their values, and the problems of wrong ones."""
 
 from pathlib import Path
 
@@ -114,7 +114,7 @@ def test_robots_without_published_dimensions_say_so(name: str) -> None:
         ('name = "small"', 'name = "Small One"', "name = 'Small One': must match pattern"),
     ],
 )
-def test_wrong_value_is_told_with_its_key_and_what_would_be_right(old: str, new: str, expected: str) -> None:
+def test_wrong_value_is_reported_with_key_and_right_range(old: str, new: str, expected: str) -> None:
     with pytest.raises(DescriptionError) as caught:
         parse(with_change(old, new), Path("arm/robot.toml"))
     assert str(caught.value).startswith(f"arm/robot.toml: {expected}")
@@ -152,7 +152,7 @@ def test_wrong_value_is_told_with_its_key_and_what_would_be_right(old: str, new:
         ),
     ],
 )
-def test_reference_to_what_is_not_there_is_told(added: str, expected: str) -> None:
+def test_unknown_reference_is_reported(added: str, expected: str) -> None:
     with pytest.raises(DescriptionError) as caught:
         parse(f"{GOOD}\n{added}\n", FOLDER)
     assert caught.value.problems[0].startswith(expected)
@@ -166,12 +166,12 @@ def test_all_problems_are_found_at_once() -> None:
     assert str(caught.value).endswith("(and 1 more problem)")
 
 
-def test_text_that_is_no_toml_is_told_with_its_line() -> None:
+def test_invalid_toml_is_reported_with_its_line() -> None:
     with pytest.raises(DescriptionError, match=r"robot\.toml: is not TOML: .*line 2"):
         parse("\nname == 1", FOLDER)
 
 
-def test_unknown_robot_is_told_the_nearest_one() -> None:
+def test_unknown_robot_gets_the_most_similar_name() -> None:
     with pytest.raises(DescriptionError, match="pt60: no such robot in the library; did you mean 'pt600'"):
         load("pt60")
 
@@ -184,12 +184,12 @@ def test_folder_of_the_same_name_does_not_hide_a_library_robot(
     assert load("pt600").title == "Pt600"
 
 
-def test_missing_file_is_told(tmp_path: Path) -> None:
+def test_missing_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(DescriptionError, match=r"arm\.toml: cannot be read: No such file"):
         load(tmp_path / "arm.toml")
 
 
-def test_urdf_that_is_not_there_is_told() -> None:
+def test_missing_urdf_is_reported() -> None:
     with pytest.raises(
         DescriptionError, match=r"urdf = 'arm\.urdf': no such file in the description's folder"
     ):

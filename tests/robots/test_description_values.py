@@ -1,4 +1,4 @@
-"""Descriptions from plain values: every problem at once, each with the path to its value."""
+"""Descriptions from plain values: all problems together, each with the path of its value."""
 
 from copy import deepcopy
 from pathlib import Path
@@ -39,7 +39,7 @@ def problems(values: dict[str, Any], folder: Path = Path("/nowhere"), **options:
     return list(found)
 
 
-def test_right_values_give_a_description_without_problems() -> None:
+def test_valid_values_give_a_description_without_problems() -> None:
     description, found = from_values(ARM, folder=Path("/nowhere"))
     assert found == ()
     assert isinstance(description, DhDescription)
@@ -82,7 +82,7 @@ def test_wrong_types_hide_neither_missing_meshes_nor_what_is_wrong_elsewhere() -
     ]
 
 
-def test_values_that_somebody_sent_reach_no_file_outside_the_folder(tmp_path: Path) -> None:
+def test_confined_values_reach_no_file_outside_the_folder(tmp_path: Path) -> None:
     inside = tmp_path / "arm"
     inside.mkdir()
     for path in (tmp_path / "out.stl", inside / "in.stl"):
@@ -91,11 +91,11 @@ def test_values_that_somebody_sent_reach_no_file_outside_the_folder(tmp_path: Pa
     for mesh in ("../out.stl", str(tmp_path / "out.stl"), "link.stl", "../none.stl"):
         values = changed(("base", "mesh"), mesh)
         (problem,) = problems(values, inside, confined=True)
-        # A long path is cut in the middle of its sentence.
+        # A long path is shortened in the middle of the text.
         assert problem.text.startswith(f"link 'base' mesh = {mesh!r}"[:60])
         assert problem.text.endswith(": must be in the description's folder")
     assert problems(changed(("base", "mesh"), "in.stl"), inside, confined=True) == []
-    # Who has the files on his own disk may lay them where he likes.
+    # A description that is not confined may name files anywhere.
     assert problems(changed(("base", "mesh"), "../out.stl"), inside) == []
 
 
@@ -105,7 +105,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_urdf_gets_what_it_cannot_say_from_the_description(folder: Path) -> None:
+def test_description_adds_values_that_urdf_does_not_have(folder: Path) -> None:
     from robots.joints import joints_of
 
     values = {
@@ -123,7 +123,7 @@ def test_urdf_gets_what_it_cannot_say_from_the_description(folder: Path) -> None
     assert joints.max_acceleration.tolist() == pytest.approx([8.0, 0.04])
 
 
-def test_home_that_nobody_gives_is_zero_or_the_middle_where_zero_is_not_allowed(folder: Path) -> None:
+def test_default_home_is_zero_or_the_middle_of_the_limits(folder: Path) -> None:
     from robots.joints import joints_of
 
     description, _ = from_values({"name": "u", "urdf": "u.urdf"}, folder=folder)
@@ -157,7 +157,7 @@ def test_home_that_nobody_gives_is_zero_or_the_middle_where_zero_is_not_allowed(
          "packages 'none': no such folder in the description's folder"),
     ],
 )  # fmt: skip
-def test_what_does_not_fit_the_urdf_is_told(
+def test_values_that_do_not_fit_the_urdf_are_reported(
     key: str, value: object, path: tuple[str | int, ...], text: str, folder: Path
 ) -> None:
     found = problems({"name": "u", "urdf": "u.urdf", key: value}, folder)
@@ -165,7 +165,7 @@ def test_what_does_not_fit_the_urdf_is_told(
     assert found[0].text.startswith(text)
 
 
-def test_problems_of_the_urdf_itself_stand_at_its_key(folder: Path) -> None:
+def test_problems_in_the_urdf_are_reported_at_its_key(folder: Path) -> None:
     (folder / "u.urdf").write_text(URDF.replace('upper="1"', 'upper="-2"'))
     (problem,) = problems({"name": "u", "urdf": "u.urdf"}, folder)
     assert problem.path == ("urdf",)
@@ -187,7 +187,7 @@ KEYS = st.sampled_from(
     st.dictionaries(KEYS, JSON, max_size=4),
     st.dictionaries(st.sampled_from([*JOINT, "name", "link"]), JSON, max_size=4),
 )
-def test_any_values_give_problems_in_words_and_no_fault(top: dict[str, Any], row: dict[str, Any]) -> None:
+def test_any_values_give_problems_and_no_exception(top: dict[str, Any], row: dict[str, Any]) -> None:
     values = {**deepcopy(ARM), **top}
     if isinstance(values["joint"], list) and values["joint"]:
         values["joint"][0] = {**values["joint"][0], **row} if isinstance(values["joint"][0], dict) else row

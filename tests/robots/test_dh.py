@@ -1,4 +1,4 @@
-"""Robots by URDF as D-H rows: the tool and the shapes stand where they stood."""
+"""URDF robots as D-H rows: the tool and the shapes keep their places."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from robots.views import views_of
 
 
 def urdf(*joints: tuple[str, str, str, str], tool: str = "0.1 0.2 0.3") -> str:
-    """A chain: each joint's type, origin xyz, rpy and axis; a ball of a shape on each link."""
+    """Return a chain: each joint's type, origin xyz, rpy and axis; a ball on each link."""
     ball = (
         '<visual><origin xyz="0.1 0.2 0.3" rpy="1 2 3"/><geometry><sphere radius="0.1"/></geometry></visual>'
     )
@@ -85,7 +85,7 @@ CHAINS = {
 
 
 @pytest.mark.parametrize("name", CHAINS)
-def test_tool_and_shapes_stand_where_they_stood_at_all_positions(name: str, tmp_path: Path) -> None:
+def test_tool_and_shapes_keep_their_places_at_all_positions(name: str, tmp_path: Path) -> None:
     before = described(tmp_path, CHAINS[name])
     form = dh_form(before)
     rows = build_model(rebuilt(form, tmp_path))
@@ -106,7 +106,7 @@ def test_tool_and_shapes_stand_where_they_stood_at_all_positions(name: str, tmp_
             )
 
 
-# As KUKA's: the first axis points down, positive turns go clockwise from above.
+# As in KUKA arms: the first axis points down, so positive rotations are clockwise from above.
 KUKA_LIKE = urdf(
     ("revolute", "0 0 0.4", "0 0 0", "0 0 -1"), ("revolute", "0.025 0 0", "0 0 0", "0 1 0"),
     ("revolute", "0.56 0 0", "0 0 0", "0 1 0"), ("revolute", "0 0 0.035", "0 0 0", "-1 0 0"),
@@ -118,7 +118,7 @@ TILTED = urdf(
 
 
 @pytest.mark.parametrize("text", [KUKA_LIKE, TILTED])
-def test_base_frame_stays_where_the_first_axis_is_not_its_z(text: str, tmp_path: Path) -> None:
+def test_base_frame_is_kept_if_the_first_axis_is_not_its_z(text: str, tmp_path: Path) -> None:
     before = described(
         tmp_path,
         text,
@@ -131,7 +131,7 @@ def test_base_frame_stays_where_the_first_axis_is_not_its_z(text: str, tmp_path:
     assert form.notes == (
         "the first joint's axis is not the base's z: [base] pose gives the start of the first row",
     )
-    # By Pinocchio's own reader of URDF, not by ours.
+    # Read with Pinocchio's URDF parser instead of the project's.
     model = pin.buildModelFromXML(text)
     data, tool = model.createData(), model.getFrameId("tool0")
     by_rows = build_model(after)
@@ -148,9 +148,7 @@ def test_base_frame_stays_where_the_first_axis_is_not_its_z(text: str, tmp_path:
 
 
 @pytest.mark.parametrize("text", [KUKA_LIKE, TILTED])
-def test_rows_that_begin_elsewhere_come_back_from_a_file_and_from_our_own_urdf(
-    text: str, tmp_path: Path
-) -> None:
+def test_rows_with_a_base_pose_survive_a_file_and_an_exported_urdf(text: str, tmp_path: Path) -> None:
     form = dh_form(described(tmp_path, text))
     saved = write_description(form.values, {}, tmp_path / "saved")
     original = load(saved.path)
@@ -176,7 +174,7 @@ AXES = {KUKA_LIKE: [0, 0, -1], TILTED: [0, 0, 1]}
 def test_known_arm_gives_the_known_rows(tmp_path: Path) -> None:
     form = dh_form(described(tmp_path, CHAINS["right angles as people write them"]))
     rows = [(row["a"], row["alpha"], row["d"]) for row in form.values["joint"]]
-    # The makers' table of this arm, but for the signs that the other way round of x and z gives.
+    # The manufacturer's table of this arm, except for signs, because x and z point the other way.
     assert [abs(a) for a, _, _ in rows] == pytest.approx([0, 425, 392.25, 0, 0, 0], abs=1e-9)
     assert [abs(alpha) for _, alpha, _ in rows] == pytest.approx([90, 0, 0, 90, 90, 0], abs=1e-9)
     assert [abs(d) for _, _, d in rows] == pytest.approx([89.159, 0, 0, 109.15, 94.65, 0], abs=1e-9)
@@ -184,7 +182,7 @@ def test_known_arm_gives_the_known_rows(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("robot", library_names())
-def test_rows_come_back_from_our_own_urdf(robot: str, tmp_path: Path) -> None:
+def test_rows_survive_an_exported_urdf(robot: str, tmp_path: Path) -> None:
     original = load(robot)
     assert isinstance(original, DhDescription)
     form = dh_form(described(tmp_path, to_urdf(original)))
@@ -211,7 +209,7 @@ def test_nearly_parallel_axes_count_as_parallel_and_the_note_says_by_how_much(tm
     text = urdf(Z_UP, ("revolute", "1 0 0", "0.00001 0 0", "0 0 1"), tool="1 0 0")
     form = dh_form(described(tmp_path, text))
     assert form.values["joint"][0]["a"] == pytest.approx(1000)
-    # A metre beyond an axis that leans by 1e-5: at most 0.01 mm and a little.
+    # One metre beyond an axis that is off by 1e-5 rad: slightly more than 0.01 mm.
     (note,) = form.notes
     assert note.startswith(
         "axes that are nearly parallel are taken as parallel: this moves the tool by up to "
@@ -219,7 +217,7 @@ def test_nearly_parallel_axes_count_as_parallel_and_the_note_says_by_how_much(tm
     assert 0.0 < float(note.split("up to ")[1].split(" mm")[0]) < 0.02
 
 
-def test_any_chain_is_exact_or_says_that_it_is_not(tmp_path: Path) -> None:
+def test_any_chain_is_exact_or_has_a_note(tmp_path: Path) -> None:
     random = np.random.default_rng(13)
     angles = [0.0, 0.0, np.pi / 2, -np.pi / 2, np.pi, 1.5708, 1.570796, 0.7]
     axes = ["1 0 0", "0 1 0", "0 0 1", "0 0 -1", "0.3 -2 1"]
@@ -229,22 +227,22 @@ def test_any_chain_is_exact_or_says_that_it_is_not(tmp_path: Path) -> None:
         xyz, rpy = random.choice([0.0, 0.2, -0.3], 3), random.choice(angles, 3)
         return kind, " ".join(map(str, xyz)), " ".join(map(str, rpy)), str(random.choice(axes))
 
-    told = 0
+    noted = 0
     for _ in range(60):
         before = described(tmp_path, urdf(*(joint() for _ in range(random.integers(1, 7)))))
         form = dh_form(before)
         if any("nearly parallel" in note for note in form.notes):
-            told += 1
+            noted += 1
             continue
         one, other = build_model(before), build_model(rebuilt(form, tmp_path))
         for _ in range(5):
             positions = random.uniform(one.joints.lower, one.joints.upper)
             expected = tool_placement(one, positions)
             np.testing.assert_allclose(tool_placement(other, positions), expected, atol=1e-12)
-    assert told < 30
+    assert noted < 30
 
 
-def test_joints_beside_the_chain_stand_at_home_and_their_shapes_ride_on_it(tmp_path: Path) -> None:
+def test_joints_outside_the_chain_are_fixed_at_home(tmp_path: Path) -> None:
     side = (
         '<link name="wing"><visual><geometry><sphere radius="1"/></geometry></visual></link>'
         '<joint name="flap" type="prismatic"><origin xyz="0 0 1"/><axis xyz="1 0 0"/><parent link="l1"/>'
@@ -254,7 +252,7 @@ def test_joints_beside_the_chain_stand_at_home_and_their_shapes_ride_on_it(tmp_p
     form = dh_form(described(tmp_path, text, '[[joint]]\nname = "flap"\nhome = 500\n'))
     assert [row["name"] for row in form.values["joint"]] == ["j1", "j2"]
     assert form.notes == ("not on the way to the tool, so fixed at home: flap",)
-    # Row 1 lies with its x along (0.3, 0.1), its origin on joint 2's axis.
+    # The x axis of row 1 is along (0.3, 0.1), its origin is on joint 2's axis.
     wing = form.shapes["l1"][-1].shape_to_link
     turn = np.arctan2(0.1, 0.3)
     # In joint 1's frame, 0.1 m up, the wing is at (0.5, 0, 1); row 1 at (0.3, 0.1, -0.1).
@@ -263,7 +261,7 @@ def test_joints_beside_the_chain_stand_at_home_and_their_shapes_ride_on_it(tmp_p
     np.testing.assert_allclose(wing[:3, 3], expected, atol=1e-12)
 
 
-def test_chain_with_a_joint_that_follows_is_refused(tmp_path: Path) -> None:
+def test_chain_with_a_mimic_joint_is_refused(tmp_path: Path) -> None:
     text = CHAINS["parallel"].replace(
         '<joint name="j2" type="revolute">', '<joint name="j2" type="revolute"><mimic joint="j1"/>'
     )

@@ -1,4 +1,4 @@
-"""The robots of example-robot-data: each loads, or is refused in words, and stands where Pinocchio has it."""
+"""The robots of example-robot-data: each loads with Pinocchio's placements, or is refused with a reason."""
 
 from pathlib import Path
 
@@ -30,7 +30,7 @@ REFUSED = {
 }
 
 
-def test_without_the_package_a_robot_of_it_is_told_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_error_without_the_package_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robots.example_robots.example_folder", lambda: None)
     with pytest.raises(
         DescriptionError, match=r"ur5: .* not installed .* Run \./dev example-robots or pip install"
@@ -40,7 +40,7 @@ def test_without_the_package_a_robot_of_it_is_told_how_to_get_it(monkeypatch: py
 
 
 @installed
-def test_names_of_example_robots_are_told_beside_the_librarys() -> None:
+def test_known_names_include_example_robots() -> None:
     assert {"pt600", "ur5", "panda"} <= set(known_names())
     with pytest.raises(DescriptionError, match="did you mean 'panda'"):
         load("pandda")
@@ -48,7 +48,7 @@ def test_names_of_example_robots_are_told_beside_the_librarys() -> None:
 
 @installed
 @pytest.mark.parametrize("file", FILES)
-def test_every_robot_stands_where_pinocchio_has_it_or_is_refused_in_words(file: str) -> None:
+def test_every_robot_equals_pinocchios_or_is_refused_with_a_reason(file: str) -> None:
     assert FOLDER is not None
     if file in REFUSED:
         with pytest.raises(DescriptionError, match=REFUSED[file]):
@@ -64,7 +64,7 @@ def compare(model: RobotModel, description: UrdfDescription, other: pinocchio.Mo
     data = other.createData()
     tree = description.robot.tree
     names = [name for name in model.link_names if other.existFrame(name, pinocchio.FrameType.BODY)]
-    # All but those whose names were made safe.
+    # All except joints with names that were made safe.
     assert len(names) >= len(model.link_names) - sum("is called" in note for note in description.robot.notes)
     random = np.random.default_rng(2)
     for _ in range(5):
@@ -89,7 +89,7 @@ def compare(model: RobotModel, description: UrdfDescription, other: pinocchio.Mo
 
 @installed
 @pytest.mark.parametrize("name", NAMES)
-def test_named_robot_is_whole(name: str) -> None:
+def test_named_robot_is_complete(name: str) -> None:
     description = load(name)
     assert isinstance(description, UrdfDescription)
     assert description.robot.missing == ()
@@ -100,7 +100,7 @@ def test_named_robot_is_whole(name: str) -> None:
 
 @installed
 @pytest.mark.parametrize("name", NAMES)
-def test_exported_robot_stands_where_it_stood(name: str, tmp_path: Path) -> None:
+def test_exported_robot_has_the_same_placements(name: str, tmp_path: Path) -> None:
     description = load(name)
     (tmp_path / "again.urdf").write_text(to_urdf(description))
     again = build_model(load(tmp_path / "again.urdf"))
@@ -122,7 +122,7 @@ def test_exported_robot_stands_where_it_stood(name: str, tmp_path: Path) -> None
 @pytest.mark.parametrize(
     "name", ["ur3", "ur5", "ur10", "panda", "xarm7", "z1", "kinova", "so100", "talos_arm"]
 )
-def test_arms_become_rows_that_put_the_tool_where_it_was(name: str, tmp_path: Path) -> None:
+def test_arms_as_rows_have_the_same_tool_placement(name: str, tmp_path: Path) -> None:
     description = load(name)
     assert isinstance(description, UrdfDescription)
     form = dh_form(description)
@@ -155,7 +155,7 @@ def test_links_of_an_example_robot_have_bodies(name: str, tmp_path: Path) -> Non
 
 @installed
 @pytest.mark.slow
-def test_a_ur10_is_not_refused_where_only_hulls_of_its_links_touch() -> None:
+def test_ur10_is_not_refused_if_only_hulls_of_its_links_touch() -> None:
     cell = build_cell(CellDescription((CellRobot("arm", "ur10", np.eye(4)),)))
     arm = cell.arms["arm"]
     reasons = dict(arm.plan.elsewhere)
@@ -163,5 +163,5 @@ def test_a_ur10_is_not_refused_where_only_hulls_of_its_links_touch() -> None:
         assert "checked as exact collision meshes" in reasons[links]
     positions = allowed_positions(arm.joints, 300, seed=1)
     touching = [bool(own_contacts(cell, "arm", each)) for each in positions]
-    # As hulls it touches itself in 41 % of them.
+    # With hulls only, it would touch itself in 41 % of them.
     assert 0.05 < np.mean(touching) < 0.25

@@ -1,4 +1,4 @@
-"""The floor: the half-space below a height, from which the moving links of an arm keep away."""
+"""The floor: the half-space below a height, which an arm's moving links must not enter."""
 
 import xml.etree.ElementTree as Xml
 from pathlib import Path
@@ -76,7 +76,7 @@ def test_the_floor_is_below_the_lowest_base_of_the_cell() -> None:
     assert CellDescription((high, low), floor=None).floor_m is None
 
 
-def test_what_is_fixed_to_a_base_may_reach_below_the_floor() -> None:
+def test_links_fixed_to_a_base_may_reach_below_the_floor() -> None:
     cell = build_cell(pt600(floor=Floor(0.1)))
     arm = cell.arms["arm"]
     found = near_along(cell, "arm", np.array([arm.joints.home]), {}, within_m=0.0)
@@ -84,7 +84,7 @@ def test_what_is_fixed_to_a_base_may_reach_below_the_floor() -> None:
     assert arm.bodies[0].corners[:, 2].min() < 0.1
 
 
-def test_an_arm_that_is_below_the_floor_may_move_up_and_not_further_down() -> None:
+def test_arm_below_the_floor_may_move_up_but_not_down() -> None:
     cell = build_cell(pt600())
     home = cell.arms["arm"].joints.home
     low = checked(pt600(floor=None), DOWN).steps[-1].target
@@ -98,7 +98,7 @@ def test_an_arm_that_is_below_the_floor_may_move_up_and_not_further_down() -> No
     assert not violations(low, home)
     assert not violations(low, low + np.radians([30.0, 0.0, 0.0, 0.0, 0.0]))
     assert violations(low, lower)
-    # Up, and then below again: that is no retreat any more.
+    # Up, and then below again: that is no longer a retreat.
     assert violations(low, home, low)
 
 
@@ -134,7 +134,7 @@ def test_without_a_floor_and_fixtures_only_the_arm_itself_was_checked() -> None:
     assert not checked(pt600(), "move_joints 10 0 0 0 0\n").alone
 
 
-def test_live_clearance_knows_the_floor_only_with_a_warning_distance() -> None:
+def test_live_clearance_includes_the_floor_only_with_a_warning_distance() -> None:
     for floor, known in ((Floor(), False), (Floor(0.0, 0.5, 0.01), True), (None, False)):
         cell = build_cell(pt600(floor=floor))
         home = cell.arms["arm"].joints.home
@@ -153,7 +153,7 @@ def test_live_clearance_knows_the_floor_only_with_a_warning_distance() -> None:
     "urdf",
     ["abb_irb2400_support/urdf/irb2400_12_155.urdf", "motoman_gp8_support/urdf/gp8.urdf"],
 )
-def test_heights_are_those_that_pinocchio_finds_of_the_same_file(shared: Path, urdf: str) -> None:
+def test_heights_equal_pinocchios_of_the_same_file(shared: Path, urdf: str) -> None:
     folder = shared / "testdata/urdf"
     path = folder / urdf
     cell = build_cell(
@@ -174,16 +174,16 @@ def test_heights_are_those_that_pinocchio_finds_of_the_same_file(shared: Path, u
     }
 
     def configuration(row) -> np.ndarray:
-        """Pinocchio's, joint by joint: those that follow others are its own, too."""
-        told = dict(zip(arm.joints.names, row.tolist(), strict=True))
+        """Return Pinocchio's positions, joint by joint: a mimic joint has its own position there."""
+        values = dict(zip(arm.joints.names, row.tolist(), strict=True))
         found = []
         for name, joint in zip(list(model.names)[1:], list(model.joints)[1:], strict=True):
             leader, multiplier, offset = mimics.get(name, (name, 1.0, 0.0))
-            angle = multiplier * told[leader] + offset
+            angle = multiplier * values[leader] + offset
             found += [angle] if joint.nq == 1 else [np.cos(angle), np.sin(angle)]
         return np.array(found)
 
-    # Of links that a joint moves; the others may reach into the floor.
+    # Only links that a joint moves; the others may reach into the floor.
     moving = [
         shape.geometry.vertices() * shape.meshScale if shape.parentJoint > 0 else np.empty((0, 3))
         for shape in shapes.geometryObjects

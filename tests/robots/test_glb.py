@@ -1,4 +1,4 @@
-"""Links as GLB: in the link's frame, in metres, painted, kept in a cache."""
+"""Links as GLB: in the link's frame, in metres, coloured, cached."""
 
 import json
 import struct
@@ -73,13 +73,13 @@ def test_mesh_is_scaled_turned_and_shifted_into_the_links_frame(tmp_path: Path) 
     np.testing.assert_allclose([low, high], [[-0.1, -0.05, 0.0], [0.1, 0.05, 0.3]], atol=1e-7)
 
 
-def test_color_replaces_the_paint_alone(tmp_path: Path) -> None:
+def test_color_replaces_only_the_paint(tmp_path: Path) -> None:
     materials = {m["name"]: m["pbrMetallicRoughness"] for m in document(one(tmp_path)["base"])["materials"]}
     assert materials["paint"]["baseColorFactor"] == pytest.approx([0, 0, 1, 0.5], abs=0.01)
     assert materials["steel"]["baseColorFactor"] == pytest.approx([0, 1, 0, 1], abs=0.01)
 
 
-def test_color_replaces_all_where_nothing_is_called_paint(tmp_path: Path) -> None:
+def test_color_replaces_all_without_a_paint_material(tmp_path: Path) -> None:
     materials = document(one(tmp_path, "red")["base"])["materials"]
     assert all(m["pbrMetallicRoughness"]["baseColorFactor"][:3] == [0, 0, 1] for m in materials)
 
@@ -90,7 +90,7 @@ def test_transparent_material_is_blended(tmp_path: Path) -> None:
     assert materials["steel"].get("alphaMode", "OPAQUE") == "OPAQUE"
 
 
-def test_normals_travel_with_the_mesh(tmp_path: Path) -> None:
+def test_normals_are_transformed_with_the_mesh(tmp_path: Path) -> None:
     for mesh in document(one(tmp_path)["base"])["meshes"]:
         assert "NORMAL" in mesh["primitives"][0]["attributes"]
 
@@ -126,7 +126,7 @@ Shape { geometry Box { size 1 1 1 } }
 """
 
 
-def test_file_that_was_missing_is_noticed_when_it_comes_and_when_it_goes(tmp_path: Path) -> None:
+def test_appearing_and_disappearing_file_changes_the_glb(tmp_path: Path) -> None:
     (tmp_path / "box.wrl").write_text(EXTERN)
     description = parse(ROBOT, tmp_path / "robot.toml")
 
@@ -157,7 +157,7 @@ def test_link_of_several_files_is_read_once(tmp_path: Path, monkeypatch: pytest.
     assert link_meshes(description, cache=tmp_path / "cache") == first
 
 
-def test_same_file_elsewhere_has_the_files_beside_it_there(tmp_path: Path) -> None:
+def test_copied_file_uses_the_files_next_to_the_copy(tmp_path: Path) -> None:
     found = []
     for folder, size in (("a", "10 10 10"), ("b", "20 20 20")):
         (tmp_path / folder).mkdir()
@@ -181,9 +181,7 @@ def test_same_file_elsewhere_has_the_files_beside_it_there(tmp_path: Path) -> No
     ],
     ids=["colors", "normals", "two_sided", "name"],
 )
-def test_mesh_that_is_made_has_another_glb_when_anything_of_it_changes(
-    tmp_path: Path, change: dict[str, Any]
-) -> None:
+def test_any_change_of_a_generated_mesh_changes_its_glb(tmp_path: Path, change: dict[str, Any]) -> None:
     def glb(part: Part) -> bytes:
         shape = Shape(Mesh((part,)), np.eye(4))
         return _cached_glb((shape,), tmp_path)
@@ -218,13 +216,13 @@ def test_cache_that_cannot_be_written_falls_back(monkeypatch: pytest.MonkeyPatch
     assert blocker not in cache_folder().parents
 
 
-def test_wrong_mesh_file_is_told(tmp_path: Path) -> None:
+def test_invalid_mesh_file_is_reported(tmp_path: Path) -> None:
     (tmp_path / "box.wrl").write_bytes(b"MM\0\0")
     with pytest.raises(MeshError, match=r"box\.wrl"):
         link_meshes(parse(ROBOT, tmp_path / "robot.toml"), cache=tmp_path / "cache")
 
 
-def test_glb_holds_the_mesh_files_shape(tmp_path: Path) -> None:
+def test_glb_has_the_mesh_files_shape(tmp_path: Path) -> None:
     description = load("pt600")
     path = description.mesh_path(description.bodies["column"])
     assert path is not None

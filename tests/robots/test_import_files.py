@@ -1,4 +1,4 @@
-"""Importing a robot.toml: every file that its meshes are made of comes along."""
+"""Import of a robot.toml: all files that its meshes consist of are copied."""
 
 from pathlib import Path
 
@@ -32,7 +32,7 @@ def write(folder: Path, files: dict[str, str]) -> None:
         path.write_text(content)
 
 
-def test_files_that_a_mesh_names_are_copied_beside_it(tmp_path: Path) -> None:
+def test_files_that_a_mesh_names_are_copied_with_it(tmp_path: Path) -> None:
     files = {
         "meshes/base.wrl": f'{VRML}Inline {{ url "parts/a.wrl" }} EXTERNPROTO P [ ] "../lib.wrl#P" P {{ }}',
         "meshes/parts/a.wrl": f'{VRML}Inline {{ url "b.wrl" }}',
@@ -48,7 +48,7 @@ def test_files_that_a_mesh_names_are_copied_beside_it(tmp_path: Path) -> None:
     assert robot.notes == ()
 
 
-def test_files_that_cannot_come_along_are_told(tmp_path: Path) -> None:
+def test_files_that_cannot_be_copied_are_reported(tmp_path: Path) -> None:
     write(
         tmp_path,
         {
@@ -60,7 +60,7 @@ def test_files_that_cannot_come_along_are_told(tmp_path: Path) -> None:
         },
     )
     robot = import_robot(str(tmp_path / "robot" / "robot.toml"))
-    # A mesh outside of the folder moves into it, and what is beside it with it.
+    # A mesh outside the folder is copied into it, together with the files that it names.
     assert sorted(robot.files) == ["a.wrl", "meshes/base.wrl", "meshes/part.wrl"]
     assert robot.values["base"]["mesh"] == "meshes/base.wrl"
     assert robot.notes == (
@@ -69,7 +69,7 @@ def test_files_that_cannot_come_along_are_told(tmp_path: Path) -> None:
     )
 
 
-def test_two_files_of_one_name_are_told(tmp_path: Path) -> None:
+def test_two_files_of_one_name_are_reported(tmp_path: Path) -> None:
     inline = f'{VRML}Inline {{ url "part.wrl" }}'
     write(
         tmp_path,

@@ -1,4 +1,4 @@
-"""Inverse kinematics: every answer is put back through the forward kinematics."""
+"""Inverse kinematics: every solution is verified by forward kinematics."""
 
 from pathlib import Path
 
@@ -23,7 +23,7 @@ ARMS = ["pt500", "pt600", "puma560", "offsets", "crooked"] + [
 
 @pytest.mark.parametrize("task", [Task.POSE_6D, Task.POSITION_AND_AXIS_5D])
 @pytest.mark.parametrize("name", ARMS)
-def test_where_the_tool_can_be_it_is_put_within_limits(name: str, task: Task) -> None:
+def test_reachable_poses_are_solved_within_limits(name: str, task: Task) -> None:
     _, model, solver = arm(name)
     for positions in allowed_positions(model, 60):
         target = tool_placement(model, positions)
@@ -42,14 +42,14 @@ def test_where_the_tool_can_be_it_is_put_within_limits(name: str, task: Task) ->
     [("pt500", True), ("puma560", True), ("offsets", True), ("crooked", False)]
     + [pytest.param(name, known, marks=installed) for name, known in (("ur5", True), ("panda", False))],
 )
-def test_closed_form_is_used_where_the_arms_family_has_one(name: str, analytic: bool) -> None:
+def test_closed_form_is_used_if_the_arms_family_has_one(name: str, analytic: bool) -> None:
     _, model, solver = arm(name)
     for positions in allowed_positions(model, 10):
         assert solve(solver, tool_placement(model, positions), task=Task.POSE_6D).analytic is analytic
 
 
-def test_every_way_to_hold_a_puma_is_told_and_each_once() -> None:
-    _, model, solver = arm("offsets")  # nothing is beyond its limits
+def test_all_postures_of_a_puma_are_found_once_each() -> None:
+    _, model, solver = arm("offsets")  # no joint is beyond its limits
     for positions in allowed_positions(model, 20):
         target = tool_placement(model, positions)
         found = solve(solver, target, task=Task.POSE_6D, near=positions, all_solutions=True).solutions
@@ -60,7 +60,7 @@ def test_every_way_to_hold_a_puma_is_told_and_each_once() -> None:
         assert len(np.unique(np.round(turns, 5), axis=0)) == 8
 
 
-def test_solutions_come_nearest_first_and_one_alone_is_the_nearest() -> None:
+def test_solutions_are_sorted_by_distance_and_a_single_one_is_the_nearest() -> None:
     _, model, solver = arm("puma560")
     width = model.joints.upper - model.joints.lower
     for positions, near in zip(
@@ -76,7 +76,7 @@ def test_solutions_come_nearest_first_and_one_alone_is_the_nearest() -> None:
 
 
 @pytest.mark.parametrize("turn", [-2 * np.pi, 0.0])
-def test_a_joint_that_turns_twice_around_is_answered_by_the_turn_near_by(turn: float) -> None:
+def test_joint_of_two_turns_is_solved_at_the_nearest_turn(turn: float) -> None:
     _, model, solver = arm("offsets")
     positions = np.array([2.0, 0.5, -1.0, 0.4, 1.2, 3.0]) + turn * np.array([1, 0, 0, 0, 0, 1])
     found = solve(solver, tool_placement(model, positions), task=Task.POSE_6D, near=positions + 0.1)
@@ -94,7 +94,7 @@ def test_free_roll_leaves_the_last_joint_where_it_was() -> None:
         assert (found.solutions[:, 4] == 1.234).all()
 
 
-def test_coupled_limits_choose_among_the_ways_to_hold_an_arm() -> None:
+def test_coupled_limits_exclude_some_postures() -> None:
     _, model, _ = arm("puma560")
     text = (
         load("puma560").text
@@ -115,11 +115,11 @@ def test_coupled_limits_choose_among_the_ways_to_hold_an_arm() -> None:
 
 
 @pytest.mark.parametrize("name", ["puma560", "pt600", pytest.param("ur5", marks=installed)])
-def test_singular_positions_are_found_again(name: str) -> None:
+def test_singular_positions_are_solved(name: str) -> None:
     _, model, solver = arm(name)
     random = np.random.default_rng(8)
     for _ in range(40):
-        # Joints at zero or at home put axes in line.
+        # With joints at zero or at home, axes are aligned.
         chosen = random.random((2, len(model.joints))) < 0.5
         positions = np.where(
             chosen[0], np.where(chosen[1], 0.0, model.joints.home), random.uniform(-0.5, 0.5)
@@ -132,8 +132,8 @@ def test_singular_positions_are_found_again(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["puma560", "pt500"])
-def test_a_pose_with_two_decimals_of_mm_and_degrees_is_reached_within_them(name: str) -> None:
-    """What people type, and controllers tell, is never exact."""
+def test_pose_with_two_decimals_is_reached_within_its_rounding(name: str) -> None:
+    """Values that users type or controllers report are rounded."""
     _, model, solver = arm(name)
     for positions in allowed_positions(model, 20):
         target = tool_placement(model, positions)
@@ -143,7 +143,7 @@ def test_a_pose_with_two_decimals_of_mm_and_degrees_is_reached_within_them(name:
         assert max(result.residual_m, result.residual_rad) < 2e-4
 
 
-def test_sliding_and_following_joints_are_solved_and_the_finger_stays(tmp_path: Path) -> None:
+def test_prismatic_and_mimic_joints_are_solved_and_the_finger_stays(tmp_path: Path) -> None:
     description = telescope(tmp_path)
     model, solver = build_model(description), build_solver(description)
     near = model.joints.home.copy()
@@ -165,7 +165,7 @@ def test_an_arm_of_one_joint_is_solved() -> None:
 
 
 @pytest.mark.parametrize("name", ["puma560", "crooked"])
-def test_the_same_question_gets_the_same_answer_to_the_last_bit(name: str) -> None:
+def test_same_arguments_give_bit_identical_results(name: str) -> None:
     _, model, solver = arm(name)
     again = build_solver(arm(name)[0])
     for positions in allowed_positions(model, 10):
@@ -230,7 +230,7 @@ HERE = np.eye(4)
 
 
 @pytest.mark.parametrize(
-    ("pose", "said"),
+    ("pose", "reason"),
     [
         ([1.0] * 15, "has 15 numbers; 16 are right"),
         (np.eye(3), r"has numbers of shape \(3, 3\); 16 are right"),
@@ -248,8 +248,8 @@ HERE = np.eye(4)
         ([10**400] * 16, "takes 16 numbers"),
     ],
 )
-def test_what_is_no_pose_is_refused_in_words(pose: object, said: str) -> None:
-    with pytest.raises(PoseError, match=f"^the pose {said}"):
+def test_invalid_pose_is_refused_with_a_reason(pose: object, reason: str) -> None:
+    with pytest.raises(PoseError, match=f"^the pose {reason}"):
         exact(arm("pt600")[2], pose)
 
 
@@ -260,7 +260,7 @@ def test_a_rotation_with_few_decimals_is_made_exact() -> None:
     np.testing.assert_allclose(mended, pose, atol=1e-4)
 
 
-def test_near_takes_one_finite_number_a_joint() -> None:
+def test_near_takes_one_finite_number_per_joint() -> None:
     _, model, solver = arm("pt600")
     target = tool_placement(model, model.joints.home)
     with pytest.raises(JointCountError, match="takes \\(5,\\)"):

@@ -1,4 +1,4 @@
-"""Why there is no solution: told, and never a guess in its place."""
+"""Reasons for no solution, which is never replaced by an approximation."""
 
 import re
 from pathlib import Path
@@ -13,7 +13,7 @@ from tests.robots.arms import allowed_positions, arm, telescope
 
 
 def placed(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> np.ndarray:
-    """In mm and degrees."""
+    """Return the (4, 4) of a pose in mm and degrees."""
     pose = np.eye(4)
     pose[:3, :3] = rpy_rotation(*np.radians([roll, pitch, yaw]))
     pose[:3, 3] = np.array([x, y, z]) / 1000
@@ -21,7 +21,7 @@ def placed(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) 
 
 
 def none(result: InverseResult) -> str:
-    """The reason why there is none."""
+    """Return the reason for no solution."""
     assert result.solutions.shape[0] == 0
     assert not result.analytic
     assert result.residual_m > 1e-5 or result.residual_rad > 2e-4 or result.reason.startswith("limits")
@@ -29,7 +29,7 @@ def none(result: InverseResult) -> str:
 
 
 @pytest.mark.parametrize("name", ["pt600", "puma560", "crooked"])
-def test_too_far_away_is_told_with_the_distance_and_the_reach(name: str) -> None:
+def test_too_far_pose_reports_the_distance_and_the_reach(name: str) -> None:
     solver = arm(name)[2]
     result = solve(solver, placed(3000, 0, 0, 0, 90, 0), task=Task.POSITION_AND_AXIS_5D)
     found = re.fullmatch(
@@ -40,11 +40,11 @@ def test_too_far_away_is_told_with_the_distance_and_the_reach(name: str) -> None
     first = solver.chain.origins[0]
     assert float(found[1]) == pytest.approx(1000 * np.linalg.norm([3.0 - first[0], *first[1:]]), abs=0.01)
     assert float(found[2]) == pytest.approx(1000 * solver.chain.reach, abs=0.01)
-    # The nearest that was found: further off than if the arm reached to the very end of its links.
+    # The nearest position found is farther away than if the arm were fully stretched.
     assert result.residual_m >= (float(found[1]) - float(found[2])) / 1000 - 1e-6
 
 
-def test_what_is_too_near_to_fold_to_is_told_with_the_nearest_that_the_tool_comes() -> None:
+def test_too_near_pose_reports_the_least_distance_of_the_tool() -> None:
     _, model, solver = arm("puma560")
     target = placed(0, 0, 660, 0, 0, 0)
     reason = none(solve(solver, target, task=Task.POSE_6D))
@@ -59,19 +59,19 @@ def test_what_is_too_near_to_fold_to_is_told_with_the_nearest_that_the_tool_come
 
 def test_a_solution_beyond_limits_names_joint_value_and_range() -> None:
     _, model, solver = arm("pt600")
-    beyond = np.radians([10.0, 20.0, -118.0, 10.0, 5.0])  # the elbow goes to 110
+    beyond = np.radians([10.0, 20.0, -118.0, 10.0, 5.0])  # the elbow's limit is 110
     reason = none(solve(solver, tool_placement(model, beyond), task=Task.POSE_6D))
     assert reason.startswith("limits: found only with joint ")
-    told = re.search(r"joint elbow at (-?[0-9.]+)°, limits -110\.00° to 110\.00°", reason)
-    assert told is None or abs(float(told[1])) > 110.0
+    found = re.search(r"joint elbow at (-?[0-9.]+)°, limits -110\.00° to 110\.00°", reason)
+    assert found is None or abs(float(found[1])) > 110.0
     names = "|".join(model.joints.names)
     assert re.search(rf"joint ({names}) at -?[0-9.]+°, limits -[0-9.]+° to [0-9.]+°", reason)
 
 
-def test_beyond_limits_is_told_without_a_closed_form_too(tmp_path: Path) -> None:
+def test_solution_beyond_limits_is_reported_without_a_closed_form(tmp_path: Path) -> None:
     description = telescope(tmp_path)
     model, solver = build_model(description), build_solver(description)
-    # The lift goes to 300 mm; the grip moves no tool.
+    # The lift's limit is 300 mm; the grip does not move the tool.
     target = tool_placement(model, [0.3, 0.5, 0.33, -0.8, 0.2, 0.1])
     reason = none(solve(solver, target, task=Task.POSE_6D))
     assert reason == "limits: found only with joint lift at 330.00 mm, limits 0.00 mm to 300.00 mm"
@@ -80,9 +80,9 @@ def test_beyond_limits_is_told_without_a_closed_form_too(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("task", "what"), [(Task.POSE_6D, "orientation"), (Task.POSITION_AND_AXIS_5D, "axis")]
 )
-def test_an_orientation_that_five_joints_cannot_give_is_told_with_the_nearest(task: Task, what: str) -> None:
+def test_unreachable_orientation_of_five_joints_reports_the_least_deviation(task: Task, what: str) -> None:
     _, model, solver = arm("pt600")
-    # Straight down but for 3 degrees out of the arm's plane, which is all that keeps it from there.
+    # Only the 3 degrees out of the arm's plane make this pose unreachable.
     target = placed(350, 0, 300, 177, 45, 0)
     result = solve(solver, target, task=task)
     off = np.degrees(result.residual_rad)
@@ -97,7 +97,7 @@ def test_an_orientation_that_five_joints_cannot_give_is_told_with_the_nearest(ta
     assert 0.5 < off < least + 0.1
 
 
-def test_a_pose_that_five_joints_happen_to_reach_is_answered_whole() -> None:
+def test_reachable_6d_pose_of_five_joints_is_solved() -> None:
     _, model, solver = arm("pt600")
     positions = np.radians([10.0, 50.0, 60.0, -20.0, 70.0])
     result = solve(solver, tool_placement(model, positions), task=Task.POSE_6D, near=positions)

@@ -1,4 +1,4 @@
-"""Joints in SI, and what their limits forbid."""
+"""Joints in SI, and violations of their limits."""
 
 import math
 import subprocess
@@ -39,7 +39,7 @@ def test_home_and_each_limit_are_allowed(robot: str) -> None:
             assert codes.JOINT_LIMIT.name not in [each.code for each in violations(joints, positions)]
 
 
-def test_position_beyond_a_limit_is_told_in_degrees() -> None:
+def test_position_beyond_a_limit_is_reported_in_degrees() -> None:
     joints = joints_of(load("pt600"))
     positions = np.radians([0, 131, 0, 0, 0])
     (found,) = violations(joints, positions)
@@ -47,7 +47,7 @@ def test_position_beyond_a_limit_is_told_in_degrees() -> None:
     assert found == codes.JOINT_LIMIT(name="shoulder", value="131.00°", limit="130.00°")
 
 
-def test_limit_rounded_to_the_protocols_digits_is_no_violation() -> None:
+def test_limit_rounded_to_the_protocols_digits_is_allowed() -> None:
     joints = joints_of(load("pt600"))
     assert violations(joints, np.radians([150.004, 0, 0, 0, 0])) == ()
     assert violations(joints, np.radians([150.01, 0, 0, 0, 0])) != ()
@@ -60,7 +60,7 @@ def test_coupled_limit_is_checked() -> None:
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_number_that_is_not_finite_is_a_violation(value: float) -> None:
+def test_nonfinite_number_is_a_violation(value: float) -> None:
     (found,) = violations(joints_of(load("pt600")), [0, 0, value, 0, 0])
     assert found == codes.JOINT_NOT_FINITE(name="elbow", value=value)
 

@@ -1,4 +1,4 @@
-"""Random positions within limits, and what is decided of pairs of links: an arm of boxes."""
+"""Random positions within limits, and verdicts on pairs of links, of an arm made of boxes."""
 
 from pathlib import Path
 
@@ -12,10 +12,10 @@ from robots.description import load
 from robots.joints import joints_of
 from robots.schema import RobotDescription
 
-# Studies run in processes of their own.
+# Studies run in separate processes.
 pytestmark = pytest.mark.slow
 
-# A post, and two bars of 0.4 m in the plane above it: the second, folded back, reaches over the post.
+# A post, and two bars of 0.4 m in the plane above it. Folded back, the second reaches over the post.
 ARM = """
 name = "scara"
 [base]
@@ -44,7 +44,7 @@ home = {home}
 link = {{ mesh = "{end}", mesh_scale = 1.0 }}
 """
 POST = "Shape { geometry Box { size 0.2 0.2 0.25 } }"
-# From the link's own joint, at x = -0.4, to 20 mm short of its end.
+# From the link's joint, at x = -0.4, to 20 mm before its end.
 BAR = "Transform { translation -0.2 0 0.01 children Shape { geometry Box { size 0.36 0.04 0.02 } } }"
 
 
@@ -88,44 +88,44 @@ def test_an_arm_that_stays_folded_always_touches_its_post(tmp_path: Path) -> Non
     assert kinds(may_unfold)["base", "elbow"] is Kind.TOUCHING
 
 
-def test_positions_beyond_a_constraint_are_not_tried(tmp_path: Path) -> None:
+def test_positions_beyond_a_constraint_are_not_sampled(tmp_path: Path) -> None:
     only_folded = "[[constraint]]\njoints = { elbow = 1.0 }\nlimits = [179.0, 181.0]\n"
     description = an_arm(tmp_path, "[-180.0, 180.0]", home=180.0, more=only_folded)
     assert kinds(description)["base", "elbow"] is Kind.ALWAYS
 
 
-def test_however_thin_a_constraint_is_all_that_it_leaves_is_tried(tmp_path: Path) -> None:
-    # The elbow goes wherever the shoulder takes it back by as much: +-170 degrees, as without a constraint.
+def test_samples_fill_a_constraint_of_any_thickness(tmp_path: Path) -> None:
+    # The elbow has all positions that the shoulder compensates: +-170 degrees, as without a constraint.
     opposite = "[[constraint]]\njoints = { shoulder = 1.0, elbow = 0.05 }\nlimits = [-1e-9, 1e-9]\n"
     description = an_arm(tmp_path, "[-170.0, 170.0]", more=opposite)
     positions = np.degrees(allowed_positions(joints_of(description), 2000))
     assert len(positions) == 2000
     assert np.allclose(positions[:, 0], -0.05 * positions[:, 1], rtol=0, atol=1e-7)
     counts, _ = np.histogram(positions[:, 1], bins=4, range=(-170, 170))
-    # 500 in each, and a deviation of 19: five of them.
+    # 500 expected in each, with a standard deviation of 19: allow five of them.
     assert (abs(counts - 500) < 97).all()
 
 
-def test_a_home_in_a_corner_of_limits_and_constraints_leads_everywhere(tmp_path: Path) -> None:
+def test_samples_spread_from_a_home_in_a_corner_of_the_limits(tmp_path: Path) -> None:
     # Home is the right angle of a triangle whose other corners are (60, 0) and (0, 60) degrees.
     triangle = "[[constraint]]\njoints = { shoulder = 1.0, elbow = 1.0 }\nlimits = [-60.0, 60.0]\n"
     description = an_arm(tmp_path, "[0.0, 90.0]", shoulder="[0.0, 90.0]", more=triangle)
     positions = np.degrees(allowed_positions(joints_of(description), 2000))
     assert positions.sum(axis=1).max() <= 60.0 + 1e-9
-    # The centre of a triangle, 20 and 20; a sum of s is as likely as the line there is long: 40 on average.
+    # The centre of the triangle is 20, 20. The density of a sum is the length of its line: 40 on average.
     assert positions.mean(axis=0) == pytest.approx([20.0, 20.0], abs=1.5)
     assert positions.sum(axis=1).mean() == pytest.approx(40.0, abs=1.5)
 
 
-def test_touching_in_the_only_position_that_constraints_leave_is_no_reason_to_ignore(tmp_path: Path) -> None:
-    # Home is at both lower limits, and the sum may only go down from there.
+def test_contact_in_the_only_allowed_position_does_not_exclude_a_pair(tmp_path: Path) -> None:
+    # Home is at both lower limits, and the sum may only decrease from there.
     downwards = "[[constraint]]\njoints = { shoulder = 1.0, elbow = 1.0 }\nlimits = [150.0, 180.0]\n"
     description = an_arm(tmp_path, "[180.0, 190.0]", shoulder="[0.0, 10.0]", home=180.0, more=downwards)
     assert len(allowed_positions(joints_of(description), 2000)) == 1
     assert kinds(description)["base", "elbow"] is Kind.TOUCHING
 
 
-def test_the_same_seed_tries_the_same_positions(tmp_path: Path) -> None:
+def test_same_seed_gives_the_same_samples(tmp_path: Path) -> None:
     joints = joints_of(an_arm(tmp_path, "[-180.0, 180.0]"))
     one, other = (allowed_positions(joints, 1000, 7) for _ in range(2))
     assert np.array_equal(one, other)
@@ -148,7 +148,7 @@ def test_a_link_without_volume_is_a_thin_plate(tmp_path: Path, points: str, face
     assert kinds(description)["base", "elbow"] is Kind.ALWAYS
 
 
-def test_links_that_a_joint_of_a_urdf_carries_together_are_adjacent(tmp_path: Path) -> None:
+def test_links_on_the_same_joint_of_a_urdf_are_adjacent(tmp_path: Path) -> None:
     box = '<visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual>'
     path = tmp_path / "two.urdf"
     path.write_text(

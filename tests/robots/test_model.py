@@ -1,4 +1,4 @@
-"""The kinematic model against the D-H product, written here a second time, from the file's numbers."""
+"""The kinematic model compared with a second implementation of the D-H product, from the file's numbers."""
 
 import tomllib
 from pathlib import Path
@@ -76,7 +76,7 @@ def translation(x: float, y: float, z: float) -> np.ndarray:
 
 
 def dh_product(text: str, positions: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
-    """Every link's placement and the tool's, from the file's text alone."""
+    """Return every link's placement and the tool's, computed only from the file's text."""
     values = tomllib.loads(text)
     placement = np.eye(4)
     links = [placement]
@@ -115,7 +115,7 @@ def test_placements_equal_the_dh_product_at_1000_random_positions(name: str, tex
 @pytest.mark.parametrize(
     ("robot", "expected"), [("pt500", (-0.0234, 0.1328, 0.7190)), ("pt600", (-0.0281, 0.1594, 0.8528))]
 )
-def test_papers_sample_frame_puts_the_tool_where_it_should_be(
+def test_papers_sample_frame_has_the_papers_tool_placement(
     robot: str, expected: tuple[float, float, float]
 ) -> None:
     model = build_model(load(robot))
@@ -157,7 +157,7 @@ def test_jacobian_is_the_derivative_of_the_tools_placement(name: str, text: str)
         np.testing.assert_allclose(jacobian[3:, index], angular, atol=1e-5)
 
 
-def test_jacobian_counts_what_follows_a_joint_and_not_what_moves_no_tool(tmp_path: Path) -> None:
+def test_jacobian_includes_mimic_joints_and_excludes_joints_beyond_the_tool(tmp_path: Path) -> None:
     model = build_model(telescope(tmp_path))
     step = 1e-6
     for positions in allowed_positions(model, 10):
@@ -172,7 +172,7 @@ def test_jacobian_counts_what_follows_a_joint_and_not_what_moves_no_tool(tmp_pat
             turn = (sides[1][:3, :3] @ sides[0][:3, :3].T - np.eye(3)) / (2 * step)
             angular = [turn[2, 1], turn[0, 2], turn[1, 0]]
             np.testing.assert_allclose(jacobian[:, index], [*linear, *angular], atol=3e-6)
-        # The second stage goes half as far as the first, along the same line.
+        # The second stage moves half as far as the first, along the same line.
         lift = model.joints.names.index("lift")
         assert np.linalg.norm(jacobian[:3, lift]) == pytest.approx(1.5)
         assert not jacobian[:, model.joints.names.index("grip")].any()
@@ -188,7 +188,7 @@ def test_manipulability_is_the_root_of_the_jacobians_gram_determinant(name: str)
         assert manipulability(model, positions) == pytest.approx(expected, abs=1e-9)
 
 
-def test_named_frames_hang_on_their_link() -> None:
+def test_named_frames_move_with_their_link() -> None:
     model = build_model(parse(TWO, Path("robot.toml")))
     assert model.frame_names == ("tool", "camera")
     positions = np.array([0.03, 0.4])

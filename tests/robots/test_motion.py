@@ -1,4 +1,4 @@
-"""Motion from rest to rest: straight, as fast as the joints may, and known at every moment."""
+"""Motion from rest to rest: straight, at the joints' limits, and known at every time."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from robots.joints import joints_of
 from robots.motion import Motion, straight_motion
 
 JOINTS = joints_of(load("pt600"))
-# Ratios that differ from joint to joint: here motion in phase is no straight line of its own accord.
+# The ratios differ between joints, so ruckig's phase synchronization would leave the straight line.
 UNEVEN = replace(
     JOINTS,
     max_acceleration=JOINTS.max_acceleration * np.array([1.0, 0.05, 1.0, 0.2, 3.0]),
@@ -44,7 +44,7 @@ interruptions = st.lists(
 
 @settings(max_examples=60, deadline=None)
 @given(shares, shares, interruptions, st.sampled_from([JOINTS, UNEVEN]))
-def test_speeds_brakes_and_goings_on_keep_to_the_line_and_all_limits(one, other, interrupted, joints):
+def test_speed_changes_brakes_and_resumes_stay_on_the_line_within_limits(one, other, interrupted, joints):
     start, target = (joints.lower + share * (joints.upper - joints.lower) for share in (one, other))
     motion, now_s, done = Motion(joints, start), 0.0, 0.0
     motion.move(target, now_s, speed=1.0)
@@ -70,7 +70,7 @@ def test_speeds_brakes_and_goings_on_keep_to_the_line_and_all_limits(one, other,
 
 @pytest.mark.parametrize(
     ("after", "speed", "becomes_slow"),
-    # So near its target it is on its way to rest, and goes on with that.
+    # Near its target it brakes already, and continues to brake.
     [
         (0.5, 0.04, True),
         (0.12, 0.1, True),
@@ -80,7 +80,7 @@ def test_speeds_brakes_and_goings_on_keep_to_the_line_and_all_limits(one, other,
         (0.97, 0.5, False),
     ],
 )
-def test_what_is_slowed_down_never_goes_back(after, speed, becomes_slow):
+def test_slowed_motion_never_reverses(after, speed, becomes_slow):
     target = JOINTS.home + np.radians([90.0, -45.0, 30.0, 0.0, 5.0])
     motion = Motion(JOINTS, JOINTS.home)
     motion.move(target, 0.0, speed=1.0)
@@ -89,25 +89,25 @@ def test_what_is_slowed_down_never_goes_back(after, speed, becomes_slow):
     waist = [motion.state(at_s).velocities[0] for at_s in np.linspace(now_s, motion.end_s, 500)]
     assert min(waist) > -1e-6
     assert (motion.end_s > now_s + 0.36) == becomes_slow
-    # It takes 0.35 s from the greatest speed to none.
+    # Braking from full speed takes 0.35 s.
     assert motion.state(now_s + 0.35).velocities[0] <= np.pi / 2 * speed + 1e-6
 
 
-def test_a_brake_takes_no_longer_way_than_accelerations_and_jerks_ask_for():
+def test_braking_distance_is_the_least_within_the_limits():
     target = JOINTS.home + np.radians([90.0, 45.0, 0.0, 0.0, 0.0])
     motion = Motion(JOINTS, JOINTS.home)
     motion.move(target, 0.0, speed=1.0)
     motion.brake(motion.end_s / 2)
-    # From 90°/s with 360°/s² and 3600°/s³: 0.25 s and 0.1 s, at half the speed in the mean.
+    # From 90°/s with 360°/s² and 3600°/s³: 0.25 s and 0.1 s, at half the speed on average.
     end = motion.state(motion.end_s).positions
     assert motion.end_s == pytest.approx(1.35 / 2 + 0.35, abs=1e-9)
     assert np.degrees(end - JOINTS.home)[:2] == pytest.approx([45 + 15.75, (45 + 15.75) / 2], abs=1e-9)
 
 
-def test_a_cruise_takes_what_its_way_speed_acceleration_and_jerk_say():
+def test_duration_follows_from_way_speed_acceleration_and_jerk():
     target = JOINTS.home + np.radians([90.0, 0.0, 0.0, 0.0, 0.0])
     motion = straight_motion(JOINTS, JOINTS.home, target, speed=1.0)
-    # 90°/s, 360°/s², 3600°/s³: 0.25 s and 0.1 s to get going, and as long to stop.
+    # 90°/s, 360°/s², 3600°/s³: 0.25 s and 0.1 s to accelerate, and as long to stop.
     assert motion is not None
     assert motion.duration == pytest.approx(90 / 90 + 0.25 + 0.1, abs=1e-9)
     share, rate = motion.progress(np.array([0.0, motion.duration / 2, motion.duration]))
@@ -115,5 +115,5 @@ def test_a_cruise_takes_what_its_way_speed_acceleration_and_jerk_say():
     assert rate == pytest.approx([0.0, 1.0, 0.0], abs=1e-9)
 
 
-def test_going_nowhere_takes_no_time():
+def test_motion_of_length_zero_takes_no_time():
     assert straight_motion(JOINTS, JOINTS.home, JOINTS.home.copy(), speed=1.0) is None

@@ -1,4 +1,4 @@
-"""Checks of programs: known collisions at known times, limits, promises, and what stands beside them."""
+"""Checks of programs: known collisions at known times, limits, tool speeds, and obstacles."""
 
 from math import asin, atan2, degrees, hypot, radians
 from pathlib import Path
@@ -19,16 +19,16 @@ from robots.singularity import reach_of, singularity_margin, singularity_margins
 from tests.robots.boxes import bar_arm, block, cell_of, placed
 
 STRETCHED = np.zeros(2)
-# Two bars as one: the outer corner sweeps a circle, and meets a shelf at y = 0.5 m where its height is that.
+# Two aligned bars: the outer corner moves on a circle and touches a shelf at y = 0.5 m.
 CORNER = (0.78, 0.02)
 MEETS = asin(0.5 / hypot(*CORNER)) - atan2(CORNER[1], CORNER[0])
-# 90°/s, 360°/s², 3600°/s³: half of the 0.35 s that it takes to get going is lost.
+# 90°/s, 360°/s², 3600°/s³: half of the 0.35 s of acceleration is lost.
 LOST_S = 0.175
 
 
 @pytest.fixture(scope="module")
 def shelf(tmp_path_factory: pytest.TempPathFactory) -> Cell:
-    """Bars beside a shelf that begins at y = 0.5 m."""
+    """Return a cell of bars and a shelf that begins at y = 0.5 m."""
     arm = bar_arm(tmp_path_factory.mktemp("arm"))
     return build_cell(cell_of({"arm": (arm, placed(0))}, (block("shelf", (2.0, 1.0, 0.5), placed(0, 1.0)),)))
 
@@ -51,7 +51,7 @@ def kinds(result: CheckResult) -> list[str]:
     return [str(each.kind) for each in result.violations]
 
 
-def test_a_collision_is_found_when_and_where_geometry_has_it(shelf: Cell) -> None:
+def test_collision_is_found_at_the_geometric_time_and_place(shelf: Cell) -> None:
     result = checked(shelf, "wait 1\nmove_joints 90 0\n")
     assert not result.ok
     assert result.refused
@@ -59,7 +59,7 @@ def test_a_collision_is_found_when_and_where_geometry_has_it(shelf: Cell) -> Non
         each for each in result.violations if each.kind is ViolationKind.COLLISION and "elbow" in each.pair[0]
     ]
     assert (touch.line, touch.pair, touch.distance_m) == (2, ("arm/elbow", "shelf"), 0.0)
-    # The outer bar moves 5 mm at most from one sample to the next, at 1.2 m/s.
+    # The outer bar moves at most 5 mm between samples, at 1.2 m/s.
     assert touch.time_s == pytest.approx(1 + degrees(MEETS) / 90 + LOST_S, abs=0.006)
     assert touch.until_s == pytest.approx(result.duration_s)
     assert touch.points[0] == pytest.approx([0.6, 0.5, 0.01], abs=0.05)
@@ -83,7 +83,7 @@ def test_nearer_than_the_warning_warns_and_nearer_than_the_stop_refuses(shelf: C
     assert checked(shelf, f"move_joints {at(0.06):.6f} 0\n").ok
 
 
-def test_a_retreat_is_no_violation_but_coming_nearer_again_is(shelf: Cell) -> None:
+def test_retreat_is_allowed_but_coming_nearer_again_is_a_violation(shelf: Cell) -> None:
     near = np.array([asin(0.495 / hypot(*CORNER)) - atan2(CORNER[1], CORNER[0]), 0.0])
     assert checked(shelf, "move_joints 0 0\n", near).ok
     back = checked(shelf, f"move_joints 0 0\nmove_joints {degrees(near[0]) - 1:.6f} 0\n", near)
@@ -94,7 +94,7 @@ def test_a_retreat_is_no_violation_but_coming_nearer_again_is(shelf: Cell) -> No
     assert standing.ok
 
 
-def test_an_arm_that_touches_at_the_start_is_told_of_it(shelf: Cell) -> None:
+def test_contact_at_the_start_is_reported(shelf: Cell) -> None:
     result = checked(shelf, "move_joints 0 0\n", np.array([MEETS + 0.05, 0.0]))
     (touch,) = result.violations
     assert (touch.kind, touch.time_s) == (ViolationKind.COLLISION, 0.0)
@@ -102,7 +102,7 @@ def test_an_arm_that_touches_at_the_start_is_told_of_it(shelf: Cell) -> None:
     assert kinds(checked(shelf, "wait 0\n", np.array([MEETS + 0.05, 0.0]))) == ["collision"]
 
 
-def test_links_of_the_arm_itself_are_kept_apart_too(alone: Cell) -> None:
+def test_self_collision_is_a_violation(alone: Cell) -> None:
     result = checked(alone, "move_joints 0 179\n")
     (touch,) = result.violations
     assert touch.kind is ViolationKind.COLLISION
@@ -111,7 +111,7 @@ def test_links_of_the_arm_itself_are_kept_apart_too(alone: Cell) -> None:
     assert result.notes == ("only the floor around the arm: its cell has no fixture and no other robot",)
 
 
-def test_each_pass_is_one_violation_of_its_own(shelf: Cell) -> None:
+def test_each_pass_is_a_separate_violation(shelf: Cell) -> None:
     result = checked(shelf, "repeat 2\n  move_joints 36 0\n  move_joints 0 0\nend\n")
     spans = [(each.line, each.time_s, each.until_s) for each in result.violations]
     # There and back: adjacent, but two statements.
@@ -120,7 +120,7 @@ def test_each_pass_is_one_violation_of_its_own(shelf: Cell) -> None:
     assert spans[0][2] == pytest.approx(spans[1][1])
 
 
-def test_limits_are_told_in_degrees_for_the_whole_of_the_move(alone: Cell) -> None:
+def test_limits_are_reported_in_degrees_for_the_whole_move(alone: Cell) -> None:
     result = checked(alone, "move_joints 0 0\nmove_joints 200 0\n")
     (beyond,) = result.violations
     assert (beyond.kind, beyond.line, beyond.refuses) == (ViolationKind.LIMIT, 2, True)
@@ -135,15 +135,15 @@ def test_coupled_limits_count(pt600: Cell) -> None:
     ]
 
 
-def test_an_arm_beyond_a_limit_may_go_back(alone: Cell) -> None:
+def test_arm_beyond_a_limit_may_move_back(alone: Cell) -> None:
     result = checked(alone, "move_joints 0 0\n", np.array([radians(185.0), 0.0]))
     (start,) = result.violations
     assert (start.line, start.refuses) == (0, False)
     assert start.text.startswith("at the start: joint shoulder at 185.00°")
 
 
-def test_a_promised_tool_speed_is_held_against_the_motion(alone: Cell) -> None:
-    # The tool is 0.8 m out and turns at 90°/s.
+def test_asserted_tool_speed_is_checked(alone: Cell) -> None:
+    # The tool is at a radius of 0.8 m and turns at 90°/s.
     most = 0.8 * radians(90)
     result = checked(alone, f"move_joints 45 0\ntool_speed {most * 1000 - 20:.3f}\nmove_joints 0 0\n")
     (fast,) = result.violations
@@ -154,8 +154,8 @@ def test_a_promised_tool_speed_is_held_against_the_motion(alone: Cell) -> None:
     assert checked(alone, f"speed 50\ntool_speed {most * 500 + 1:.3f}\nmove_joints 45 0\n").ok
 
 
-def test_a_line_near_a_singular_position_is_told(pt600: Cell) -> None:
-    # The wrist is 600 mm from the shoulder at most: the elbow is then straight.
+def test_line_near_a_singular_position_is_reported(pt600: Cell) -> None:
+    # The wrist is at most 600 mm from the shoulder, with a straight elbow.
     begin = "move_joints 0 60 -80 -70 0\nmove_line 550 0 230 180 0 0\n"
     near = checked(pt600, f"{begin}move_line 599.9 0 230 180 0 0\n", pt600.arms["arm"].joints.home)
     (singular,) = near.violations
@@ -167,7 +167,7 @@ def test_a_line_near_a_singular_position_is_told(pt600: Cell) -> None:
     assert checked(pt600, f"{begin}move_joints {last}\n", pt600.arms["arm"].joints.home).ok
 
 
-def test_the_duration_is_the_simulated_arms_own(pt600: Cell) -> None:
+def test_duration_equals_the_simulated_arms(pt600: Cell) -> None:
     joints = pt600.arms["arm"].joints
     result = checked(pt600, "home\nspeed 40\nmove_joints 30 60 -60 20 -40\nwait 0.25\n", joints.home + 0.3)
     motion, now_s = Motion(joints, joints.home + 0.3), 0.0
@@ -189,7 +189,7 @@ def test_no_link_moves_more_than_5_mm_between_samples(pt600: Cell) -> None:
 
 
 @pytest.mark.parametrize("robot", ["pt600", "puma560"])
-def test_many_positions_at_once_are_what_pinocchio_has_one_by_one(robot: str) -> None:
+def test_vectorized_tools_and_jacobians_equal_pinocchios(robot: str) -> None:
     arm = build_cell(cell_of({"arm": (robot, placed(0.3, 0.2, 0.1))})).arms["arm"]
     chain, random = tool_chain(arm), np.random.default_rng(1)
     positions = random.uniform(arm.joints.lower, arm.joints.upper, (20, len(arm.joints)))
@@ -208,13 +208,13 @@ def two_arms(folder: Path, apart_m: float) -> Cell:
     return build_cell(cell_of({name: (models[name], bases[name]) for name in models}))
 
 
-def test_another_robot_counts_wherever_it_may_be_on_its_way(tmp_path: Path) -> None:
+def test_another_robot_counts_at_every_position_of_its_path(tmp_path: Path) -> None:
     plan = [Step(line=7, kind=StepKind.MOVE, target=np.array([0.5, 0.0]))]
-    # Each reaches 0.78 m: 2 m apart they never meet ...
+    # Each reaches 0.78 m: at 2 m distance they never touch ...
     turn = np.array([[0.0, 0.0], [np.pi, 0.0]])
     assert check_plan(two_arms(tmp_path, 2.0), "arm", STRETCHED, plan, others={"other": turn}).ok
     near = two_arms(tmp_path, 1.5)
-    # ... 1.5 m apart they do, on a way that begins and ends elsewhere.
+    # ... at 1.5 m they do, on a path that begins and ends elsewhere.
     quarter = np.array([[np.pi * 0.7, 0.0], [np.pi * 1.3, 0.0]])
     passed = check_plan(near, "arm", STRETCHED, plan, others={"other": quarter})
     assert ("arm/elbow", "other/elbow") in [each.pair for each in passed.violations]
@@ -231,13 +231,13 @@ def test_links_without_a_shape_are_named(tmp_path: Path) -> None:
     )
 
 
-def test_a_text_that_cannot_be_read_is_violations_with_lines(alone: Cell) -> None:
+def test_unreadable_text_gives_violations_with_lines(alone: Cell) -> None:
     result = checked(alone, "home\nspeed 0\nmov 1\n")
     assert [(str(each.kind), each.line) for each in result.violations] == [("program", 2), ("program", 3)]
     assert (result.ok, result.steps, len(result.path.times_s)) == (False, (), 0)
 
 
-def test_a_long_program_is_told_in_bounded_numbers(shelf: Cell) -> None:
+def test_result_of_a_long_program_is_bounded(shelf: Cell) -> None:
     result = checked(shelf, "repeat 700\n move_joints 36 0\n move_joints 0 0\nend\n")
     assert len(result.violations) == MOST_VIOLATIONS
     assert result.notes == ("400 more violations are not listed",)
@@ -246,7 +246,7 @@ def test_a_long_program_is_told_in_bounded_numbers(shelf: Cell) -> None:
     assert (np.diff(result.path.times_s) >= 0).all()
 
 
-def test_samples_that_follow_are_one_violation_and_its_worst_is_kept() -> None:
+def test_adjacent_samples_are_one_violation_with_the_worst_value() -> None:
     runs = Runs()
     for sample, value in ((5, 0.04), (6, 0.008), (7, 0.02), (9, 0.03)):
         runs.add(
@@ -266,10 +266,10 @@ def test_samples_that_follow_are_one_violation_and_its_worst_is_kept() -> None:
     assert (second.time_s, second.until_s, second.refuses) == (0.9, 0.9, False)
 
 
-def test_more_joints_ask_for_more_samples(alone: Cell) -> None:
+def test_more_joints_need_more_samples(alone: Cell) -> None:
     chain = tool_chain(alone.arms["arm"])
     one = samples_between(chain, STRETCHED, np.array([1.0, 0.0]))
-    # The outer bar's far corner is 0.78 m out.
+    # The outer bar's far corner is at a radius of 0.78 m.
     assert 0.78 / SAMPLE_M <= one <= 0.9 / SAMPLE_M
     assert samples_between(chain, STRETCHED, np.array([1.0, 1.0])) > one
 

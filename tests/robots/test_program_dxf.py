@@ -1,4 +1,4 @@
-"""Drawings as programs: the points that were drawn, where the frame has them."""
+"""Drawings as programs: the drawn points, placed by the frame."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +20,7 @@ ASKED = DxfPath(layer="cut", approach_mm=20.0)
 
 
 def drawn(folder: Path, unit: int = 4) -> Path:
-    """A closed square on "cut", a chain drawn in any order on "seam", a circle on "hole"."""
+    """Draw a closed square on "cut", a chain in arbitrary order on "seam", a circle on "hole"."""
     drawing = ezdxf.new()
     drawing.header["$INSUNITS"] = unit
     space = drawing.modelspace()
@@ -35,11 +35,11 @@ def drawn(folder: Path, unit: int = 4) -> Path:
 
 
 def moves(text: str) -> list[tuple[type, np.ndarray]]:
-    """Each move and where it goes: (4, 4) [m]."""
+    """Return each move and its target: (4, 4) [m]."""
     return [(type(each), each.target.tool_to_base) for each in parse_program(text, JOINTS).statements]
 
 
-def test_a_polyline_comes_back_as_lines_through_its_points(tmp_path: Path) -> None:
+def test_polyline_becomes_lines_through_its_points(tmp_path: Path) -> None:
     frame = (400.0, 100.0, 250.0, 0.0, 90.0, 30.0)
     found = moves(program_from_dxf(drawn(tmp_path), replace(ASKED, frame=frame, tool=(180.0, 0.0, 45.0))))
     assert [kind for kind, _ in found] == [MoveJoints, *[MoveLine] * 6]
@@ -49,13 +49,13 @@ def test_a_polyline_comes_back_as_lines_through_its_points(tmp_path: Path) -> No
         assert pose == pytest.approx(pose_of(*frame) @ pose_of(x, y, z, 180.0, 0.0, 45.0), abs=1e-8)
 
 
-def test_lines_are_joined_where_they_meet_whichever_way_they_were_drawn(tmp_path: Path) -> None:
+def test_lines_are_joined_in_either_direction(tmp_path: Path) -> None:
     found = moves(program_from_dxf(drawn(tmp_path), replace(ASKED, layer="SEAM", approach_mm=0.0)))
     places = [(1000 * pose[:2, 3]).round(6).tolist() for _, pose in found[1:-1]]
     assert places == [[0, 0], [10, 0], [20, 0], [20, 10]]
 
 
-def test_a_circle_is_as_near_as_its_tolerance(tmp_path: Path) -> None:
+def test_circle_is_followed_within_its_tolerance(tmp_path: Path) -> None:
     text = program_from_dxf(drawn(tmp_path), replace(ASKED, layer="hole", tolerance_mm=0.5))
     places = np.array([1000 * pose[:2, 3] - 5 for _, pose in moves(text)[1:-1]])
     assert np.linalg.norm(places, axis=1) == pytest.approx(40.0, abs=1e-6)
@@ -67,7 +67,7 @@ def test_a_circle_is_as_near_as_its_tolerance(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("bulge", [1.0, -1.0])
-def test_a_polylines_arcs_are_followed_the_way_it_goes(tmp_path: Path, bulge: float) -> None:
+def test_arcs_follow_their_polylines_direction(tmp_path: Path, bulge: float) -> None:
     drawing = ezdxf.new()
     drawing.header["$INSUNITS"] = 4
     corners = [(0, 0, 0), (50, 0, bulge), (50, 80, 0), (0, 80, 0)]
@@ -82,14 +82,14 @@ def test_a_polylines_arcs_are_followed_the_way_it_goes(tmp_path: Path, bulge: fl
     assert (bulge * arc[1:-1, 0] > 0).all()
 
 
-def test_one_curve_is_chosen_by_its_handle(tmp_path: Path) -> None:
+def test_curve_is_selected_by_its_handle(tmp_path: Path) -> None:
     path = drawn(tmp_path)
     handle = ezdxf.readfile(path).modelspace()[1].dxf.handle
     found = moves(program_from_dxf(path, replace(ASKED, layer="", handle=handle.lower())))
     assert [round(1000 * pose[0, 3]) for _, pose in found] == [10, 10, 20, 20]
 
 
-def test_the_drawings_unit_counts(tmp_path: Path) -> None:
+def test_drawings_unit_is_applied(tmp_path: Path) -> None:
     found = moves(program_from_dxf(drawn(tmp_path, unit=1), ASKED))
     assert found[2][1][0, 3] == pytest.approx(2.54)
     with pytest.raises(
@@ -115,13 +115,15 @@ def test_the_drawings_unit_counts(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_what_cannot_be_followed_is_named(tmp_path: Path, asked: DxfPath, sentence: str) -> None:
+def test_curves_that_cannot_be_followed_are_refused_with_a_reason(
+    tmp_path: Path, asked: DxfPath, sentence: str
+) -> None:
     with pytest.raises(MeshError, match=sentence):
         program_from_dxf(drawn(tmp_path), asked)
 
 
 @pytest.mark.parametrize("content", [b"", b"solid a", b"0\nSECTION\n2\nENTITIES\n0\nLINE\n"])
-def test_what_is_no_drawing_is_refused_in_one_line(tmp_path: Path, content: bytes) -> None:
+def test_invalid_drawing_is_refused_in_one_line(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "part.dxf"
     path.write_bytes(content)
     with pytest.raises(MeshError) as caught:

@@ -1,4 +1,4 @@
-"""Lines of the tool as joint moves: near the line everywhere, or a reason."""
+"""Lines of the tool as joint moves: within the tolerance everywhere, or refused with a reason."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def planned(robot: str, text: str):
         ("puma560", "move_line 500 -150 200 180 0 0", "move_line 500 -150 200 150 10 0"),
     ],
 )
-def test_the_tool_stays_by_the_line_and_arrives(robot: str, taught: str, line: str) -> None:
+def test_tool_stays_within_tolerance_of_the_line_and_arrives(robot: str, taught: str, line: str) -> None:
     model, task = ARMS[robot].model, natural_task(ARMS[robot].joints)
     plan = planned(robot, f"{taught}\n{line}\n")
     assert not plan.violations
@@ -45,7 +45,7 @@ def test_the_tool_stays_by_the_line_and_arrives(robot: str, taught: str, line: s
     for step in parts:
         for look in np.linspace(0, 1, 15):
             tool = tool_placement(model, at + look * (step.target - at))
-            # Where the tool only turns, how far it has turned says where on the line it is.
+            # If the tool only rotates, its rotation gives its share of the line.
             turned = tool_misses(tool, way.begin, task)[1] / max(float(np.linalg.norm(way.turn)), 1e-9)
             away, angle = tool_misses(tool, way.pose(way.share_of(tool, turned)), task)
             assert away <= LINE_M
@@ -56,7 +56,7 @@ def test_the_tool_stays_by_the_line_and_arrives(robot: str, taught: str, line: s
     assert angle < 1e-5
 
 
-def test_a_line_out_of_reach_ends_the_plan_where_it_is_and_says_why() -> None:
+def test_unreachable_line_ends_the_plan_with_a_reason() -> None:
     plan = planned("pt600", "move_line 400 0 300 180 0 0\nmove_line 1400 0 300 180 0 0\nhome\n")
     (violation,) = plan.violations
     assert (violation.kind, violation.line) == (ViolationKind.UNREACHABLE, 2)
@@ -76,7 +76,7 @@ def test_a_pose_out_of_reach_names_the_point() -> None:
     assert violation.points[0] == pytest.approx([3.0, 0.0, 0.0])
 
 
-def test_an_arm_of_five_joints_says_how_far_its_tool_leans_on_a_line() -> None:
+def test_arm_of_five_joints_reports_its_axis_deviation_on_a_line() -> None:
     plan = planned("pt600", "move_joints 30 80 -80 20 0\nmove_line 400 200 300 180 0 0\n")
     assert not plan.violations
     (note,) = plan.notes
@@ -84,7 +84,7 @@ def test_an_arm_of_five_joints_says_how_far_its_tool_leans_on_a_line() -> None:
     assert note.endswith("° from a uniform rotation: this arm cannot follow it")
 
 
-def test_a_repeated_line_comes_to_the_same_moves_to_the_last_bit() -> None:
+def test_repeated_line_gives_bit_identical_moves() -> None:
     there, back = "move_line 400 200 300 180 0 0", "move_line 400 0 300 180 0 0"
     plan = planned("pt600", f"{back}\nrepeat 3\n{there}\n{back}\nend")
     rounds = [step.target.tobytes() for step in plan.steps if step.line in (3, 4)]
@@ -93,7 +93,7 @@ def test_a_repeated_line_comes_to_the_same_moves_to_the_last_bit() -> None:
     assert rounds[third : 2 * third] == rounds[2 * third :]
 
 
-def test_a_program_that_names_no_speed_begins_with_one() -> None:
+def test_program_without_a_speed_begins_with_100_percent() -> None:
     kinds = [(step.kind, step.percent) for step in planned("pt600", "trace on\nhome\nspeed 20\nhome").steps]
     assert kinds == [
         (StepKind.TRACE, None),

@@ -1,4 +1,4 @@
-"""The text of teach programs: both ways, and every problem in words."""
+"""The text of teach programs: parsing, writing, and all problems."""
 
 import numpy as np
 import pytest
@@ -51,10 +51,10 @@ TABLE: tuple[tuple[str, tuple[Statement, ...]], ...] = (
 )
 
 
-def said(statement: Statement) -> tuple[object, ...]:
-    """A statement as something that compares."""
+def comparable(statement: Statement) -> tuple[object, ...]:
+    """Convert a statement to comparable values."""
     if isinstance(statement, Repeat):
-        return ("repeat", statement.line, statement.count, *map(said, statement.body))
+        return ("repeat", statement.line, statement.count, *map(comparable, statement.body))
     if isinstance(statement, MoveJoints | MoveLine):
         target = statement.target
         values = target.positions if isinstance(target, JointTarget) else target.tool_to_base
@@ -63,18 +63,16 @@ def said(statement: Statement) -> tuple[object, ...]:
 
 
 @pytest.mark.parametrize(("text", "statements"), TABLE)
-def test_a_text_and_its_statements_are_the_same_both_ways(
-    text: str, statements: tuple[Statement, ...]
-) -> None:
+def test_text_and_statements_round_trip(text: str, statements: tuple[Statement, ...]) -> None:
     program = parse_program(HEAD + text, JOINTS)
-    assert [said(each) for each in program.statements] == [said(each) for each in statements]
+    assert [comparable(each) for each in program.statements] == [comparable(each) for each in statements]
     assert program_text(Program(statements, POINTS), JOINTS) == HEAD + text
 
 
-def test_comments_blank_lines_and_the_place_of_a_point_say_nothing() -> None:
+def test_comments_blank_lines_and_the_place_of_a_point_do_not_matter() -> None:
     text = "\ufeff# all of it\r\n\r\n  move_joints above   # taught today\r\n" + HEAD.replace("\n", "\r\n")
     (move,) = parse_program(text, JOINTS).statements
-    assert said(move) == said(MoveJoints(3, ABOVE))
+    assert comparable(move) == comparable(MoveJoints(3, ABOVE))
 
 
 WRONG = (
@@ -123,19 +121,19 @@ WRONG = (
 
 
 @pytest.mark.parametrize(("line", "sentence"), WRONG)
-def test_what_cannot_be_read_is_named_with_word_value_and_range(line: str, sentence: str) -> None:
+def test_unreadable_line_is_reported_with_word_value_and_range(line: str, sentence: str) -> None:
     with pytest.raises(ProgramError) as caught:
         parse_program(f"{HEAD}{line}\n{'end' if line.startswith('repeat') else ''}", JOINTS)
     assert caught.value.problems == ((3, sentence),)
 
 
-def test_every_problem_is_told_at_once_by_line() -> None:
+def test_all_problems_are_reported_by_line() -> None:
     with pytest.raises(ProgramError, match=r"line 1: .* \(and 3 more problems\)") as caught:
         parse_program("mov 1\nhome\nspeed 0\nrepeat 2\nmove_joints nowhere\n", JOINTS)
     assert [line for line, _ in caught.value.problems] == [1, 3, 4, 5]
 
 
-def test_a_point_that_cannot_be_read_is_no_problem_of_those_who_go_there() -> None:
+def test_use_of_an_unreadable_point_is_not_reported() -> None:
     with pytest.raises(ProgramError) as caught:
         parse_program("point a = joints 1 2\nmove_joints a\n", JOINTS)
     assert [line for line, _ in caught.value.problems] == [1]
@@ -153,7 +151,7 @@ def test_a_point_that_cannot_be_read_is_no_problem_of_those_who_go_there() -> No
         ("repeat 2\n" * 21 + "home\n" + "end\n" * 21, "'repeat' is nested more than 20 deep"),
     ],
 )
-def test_what_is_too_large_is_refused_in_words(text: str, sentence: str) -> None:
+def test_too_large_program_is_refused_with_a_reason(text: str, sentence: str) -> None:
     with pytest.raises(ProgramError) as caught:
         parse_program(text, JOINTS)
     assert sentence in [problem for _, problem in caught.value.problems]
@@ -165,7 +163,7 @@ words = st.sampled_from((*WORDS.split(), "\n", "\n", "\r", "\x00"))
 
 @settings(max_examples=80, deadline=None)
 @given(st.lists(words, max_size=40).map(" ".join) | st.text(max_size=80))
-def test_any_text_is_a_program_or_gets_lines_and_sentences(text: str) -> None:
+def test_any_text_is_a_program_or_gets_problems_with_lines(text: str) -> None:
     try:
         program = parse_program(text, JOINTS)
     except ProgramError as error:

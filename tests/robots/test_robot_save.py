@@ -1,4 +1,4 @@
-"""Saving a robot: the text that people read, and a folder that is whole whatever happens."""
+"""Saving a robot: readable text, and a folder that is complete after any interruption."""
 
 import io
 import os
@@ -38,7 +38,7 @@ SMALL = {
 }
 
 
-def test_a_description_is_written_as_people_write_one():
+def test_description_is_written_like_a_hand_written_file():
     assert description_text(SMALL) == (
         'name = "one"\n'
         'units = { length = "mm", angle = "deg" }\n'
@@ -63,7 +63,7 @@ def test_a_description_is_written_as_people_write_one():
 
 
 @pytest.mark.parametrize("robot", ["pt500", "pt600", "puma560"])
-def test_the_librarys_own_files_come_back_as_they_were(robot):
+def test_library_files_round_trip(robot):
     text = (LIBRARY / robot / "robot.toml").read_text(encoding="utf-8")
     values = tomllib.loads(text)
     assert description_text(values, text) == text
@@ -92,7 +92,7 @@ def test_comments_stay_with_their_joints_when_rows_move_change_and_go():
     assert "[tool]" not in written
 
 
-def test_a_file_that_is_no_toml_any_more_is_written_anew():
+def test_file_that_is_not_toml_is_rewritten():
     assert description_text({"name": "x"}, "name = [") == 'name = "x"\n'
 
 
@@ -119,7 +119,7 @@ def save(folder: Path, number: int, **more) -> Saved:
     return write_description(version(number), files, folder, **more)
 
 
-def test_a_saved_robot_is_the_one_that_was_described(tmp_path):
+def test_saved_robot_equals_its_description(tmp_path):
     values, files = read_robot(LIBRARY / "pt500")
     path = write_description(values | {"name": "mine"}, files, tmp_path / "robots").path
     assert path == tmp_path / "robots" / "mine" / "robot.toml"
@@ -127,7 +127,7 @@ def test_a_saved_robot_is_the_one_that_was_described(tmp_path):
     assert read_robot(path.parent)[1].keys() == files.keys()
 
 
-def test_a_robot_is_replaced_only_when_asked_and_then_whole(tmp_path):
+def test_robot_is_replaced_completely_and_only_on_request(tmp_path):
     save(tmp_path, 1)
     with pytest.raises(RobotExistsError):
         save(tmp_path, 2)
@@ -137,7 +137,7 @@ def test_a_robot_is_replaced_only_when_asked_and_then_whole(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["arm"]
 
 
-def test_a_robot_is_replaced_without_a_question_while_it_is_the_one_that_was_seen(tmp_path):
+def test_robot_is_replaced_if_its_revision_is_unchanged(tmp_path):
     first = save(tmp_path, 1).revision
     second = save(tmp_path, 2, replaces=first).revision
     assert second == revision_of(tmp_path / "arm") != first
@@ -148,7 +148,7 @@ def test_a_robot_is_replaced_without_a_question_while_it_is_the_one_that_was_see
 
 
 @pytest.mark.parametrize("what", ["added", "changed", "gone", "renamed", "a link"])
-def test_whatever_is_changed_in_a_folder_changes_its_revision(tmp_path, what):
+def test_any_change_in_a_folder_changes_its_revision(tmp_path, what):
     before = save(tmp_path, 1).revision
     mesh = tmp_path / "arm" / "meshes" / "a.wrl"
     if what == "added":
@@ -164,7 +164,7 @@ def test_whatever_is_changed_in_a_folder_changes_its_revision(tmp_path, what):
     assert revision_of(tmp_path / "arm") != before
 
 
-def test_a_robot_that_is_a_link_is_saved_where_it_leads_again_and_again(tmp_path):
+def test_saving_follows_a_symbolic_link(tmp_path):
     save(tmp_path / "elsewhere", 1)
     (tmp_path / "robots").mkdir()
     (tmp_path / "robots" / "arm").symlink_to(tmp_path / "elsewhere" / "arm")
@@ -175,7 +175,7 @@ def test_a_robot_that_is_a_link_is_saved_where_it_leads_again_and_again(tmp_path
     assert [path.name for path in (tmp_path / "elsewhere").iterdir()] == ["arm"]
 
 
-def test_what_a_save_left_behind_as_a_link_or_a_file_keeps_nobody_from_saving(tmp_path):
+def test_leftover_link_or_file_does_not_prevent_saving(tmp_path):
     save(tmp_path, 1)
     (tmp_path / ".arm.0000.saving").symlink_to(tmp_path / "arm")
     (tmp_path / ".arm.0001.saving").write_text("")
@@ -193,7 +193,7 @@ def test_a_file_called_robot_toml_is_neither_saved_nor_zipped_in_place_of_the_dr
         assert tomllib.loads(zipped.read("arm/robot.toml").decode()) == version(1)
 
 
-def test_what_is_no_robot_is_not_replaced(tmp_path):
+def test_folder_without_a_robot_is_not_replaced(tmp_path):
     (tmp_path / "arm").mkdir()
     (tmp_path / "arm" / "thesis.txt").write_text("years of work")
     with pytest.raises(SaveError, match="is not a robot's folder"):
@@ -228,18 +228,18 @@ def test_a_path_that_leads_out_of_the_folder_is_refused(path, tmp_path):
 
 
 @pytest.mark.parametrize("name", [None, "", "../x", "Arm", "a b", ".arm", 5, "a" * 101])
-def test_a_name_that_is_no_robots_is_refused(name, tmp_path):
+def test_invalid_robot_name_is_refused(name, tmp_path):
     with pytest.raises(DescriptionError, match="name"):
         write_description({"name": name}, {}, tmp_path)
 
 
-def test_a_file_in_the_place_of_a_folder_is_refused_and_leaves_nothing(tmp_path):
+def test_file_in_place_of_a_folder_is_refused_without_leftovers(tmp_path):
     with pytest.raises(SaveError):
         write_description(version(1), {"a": b"1", "a/b": b"2"}, tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_zip_holds_the_same_folder_and_is_the_same_each_time():
+def test_zip_has_the_same_folder_and_is_reproducible():
     files = {"meshes/a.wrl": b"mesh"}
     archive = zip_description(version(1), files)
     assert archive == zip_description(version(1), files)
@@ -261,7 +261,7 @@ for number in itertools.cycle([1, 2]):
 
 
 @pytest.mark.slow
-def test_a_kill_at_any_instant_leaves_one_whole_robot(tmp_path):
+def test_kill_at_any_time_leaves_one_complete_robot(tmp_path):
     save(tmp_path, 1)
     seen = set()
     for round_ in range(15):
@@ -298,7 +298,7 @@ def small_disk(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_full_disk_is_told_in_words_and_the_old_robot_stays(small_disk):
+def test_full_disk_is_reported_and_the_old_robot_stays(small_disk):
     save(small_disk, 1)
     with pytest.raises(SaveError, match="arm: not saved, No space left on device"):
         save(small_disk, 2, overwrite=True)
@@ -310,7 +310,7 @@ BOX = "#VRML V2.0 utf8\nShape { geometry Box { } }\n"
 
 
 def write_inlining_robot(folder, address):
-    """Write a robot whose base shows a box, and inlines a file."""
+    """Write a robot with a box as its base, which inlines a file."""
     folder.mkdir()
     (folder / "base.wrl").write_text(f'{BOX}Inline {{ url "{address}" }}\n')
     values, _ = read_robot(LIBRARY / "pt500")
@@ -320,7 +320,7 @@ def write_inlining_robot(folder, address):
 
 
 @pytest.mark.parametrize("address", ["../outside.wrl", "{folder}/outside.wrl", "link.wrl"])
-def test_a_robots_mesh_shows_no_file_outside_of_the_robots_folder(tmp_path, address):
+def test_mesh_reads_no_file_outside_the_robots_folder(tmp_path, address):
     (tmp_path / "outside.wrl").write_text(BOX)
     robot = tmp_path / "arm"
     write_inlining_robot(robot, address.format(folder=tmp_path))
@@ -332,7 +332,7 @@ def test_a_robots_mesh_shows_no_file_outside_of_the_robots_folder(tmp_path, addr
 
 
 @pytest.mark.parametrize("confined", [False, True])
-def test_a_vrml_robot_shows_no_file_outside_of_its_folder(tmp_path, confined):
+def test_vrml_robot_reads_no_file_outside_its_folder(tmp_path, confined):
     (tmp_path / "outside.wrl").write_text(BOX)
     robot = tmp_path / "arm" / "arm.wrl"
     robot.parent.mkdir()
@@ -342,17 +342,17 @@ def test_a_vrml_robot_shows_no_file_outside_of_its_folder(tmp_path, confined):
     robot.write_text("#VRML V2.0 utf8\n" + joint)
     description = load(robot, confined=confined)
     assert not any(link.shapes for link in tree_of(description).links)
-    said = "no such file in the folder 'arm', and no other is read"
-    assert any(said in note for note in description.robot.notes)
+    note_text = "no such file in the folder 'arm', and no other is read"
+    assert any(note_text in note for note in description.robot.notes)
 
 
-def test_a_robot_that_is_confined_shows_no_file_of_another_folder(tmp_path):
+def test_confined_robot_reads_no_file_of_another_folder(tmp_path):
     (tmp_path / "package.xml").touch()  # what is in the robot's package may be read, if it is not confined
     (tmp_path / "outside.wrl").write_text(BOX)
     robot = tmp_path / "arm"
     write_inlining_robot(robot, f"{tmp_path}/outside.wrl")
     cache = tmp_path / "cache"
-    # Anybody else's GLB in the cache is not taken for it, nor the other way round.
+    # The cache does not confuse this GLB with that of a robot that is not confined.
     free = link_meshes(load(robot), cache=cache)["base"]
     confined = link_meshes(load(robot, confined=True), cache=cache)["base"]
     (robot / "base.wrl").write_text(f'{BOX}Inline {{ url "{tmp_path}/none.wrl" }}\n')
@@ -360,7 +360,7 @@ def test_a_robot_that_is_confined_shows_no_file_of_another_folder(tmp_path):
     assert link_meshes(load(robot), cache=cache)["base"] == confined
 
 
-def test_a_confined_description_names_no_file_of_another_folder(tmp_path):
+def test_confined_description_names_no_file_of_another_folder(tmp_path):
     (tmp_path / "outside.wrl").write_text(BOX)
     (tmp_path / "arm").mkdir()
     text = PT500.replace("meshes/base.wrl", "../outside.wrl")
@@ -373,7 +373,7 @@ def test_a_confined_description_names_no_file_of_another_folder(tmp_path):
 @pytest.mark.parametrize(
     "value", ["9" * 5000, "0x" + "f" * 5000, "[" * 2000 + "]" * 2000], ids=["digits", "hex", "nested"]
 )
-def test_a_number_of_thousands_of_digits_is_told_in_words(tmp_path, value):
+def test_number_of_thousands_of_digits_is_reported(tmp_path, value):
     (tmp_path / "robot.toml").write_text(f"{PT500}\nodd = {value}\n".replace("\nodd", "\n[tool2]\nodd"))
     (tmp_path / "other.toml").write_text(f"name = {value}\n")
     for name in ("robot.toml", "other.toml"):

@@ -16,7 +16,7 @@ from robots.urdf_to_dh import dh_form
 
 
 @pytest.mark.parametrize("robot", library_names())
-def test_exported_robot_stands_where_the_described_one_does(robot: str) -> None:
+def test_exported_robot_has_the_placements_of_the_described_one(robot: str) -> None:
     description = load(robot)
     model = build_model(description)
     exported = pinocchio.buildModelFromXML(to_urdf(description))
@@ -59,18 +59,18 @@ link = {{ name = "{link}" }}
 """
 
 
-def test_frames_and_joints_keep_their_names_where_the_export_would_take_them(tmp_path: Path) -> None:
+def test_frames_and_joints_keep_names_that_the_export_would_use(tmp_path: Path) -> None:
     joints = JOINT.format(name="a", link="one") + JOINT.format(name="one_fixed", link="two")
     description = parse(CLASHING.format(joints=joints, link="one"), tmp_path / "robot.toml")
     exported = to_urdf(description)
     read = read_urdf(exported, tmp_path / "clash.urdf", resolve=lambda address: None)
     assert [joint.name for joint in read.tree.joints] == ["a", "one_fixed"]
     links = {link.name: link for link in read.tree.links}
-    # Behind a's axis: the link at d 50 mm and a 100 mm, and from there the frame.
+    # After a's axis: the link at d 50 mm and a 100 mm, and the frame relative to it.
     np.testing.assert_allclose(links["one"].link_to_joint[:3, 3], [0.1, 0.0, 0.05])
     np.testing.assert_allclose(links["a_axis"].link_to_joint[:3, 3], [0.101, 0.002, 0.053])
     assert links["a_axis"].joint == 0
-    # And back to rows the frame is there, and no frame more.
+    # Converted back to rows, there is this frame and no other.
     (tmp_path / "clash.urdf").write_text(exported)
     by_urdf = parse('name = "clash"\nurdf = "clash.urdf"\n', tmp_path / "robot.toml")
     assert isinstance(by_urdf, UrdfDescription)

@@ -23,7 +23,7 @@ target = [0.0, 0.0, 500.0]
 
 
 @pytest.mark.parametrize("robot", library_names())
-def test_top_front_and_left_are_there_without_being_described(robot: str) -> None:
+def test_top_front_and_left_views_exist_by_default(robot: str) -> None:
     views = {view.name: view for view in views_of(load(robot))}
     assert list(views) == ["top", "front", "left"]
     assert all(view.orthographic for view in views.values())
@@ -41,7 +41,7 @@ def test_described_views_replace_and_add_in_metres() -> None:
 
 
 @pytest.mark.parametrize("robot", library_names())
-def test_tool_never_gets_beyond_the_reach(robot: str) -> None:
+def test_tool_never_exceeds_the_reach(robot: str) -> None:
     description = load(robot)
     model = build_model(description)
     generator = np.random.default_rng(11)

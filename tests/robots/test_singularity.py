@@ -1,4 +1,4 @@
-"""How near an arm is to a singular position: nothing where it is singular, the same in any unit of length."""
+"""Distance of an arm from singular positions: 0 in one, and independent of the unit of length."""
 
 import numpy as np
 import pytest
@@ -21,17 +21,17 @@ def test_the_reach_is_the_arms_length_from_its_first_joint_to_its_tool():
 @pytest.mark.parametrize(
     ("name", "stretched", "bent"),
     [
-        # A straight elbow cannot move the tool along the arm; a straight wrist cannot turn it one way.
+        # A straight elbow cannot move the tool along the arm; a straight wrist cannot rotate it one way.
         ("pt600", [10, 40, 0, -40, 0], [10, 40, 60, -40, 0]),
         ("puma560", [10, 40, 60, 0, 0, 0], [10, 40, 10, 30, 60, 20]),
     ],
 )
-def test_it_is_nothing_where_the_arm_is_singular_and_something_elsewhere(name, stretched, bent):
+def test_margin_is_zero_only_in_singular_positions(name, stretched, bent):
     assert margin(name, bent) > 0.02
     assert margin(name, stretched) < 1e-9
 
 
-def test_an_arm_twice_as_large_is_as_near(tmp_path):
+def test_margin_does_not_depend_on_the_arms_size(tmp_path):
     library = load("pt600").source
     lines = library.read_text(encoding="utf-8").splitlines()
     doubled = [

@@ -1,4 +1,4 @@
-"""Robots of a mesh as one URDF: read back by Pinocchio, each stands where its site has it."""
+"""Robots of a mesh as one URDF: read back by Pinocchio, each has its placement in the site."""
 
 from dataclasses import replace
 from xml.etree import ElementTree as Xml
@@ -25,25 +25,25 @@ def viewed(site, robot, pose):
 
 
 @pytest.mark.parametrize("pose", POSES.values(), ids=POSES)
-def test_every_link_of_every_robot_is_where_its_site_has_it(pose):
+def test_every_link_of_every_robot_has_its_placement_in_the_site(pose):
     robots = [viewed("hall", "pt600", pose), viewed("hall", "puma560", pinocchio.SE3.Identity())]
     whole = pinocchio.buildModelFromXML(together(robots, plain_joints=False))
     generator = np.random.default_rng(5)
     for robot, base_to_site in (("pt600", pose), ("puma560", pinocchio.SE3.Identity())):
         model = build_model(load(robot))
         positions = generator.uniform(model.joints.lower, model.joints.upper)
-        told = pinocchio.neutral(whole)
+        positions_of_all = pinocchio.neutral(whole)
         for name, position in zip(model.joints.names, positions, strict=True):
-            told[whole.joints[whole.getJointId(f"hall/{robot}/{name}")].idx_q] = position
+            positions_of_all[whole.joints[whole.getJointId(f"hall/{robot}/{name}")].idx_q] = position
         data = whole.createData()
-        pinocchio.framesForwardKinematics(whole, data, told)
+        pinocchio.framesForwardKinematics(whole, data, positions_of_all)
         for name, placement in zip(model.link_names, link_placements(model, positions), strict=True):
             frame = whole.getFrameId(f"hall/{robot}/{name}", pinocchio.FrameType.BODY)
             expected = base_to_site.homogeneous @ placement
             np.testing.assert_allclose(data.oMf[frame].homogeneous, expected, atol=1e-7)
 
 
-def test_several_sites_hang_in_one_root_and_one_site_is_the_root_itself():
+def test_several_sites_share_a_root_and_a_single_site_is_the_root():
     here, there = (viewed(site, "pt600", pinocchio.SE3.Identity()) for site in ("here", "there"))
 
     def roots(text):
@@ -56,7 +56,7 @@ def test_several_sites_hang_in_one_root_and_one_site_is_the_root_itself():
     assert pinocchio.buildModelFromXML(together([here, there], plain_joints=False)).nq == 10
 
 
-def test_the_upper_side_of_a_floors_plate_is_where_the_floor_is():
+def test_upper_side_of_the_floors_plate_is_at_the_floors_height():
     high, low = POSES["upright"], pinocchio.SE3.Identity()
     robots = [
         replace(viewed("hall", robot, pose), floor_m=floor_m)
@@ -70,7 +70,7 @@ def test_the_upper_side_of_a_floors_plate_is_where_the_floor_is():
     pinocchio.framesForwardKinematics(whole, data, pinocchio.neutral(whole))
     middle = data.oMf[whole.getFrameId("hall/floor.0")].translation
     assert middle[2] + size[2] / 2 == pytest.approx(-0.25)
-    # Both robots stand on it, with room around.
+    # Both robots are on it, with a margin around them.
     for pose in (high, low):
         assert (np.abs(pose.translation[:2] - middle[:2]) + 1.5 < np.array(size[:2]) / 2).all()
 
@@ -83,14 +83,14 @@ def test_plain_joints_keep_their_names_and_the_meshes_are_those_of_the_mesh():
     assert not list(urdf.iter("collision"))
 
 
-def test_a_mimicking_joint_follows_the_joint_by_its_new_name():
+def test_mimic_joint_follows_the_renamed_joint():
     text = """<robot name="g"><link name="a"/><link name="b"/><joint name="two" type="revolute">
     <parent link="a"/><child link="b"/><mimic joint="one"/></joint></robot>"""
     joint = prefixed(text, "s/g/", lambda link: None, joints=True).find("joint")
     assert (joint.get("name"), joint.find("mimic").get("joint")) == ("s/g/two", "s/g/one")
 
 
-def test_what_is_no_urdf_is_left_out_and_keeps_nobody_else_from_being_seen():
+def test_invalid_urdf_is_left_out_and_the_others_stay():
     bad = Viewed("here", "bad", "<robot", (), lambda link: None)
     text = together([bad, viewed("here", "pt600", pinocchio.SE3.Identity())], plain_joints=False)
     assert "here/pt600/base" in text

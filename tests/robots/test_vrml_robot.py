@@ -1,4 +1,4 @@
-"""Robots in VRML: OpenHRP's Humanoid, Joint and Segment, as its files have them."""
+"""Robots in VRML: OpenHRP's Humanoid, Joint and Segment, as in its files."""
 
 from math import pi
 from pathlib import Path
@@ -71,7 +71,7 @@ def test_joints_have_their_axes_limits_and_speeds(tmp_path: Path, protos: str) -
     np.testing.assert_allclose(elbow.joint_to_parent[:3, 1], [0, 0, 1], atol=1e-12)
 
 
-def test_links_stand_on_their_joints_and_look_as_drawn(tmp_path: Path) -> None:
+def test_links_are_on_their_joints_with_their_shapes(tmp_path: Path) -> None:
     base, upper, lower, hand = robot(tmp_path, ARM).tree.links
     assert [(link.name, link.joint) for link in (base, upper, lower, hand)] == [
         ("BASE_LINK", BASE),
@@ -103,7 +103,7 @@ def joint(name: str, fields: str, children: str = "") -> str:
     return f"DEF {name} Joint {{ {fields} children [ {children} ] }}"
 
 
-def test_joints_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
+def test_joints_are_in_the_order_of_jointid(tmp_path: Path) -> None:
     second = joint("B", f"{TURNS} jointId 1")
     third = joint("C", f"{TURNS} jointId 2", "DEF C_LINK Segment { }")
     passive = joint("P", TURNS)
@@ -120,7 +120,7 @@ def test_joints_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
     }
 
 
-def test_order_that_puts_a_joint_before_its_parent_is_not_taken(tmp_path: Path) -> None:
+def test_order_with_a_joint_before_its_parent_is_rejected(tmp_path: Path) -> None:
     inner = joint("B", f"{TURNS} jointId 0")
     found = robot(tmp_path, joint("A", f"{TURNS} jointId 1", inner))
     assert [known.name for known in found.tree.joints] == ["A", "B"]
@@ -134,13 +134,13 @@ def test_joint_without_limits_turns_once_each_way(tmp_path: Path) -> None:
     assert "no llimit and ulimit" in found.notes[0]
 
 
-def test_root_that_is_free_stands_still(tmp_path: Path) -> None:
+def test_free_root_is_fixed(tmp_path: Path) -> None:
     found = robot(tmp_path, joint("W", 'jointType "free" translation 0 0 2', joint("A", TURNS)))
     (known,) = found.tree.joints
     assert known.joint_to_parent[:3, 3].tolist() == [0, 0, 2]
 
 
-def test_joints_may_stand_in_groups_and_transforms(tmp_path: Path) -> None:
+def test_joints_may_be_in_groups_and_transforms(tmp_path: Path) -> None:
     inner = joint("A", f"{TURNS} translation 1 0 0")
     placed = f"Transform {{ translation 0 0 5 children [ {inner} {BOX} ] }}"
     found = robot(tmp_path, f"Group {{ children {placed} }}")
@@ -150,7 +150,7 @@ def test_joints_may_stand_in_groups_and_transforms(tmp_path: Path) -> None:
     assert base.link_to_joint[:3, 3].tolist() == [0, 0, 5]
 
 
-def test_names_are_made_safe_and_different(tmp_path: Path) -> None:
+def test_names_are_made_safe_and_unique(tmp_path: Path) -> None:
     found = robot(tmp_path, joint("a:b", TURNS, joint("a/b", TURNS)))
     assert [known.name for known in found.tree.joints] == ["a_b", "a_b_2"]
 
@@ -175,7 +175,7 @@ def test_missing_mesh_of_a_link_is_a_note(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_robot_that_cannot_be_is_refused(tmp_path: Path, text: str, reason: str) -> None:
+def test_invalid_robot_is_refused(tmp_path: Path, text: str, reason: str) -> None:
     with pytest.raises(MeshError) as caught:
         robot(tmp_path, text)
     assert reason in str(caught.value)

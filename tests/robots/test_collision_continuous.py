@@ -1,4 +1,4 @@
-"""How near an arm gets along a path: as measuring each sample says, sooner."""
+"""Clearances of an arm on a path: equal to those of each sample, but faster."""
 
 import re
 from itertools import pairwise
@@ -38,7 +38,7 @@ def cell() -> Cell:
 
 
 def motions(cell: Cell, robot: str, count: int, seed: int) -> FloatArray:
-    """Straight joint motions between random positions, in samples of some 20 mm."""
+    """Return straight joint motions between random positions, in samples of about 20 mm."""
     ends = allowed_positions(cell.arms[robot].joints, count + 1, seed)
     shares = np.linspace(0.0, 1.0, 60)[1:, None]
     lines = [start + shares * (end - start) for start, end in pairwise(ends)]
@@ -48,7 +48,7 @@ def motions(cell: Cell, robot: str, count: int, seed: int) -> FloatArray:
 def measured(
     cell: Cell, positions: FloatArray, others: dict[str, FloatArray]
 ) -> tuple[float, dict[tuple[str, str], float]]:
-    """The least distance around, and what is near, one position alone."""
+    """Return the least distance and the near pairs, for one position."""
     moving = [pair for pair in outside_nearest(cell, "one", positions, others) if pair.pair[0] != "one/base"]
     near = {each.pair: each.distance_m for each in moving if each.distance_m <= WITHIN}
     near |= {each.pair: 0.0 for each in own_contacts(cell, "one", positions)}
@@ -56,7 +56,7 @@ def measured(
 
 
 @pytest.mark.parametrize("beside", [{}, {"two": np.radians([[20.0, 60.0, -60.0, 10.0, 0.0]])}])
-def test_a_path_says_what_each_of_its_samples_says(cell: Cell, beside: dict[str, FloatArray]) -> None:
+def test_path_check_equals_the_check_of_each_sample(cell: Cell, beside: dict[str, FloatArray]) -> None:
     path = motions(cell, "one", 12, seed=4)
     along = near_along(cell, "one", path, beside, within_m=WITHIN)
     seen: dict[int, dict[tuple[str, str], float]] = {}
@@ -74,13 +74,13 @@ def test_a_path_says_what_each_of_its_samples_says(cell: Cell, beside: dict[str,
         assert seen.get(sample, {}) == {pair: pytest.approx(d, abs=1e-5) for pair, d in expected.items()}
         near += bool(expected)
         touching += least == 0.0
-    # A path that meets nothing, or is never clear of anything, would have shown little.
+    # The path must have encounters and free samples to show anything.
     assert 5 < near < len(path) / 7 - 5
     assert touching > 0
 
 
-def test_another_arms_way_counts_as_all_of_its_places_at_once(cell: Cell) -> None:
-    # The neighbour turns by the arm: at both of its ends it is far away.
+def test_another_arms_path_counts_as_all_of_its_positions(cell: Cell) -> None:
+    # The neighbour passes the arm: at both ends of its path it is far away.
     way = np.radians([[-100.0, 60.0, -60.0, 10.0, 0.0], [100.0, 60.0, -60.0, 10.0, 0.0]])
     path = motions(cell, "one", 3, seed=11)
     swept = near_along(cell, "one", path, {"two": way}, within_m=WITHIN).clearances
@@ -88,7 +88,7 @@ def test_another_arms_way_counts_as_all_of_its_places_at_once(cell: Cell) -> Non
     count = len(places)
     stands = [way[0] + share * (way[1] - way[0]) for share in np.linspace(0.0, 1.0, count)]
     for sample in range(0, len(path), 25):
-        # Every tenth place: no nearer than all of them, nor farther than what is between.
+        # Every tenth position: not nearer than all of them, and not farther than the interval allows.
         found = [measured(cell, path[sample], {"two": there})[0] for there in stands[::10]]
         assert swept[sample] <= min(found) + 1e-6
         assert swept[sample] >= min(found) - 10 * SAMPLE_M
@@ -96,20 +96,20 @@ def test_another_arms_way_counts_as_all_of_its_places_at_once(cell: Cell) -> Non
     assert (swept < np.minimum(*ends) - 0.05).any()
 
 
-def test_a_way_is_sampled_so_that_no_link_moves_more_than_five_millimetres(cell: Cell) -> None:
+def test_path_is_sampled_so_that_no_link_moves_more_than_five_millimetres(cell: Cell) -> None:
     arm = cell.arms["one"]
-    # A turn right round, whose ends are one place.
+    # A full turn, with both ends at the same place.
     way = np.array([[-pi, 1.0, -1.0, 0.0, -pi], [pi, 1.0, -1.0, 0.0, pi], [pi, 1.2, -1.0, 0.0, 0.0]])
     places, come = sampled_path(arm, way)
     assert np.diff(come, axis=0).max() <= SAMPLE_M
-    # The hand, half a metre out, goes once round and a little more.
+    # The hand, at a radius of 0.5 m, makes a little more than one turn.
     assert come[-1].max() > 2.0
     assert places[0] == pytest.approx(arm_obstacles(arm, way[0]).placements, abs=1e-12)
     assert places[-1] == pytest.approx(arm_obstacles(arm, way[-1]).placements, abs=1e-12)
 
 
-def test_bodies_are_where_pinocchio_has_them(cell: Cell, tmp_path: Path) -> None:
-    # Prismatic joints, and one that follows another; a look for each of its bare links.
+def test_body_placements_equal_pinocchios(cell: Cell, tmp_path: Path) -> None:
+    # Prismatic joints and a mimic joint; a shape for each of its bare links.
     urdf = tmp_path / "telescope.urdf"
     look = r'<link name="\1"><visual><geometry><box size="0.1 0.05 0.02"/></geometry></visual></link>'
     urdf.write_text(re.sub(r'<link name="(\w+)"/>', look, TELESCOPE))
@@ -123,7 +123,7 @@ def test_bodies_are_where_pinocchio_has_them(cell: Cell, tmp_path: Path) -> None
             assert there == pytest.approx(arm_obstacles(arm, positions).placements, abs=1e-12)
 
 
-def test_no_point_of_a_body_comes_farther_than_its_travel_says(cell: Cell) -> None:
+def test_travel_bounds_the_movement_of_every_point(cell: Cell) -> None:
     arm = cell.arms["one"]
     path = motions(cell, "one", 2, seed=3)
     places = placements_along(arm, path)
@@ -136,7 +136,7 @@ def test_no_point_of_a_body_comes_farther_than_its_travel_says(cell: Cell) -> No
             assert (moved <= come[later:, number] - come[:-later, number] + 1e-12).all()
 
 
-def test_an_arm_that_looks_like_nothing_meets_nothing(tmp_path: Path) -> None:
+def test_arm_without_shapes_has_no_encounters(tmp_path: Path) -> None:
     bare = bar_arm(tmp_path / "bare", bare=("base", "shoulder", "elbow"))
     robots = {"bare": (bare, placed(0.0)), "seen": (bar_arm(tmp_path / "seen"), placed(0.1))}
     cell = build_cell(cell_of(robots, FIXTURES))
@@ -148,7 +148,7 @@ def test_an_arm_that_looks_like_nothing_meets_nothing(tmp_path: Path) -> None:
     assert near_along(cell, "bare", path, {}, within_m=WITHIN).clearances.tolist() == [np.inf, np.inf]
 
 
-def test_nothing_around_is_infinitely_far(tmp_path: Path) -> None:
+def test_clearance_without_obstacles_is_infinite(tmp_path: Path) -> None:
     cell = build_cell(cell_of({"arm": (bar_arm(tmp_path), placed(0.0))}))
     folded = np.array([0.0, pi])
     along = near_along(cell, "arm", np.array([np.zeros(2), folded]), {}, within_m=WITHIN)

@@ -1,4 +1,4 @@
-"""What happens between two samples of a motion, on a mate's long way, and along many small motions."""
+"""Contacts between two samples, on another robot's long path, and on many small motions."""
 
 from pathlib import Path
 
@@ -36,7 +36,7 @@ def kinds(result: CheckResult) -> list[ViolationKind]:
 
 
 @pytest.mark.parametrize("x_m", [0.5 + 0.00037 * number for number in range(14)])
-def test_a_blade_goes_through_no_plate_however_thin_both_are(tmp_path: Path, x_m: float) -> None:
+def test_thin_blade_does_not_tunnel_through_a_thin_plate(tmp_path: Path, x_m: float) -> None:
     urdf = tmp_path / "blade.urdf"
     urdf.write_text(BLADE.format(x=0.0, box="0.05 0.05 0.05"))
     robot = CellRobot("blade", urdf, placed(0.0), warning_m=0.0, stop_m=0.0)
@@ -45,12 +45,12 @@ def test_a_blade_goes_through_no_plate_however_thin_both_are(tmp_path: Path, x_m
     (violation,) = moved(cell, "blade", [0.0, 0.0], [0.0, 0.8]).violations
     assert violation.kind is ViolationKind.COLLISION
     assert violation.points[:, 0] == pytest.approx([x_m, x_m], abs=2 * PLATE_M)
-    # Up to it, and beside it.
+    # Up to the plate, and past it.
     assert kinds(moved(cell, "blade", [0.0, 0.0], [0.0, x_m - 0.2 - 1.5 * PLATE_M])) == []
     assert kinds(moved(cell, "blade", [0.0, x_m - 0.2 + 1.5 * PLATE_M], [0.5, 0.8])) == []
 
 
-def test_a_blade_goes_through_no_plate_on_the_arms_own_base(tmp_path: Path) -> None:
+def test_thin_blade_does_not_tunnel_through_a_plate_on_its_base(tmp_path: Path) -> None:
     for number in range(6):
         x_m = 0.5 + 0.00071 * number
         urdf = tmp_path / f"fin-{number}.urdf"
@@ -61,56 +61,56 @@ def test_a_blade_goes_through_no_plate_on_the_arms_own_base(tmp_path: Path) -> N
 
 
 @pytest.fixture(scope="module")
-def mates(tmp_path_factory: pytest.TempPathFactory) -> Cell:
+def cell_of_two(tmp_path_factory: pytest.TempPathFactory) -> Cell:
     bars = bar_arm(tmp_path_factory.mktemp("bars"))
     return build_cell(
         cell_of(
-            {"arm": (bars, placed(0.0)), "mate": (bars, placed(1.2))},
+            {"arm": (bars, placed(0.0)), "other": (bars, placed(1.2))},
             (block("post", (0.1, 0.1, 0.4), placed(0, 1)),),
         )
     )
 
 
-def test_near_is_the_same_whether_or_not_far_is_asked_for(mates: Cell) -> None:
+def test_far_does_not_change_near_encounters(cell_of_two: Cell) -> None:
     path = np.linspace([-1.0, 0.2], [1.5, 0.0], 200)
-    way = allowed_positions(mates.arms["mate"].joints, 8, 3)
+    way = allowed_positions(cell_of_two.arms["other"].joints, 8, 3)
     whole, near = (
-        near_along(mates, "arm", path, {"mate": way}, within_m=0.05, far=far) for far in (True, False)
+        near_along(cell_of_two, "arm", path, {"other": way}, within_m=0.05, far=far) for far in (True, False)
     )
-    told = {each.pair: each for each in whole.encounters}
-    assert any(pair[1].startswith("mate/") for pair in told)
-    assert told.keys() == {each.pair for each in near.encounters}
+    expected = {each.pair: each for each in whole.encounters}
+    assert any(pair[1].startswith("other/") for pair in expected)
+    assert expected.keys() == {each.pair for each in near.encounters}
     for each in near.encounters:
-        assert each.samples.tolist() == told[each.pair].samples.tolist()
-        assert each.distances == pytest.approx(told[each.pair].distances, abs=1e-6)
+        assert each.samples.tolist() == expected[each.pair].samples.tolist()
+        assert each.distances == pytest.approx(expected[each.pair].distances, abs=1e-6)
     assert np.isfinite(whole.clearances).all()
     seen = whole.clearances < 0.05
     assert near.clearances[seen] == pytest.approx(whole.clearances[seen], abs=1e-6)
 
 
-def test_of_two_pieces_each_is_met_in_its_turn(tmp_path: Path) -> None:
+def test_two_pieces_are_encountered_in_order(tmp_path: Path) -> None:
     cheeks = two_cheeks("cheeks", placed(0.75))
     cell = build_cell(cell_of({"arm": (bar_arm(tmp_path), placed(0.0))}, (cheeks,)))
     path = np.linspace([-0.5, 0.0], [0.5, 0.0], 400)
     for positions in (path, path[::-1]):
-        (met,) = [
+        (encounter,) = [
             each
             for each in near_along(cell, "arm", positions, {}, within_m=0.02, far=False).encounters
             if each.pair == ("arm/elbow", "cheeks")
         ]
-        assert {-1, 1} == set(np.sign(met.points[met.distances == 0.0, 0, 1]).tolist())
-        # Between them is free.
-        assert (np.diff(met.samples) > 5).sum() == 1
+        assert {-1, 1} == set(np.sign(encounter.points[encounter.distances == 0.0, 0, 1]).tolist())
+        # The space between them is free.
+        assert (np.diff(encounter.samples) > 5).sum() == 1
 
 
-def test_of_a_long_way_only_what_is_near_is_sampled_and_each_line_once(mates: Cell) -> None:
-    arm = mates.arms["arm"]
+def test_long_path_is_sampled_only_near_the_arm_and_each_line_once(cell_of_two: Cell) -> None:
+    arm = cell_of_two.arms["arm"]
     places = placements_along(arm, np.linspace([-0.3, 0.0], [0.3, 0.0], 50))
     passed = passed_along(arm, places)
     aside, across = [1.5, 0.0], [np.pi, 0.0]
 
     def sampled(way: list[list[float]]) -> int:
-        sweeps = sweeps_of(mates, "arm", {"mate": np.array(way)}, passed=passed, within_m=0.05)
+        sweeps = sweeps_of(cell_of_two, "arm", {"other": np.array(way)}, passed=passed, within_m=0.05)
         return sum(len(sweep.travel) for sweep in sweeps if len(sweep.travel) > 1)
 
     assert sampled([[0.0, 0.0], aside]) == 0
@@ -120,8 +120,8 @@ def test_of_a_long_way_only_what_is_near_is_sampled_and_each_line_once(mates: Ce
     assert sampled([aside, across, aside, [0.0, 0.0], aside]) == once
 
 
-def test_a_robot_far_from_its_mates_long_way_measures_next_to_nothing(
-    mates: Cell, monkeypatch: pytest.MonkeyPatch
+def test_robot_far_from_another_robots_long_path_measures_almost_nothing(
+    cell_of_two: Cell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     measured = 0
     distance = Gauge.distance
@@ -132,14 +132,14 @@ def test_a_robot_far_from_its_mates_long_way_measures_next_to_nothing(
         return distance(*args)  # type: ignore[arg-type]
 
     monkeypatch.setattr(Gauge, "distance", counted)
-    # The mate turns away from the arm, a hundred times and elsewhere each time.
+    # The other robot turns away from the arm, a hundred times, to a different position each time.
     way = np.random.default_rng(0).uniform([-1.5, -0.3], [1.5, 0.3], (101, 2))
     path = np.linspace([2.0, 0.0], [2.5, 0.0], 60)
-    near_along(mates, "arm", path, {"mate": way}, within_m=0.05, far=False)
+    near_along(cell_of_two, "arm", path, {"other": way}, within_m=0.05, far=False)
     assert measured < 500
 
 
-def test_no_row_of_small_motions_comes_nearer_than_the_stop_distance() -> None:
+def test_repeated_small_motions_never_pass_the_stop_distance() -> None:
     post = block("post", (0.06, 0.06, 1.0), placed(0.0, 0.45, 0.5))
     cell = build_cell(CellDescription((CellRobot("arm", "pt600", np.eye(4)),), (post,)))
 
@@ -157,7 +157,7 @@ def test_no_row_of_small_motions_comes_nearer_than_the_stop_distance() -> None:
             break
         turn += 5e-5
     assert 0.01 <= clearance(turn) < 0.0101
-    # Who is nearer than that may go away, but not a hair nearer.
+    # A pair that is nearer than that may separate, but not come nearer at all.
     inside = turn + 2e-3
     assert 0.001 < clearance(inside) < 0.01
     assert not moved(cell, "arm", [inside, 0, 0, 0, 0], [inside - 0.1, 0, 0, 0, 0]).refused

@@ -1,4 +1,4 @@
-"""Which links of an arm are checked against each other, and as what."""
+"""Pairs of an arm's links: which are checked against each other, and with which geometry."""
 
 import json
 import re
@@ -26,7 +26,7 @@ from services.kinematics.worker import begin
 from services.kinematics.worker_messages import CheckQuestion
 
 REAL = Path(__file__).parents[3] / "shared" / "testdata" / "urdf" / "abb_irb2400_support"
-# Studies run in processes of their own.
+# Studies run in separate processes.
 pytestmark = pytest.mark.slow
 needs_real_robots = pytest.mark.skipif(not REAL.is_dir(), reason="no ../shared/testdata/urdf: no real robots")
 
@@ -35,7 +35,7 @@ def solid(x: float, size: str, z: float = 0.0) -> str:
     return f'<collision><origin xyz="{x} 0 {z}"/><geometry><box size="{size}"/></geometry></collision>'
 
 
-# The hand slides along x between two walls of the base, 0.19 m to each side; their hull holds it.
+# The hand slides along x between two walls of the base, 0.19 m to each side, inside their hull.
 WALLS = solid(-0.2, "0.02 0.4 0.4") + solid(0.2, "0.02 0.4 0.4")
 ARM = """<robot name="hollow">
 <link name="base">{base}</link>
@@ -68,7 +68,7 @@ def touching(cell: Cell, *positions: float) -> list[tuple[str, str]]:
     return [each.pair for each in own_contacts(cell, "arm", np.array(positions))]
 
 
-def test_links_whose_hulls_touch_at_home_and_meshes_do_not_are_checked_as_meshes(tmp_path: Path) -> None:
+def test_pair_of_which_only_hulls_touch_at_home_is_checked_as_meshes(tmp_path: Path) -> None:
     cell = cell_of(hollow(tmp_path))
     pair = ("arm/base", "arm/hand")
     assert touching(cell, 0.0, 0.0) == []
@@ -77,22 +77,22 @@ def test_links_whose_hulls_touch_at_home_and_meshes_do_not_are_checked_as_meshes
     nearest = own_nearest(cell, "arm", np.zeros(2))
     assert nearest is not None
     assert nearest.distance_m == pytest.approx(0.14, abs=0.01)
-    # And along a path: into the wall.
+    # On a path, into the wall.
     path = np.column_stack([np.zeros(50), np.linspace(0.0, 0.2, 50)])
     near = near_along(cell, "arm", path, {}, within_m=0.01)
-    (met,) = (each for each in near.encounters if each.own)
-    assert met.pair == pair
-    assert path[met.samples[0], 1] == pytest.approx(0.14, abs=0.006)
+    (encounter,) = (each for each in near.encounters if each.own)
+    assert encounter.pair == pair
+    assert path[encounter.samples[0], 1] == pytest.approx(0.14, abs=0.006)
     ((links, text),) = cell.arms["arm"].plan.refined
     assert links == ("base", "hand")
     assert "exact collision meshes" in text
 
 
-# The hand is clear of both walls at home, fits between them, and goes through each.
+# The hand is clear of both walls at home, fits between them, and moves through each.
 BESIDE = solid(0.12, "0.02 0.4 0.4") + solid(0.3, "0.02 0.4 0.4")
 
 
-def test_links_apart_at_home_whose_hulls_touch_often_and_meshes_do_not_are_checked_as_meshes(
+def test_pair_apart_at_home_of_which_only_hulls_often_touch_is_checked_as_meshes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model = hollow(tmp_path, base=BESIDE)
@@ -103,20 +103,20 @@ def test_links_apart_at_home_whose_hulls_touch_often_and_meshes_do_not_are_check
         nearest = own_nearest(cell, "arm", np.array([0.0, x]))
         assert nearest is not None
         assert nearest.distance_m == pytest.approx(distance, abs=0.01)
-    # And along a path: through the first wall, up to the second.
+    # On a path, through the first wall, up to the second.
     path = np.column_stack([np.zeros(200), np.linspace(-0.3, 0.3, 200)])
-    (met,) = (each for each in near_along(cell, "arm", path, {}, within_m=0.01).encounters if each.own)
-    there = path[met.samples, 1]
+    (encounter,) = (each for each in near_along(cell, "arm", path, {}, within_m=0.01).encounters if each.own)
+    there = path[encounter.samples, 1]
     assert there.min() == pytest.approx(0.06, abs=0.006)
     free = there[np.diff(there, append=there[-1]).argmax() :][:2]
     assert free == pytest.approx([0.18, 0.24], abs=0.006)
     assert run(["robot", "check", str(model)]) == 0
-    # A tenth, and a deviation of 1.5 %.
-    said = re.search(
+    # 10 % expected, with a standard deviation of 1.5 %.
+    found = re.search(
         r"base and hand are apart at home; only their hulls touch in (\d+) % of", capsys.readouterr().out
     )
-    assert said is not None
-    assert int(said[1]) == pytest.approx(10, abs=5)
+    assert found is not None
+    assert int(found[1]) == pytest.approx(10, abs=5)
 
 
 @pytest.mark.parametrize(
@@ -124,13 +124,13 @@ def test_links_apart_at_home_whose_hulls_touch_often_and_meshes_do_not_are_check
     [solid(0.2, "0.2 0.4 0.4"), solid(0.2, "0.02 0.4 0.4")],
     ids=["its solid holds the hand", "its hull is its mesh"],
 )
-def test_links_apart_at_home_stay_hulls_where_their_meshes_touch_as_often(tmp_path: Path, base: str) -> None:
+def test_pair_apart_at_home_stays_hulls_if_meshes_touch_as_often(tmp_path: Path, base: str) -> None:
     cell = cell_of(hollow(tmp_path, base=base))
     assert cell.arms["arm"].plan.elsewhere == ()
     assert touching(cell, 0.0, 0.2) == [("arm/base", "arm/hand")]
 
 
-def test_meshes_too_large_to_check_and_a_study_that_failed_leave_hulls(
+def test_too_large_meshes_and_a_failed_study_leave_hulls(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(pair_study, "_failed", {})
@@ -182,9 +182,7 @@ def test_a_damaged_result_of_a_study_is_replaced(tmp_path: Path, own_cache: Path
     assert kept.read_text() == whole
 
 
-def test_threads_that_ask_for_the_same_study_share_it(
-    own_cache: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_threads_share_the_same_study(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pair_study, "_failed", {})
     monkeypatch.setattr(pair_study, "_running", {})
     started, waiting, ended = [], threading.Semaphore(0), threading.Event()
@@ -221,7 +219,7 @@ def test_a_cell_is_pending_until_the_study_ends(tmp_path: Path) -> None:
     assert pending(cell_of(model, wait=False)) == ()
 
 
-def test_a_study_that_fails_leaves_hulls_and_is_tried_again(
+def test_failed_study_leaves_hulls_and_is_repeated_later(
     tmp_path: Path, own_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(pair_study, "_failed", {})
@@ -235,7 +233,7 @@ def test_a_study_that_fails_leaves_hulls_and_is_tried_again(
     assert [*own_cache.rglob("*.json")] == []
     ((path, (failures, _)),) = pair_study._failed.items()
     assert failures == 1
-    # Not at once, ...
+    # Not immediately, ...
     assert pending(cell_of(model, wait=False)) == ("arm",)
     assert pair_study._running == {}
     pair_study._failed[path] = (pair_study._TRIES, pair_study._failed[path][1])
@@ -247,7 +245,7 @@ def test_a_study_that_fails_leaves_hulls_and_is_tried_again(
     assert pair_study._failed == {}
 
 
-def test_the_services_check_answers_while_a_study_goes_on(
+def test_kinematics_service_answers_checks_during_a_study(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(pair_study, "_running", {})
@@ -278,7 +276,7 @@ def test_the_services_check_answers_while_a_study_goes_on(
     assert ready.ok
 
 
-def test_a_link_wholly_inside_another_touches_it_and_one_in_a_hollow_does_not(tmp_path: Path) -> None:
+def test_link_inside_another_touches_it_and_one_in_a_cavity_does_not(tmp_path: Path) -> None:
     inside = cell_of(hollow(tmp_path, base=solid(0, "2 0.4 0.4")))
     assert "all of 10,000 positions" in dict(inside.arms["arm"].plan.ignored)["base", "hand"]
     vertices, triangles = ball(1.0, 16)
@@ -291,7 +289,7 @@ def test_a_link_wholly_inside_another_touches_it_and_one_in_a_hollow_does_not(tm
 
 
 def test_only_a_pair_that_touches_everywhere_as_meshes_too_is_ignored(tmp_path: Path) -> None:
-    # The bar that the hand is goes through the base, wherever it slides.
+    # The hand is a bar that goes through the base in every position.
     inside = solid(0, "1.2 0.05 0.05")
     always = cell_of(hollow(tmp_path, base=solid(0, "0.01 0.2 0.01"), hand=inside))
     reasons = dict(always.arms["arm"].plan.ignored)
@@ -299,7 +297,7 @@ def test_only_a_pair_that_touches_everywhere_as_meshes_too_is_ignored(tmp_path: 
     assert touching(always, 0.0, 0.0) == []
 
 
-def test_touching_at_home_is_no_reason_to_ignore_a_pair(tmp_path: Path) -> None:
+def test_contact_at_home_does_not_exclude_a_pair(tmp_path: Path) -> None:
     cell = cell_of(hollow(tmp_path, base=solid(0.05, "0.02 0.4 0.4")))
     assert ("base", "hand") not in dict(cell.arms["arm"].plan.ignored)
     assert touching(cell, 0.0, 0.0) == [("arm/base", "arm/hand")]
@@ -307,7 +305,7 @@ def test_touching_at_home_is_no_reason_to_ignore_a_pair(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("reason", "ignored"), [("Default", True), ("User", True), ("Never", False)])
-def test_pairs_that_the_srdf_beside_leaves_out_are_ignored_unless_they_never_touched(
+def test_pairs_that_the_srdf_disables_are_ignored_unless_they_never_touch(
     tmp_path: Path, reason: str, ignored: bool
 ) -> None:
     model = hollow(tmp_path)
@@ -318,7 +316,7 @@ def test_pairs_that_the_srdf_beside_leaves_out_are_ignored_unless_they_never_tou
 
 
 @pytest.mark.parametrize(("folder", "ignored"), [("urdf", True), ("robots", True), ("elsewhere", False)])
-def test_a_packages_folder_srdf_is_beside_its_folder_of_urdfs(
+def test_srdf_folder_next_to_a_packages_urdf_folder_is_used(
     tmp_path: Path, folder: str, ignored: bool
 ) -> None:
     (tmp_path / folder).mkdir()
@@ -352,14 +350,12 @@ def test_an_srdf_alone_with_a_urdf_is_used_unless_it_names_another_robot(
     plan = plan_of(load(model))
     assert (("base", "hand") in dict(plan.ignored)) is ignored
     assert run(["robot", "check", str(model)]) == 0
-    said = f"any.srdf: is of the robot '{name}'; it is not used"
-    assert (said in capsys.readouterr().out) is not ignored
+    found = f"any.srdf: is of the robot '{name}'; it is not used"
+    assert (found in capsys.readouterr().out) is not ignored
 
 
 @pytest.mark.parametrize("urdf", ["hollow", "of_another_name"])
-def test_the_srdf_of_the_urdfs_or_robots_name_comes_before_others_of_its_robot(
-    tmp_path: Path, urdf: str
-) -> None:
+def test_srdf_with_the_urdfs_or_robots_name_has_priority(tmp_path: Path, urdf: str) -> None:
     model = hollow(tmp_path)
     model = model.rename(model.with_stem(urdf))
     disabled = '<disable_collisions link1="hand" link2="base" reason="User"/>'
@@ -380,7 +376,7 @@ def test_the_srdf_of_another_robot_and_a_broken_one_are_not_used(tmp_path: Path)
 
 
 @pytest.mark.parametrize("as_dh", [True, False], ids=["rows", "urdf"])
-def test_an_imported_robot_keeps_the_pairs_that_its_srdf_leaves_out(tmp_path: Path, as_dh: bool) -> None:
+def test_imported_robot_keeps_the_pairs_that_its_srdf_disables(tmp_path: Path, as_dh: bool) -> None:
     model = hollow(tmp_path, base=solid(0.05, "0.02 0.4 0.4"))
     disabled = '<disable_collisions link1="hand" link2="base" reason="User"/>'
     (tmp_path / "hollow.srdf").write_text(f'<robot name="hollow">{disabled}</robot>')
@@ -392,7 +388,7 @@ def test_an_imported_robot_keeps_the_pairs_that_its_srdf_leaves_out(tmp_path: Pa
 @pytest.mark.parametrize(
     ("others", "ignored"), [("", False), ('<disable_collisions link1="cap" link2="base"/>', True)]
 )
-def test_a_rows_link_of_several_is_ignored_where_all_of_them_are(
+def test_rows_link_of_several_links_is_ignored_if_all_of_them_are(
     tmp_path: Path, others: str, ignored: bool
 ) -> None:
     model = hollow(tmp_path)
@@ -405,7 +401,7 @@ def test_a_rows_link_of_several_is_ignored_where_all_of_them_are(
     assert values.get("collision", {}).get("ignore", []) == ([["base", "hand"]] if ignored else [])
 
 
-def test_robot_check_lists_what_is_not_checked_and_what_stands_out(
+def test_robot_check_lists_unchecked_pairs_and_protruding_geometry(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     seen = '<visual><geometry><box size="0.1 0.1 0.118"/></geometry></visual>'
@@ -433,5 +429,5 @@ def test_a_real_arm_with_a_spherical_wrist_is_free_at_home_with_and_without_its_
     for cell, reason in ((with_srdf, "abb_irb2400.srdf says so"), (without, "all of 10,000 positions")):
         assert touching(cell, *np.zeros(6)) == []
         assert reason in dict(cell.arms["arm"].plan.ignored)["link_4", "link_6"]
-        # What never touched stays checked.
+        # A pair that never touched stays checked.
         assert ("link_2", "link_6") not in dict(cell.arms["arm"].plan.ignored)
