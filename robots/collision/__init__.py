@@ -13,25 +13,25 @@ from robots.collision.cell import (
     unshaped,
     unshaped_moving,
 )
-from robots.collision.continuous import Along, Encounter, near_along
+from robots.collision.continuous import Encounter, PathEncounters, path_encounters
 from robots.collision.distance import Nearest, outside_clearance, outside_nearest, own_contacts, own_nearest
 from robots.collision.sampling import allowed_positions
 
 __all__ = [
-    "Along",
     "Arm",
     "Cell",
     "Encounter",
     "Nearest",
+    "PathEncounters",
     "allowed_positions",
     "build_cell",
     "distances",
     "missing_meshes",
-    "near_along",
     "outside_clearance",
     "outside_nearest",
     "own_contacts",
     "own_nearest",
+    "path_encounters",
     "pending",
     "unshaped",
     "unshaped_moving",

@@ -15,7 +15,7 @@ from robots.cells import FLOOR, CellDescription, CellRobot, Fixture, Floor
 from robots.collision.geometry import Body, exact_bodies, hull_bodies, piece_bodies
 from robots.collision.link_pairs import PairPlan, plan_pairs
 from robots.collision.obstacles import Balls, Obstacles, balls_of, joined
-from robots.collision.self_collision import OwnPairs, own_pairs
+from robots.collision.self_collision import SelfPairs, self_pairs
 from robots.description import load
 from robots.errors import MeshError
 from robots.joints import FloatArray, Joints
@@ -52,7 +52,7 @@ class Arm:
     links: NDArray[np.int64]
     moving: NDArray[np.bool_]
     balls: Balls
-    own: OwnPairs
+    own: SelfPairs
     plan: PairPlan
 
 
@@ -130,7 +130,7 @@ def _arm(robot: CellRobot, *, exact: bool, wait: bool) -> Arm:
         links=links,
         moving=np.array([tree.links[number].joint != BASE for number in links], dtype=np.bool_),
         balls=balls_of([body for _, body in bodies]),
-        own=own_pairs(tree, bodies, pairs),
+        own=self_pairs(tree, bodies, pairs),
         plan=plan,
     )
 

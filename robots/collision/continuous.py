@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from robots.cells import FLOOR, Floor
 from robots.collision.cell import Arm, Cell
 from robots.collision.distance import Gauge
-from robots.collision.floor import Heights, heights_along
+from robots.collision.floor import Heights, heights_on_path
 from robots.collision.geometry import TOUCH_M, Body
 from robots.collision.interpolated import Placed, touching_share
 from robots.collision.obstacles import joined_boxes, least_distances
 from robots.collision.path import placements_along, travelled
-from robots.collision.swept_volumes import Sweep, least_of_sweep, passed_along, sweeps_of
+from robots.collision.swept_volumes import Sweep, distance_to_sweep, sweeps_of, swept_region
 from robots.joints import FloatArray
 
 # Distance at which bodies touch, and the error of coal's distances [m].
@@ -49,7 +49,7 @@ class Encounter:
 
 
 @dataclass(frozen=True, eq=False)
-class Along:
+class PathEncounters:
     """Clearances and encounters of an arm on a path.
 
     Attributes:
@@ -61,7 +61,7 @@ class Along:
     encounters: tuple[Encounter, ...]
 
 
-def near_along(
+def path_encounters(
     cell: Cell,
     robot: str,
     positions: FloatArray,
@@ -69,7 +69,7 @@ def near_along(
     *,
     within_m: float,
     far: bool = True,
-) -> Along:
+) -> PathEncounters:
     """Find the fixtures, other robots, floor and own links that an arm comes near to on a path.
 
     Between two samples, a distance may be smaller by half of the arm's travel there. If two bodies may touch
@@ -90,9 +90,9 @@ def near_along(
     travel = travelled(arm.bodies, places)
     gauge = Gauge()
     reach = np.inf if far else within_m + _TOLERANCE_M
-    sweeps = sweeps_of(cell, robot, others, passed=passed_along(arm, places), within_m=reach)
+    sweeps = sweeps_of(cell, robot, others, passed=swept_region(arm, places), within_m=reach)
     outside = _OutsidePairs(cell, arm, places[0], sweeps, within_m, reach)
-    own = _OwnPairs(arm, travel)
+    own = _SelfPairs(arm, travel)
     clearances = np.full(len(positions), np.inf)
     found: dict[tuple[str, str], dict[int, _Near]] = {}
     for sample, row in enumerate(places):
@@ -103,12 +103,12 @@ def near_along(
             found.setdefault(each.pair, {})[sample] = each
     encounters = [_encounter(arm, samples) for samples in found.values()]
     if cell.floor is not None:
-        heights = heights_along(cell.floor, arm, positions, places, travel)
+        heights = heights_on_path(cell.floor, arm, positions, places, travel)
         encounters += _floor_encounters(cell.floor, arm, heights)
         if cell.floor.warning_m > 0.0:
             lowest = heights.heights.min(axis=1, initial=np.inf)
             clearances = np.minimum(clearances, np.maximum(lowest, 0.0))
-    return Along(clearances, tuple(encounters))
+    return PathEncounters(clearances, tuple(encounters))
 
 
 def _floor_encounters(floor: Floor, arm: Arm, found: Heights) -> Iterator[Encounter]:
@@ -235,19 +235,21 @@ class _OutsidePairs:
         """
         one, other = self._pairs[number]
         body, sweep = self._arm.bodies[one], self._sweeps[other]
-        distance, place = least_of_sweep(gauge, body, at[one], sweep, cutoff_m)
+        distance, place = distance_to_sweep(gauge, body, at[one], sweep, cutoff_m)
         self._known[number] = distance + moved
         step = float(at.steps[one])
         before = bound + step
         if at.joined and before > TOUCH_M and 0.0 < distance < step:
 
             def measure(share: float) -> float:
-                return least_of_sweep(gauge, body, at.interpolated(one, share), sweep, step)[0]
+                return distance_to_sweep(gauge, body, at.interpolated(one, share), sweep, step)[0]
 
             share = touching_share(measure, before, distance, step)
             if share >= 0.0:
                 there = at.interpolated(one, share)
-                return _Measured(0.0, body, there, sweep, least_of_sweep(gauge, body, there, sweep, 0.0)[1])
+                return _Measured(
+                    0.0, body, there, sweep, distance_to_sweep(gauge, body, there, sweep, 0.0)[1]
+                )
         return _Measured(distance, body, at[one], sweep, place)
 
     def _points(self, gauge: Gauge, measured: _Measured) -> _Points:
@@ -256,7 +258,7 @@ class _OutsidePairs:
         return gauge.points(measured.body, measured.at, measured.sweep.body, there)
 
 
-class _OwnPairs:
+class _SelfPairs:
     """Pairs of the arm's own bodies, near if they touch. Each is measured when it may touch again."""
 
     def __init__(self, arm: Arm, travel: FloatArray) -> None:

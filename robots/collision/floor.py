@@ -57,7 +57,7 @@ def heights_above(
     return Heights(numbers, points[..., 2] - (floor.height_m - TOUCH_M), points)
 
 
-def heights_along(
+def heights_on_path(
     floor: Floor, arm: Arm, positions: FloatArray, placements: FloatArray, travel: FloatArray
 ) -> Heights:
     """Return the heights of an arm's moving bodies on a path, with contacts between samples.

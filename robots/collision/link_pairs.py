@@ -20,7 +20,7 @@ from robots.collision.pair_study import (
     study_results,
 )
 from robots.collision.sampling import SAMPLES, allowed_positions
-from robots.collision.self_collision import OwnPairs, Pairs, own_pairs, touching_pairs
+from robots.collision.self_collision import Pairs, SelfPairs, self_pairs, touching_pairs
 from robots.collision.verdicts import ELSEWHERE, EXACT, IGNORED, Kind, Verdict
 from robots.description import load
 from robots.joints import FloatArray
@@ -157,7 +157,7 @@ def _prepare(description: RobotDescription) -> _Preparation:
             pairs.append((one, other, (bodies[one][1], bodies[other][1])))
     plan = PairPlan(bodies, tuple(pairs), tuple(verdicts))
     positions = allowed_positions(built.joints, SURVEYED)
-    touching = _touching(own_pairs(tree, bodies, pairs), built, positions)
+    touching = _touching(self_pairs(tree, bodies, pairs), built, positions)
     if not touching:
         return _Preparation(plan)
     case = _case(
@@ -169,7 +169,7 @@ def _prepare(description: RobotDescription) -> _Preparation:
     return _Preparation(plan, tuple(touching), case)
 
 
-def _touching(own: OwnPairs, model: RobotModel, positions: FloatArray) -> dict[int, list[int]]:
+def _touching(own: SelfPairs, model: RobotModel, positions: FloatArray) -> dict[int, list[int]]:
     """Return the pairs of which the hulls touch at home or often, with the positions in which they touch.
 
     Args:

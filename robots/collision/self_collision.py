@@ -16,7 +16,7 @@ Points = tuple[FloatArray, FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
-class OwnPairs:
+class SelfPairs:
     """Pairs of one arm's bodies that are checked against each other.
 
     Attributes:
@@ -38,7 +38,7 @@ class OwnPairs:
 Pairs = Sequence[tuple[int, int, tuple[Body, Body]]]
 
 
-def own_pairs(tree: Tree, bodies: Sequence[tuple[int, Body]], pairs: Pairs) -> OwnPairs:
+def self_pairs(tree: Tree, bodies: Sequence[tuple[int, Body]], pairs: Pairs) -> SelfPairs:
     """Prepare the self-collision check of an arm.
 
     Args:
@@ -65,7 +65,7 @@ def own_pairs(tree: Tree, bodies: Sequence[tuple[int, Body]], pairs: Pairs) -> O
     for request in workspace.collisionRequests:
         request.security_margin = TOUCH_M
         request.enable_contact = True
-    return OwnPairs(
+    return SelfPairs(
         tuple((one, other) for one, other, _ in pairs),
         tuple(measured for _, _, measured in pairs),
         geometry,
@@ -76,7 +76,7 @@ def own_pairs(tree: Tree, bodies: Sequence[tuple[int, Body]], pairs: Pairs) -> O
     )
 
 
-def touching_pairs(own: OwnPairs, model: RobotModel, positions: FloatArray) -> dict[int, Points]:
+def touching_pairs(own: SelfPairs, model: RobotModel, positions: FloatArray) -> dict[int, Points]:
     """Return the touching pairs by number, with a contact point (3,) on each body, in the base frame [m].
 
     Raises:
@@ -94,7 +94,9 @@ def touching_pairs(own: OwnPairs, model: RobotModel, positions: FloatArray) -> d
     }
 
 
-def nearest_pair(own: OwnPairs, model: RobotModel, positions: FloatArray) -> tuple[int, float, Points] | None:
+def nearest_pair(
+    own: SelfPairs, model: RobotModel, positions: FloatArray
+) -> tuple[int, float, Points] | None:
     """Return the number of the nearest pair, its distance [m] and its points; None without pairs.
 
     Raises:

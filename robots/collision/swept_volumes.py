@@ -63,7 +63,7 @@ class Sweep:
 
 
 @dataclass(frozen=True, eq=False)
-class Passed:
+class SweptRegion:
     """Boxes along the site's axes that contain the volume that an arm's moving bodies sweep [m].
 
     Attributes:
@@ -82,7 +82,7 @@ class Passed:
         return found
 
 
-def passed_along(arm: Arm, placements: FloatArray) -> Passed:
+def swept_region(arm: Arm, placements: FloatArray) -> SweptRegion:
     """Return the boxes that an arm's moving bodies sweep.
 
     Args:
@@ -93,16 +93,16 @@ def passed_along(arm: Arm, placements: FloatArray) -> Passed:
     low = np.concatenate([part.min(axis=(0, 2)) for part in parts])
     high = np.concatenate([part.max(axis=(0, 2)) for part in parts])
     # Between two samples, a body is within this distance of one of them.
-    return Passed(low - SAMPLE_M, high + SAMPLE_M)
+    return SweptRegion(low - SAMPLE_M, high + SAMPLE_M)
 
 
 def sweeps_of(
-    cell: Cell, robot: str, others: Mapping[str, FloatArray], *, passed: Passed, within_m: float
+    cell: Cell, robot: str, others: Mapping[str, FloatArray], *, passed: SweptRegion, within_m: float
 ) -> list[Sweep]:
     """Return the sweeps of a cell's fixtures and of the other robots.
 
     Args:
-        others: See `near_along`.
+        others: See `path_encounters`.
         passed: The boxes that the checked arm sweeps.
         within_m: Leave out moving bodies that are farther than this from these boxes.
     """
@@ -133,7 +133,7 @@ def _at_rest(name: str, body: Body, placement: FloatArray) -> Sweep:
     return Sweep(name, body, placement[None], np.zeros(1), boxes_of([body], placement[None]))
 
 
-def _swept(arm: Arm, lines: FloatArray, passed: Passed, within_m: float) -> list[Sweep]:
+def _swept(arm: Arm, lines: FloatArray, passed: SweptRegion, within_m: float) -> list[Sweep]:
     """Return the sweeps of an arm's moving bodies on (k, 2, n) straight lines."""
     pieces = pieces_of(lines)
     low, high = boxes_of_pieces(arm, pieces)
@@ -150,7 +150,7 @@ def _swept(arm: Arm, lines: FloatArray, passed: Passed, within_m: float) -> list
     return found
 
 
-def least_of_sweep(gauge: Gauge, body: Body, at: Any, sweep: Sweep, cutoff_m: float) -> tuple[float, int]:
+def distance_to_sweep(gauge: Gauge, body: Body, at: Any, sweep: Sweep, cutoff_m: float) -> tuple[float, int]:
     """Return the distance of a body to a sweep [m], and the number of the nearest placement.
 
     The distance is exact up to `cutoff_m`; a larger value is a lower bound. A distance up to the sweep's

@@ -10,7 +10,7 @@ import numpy as np
 
 from robomesh.reasons import Reason
 from robots.collision import Cell, distances
-from robots.collision.continuous import Encounter, near_along
+from robots.collision.continuous import Encounter, path_encounters
 from robots.joints import FloatArray, violations
 from robots.programs.steps import Step, ViolationKind
 from robots.programs.tool_chain import samples_between, tool_chain, tools_and_jacobians
@@ -146,7 +146,9 @@ class SegmentChecker:
         positions = np.concatenate([each.positions for each in requests])
         ends = np.cumsum([len(each.positions) for each in requests]).tolist()
         near_m = max(self._cell.arms[name].warning_m for name in (self._robot, *self._others))
-        along = near_along(self._cell, self._robot, positions, self._others, within_m=near_m, far=self._far)
+        along = path_encounters(
+            self._cell, self._robot, positions, self._others, within_m=near_m, far=self._far
+        )
         numbered = [found for each in along.encounters for found in self._findings(each)]
         numbered.sort(key=itemgetter(0))
         numbers = [number for number, _ in numbered]

@@ -13,9 +13,9 @@ from robots.collision import (
     Cell,
     allowed_positions,
     build_cell,
-    near_along,
     outside_nearest,
     own_contacts,
+    path_encounters,
 )
 from robots.collision.distance import arm_obstacles
 from robots.collision.path import SAMPLE_M, placements_along, sampled_path, travelled
@@ -58,7 +58,7 @@ def measured(
 @pytest.mark.parametrize("beside", [{}, {"two": np.radians([[20.0, 60.0, -60.0, 10.0, 0.0]])}])
 def test_path_check_equals_the_check_of_each_sample(cell: Cell, beside: dict[str, FloatArray]) -> None:
     path = motions(cell, "one", 12, seed=4)
-    along = near_along(cell, "one", path, beside, within_m=WITHIN)
+    along = path_encounters(cell, "one", path, beside, within_m=WITHIN)
     seen: dict[int, dict[tuple[str, str], float]] = {}
     for each in along.encounters:
         assert list(each.samples) == sorted(set(each.samples))
@@ -83,7 +83,7 @@ def test_another_arms_path_counts_as_all_of_its_positions(cell: Cell) -> None:
     # The neighbour passes the arm: at both ends of its path it is far away.
     way = np.radians([[-100.0, 60.0, -60.0, 10.0, 0.0], [100.0, 60.0, -60.0, 10.0, 0.0]])
     path = motions(cell, "one", 3, seed=11)
-    swept = near_along(cell, "one", path, {"two": way}, within_m=WITHIN).clearances
+    swept = path_encounters(cell, "one", path, {"two": way}, within_m=WITHIN).clearances
     places, _ = sampled_path(cell.arms["two"], way)
     count = len(places)
     stands = [way[0] + share * (way[1] - way[0]) for share in np.linspace(0.0, 1.0, count)]
@@ -92,7 +92,7 @@ def test_another_arms_path_counts_as_all_of_its_positions(cell: Cell) -> None:
         found = [measured(cell, path[sample], {"two": there})[0] for there in stands[::10]]
         assert swept[sample] <= min(found) + 1e-6
         assert swept[sample] >= min(found) - 10 * SAMPLE_M
-    ends = [near_along(cell, "one", path, {"two": end[None]}, within_m=WITHIN).clearances for end in way]
+    ends = [path_encounters(cell, "one", path, {"two": end[None]}, within_m=WITHIN).clearances for end in way]
     assert (swept < np.minimum(*ends) - 0.05).any()
 
 
@@ -142,16 +142,16 @@ def test_arm_without_shapes_has_no_encounters(tmp_path: Path) -> None:
     cell = build_cell(cell_of(robots, FIXTURES))
     path = np.array([[0.0, 0.0], [1.0, 1.0]])
     for robot, other in (("bare", "seen"), ("seen", "bare")):
-        along = near_along(cell, robot, path, {other: path}, within_m=WITHIN)
+        along = path_encounters(cell, robot, path, {other: path}, within_m=WITHIN)
         names = {name for each in along.encounters for name in each.pair}
         assert not any(name.startswith("bare/") for name in names)
-    assert near_along(cell, "bare", path, {}, within_m=WITHIN).clearances.tolist() == [np.inf, np.inf]
+    assert path_encounters(cell, "bare", path, {}, within_m=WITHIN).clearances.tolist() == [np.inf, np.inf]
 
 
 def test_clearance_without_obstacles_is_infinite(tmp_path: Path) -> None:
     cell = build_cell(cell_of({"arm": (bar_arm(tmp_path), placed(0.0))}))
     folded = np.array([0.0, pi])
-    along = near_along(cell, "arm", np.array([np.zeros(2), folded]), {}, within_m=WITHIN)
+    along = path_encounters(cell, "arm", np.array([np.zeros(2), folded]), {}, within_m=WITHIN)
     assert along.clearances.tolist() == [np.inf, np.inf]
     (contact,) = along.encounters
     assert contact.own

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from robots.cells import CellDescription, CellRobot
-from robots.collision import Cell, allowed_positions, build_cell, near_along, outside_nearest
+from robots.collision import Cell, allowed_positions, build_cell, outside_nearest, path_encounters
 from robots.collision.distance import Gauge
 from robots.collision.path import placements_along
-from robots.collision.swept_volumes import passed_along, sweeps_of
+from robots.collision.swept_volumes import sweeps_of, swept_region
 from robots.programs.check import check_plan
 from robots.programs.steps import CheckResult, Step, StepKind, ViolationKind
 from tests.robots.boxes import bar_arm, block, cell_of, placed, two_cheeks
@@ -75,7 +75,8 @@ def test_far_does_not_change_near_encounters(cell_of_two: Cell) -> None:
     path = np.linspace([-1.0, 0.2], [1.5, 0.0], 200)
     way = allowed_positions(cell_of_two.arms["other"].joints, 8, 3)
     whole, near = (
-        near_along(cell_of_two, "arm", path, {"other": way}, within_m=0.05, far=far) for far in (True, False)
+        path_encounters(cell_of_two, "arm", path, {"other": way}, within_m=0.05, far=far)
+        for far in (True, False)
     )
     expected = {each.pair: each for each in whole.encounters}
     assert any(pair[1].startswith("other/") for pair in expected)
@@ -95,7 +96,7 @@ def test_two_pieces_are_encountered_in_order(tmp_path: Path) -> None:
     for positions in (path, path[::-1]):
         (encounter,) = [
             each
-            for each in near_along(cell, "arm", positions, {}, within_m=0.02, far=False).encounters
+            for each in path_encounters(cell, "arm", positions, {}, within_m=0.02, far=False).encounters
             if each.pair == ("arm/elbow", "cheeks")
         ]
         assert {-1, 1} == set(np.sign(encounter.points[encounter.distances == 0.0, 0, 1]).tolist())
@@ -106,7 +107,7 @@ def test_two_pieces_are_encountered_in_order(tmp_path: Path) -> None:
 def test_long_path_is_sampled_only_near_the_arm_and_each_line_once(cell_of_two: Cell) -> None:
     arm = cell_of_two.arms["arm"]
     places = placements_along(arm, np.linspace([-0.3, 0.0], [0.3, 0.0], 50))
-    passed = passed_along(arm, places)
+    passed = swept_region(arm, places)
     aside, across = [1.5, 0.0], [np.pi, 0.0]
 
     def sampled(way: list[list[float]]) -> int:
@@ -135,7 +136,7 @@ def test_robot_far_from_another_robots_long_path_measures_almost_nothing(
     # The other robot turns away from the arm, a hundred times, to a different position each time.
     way = np.random.default_rng(0).uniform([-1.5, -0.3], [1.5, 0.3], (101, 2))
     path = np.linspace([2.0, 0.0], [2.5, 0.0], 60)
-    near_along(cell_of_two, "arm", path, {"other": way}, within_m=0.05, far=False)
+    path_encounters(cell_of_two, "arm", path, {"other": way}, within_m=0.05, far=False)
     assert measured < 500
 
 

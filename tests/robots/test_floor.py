@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 from robots.cells import FLOOR, CellDescription, CellRobot, Floor
-from robots.collision import build_cell, near_along, outside_clearance, outside_nearest
+from robots.collision import build_cell, outside_clearance, outside_nearest, path_encounters
 from robots.collision.floor import heights_above
 from robots.collision.path import placements_along
 from robots.programs.check import check_plan, check_program
@@ -50,7 +50,7 @@ def test_a_program_that_drives_the_tool_below_the_drawn_floor_is_refused() -> No
 def test_only_contact_counts_unless_a_warning_distance_is_given() -> None:
     steps = checked(pt600(floor=None), DOWN).steps
     cell = build_cell(pt600(floor=None))
-    path = near_along(cell, "arm", np.array([steps[-1].target]), {}, within_m=0.0)
+    path = path_encounters(cell, "arm", np.array([steps[-1].target]), {}, within_m=0.0)
     assert path.encounters == ()
     arm = cell.arms["arm"]
     end = np.array([steps[-1].target])
@@ -79,7 +79,7 @@ def test_the_floor_is_below_the_lowest_base_of_the_cell() -> None:
 def test_links_fixed_to_a_base_may_reach_below_the_floor() -> None:
     cell = build_cell(pt600(floor=Floor(0.1)))
     arm = cell.arms["arm"]
-    found = near_along(cell, "arm", np.array([arm.joints.home]), {}, within_m=0.0)
+    found = path_encounters(cell, "arm", np.array([arm.joints.home]), {}, within_m=0.0)
     assert "arm/base" not in {name for each in found.encounters for name in each.pair}
     assert arm.bodies[0].corners[:, 2].min() < 0.1
 
@@ -116,7 +116,7 @@ def test_a_link_that_dips_into_the_floor_between_two_samples_is_found(tmp_path: 
     # Its end is at -0.02 m when it hangs down, and 0.05 mm higher at both samples.
     for height_m, touches in ((-0.01996, True), (-0.02005, False)):
         cell = build_cell(CellDescription((robot,), floor=Floor(height_m)))
-        found = near_along(cell, "arm", path, {}, within_m=0.0).encounters
+        found = path_encounters(cell, "arm", path, {}, within_m=0.0).encounters
         assert [each.pair for each in found] == [("arm/spoke", FLOOR)] * touches
         heights = heights_above(Floor(height_m), cell.arms["arm"], placements_along(cell.arms["arm"], path))
         assert heights.heights.min() > 0.0

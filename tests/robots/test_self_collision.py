@@ -12,7 +12,7 @@ import pytest
 
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.cells import CellDescription, CellRobot
-from robots.collision import build_cell, near_along, own_contacts, own_nearest, pair_study, pending
+from robots.collision import build_cell, own_contacts, own_nearest, pair_study, path_encounters, pending
 from robots.collision.cell import Cell
 from robots.collision.link_pairs import plan_of
 from robots.collision.surfaces import winding_number
@@ -79,7 +79,7 @@ def test_pair_of_which_only_hulls_touch_at_home_is_checked_as_meshes(tmp_path: P
     assert nearest.distance_m == pytest.approx(0.14, abs=0.01)
     # On a path, into the wall.
     path = np.column_stack([np.zeros(50), np.linspace(0.0, 0.2, 50)])
-    near = near_along(cell, "arm", path, {}, within_m=0.01)
+    near = path_encounters(cell, "arm", path, {}, within_m=0.01)
     (encounter,) = (each for each in near.encounters if each.own)
     assert encounter.pair == pair
     assert path[encounter.samples[0], 1] == pytest.approx(0.14, abs=0.006)
@@ -105,7 +105,9 @@ def test_pair_apart_at_home_of_which_only_hulls_often_touch_is_checked_as_meshes
         assert nearest.distance_m == pytest.approx(distance, abs=0.01)
     # On a path, through the first wall, up to the second.
     path = np.column_stack([np.zeros(200), np.linspace(-0.3, 0.3, 200)])
-    (encounter,) = (each for each in near_along(cell, "arm", path, {}, within_m=0.01).encounters if each.own)
+    (encounter,) = (
+        each for each in path_encounters(cell, "arm", path, {}, within_m=0.01).encounters if each.own
+    )
     there = path[encounter.samples, 1]
     assert there.min() == pytest.approx(0.06, abs=0.006)
     free = there[np.diff(there, append=there[-1]).argmax() :][:2]
