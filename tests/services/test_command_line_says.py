@@ -46,7 +46,7 @@ def test_a_command_ends_quietly_when_its_reader_has_gone(arguments, lines):
 def test_a_site_goes_on_when_nobody_takes_its_log():
     program = (
         "from services.command_line.site import up\n"
-        "up._say_lines_as_they_are()\n"
+        "up._log_plain_lines()\n"
         "for number in range(3000): up._write(f'{number:<200}')\n"
         "print('goes on', flush=True)\n"
     )

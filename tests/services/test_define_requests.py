@@ -16,7 +16,8 @@ from robomesh.endpoints import router_config
 from robomesh.session import SessionSettings
 from robots.description import LIBRARY, load
 from robots.save_description import read_robot, write_folder
-from services.command_line.site import services
+from services.command_line.site import launch
+from services.command_line.site.services import Options
 from services.console.define import routes, store
 from services.console.define.errors import RefusedRequest
 from services.console.define.routes import Define
@@ -379,8 +380,8 @@ def test_without_a_supervisor_the_lines_for_the_site_file_are_told(mesh, tmp_pat
 
 def test_a_running_robot_of_the_pages_reads_its_own_folder_only(tmp_path, monkeypatch):
     begun = []
-    monkeypatch.setattr(services.service, "run", lambda serve, settings, **_: begun.append(settings))
-    monkeypatch.setattr(services.service, "log_to_stderr", lambda: None)
+    monkeypatch.setattr(launch.service, "run", lambda serve, settings, **_: begun.append(settings))
+    monkeypatch.setattr(launch.service, "log_to_stderr", lambda: None)
     robots = tmp_path / "robots"
     for folder in (robots / "mine", tmp_path / "own"):
         folder.mkdir(parents=True)
@@ -395,8 +396,8 @@ def test_a_running_robot_of_the_pages_reads_its_own_folder_only(tmp_path, monkey
     (robots / "started.toml").write_text(
         'site = "s"\n[[robot]]\nname = "mine"\nmodel = "mine/pt500/robot.toml"\ncontroller = "simulated"\n'
     )
-    services.kinematics(tmp_path / "site.toml", "tcp/127.0.0.1:1", "")
-    services.kinematics(tmp_path / "site.toml", "tcp/127.0.0.1:1", "mine")
+    launch.launch("kinematics", Options(site_file=tmp_path / "site.toml"), "tcp/127.0.0.1:1")
+    launch.launch("kinematics", Options(site_file=tmp_path / "site.toml", started="mine"), "tcp/127.0.0.1:1")
     found = {
         each.name: each.confined
         for settings in begun

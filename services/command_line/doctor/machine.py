@@ -14,15 +14,13 @@ from dataclasses import dataclass
 
 import typer
 
-# Role -> the packages that it imports; the extra has the role's name.
-_ROLES = {
-    "gateway": ("zenoh", "pydantic", "numpy"),
-    "kinematics": ("pinocchio", "coal", "trimesh"),
+from services.command_line.site.services import SERVICES
+
+# Extra -> packages that it installs.
+_EXTRAS = {
+    **{name: row.packages for name, row in SERVICES.items() if row.packages},
     "simulator": ("ruckig",),
-    "recorder": ("mcap", "mcap_protobuf"),
-    "renderer": ("moderngl", "av", "cv2"),
     "keys": ("cryptography",),
-    "console": ("starlette", "uvicorn", "websockets"),
 }
 _FREE_BYTES = 1 << 30
 # For a site that runs here to say so.
@@ -65,7 +63,7 @@ def _python() -> list[Finding]:
 
 def _roles() -> list[Finding]:
     findings = []
-    for role, packages in _ROLES.items():
+    for role, packages in _EXTRAS.items():
         absent = [package for package in packages if importlib.util.find_spec(package) is None]
         findings.append(
             Finding(

@@ -1,7 +1,7 @@
 """The commands that run a site, or one service of it."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -19,8 +19,8 @@ def up(
         str,
         typer.Option(
             metavar="HOST:PORT",
-            help="Serve Prometheus: the first service there, the others at the ports after it; "
-            "port 0: free ones. The log tells each.",
+            help="Serve Prometheus: the first service on this port, the others on the following ones; "
+            "port 0: free ports. The log lists them.",
         ),
     ] = "",
 ) -> None:
@@ -34,7 +34,7 @@ def up(
 def router(
     site: SiteFile = None,
     config_out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write its configuration for zenohd, and end.")
+        Path | None, typer.Option(metavar="FILE", help="Write the configuration for zenohd, and exit.")
     ] = None,
     metrics: Metrics = "",
 ) -> None:
@@ -50,15 +50,13 @@ def gateway(
     connect: Connect = DEFAULT_ROUTER,
     controller: Annotated[
         list[str] | None,
-        typer.Option(metavar="ROBOT=tcp://HOST:PORT", help="Where a robot's controller is, instead."),
+        typer.Option(metavar="ROBOT=tcp://HOST:PORT", help="A robot's controller; else the site file's."),
     ] = None,
     started: Started = "",
     metrics: Metrics = "",
 ) -> None:
     """Put the site's controllers on the mesh."""
-    from services.command_line.site import services
-
-    services.gateway(site, connect, controller or [], started, metrics)
+    _run("gateway", site, connect, metrics, controllers=controller or (), started=started)
 
 
 @app.command()
@@ -66,33 +64,25 @@ def kinematics(
     site: SiteFile = None, connect: Connect = DEFAULT_ROUTER, started: Started = "", metrics: Metrics = ""
 ) -> None:
     """Publish what the robots are and where their links are."""
-    from services.command_line.site import services
-
-    services.kinematics(site, connect, started, metrics)
+    _run("kinematics", site, connect, metrics, started=started)
 
 
 @app.command()
 def recorder(site: SiteFile = None, connect: Connect = DEFAULT_ROUTER, metrics: Metrics = "") -> None:
     """Record robots on request."""
-    from services.command_line.site import services
-
-    services.recorder(site, connect, metrics)
+    _run("recorder", site, connect, metrics)
 
 
 @app.command()
 def player(site: SiteFile = None, connect: Connect = DEFAULT_ROUTER, metrics: Metrics = "") -> None:
     """Play recordings back as separate robots."""
-    from services.command_line.site import services
-
-    services.player(site, connect, metrics)
+    _run("player", site, connect, metrics)
 
 
 @app.command()
 def renderer(site: SiteFile = None, connect: Connect = DEFAULT_ROUTER, metrics: Metrics = "") -> None:
     """Draw the robots off screen and publish video."""
-    from services.command_line.site import services
-
-    services.renderer(site, connect, metrics)
+    _run("renderer", site, connect, metrics)
 
 
 @app.command()
@@ -100,22 +90,18 @@ def console(
     site: SiteFile = None,
     connect: Connect = DEFAULT_ROUTER,
     supervised: Annotated[
-        bool, typer.Option(help="Robots may be started from the page: a supervisor follows (robomesh up).")
+        bool, typer.Option(help="Let the page start robots, which a supervisor runs (robomesh up).")
     ] = False,
     metrics: Metrics = "",
 ) -> None:
     """Serve the page."""
-    from services.command_line.site import services
-
-    services.console(site, connect, supervised, metrics)
+    _run("console", site, connect, metrics, supervised=supervised)
 
 
 @app.command()
 def watch(site: SiteFile = None, connect: Connect = DEFAULT_ROUTER, metrics: Metrics = "") -> None:
     """Hold the site's alarms, and check presence, clocks, versions and names."""
-    from services.command_line.site import services
-
-    services.watch(site, connect, metrics)
+    _run("watch", site, connect, metrics)
 
 
 @app.command()
@@ -129,27 +115,25 @@ def simulate(
         list[str] | None,
         typer.Option(
             metavar="NAME[@BEGIN][+LENGTH]",
-            help=f"Misbehaves, BEGIN seconds after the first client came: {', '.join(FAULTS)}.",
+            help=f"A fault, BEGIN seconds after the first client connects: {', '.join(FAULTS)}.",
         ),
     ] = None,
     code: Annotated[
         list[str] | None,
         typer.Option(metavar="NUMBER=TYPE", help="A type code of the site file: 2=ABSOLUTE.DEG"),
     ] = None,
-    insecure: Annotated[bool, typer.Option(help="Listen beyond loopback, without any protection.")] = False,
+    insecure: Annotated[bool, typer.Option(help="Listen beyond loopback without protection.")] = False,
     for_: Annotated[
         str,
-        typer.Option(
-            "--for", metavar="SITE/ROBOT", help="Takes robomesh fault as this robot; else nobody's."
-        ),
+        typer.Option("--for", metavar="SITE/ROBOT", help="Accept `robomesh fault` for this robot."),
     ] = "",
     site: SiteFile = None,
     connect: Connect = DEFAULT_ROUTER,
 ) -> None:
     """Run a simulated controller with the old text protocol."""
-    from services.command_line.site import services
+    from services.command_line.site.launch import launch_simulator
 
-    services.simulate(
+    launch_simulator(
         robot=robot,
         listen=listen,
         rate_hz=rate,
@@ -158,5 +142,14 @@ def simulate(
         faults=tuple(fault or ()),
         codes=code or [],
         insecure=insecure,
-        mesh=services.mesh_of_simulator(for_, site, connect) if for_ else None,
+        faults_for=for_,
+        site=site,
+        connect=connect,
     )
+
+
+def _run(name: str, site: Path | None, connect: str, metrics: str, **options: Any) -> None:
+    from services.command_line.site.launch import launch
+    from services.command_line.site.services import Options
+
+    launch(name, Options(site_file=site, **options), connect, metrics)

@@ -1,4 +1,4 @@
-"""`robomesh up --metrics`: every process of a site serves Prometheus, on ports one after the other."""
+"""`robomesh up --metrics`: every process of a site serves Prometheus, on consecutive ports."""
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
@@ -11,15 +11,15 @@ _MOST = 65535
 
 
 def with_metrics(programs: Sequence[Program], listen: tuple[str, int] | None) -> tuple[Program, ...]:
-    """The same programs; the first that is a service serves at the port, the next at the next.
+    """Return the programs with `--metrics`, the first service on the given port, the others on the next ones.
 
-    A simulated controller has none. The log says which service has which address.
+    A simulated controller serves none. Each service logs its address.
 
     Args:
-        listen: Host and first port; port 0: each takes a free one. None: nobody serves.
+        listen: Host and first port; port 0: each takes a free port. None: no metrics.
 
     Raises:
-        ListenError: If there are not so many ports.
+        ListenError: If there are not enough ports.
     """
     if listen is None:
         return tuple(programs)
@@ -41,7 +41,7 @@ def with_metrics(programs: Sequence[Program], listen: tuple[str, int] | None) ->
 
 
 def extra_with_metrics(extra: ExtraPrograms, listen: tuple[str, int] | None) -> ExtraPrograms:
-    """What comes while the site runs serves at free ports: nobody knows beforehand how many come."""
+    """Return `extra` with metrics on free ports: the number of programs is not known beforehand."""
     if listen is None:
         return extra
     free = (listen[0], 0)

@@ -1,10 +1,10 @@
-"""`robomesh router`: reads no more of the site file than it needs, for its restart has to be quick."""
+"""`robomesh router`: reads only a part of the site file, because its restart has to be quick."""
 
 import logging
 from pathlib import Path
 
 from robomesh import service
-from services import router as role
+from services import router
 from services.pki import Folder
 from services.site_file.listen_address import check_reach, split_address
 from services.site_file.router import RoutedSite, read_routed
@@ -17,13 +17,13 @@ def run(path: Path | None, config_out: Path | None = None, metrics: str = "") ->
     """Run the router of the site."""
     service.log_to_stderr()
     wait_as_standby()
-    # zenohd may be started in another folder.
+    # zenohd may run in another folder.
     site = _read(path if path is None or config_out is None else path.absolute())
     settings = _settings(site, metrics_address(site, metrics))
     if config_out is not None:
-        print(role.write_config(settings, config_out))
+        print(router.write_config(settings, config_out))
         return
-    service.run_until_signalled(role.serve(settings, ready=print))
+    service.run_until_signalled(router.serve(settings, ready=print))
 
 
 def _read(path: Path | None) -> RoutedSite:
@@ -31,17 +31,17 @@ def _read(path: Path | None) -> RoutedSite:
         return RoutedSite(site="demo")
     site = read_routed(path)
     if site is None:
-        from services.site_file.site import load  # half of a router's start, for words that are seldom needed
+        from services.site_file.site import load  # half of a router's start; only to report an invalid file
 
         site = load(path)
     return site
 
 
-def _settings(site: RoutedSite, metrics: tuple[str, int] | None) -> role.Settings:
+def _settings(site: RoutedSite, metrics: tuple[str, int] | None) -> router.Settings:
     access = site.router.access
     if access is None and site.keys.folder is not None:
         access = Folder(site.keys.folder).access
-    return role.Settings(
+    return router.Settings(
         site=site.site,
         listen=site.listened,
         connect=site.links,
@@ -54,10 +54,10 @@ def _settings(site: RoutedSite, metrics: tuple[str, int] | None) -> role.Setting
 
 
 def metrics_address(site: RoutedSite, text: str) -> tuple[str, int] | None:
-    """Where Prometheus may ask; None: nowhere.
+    """Parse the address of the Prometheus endpoint; None: no endpoint.
 
     Raises:
-        ListenError: If it is no address, or beyond loopback without the site's `insecure = true`.
+        ListenError: If the address is invalid, or beyond loopback without the site's `insecure = true`.
     """
     if not text:
         return None

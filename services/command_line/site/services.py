@@ -1,42 +1,66 @@
-"""The commands that run one service: its part of the site file becomes its Settings."""
+"""The table of a site's services, which the commands, `robomesh up` and `robomesh doctor` use.
 
-import logging
-from collections.abc import Iterable
-from itertools import combinations
+A row imports its service when it runs, so that the table costs no time.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-from protocol_gateway.legacy.settings import LegacySettings
-from robomesh import service
-from robomesh.endpoints import DEFAULT_ROUTER
-from robomesh.keys import WHOLE_SITE, check_name
-from robomesh.session import SessionSettings
-from services.command_line.connection_options import addresses, with_keys
-from services.command_line.site.router import metrics_address
-from services.errors import ServiceError
-from services.site_file import site as site_file
-from services.site_file.listen_address import reachable, same_address, split_address
-from services.site_file.site import Robot, Site
-from services.site_file.started_robots import read_started
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from services.simulator.fault_requests import Mesh
-
-logger = logging.getLogger(__name__)
+    from services.site_file.site import Site
 
 
-class ControllerError(ServiceError):
-    """A controller that nobody can tell where to find."""
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """What the command line adds to a site file.
+
+    Attributes:
+        site_file: The site file; None: the built-in site.
+        controllers: ROBOT=tcp://HOST:PORT of robots whose controller is elsewhere than the site file says.
+        started: Run for this robot only, which was started from the page; empty: for the site's robots.
+        supervised: A supervisor starts the robots that are started from the page.
+    """
+
+    site_file: Path | None = None
+    controllers: Sequence[str] = ()
+    started: str = ""
+    supervised: bool = False
 
 
-def gateway(path: Path | None, connect: str, controllers: list[str], started: str, metrics: str = "") -> None:
-    """Run the gateway of the site's robots, or of one that was started from the page."""
-    from protocol_gateway import gateway as role
+@dataclass(frozen=True, kw_only=True)
+class Service:
+    """A service that runs from a site file.
+
+    Attributes:
+        module: Has the service's `Settings` and `serve`.
+        settings: Makes the Settings; None: `site/router.py` does, which reads a part of the site file.
+        of_robots: It declares presence for each robot, and a site without robots does not run it.
+        required: `robomesh up` ends if it cannot start.
+        standby: `robomesh up` keeps a second process loaded.
+        last: `robomesh up` ends it after the others, which need it until their end.
+        finishes: Work at its end that no kill may cut, for a line of log; empty: none.
+        packages: Packages of its extra that `robomesh doctor` looks for.
+    """
+
+    module: str
+    settings: "Callable[[Site, Options], Any] | None"
+    of_robots: bool = False
+    required: bool = True
+    standby: bool = False
+    last: bool = False
+    finishes: str = ""
+    packages: tuple[str, ...] = ()
+
+
+def _gateway(site: "Site", options: Options) -> Any:
+    from protocol_gateway.gateway import Settings
     from protocol_gateway.settings import RobotSettings
+    from services.command_line.site.controllers import controller_addresses, legacy_settings
     from services.site_file.cells import cells_of
 
-    site = _with(_begin(path), started)
-    addresses, cells = _addresses(site, controllers), cells_of(site)
+    addresses, cells = controller_addresses(site, options.controllers), cells_of(site)
     robots = tuple(
         RobotSettings(
             name=robot.name,
@@ -49,48 +73,27 @@ def gateway(path: Path | None, connect: str, controllers: list[str], started: st
             stop_proven=robot.can_be_stopped,
             stale_after_s=robot.stale_after_s,
             reconnect_after_s=max(4.0, 2.0 * robot.stale_after_s),
-            legacy_clients=_legacy_settings(robot),
+            legacy_clients=legacy_settings(robot),
             check=robot.check,
             cell=cells[robot.name],
         )
         for robot in site.robot
     )
-    settings = role.Settings(
+    return Settings(
         site=site.site,
         robots=robots,
         audit_folder=site.audit.folder,
         audit_rotate_bytes=round(site.audit.rotate_mib * 2**20),
     )
-    service.run(
-        role.serve,
-        settings,
-        service="gateway",
-        session_settings=_session(site, connect, "started" if started else "gateway"),
-        present_for=_each_robot(site),
-        metrics=metrics_address(site, metrics),
-        ends_within_s=service.WRITES_WITHIN_S,
-    )
 
 
-def _legacy_settings(robot: Robot) -> LegacySettings | None:
-    """Where old client programs attach to a robot; None: none may."""
-    clients = robot.legacy_clients
-    if clients is None:
-        return None
-    if warning := clients.warning(f"robot {robot.name}: legacy_clients"):
-        logger.warning("%s", warning)
-    return clients.settings
-
-
-def kinematics(path: Path | None, connect: str, started: str, metrics: str = "") -> None:
-    """Run the kinematics of the site's robots, or of one that was started from the page."""
-    from services import kinematics as role
+def _kinematics(site: "Site", _: Options) -> Any:
+    from services.kinematics import RobotSettings, Settings
     from services.site_file.cells import cells_of
 
-    site = _with(_begin(path), started)
     cells = cells_of(site)
     robots = tuple(
-        role.RobotSettings(
+        RobotSettings(
             name=robot.name,
             cell_description=cells[robot.name],
             cell=robot.cell,
@@ -99,64 +102,59 @@ def kinematics(path: Path | None, connect: str, started: str, metrics: str = "")
         )
         for robot in site.robot
     )
-    service.run(
-        role.serve,
-        role.Settings(site=site.site, robots=robots, quotas=site.quotas.settings),
-        service="kinematics",
-        session_settings=_session(site, connect, "kinematics"),
-        present_for=_each_robot(site),
-        metrics=metrics_address(site, metrics),
+    return Settings(site=site.site, robots=robots, quotas=site.quotas.settings)
+
+
+def _console(site: "Site", options: Options) -> Any:
+    from services.console.app import Settings
+    from services.console.define.settings import DefineSettings
+
+    tls = site.console.tls
+    return Settings(
+        site=site.site,
+        listen=site.console.listen,
+        insecure=site.console.insecure,
+        hosts=site.console.hosts,
+        accounts=site.console.accounts,
+        certificate=None if tls is None else tls.certificate,
+        key=None if tls is None else tls.key,
+        define=DefineSettings(site=site, can_start=options.supervised),
     )
 
 
-def recorder(path: Path | None, connect: str, metrics: str = "") -> None:
-    """Run the recorder of the site."""
-    from services import recorder as role
+def _recorder(site: "Site", options: Options) -> Any:
+    from services import recorder
 
-    site = _begin(path)
-    settings = role.Settings(
+    file = options.site_file
+    return recorder.Settings(
         site=site.site,
         robots=tuple(robot.name for robot in site.robot),
         folder=site.recorder.folder,
         views=site.recorded_views,
-        flight=role.flight_of(site.recorder.flight.model_dump()),
-        split=role.Split(**site.recorder.split.model_dump()),
-        marks=role.marks_of(site.recorder.free.model_dump()),
+        flight=recorder.flight_of(site.recorder.flight.model_dump()),
+        split=recorder.Split(**site.recorder.split.model_dump()),
+        marks=recorder.marks_of(site.recorder.free.model_dump()),
         quotas=site.quotas.settings,
-        site_file="" if path is None else role.without_secrets(path.read_text(encoding="utf-8")),
-    )
-    service.run(
-        role.serve,
-        settings,
-        service="recorder",
-        session_settings=_session(site, connect, "recorder"),
-        present_for=[(site.site, WHOLE_SITE)],
-        metrics=metrics_address(site, metrics),
-        ends_within_s=service.WRITES_WITHIN_S,
+        site_file="" if file is None else recorder.without_secrets(file.read_text(encoding="utf-8")),
     )
 
 
-def player(path: Path | None, connect: str, metrics: str = "") -> None:
-    """Run the player of the site's recordings."""
-    from services import player as role
+def _player(site: "Site", _: Options) -> Any:
+    from services.player import Settings
 
-    site = _begin(path)
-    service.run(
-        role.serve,
-        role.Settings(site=site.site, folder=site.recorder.folder),
-        service="player",
-        session_settings=_session(site, connect, "player"),
-        present_for=[(site.site, WHOLE_SITE)],
-        metrics=metrics_address(site, metrics),
-    )
+    return Settings(site=site.site, folder=site.recorder.folder)
 
 
-def renderer(path: Path | None, connect: str, metrics: str = "") -> None:
-    """Run the renderer of the site's robots."""
-    from renderer import service as role
+def _watch(site: "Site", _: Options) -> Any:
+    from services.watch import Settings
 
-    site = _begin(path)
-    settings = role.Settings(
+    return Settings(site=site.site, folder=site.watch.folder)
+
+
+def _renderer(site: "Site", _: Options) -> Any:
+    from renderer.service import Settings
+
+    return Settings(
         site=site.site,
         views=site.renderer.views,
         size=site.renderer.size,
@@ -167,171 +165,42 @@ def renderer(path: Path | None, connect: str, metrics: str = "") -> None:
         most_views=site.renderer.most_views,
         quotas=site.quotas.settings,
     )
-    service.run(
-        role.serve,
-        settings,
-        service="renderer",
-        session_settings=_session(site, connect, "renderer"),
-        present_for=[(site.site, WHOLE_SITE)],
-        metrics=metrics_address(site, metrics),
-    )
 
 
-def console(path: Path | None, connect: str, supervised: bool, metrics: str = "") -> None:
-    """Serve the page."""
-    from services.console import app as role
-    from services.console.define.settings import DefineSettings
-
-    site = _begin(path)
-    tls = site.console.tls
-    settings = role.Settings(
-        site=site.site,
-        listen=site.console.listen,
-        insecure=site.console.insecure,
-        hosts=site.console.hosts,
-        accounts=site.console.accounts,
-        certificate=None if tls is None else tls.certificate,
-        key=None if tls is None else tls.key,
-        define=DefineSettings(site=site, can_start=supervised),
-    )
-    service.run(
-        role.serve,
-        settings,
-        service="console",
-        session_settings=_session(site, connect, "console"),
-        present_for=[(site.site, WHOLE_SITE)],
-        metrics=metrics_address(site, metrics),
-    )
-
-
-def watch(path: Path | None, connect: str, metrics: str = "") -> None:
-    """Hold the site's alarms, and look at the mesh."""
-    from services import watch as role
-
-    site = _begin(path)
-    service.run(
-        role.serve,
-        role.Settings(site=site.site, folder=site.watch.folder),
-        service="watch",
-        session_settings=_session(site, connect, "watch"),
-        present_for=[(site.site, WHOLE_SITE)],
-        metrics=metrics_address(site, metrics),
-    )
-
-
-def simulate(
-    *,
-    robot: str,
-    listen: str,
-    rate_hz: float,
-    max_clients: int,
-    demo: bool,
-    faults: tuple[str, ...],
-    codes: list[str],
-    insecure: bool,
-    mesh: "Mesh | None",
-) -> None:
-    """Run a simulated controller."""
-    from services.simulator import simulator as role
-
-    service.log_to_stderr()
-    settings = role.Settings(
-        robot=robot,
-        listen=listen,
-        rate_hz=rate_hz,
-        max_clients=max_clients,
-        demo=demo,
-        faults=faults,
-        codes=dict(_code(text) for text in codes),
-        insecure=insecure,
-        mesh=mesh,
-    )
-    service.run_until_signalled(role.serve(settings, ready=lambda line: print(line, flush=True)))
-
-
-def mesh_of_simulator(text: str, path: Path | None, connect: str) -> "Mesh":
-    """Where `--for SITE/ROBOT` can be asked for faults; the site file has the certificates for it."""
-    from services.simulator.fault_requests import Mesh
-
-    site, slash, robot = text.partition("/")
-    if not slash:
-        raise ControllerError(f"--for {text}: SITE/ROBOT is right, as in demo/pt600")
-    check_name(site, "site")
-    session = _session(site_file.load(path), connect, "simulator")
-    return Mesh(site=site, robot=check_name(robot, "robot"), session=session)
-
-
-def _code(text: str) -> tuple[int, str]:
-    number, _, meaning = text.partition("=")
-    try:
-        return int(number), meaning
-    except ValueError:
-        raise ControllerError(f"--code {text}: NUMBER=TYPE is right, as in 2=ABSOLUTE.DEG") from None
-
-
-def _begin(path: Path | None) -> Site:
-    service.log_to_stderr()
-    return site_file.load(path)
-
-
-def _with(site: Site, started: str) -> Site:
-    """The site with one robot only, that was started from the page; the site as it is without a name."""
-    if not started:
-        return site
-    robots = tuple(robot for robot in read_started(site) if robot.name == started)
-    if not robots:
-        raise ControllerError(f"--started {started}: no such robot was started from the page of {site.site}")
-    return site.model_copy(update={"robot": robots})
-
-
-def _session(site: Site, connect: str, service: str) -> SessionSettings:
-    """In the name of `--keys`, else of the site's own certificate for this service."""
-    given = with_keys(connect)
-    if given is not None:
-        return given
-    routers, tls = addresses(connect), site.tls_of(service)
-    if tls is not None and routers == (DEFAULT_ROUTER,):
-        routers = tuple(map(reachable, site.listened))
-    return SessionSettings(connect=routers, tls=tls)
-
-
-def _each_robot(site: Site) -> Iterable[tuple[str, str]]:
-    return [(site.site, robot.name) for robot in site.robot]
-
-
-def _addresses(site: Site, controllers: list[str]) -> dict[str, tuple[str, int]]:
-    """Host and port of every robot's controller: the site file's, or the one given here.
-
-    Raises:
-        ControllerError: If one is missing, or of no robot, or is something else's too.
-        ListenError: If one is none.
-    """
-    given: dict[str, str] = {}
-    for text in controllers:
-        name, _, address = text.partition("=")
-        if name not in [robot.name for robot in site.robot]:
-            raise ControllerError(
-                f"--controller {text}: the site has no robot {name!r}; "
-                f"it has {', '.join(robot.name for robot in site.robot) or 'none'}"
-            )
-        given[name] = address
-    addresses: dict[str, str] = {}
-    for robot in site.robot:
-        address = given.get(robot.name, robot.controller)
-        if address == "simulated":
-            raise ControllerError(
-                f"robot {robot.name}: its controller is simulated, and nobody said where: "
-                f"--controller {robot.name}=tcp://HOST:PORT (robomesh up starts one by itself)"
-            )
-        addresses[robot.name] = address.removeprefix("tcp://")
-    # What the site file says has been looked at; what is given here has not.
-    taken = [(f"robot {name}'s controller", address) for name, address in addresses.items()]
-    taken += [
-        (f"robot {robot.name}'s legacy_clients", robot.legacy_clients.listen)
-        for robot in site.robot
-        if robot.legacy_clients is not None
-    ]
-    for (what, address), (other, another) in combinations(taken, 2):
-        if same_address(address, another):
-            raise ControllerError(f"{another} is given twice, to {what} and to {other}: each needs its own")
-    return {name: split_address(address) for name, address in addresses.items()}
+# In the order in which `robomesh up` starts them.
+SERVICES = {
+    "router": Service(module="services.router", settings=None, standby=True, last=True),
+    "gateway": Service(
+        module="protocol_gateway.gateway",
+        settings=_gateway,
+        of_robots=True,
+        finishes="stopping its robots and completing the audit log",
+        packages=("zenoh", "pydantic", "numpy"),
+    ),
+    "kinematics": Service(
+        module="services.kinematics",
+        settings=_kinematics,
+        of_robots=True,
+        packages=("pinocchio", "coal", "trimesh"),
+    ),
+    "console": Service(
+        module="services.console.app",
+        settings=_console,
+        packages=("starlette", "uvicorn", "websockets"),
+    ),
+    "recorder": Service(
+        module="services.recorder",
+        settings=_recorder,
+        finishes="closing its recordings",
+        packages=("mcap", "mcap_protobuf"),
+    ),
+    "player": Service(module="services.player", settings=_player, required=False),
+    "watch": Service(module="services.watch", settings=_watch, required=False),
+    # Without OpenGL everything else runs.
+    "renderer": Service(
+        module="renderer.service",
+        settings=_renderer,
+        required=False,
+        packages=("moderngl", "av", "cv2"),
+    ),
+}

@@ -1,4 +1,4 @@
-"""`robomesh up`: the whole site under the supervisor, and a ready line when the arm is on the page."""
+"""`robomesh up`: the whole site under the supervisor, with a ready line when the page shows the arm."""
 
 import asyncio
 import logging
@@ -16,6 +16,7 @@ from robomesh.keys import robot_key
 from robomesh.session import SessionSettings, open_session
 from services.command_line.site.metrics_ports import extra_with_metrics, with_metrics
 from services.command_line.site.router import metrics_address
+from services.command_line.site.services import SERVICES
 from services.errors import SiteFileError
 from services.pki import Folder
 from services.pki.errors import KeysError
@@ -28,24 +29,23 @@ from services.supervisor import ENDS_WITHIN_S, Program, supervise
 log = logging.getLogger(__name__)
 
 _CONSOLE_POLL_S = 0.1
-_STOPS_AND_AUDIT = "stopping its robots and completing the audit log"
 
 
 def run(path: Path | None, metrics: str = "") -> None:
     """Run the site until Ctrl-C.
 
     Args:
-        metrics: HOST:PORT of the first service's numbers for Prometheus; empty: nobody serves them.
+        metrics: HOST:PORT of the first service's Prometheus endpoint; empty: none.
     """
-    _say_lines_as_they_are()
-    # The services say themselves that they wait for their router.
+    _log_plain_lines()
+    # The services log that they wait for their router.
     logging.getLogger("robomesh").setLevel(logging.ERROR)
     site = site_file.load(path)
     endpoint = reachable(site.listened[0])
     metered = metrics_address(site, metrics)
 
     async def ready() -> None:
-        await _until_on_the_page(site, endpoint)
+        await _until_page_shows_robots(site, endpoint)
         print(f"console {_console_url(site)}", flush=True)
 
     service.run_until_signalled(
@@ -69,45 +69,37 @@ def programs(site: Site, path: Path | None, endpoint: str) -> tuple[Program, ...
             simulator, controller = _simulator(robot, site.site, (*of_site, *attach))
             simulators.append(simulator)
             controllers += controller
-    # Of a site without robots they would end at once; robots that are started later bring their own.
-    of_robots = (
-        Program(
-            name="gateway",
-            arguments=("gateway", *of_site, *attach, *controllers),
-            finishes=_STOPS_AND_AUDIT,
-        ),
-        Program(name="kinematics", arguments=("kinematics", *of_site, *attach)),
-    )
-    return (
-        Program(name="router", arguments=("router", *of_site), standby=True, last=True),
-        *simulators,
-        *(of_robots if site.robot else ()),
-        Program(name="console", arguments=("console", *of_site, *attach, "--supervised")),
-        Program(
-            name="recorder", arguments=("recorder", *of_site, *attach), finishes="closing its recordings"
-        ),
-        Program(name="player", arguments=("player", *of_site, *attach), required=False),
-        Program(name="watch", arguments=("watch", *of_site, *attach), required=False),
-        # Without OpenGL everything else runs.
-        Program(name="renderer", arguments=("renderer", *of_site, *attach), required=False),
+    more = {"gateway": controllers, "console": ["--supervised"]}
+    services = [
+        _program(name, (*of_site, *attach, *more.get(name, ())))
+        for name, row in SERVICES.items()
+        # Without robots a service of robots would end immediately; robots started later bring their own.
+        if name != "router" and (site.robot or not row.of_robots)
+    ]
+    return (_program("router", of_site), *simulators, *services)
+
+
+def _program(name: str, options: tuple[str, ...]) -> Program:
+    row = SERVICES[name]
+    return Program(
+        name=name,
+        arguments=(name, *options),
+        required=row.required,
+        standby=row.standby,
+        finishes=row.finishes,
+        last=row.last,
     )
 
 
 def _programs_of_started(robot: Robot, site: str, path: Path | None, endpoint: str) -> tuple[Program, ...]:
-    """The processes of a robot that was started from the page: all its own, so that no other notices."""
+    """Return the processes of a robot that was started from the page; it shares none with other robots."""
     attach = (*_of_site(path), "--connect", endpoint)
     simulator, controller = _simulator(robot, site, attach)
-    name = robot.name
-    rest = (*attach, "--started", name)
+    options = (*attach, "--started", robot.name)
+    programs = (_program("gateway", (*options, *controller)), _program("kinematics", options))
     return (
         replace(simulator, required=False),
-        Program(
-            name=f"gateway {name}",
-            arguments=("gateway", *rest, *controller),
-            required=False,
-            finishes=_STOPS_AND_AUDIT,
-        ),
-        Program(name=f"kinematics {name}", arguments=("kinematics", *rest), required=False),
+        *(replace(each, name=f"{each.name} {robot.name}", required=False) for each in programs),
     )
 
 
@@ -116,7 +108,7 @@ def _of_site(path: Path | None) -> tuple[str, ...]:
 
 
 def _simulator(robot: Robot, site: str, attach: tuple[str, ...]) -> tuple[Program, tuple[str, ...]]:
-    """A robot's simulated controller, and how the gateway is told where it is."""
+    """Return a robot's simulated controller, and the gateway's option with its address."""
     port = _free_port()
     demo = ("--demo",) if robot.demo else ()
     codes = (option for code, type_ in robot.codes.items() for option in ("--code", f"{code}={type_}"))
@@ -129,7 +121,7 @@ def _simulator(robot: Robot, site: str, attach: tuple[str, ...]) -> tuple[Progra
 
 
 class _Started:
-    """The robots that were started from the page, as the supervisor follows them."""
+    """The robots that were started from the page, for the supervisor to run."""
 
     def __init__(self, site: Site, path: Path | None, endpoint: str) -> None:
         self._site, self._path, self._endpoint = site, path, endpoint
@@ -138,15 +130,15 @@ class _Started:
         self._problem = ""
 
     def wanted(self) -> dict[Hashable, Callable[[], tuple[Program, ...]]]:
-        """What is to run now, a key for each robot as its files are: saved anew, it is another."""
+        """Return the programs to run now, by a key for each robot that changes when its files are saved."""
         try:
             robots = read_started(self._site)
             self._entitle([robot.name for robot in robots])
             self._robots, self._problem = robots, ""
         except (SiteFileError, KeysError) as error:
-            # Half a change by somebody's editor ends no robot: what runs, runs on.
+            # A half-written file must not end a running robot.
             if str(error) != self._problem:
-                _write(f"{error}; the robots that were started before stay as they are")
+                _write(f"{error}; robots that were started before keep running")
             self._problem = str(error)
         return {
             (robot.name, robot.model, _version(Path(robot.model))): partial(
@@ -156,17 +148,17 @@ class _Started:
         }
 
     def _entitle(self, names: list[str]) -> None:
-        """Tell the routers for whom their gateways may speak, before they do.
+        """Add robots to the routers' rules before their gateways publish.
 
-        Those that may be started are named ahead, because routers open anew for new rules, which stops
-        motions: only the first start of one that was saved since then does that.
+        Robots that may be started are added ahead, because a router reopens for new rules, which stops
+        motions: that way only the first start of a robot saved since then does it.
         """
         if names == self._entitled or self._site.keys.folder is None:
             return
-        from services.pki import authority  # only what changes keys needs the package that makes them
+        from services.pki import authority  # imports cryptography
 
         folder = Folder(self._site.keys.folder)
-        # Where only bundles were brought, nobody was started from the page.
+        # A folder with bundles only belongs to a machine without the page.
         if names or folder.principals.is_file():
             there, ahead = authority.entitled(folder), {*names, *may_start(self._site)}
             try:
@@ -175,7 +167,7 @@ class _Started:
             except KeysError as error:
                 if not there.issuperset(names):
                     raise
-                _write(f"{error}; the robots that were started run, others are named when they are started")
+                _write(f"{error}; started robots run, and others are added to the rules when they start")
         self._entitled = names
 
 
@@ -187,8 +179,8 @@ def _version(file: Path) -> tuple[int, int, int]:
     return stat.st_ino, stat.st_mtime_ns, stat.st_size
 
 
-async def _until_on_the_page(site: Site, endpoint: str) -> None:
-    """Until the console serves, every robot is described, and the simulated ones move."""
+async def _until_page_shows_robots(site: Site, endpoint: str) -> None:
+    """Wait until the console serves, every robot is described, and the simulated robots publish frames."""
     async with open_session(SessionSettings(connect=(endpoint,), tls=site.tls_of("console"))) as session:
         for robot in site.robot:
             topic = "frames" if robot.simulated else "description"
@@ -208,7 +200,7 @@ def _console_url(site: Site) -> str:
 
 
 def _answers(url: str) -> bool:
-    # Whether it serves is asked, not whether its certificate is for this address.
+    # This checks that the console serves, not that its certificate is for this address.
     context = ssl.create_default_context() if url.startswith("https") else None
     if context is not None:
         context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
@@ -226,8 +218,8 @@ def _free_port() -> int:
         return port
 
 
-def _say_lines_as_they_are() -> None:
-    """A terminal that is held, or whose reader has gone, must hold no site: restarts go on unseen."""
+def _log_plain_lines() -> None:
+    """Log plain lines to standard error, whose blocked or missing reader must not block the site."""
     service.log_to_stderr(logging.WARNING)
     for handler in logging.getLogger().handlers:
         handler.setFormatter(logging.Formatter("%(message)s"))

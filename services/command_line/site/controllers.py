@@ -1,0 +1,67 @@
+"""The addresses of a site's controllers and of its old client programs."""
+
+import logging
+from collections.abc import Sequence
+from itertools import combinations
+
+from protocol_gateway.legacy.settings import LegacySettings
+from services.errors import ServiceError
+from services.site_file.listen_address import same_address, split_address
+from services.site_file.site import Robot, Site
+
+logger = logging.getLogger(__name__)
+
+
+class ControllerError(ServiceError):
+    """A controller's option or address is missing or invalid."""
+
+
+def controller_addresses(site: Site, options: Sequence[str]) -> dict[str, tuple[str, int]]:
+    """Return host and port of every robot's controller, from an option or the site file.
+
+    Args:
+        options: ROBOT=tcp://HOST:PORT each.
+
+    Raises:
+        ControllerError: If an address is missing, names no robot of the site, or is used twice.
+        ListenError: If an address is invalid.
+    """
+    given: dict[str, str] = {}
+    for text in options:
+        name, _, address = text.partition("=")
+        if name not in [robot.name for robot in site.robot]:
+            raise ControllerError(
+                f"--controller {text}: the site has no robot {name!r}; "
+                f"it has {', '.join(robot.name for robot in site.robot) or 'none'}"
+            )
+        given[name] = address
+    addresses: dict[str, str] = {}
+    for robot in site.robot:
+        address = given.get(robot.name, robot.controller)
+        if address == "simulated":
+            raise ControllerError(
+                f"robot {robot.name}: its controller is simulated, at an unknown address: give "
+                f"--controller {robot.name}=tcp://HOST:PORT (robomesh up starts a simulator itself)"
+            )
+        addresses[robot.name] = address.removeprefix("tcp://")
+    # The site file's addresses were compared when it was read; those of options were not.
+    taken = [(f"robot {name}'s controller", address) for name, address in addresses.items()]
+    taken += [
+        (f"robot {robot.name}'s legacy_clients", robot.legacy_clients.listen)
+        for robot in site.robot
+        if robot.legacy_clients is not None
+    ]
+    for (what, address), (other, another) in combinations(taken, 2):
+        if same_address(address, another):
+            raise ControllerError(f"{another} is given twice, to {what} and to {other}: each needs its own")
+    return {name: split_address(address) for name, address in addresses.items()}
+
+
+def legacy_settings(robot: Robot) -> LegacySettings | None:
+    """Return where old client programs attach to a robot; None: they cannot. Warn if others can reach it."""
+    clients = robot.legacy_clients
+    if clients is None:
+        return None
+    if warning := clients.warning(f"robot {robot.name}: legacy_clients"):
+        logger.warning("%s", warning)
+    return clients.settings

@@ -1,0 +1,122 @@
+"""The start of one service: its row of the table makes its Settings from the site file."""
+
+from importlib import import_module
+from pathlib import Path
+
+from robomesh import service
+from robomesh.endpoints import DEFAULT_ROUTER
+from robomesh.keys import WHOLE_SITE, check_name
+from robomesh.session import SessionSettings
+from services.command_line.connection_options import addresses, with_keys
+from services.command_line.site.controllers import ControllerError
+from services.command_line.site.router import metrics_address
+from services.command_line.site.services import SERVICES, Options
+from services.site_file import site as site_file
+from services.site_file.listen_address import reachable
+from services.site_file.site import Site
+from services.site_file.started_robots import read_started
+
+
+def launch(name: str, options: Options, connect: str, metrics: str = "") -> None:
+    """Run a service of the table, except the router, until a signal.
+
+    Args:
+        connect: The routers to attach to, separated by commas.
+        metrics: HOST:PORT of the Prometheus endpoint; empty: none.
+    """
+    service.log_to_stderr()
+    row, site = SERVICES[name], site_file.load(options.site_file)
+    assert row.settings is not None
+    if options.started:
+        site = _only_started(site, options.started)
+    # The gateways of robots that were started from the page share a certificate of their own.
+    certificate = "started" if options.started and name == "gateway" else name
+    # A service with work to finish gets more time than the default.
+    ends = {"ends_within_s": service.WRITES_WITHIN_S} if row.finishes else {}
+    service.run(
+        import_module(row.module).serve,
+        row.settings(site, options),
+        service=name,
+        session_settings=session_settings(site, connect, certificate),
+        present_for=[
+            (site.site, robot)
+            for robot in ([each.name for each in site.robot] if row.of_robots else [WHOLE_SITE])
+        ],
+        metrics=metrics_address(site, metrics),
+        **ends,
+    )
+
+
+def session_settings(site: Site, connect: str, certificate: str) -> SessionSettings:
+    """Return a session with the certificate of `--keys`, else with the site's own for this service."""
+    given = with_keys(connect)
+    if given is not None:
+        return given
+    routers, tls = addresses(connect), site.tls_of(certificate)
+    if tls is not None and routers == (DEFAULT_ROUTER,):
+        routers = tuple(map(reachable, site.listened))
+    return SessionSettings(connect=routers, tls=tls)
+
+
+def _only_started(site: Site, name: str) -> Site:
+    """Return the site with one robot only, which was started from the page."""
+    robots = tuple(robot for robot in read_started(site) if robot.name == name)
+    if not robots:
+        raise ControllerError(f"--started {name}: no such robot was started from the page of {site.site}")
+    return site.model_copy(update={"robot": robots})
+
+
+def launch_simulator(
+    *,
+    robot: str,
+    listen: str,
+    rate_hz: float,
+    max_clients: int,
+    demo: bool,
+    faults: tuple[str, ...],
+    codes: list[str],
+    insecure: bool,
+    faults_for: str,
+    site: Path | None,
+    connect: str,
+) -> None:
+    """Run a simulated controller.
+
+    Args:
+        faults_for: SITE/ROBOT that accepts fault requests on the mesh, with the site file's certificates;
+            empty: none.
+    """
+    from services.simulator import simulator
+    from services.simulator.fault_requests import Mesh
+
+    service.log_to_stderr()
+    mesh = None
+    if faults_for:
+        site_name, slash, robot_name = faults_for.partition("/")
+        if not slash:
+            raise ControllerError(f"--for {faults_for}: SITE/ROBOT is right, as in demo/pt600")
+        mesh = Mesh(
+            site=check_name(site_name, "site"),
+            robot=check_name(robot_name, "robot"),
+            session=session_settings(site_file.load(site), connect, "simulator"),
+        )
+    settings = simulator.Settings(
+        robot=robot,
+        listen=listen,
+        rate_hz=rate_hz,
+        max_clients=max_clients,
+        demo=demo,
+        faults=faults,
+        codes=dict(_code(text) for text in codes),
+        insecure=insecure,
+        mesh=mesh,
+    )
+    service.run_until_signalled(simulator.serve(settings, ready=lambda line: print(line, flush=True)))
+
+
+def _code(text: str) -> tuple[int, str]:
+    number, _, meaning = text.partition("=")
+    try:
+        return int(number), meaning
+    except ValueError:
+        raise ControllerError(f"--code {text}: NUMBER=TYPE is right, as in 2=ABSOLUTE.DEG") from None
