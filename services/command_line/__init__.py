@@ -1,1 +1,1 @@
-"""The command line: translates words into Settings and calls; knows no more than that."""
+"""The command line: it turns words into Settings and calls, and holds no other logic."""

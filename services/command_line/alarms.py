@@ -158,7 +158,7 @@ def _seconds(text: str) -> float:
     """Return the seconds of a duration such as 30m.
 
     Raises:
-        NoSuchAlarmError: If it is not one.
+        NoSuchAlarmError: If the text has no valid unit.
     """
     match = re.fullmatch(r"(\d+(?:\.\d+)?)([smh])", text.strip())
     if match is None:

@@ -1,4 +1,4 @@
-"""How a command attaches to the mesh: `--connect`, and `--keys` beside it wherever that is taken."""
+"""A command's connection to the mesh: `--connect`, and `--keys` wherever `--connect` is."""
 
 from contextvars import ContextVar
 from pathlib import Path
@@ -18,7 +18,7 @@ _KEYS: ContextVar[Path | None] = ContextVar("keys", default=None)
 
 
 def offer_keys(command: Any) -> Any:
-    """A command or group, with `--keys FILE` wherever there is `--connect`."""
+    """Add `--keys FILE` to a command, or to the commands of a group, wherever there is `--connect`."""
     for each in getattr(command, "commands", {}).values():
         offer_keys(each)
     if any(parameter.name == "connect" for parameter in command.params):
@@ -27,7 +27,7 @@ def offer_keys(command: Any) -> Any:
 
 
 def _option() -> Any:
-    """The option, as typer makes it of a command that has no other."""
+    """Return the option `--keys`, taken from a command that Typer makes with it alone."""
     app = typer.Typer(add_completion=False)
 
     @app.command()
@@ -37,7 +37,7 @@ def _option() -> Any:
             typer.Option(
                 metavar="FILE",
                 envvar="ROBOMESH_KEYS",
-                help="A bundle of robomesh keys: who asks, by certificate.",
+                help="Your bundle from robomesh keys: certificate and key.",
                 expose_value=False,
                 callback=_keep,
             ),
@@ -54,30 +54,30 @@ def _keep(value: Path | None) -> Path | None:
 
 
 def own_identity() -> Identity | None:
-    """Who asks, by the certificate that was given; None: nobody said.
+    """Return the identity in the certificate of `--keys`; None: no `--keys`.
 
     Raises:
-        SessionError: If the file cannot be read, or is no bundle.
+        SessionError: If the file cannot be read, or is not a bundle.
     """
     file = _KEYS.get()
     if file is None:
         return None
     identity = read_identity(file)
     if identity is None:
-        raise SessionError(f"--keys {file}: it does not say whose it is: robomesh keys issue writes a bundle")
+        raise SessionError(f"--keys {file}: it names no owner: use a bundle that robomesh keys issue wrote")
     return identity
 
 
 def addresses(connect: str) -> tuple[str, ...]:
-    """The routers that `--connect` names."""
+    """Return the routers that `--connect` names."""
     return tuple(part for each in connect.split(",") if (part := each.strip()))
 
 
 def with_keys(connect: str, *, wait_s: float | None = None) -> "SessionSettings | None":
-    """A session in the name of the certificate that was given; None: none was.
+    """Return session settings with the certificate of `--keys`; None: no `--keys`.
 
     Raises:
-        SessionError: If the file is no bundle, or no router takes it there.
+        SessionError: If the file is not a bundle, or a router is not reached by TLS.
     """
     from robomesh.session import SessionSettings
 
@@ -89,12 +89,12 @@ def with_keys(connect: str, *, wait_s: float | None = None) -> "SessionSettings 
         routers = identity.routers or (DEFAULT_ROUTER.replace("tcp/", "tls/"),)
     for each in routers:
         if not each.startswith(("tls/", "quic/")):
-            raise SessionError(f"--connect {each}: with --keys a router is reached by TLS: tls/HOST:PORT")
+            raise SessionError(f"--connect {each}: --keys needs TLS to the router: tls/HOST:PORT")
     return SessionSettings(connect=routers, tls=bundle(file), wait_s=wait_s)
 
 
 def attachment(connect: str, *, wait_s: float | None = None) -> "SessionSettings":
-    """A session for one command, in the name of its certificate where one was given."""
+    """Return session settings for one command, with the certificate of `--keys` if given."""
     from robomesh.session import SessionSettings
 
     return with_keys(connect, wait_s=wait_s) or SessionSettings(connect=addresses(connect), wait_s=wait_s)

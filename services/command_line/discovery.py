@@ -1,4 +1,4 @@
-"""What is on the mesh: robots by name, services, states; a session for one command."""
+"""A session for one command, robots by name, and JSON output."""
 
 import asyncio
 import getpass
@@ -22,7 +22,7 @@ _ESCAPED = {ord(each): f"\\u{ord(each):04x}" for each in DIRECTION}
 
 
 class Robot(NamedTuple):
-    """A robot somewhere on the mesh."""
+    """A robot on the mesh."""
 
     site: str
     name: str
@@ -32,7 +32,7 @@ class Robot(NamedTuple):
 
 
 class NoSuchRobotError(ServiceError):
-    """A robot that is not on the mesh, or a name that several have."""
+    """No robot on the mesh has the name, or several have it."""
 
 
 def run(main: Coroutine[Any, Any, T]) -> T:
@@ -42,48 +42,48 @@ def run(main: Coroutine[Any, Any, T]) -> T:
 
 @asynccontextmanager
 async def attached(router: str) -> AsyncIterator[Session]:
-    """A session for one command: it does not wait for a router.
+    """Open a session for one command, without waiting for a router.
 
     Raises:
-        SessionError: If none is there, or it shows nothing to the certificate that was given.
+        SessionError: If no router answers, or the router shows nothing to the certificate of `--keys`.
     """
     async with open_session(attachment(router, wait_s=0.0)) as session:
-        # A router that was told of no such name lets it in and keeps everything from it, itself too.
+        # A router without rules for the name accepts the session and hides everything, itself too.
         if session.principal is not None and not await session.present():
             raise SessionError(
                 f"the router shows {session.principal.name} nothing: its certificate was revoked, or the "
-                "router does not follow this site's list yet (robomesh keys list)"
+                "router has not read this site's list yet (robomesh keys list)"
             )
         yield session
 
 
 async def find(session: Session, text: str) -> Robot:
-    """The robot that `robot` or `site/robot` means.
+    """Return the robot that `robot` or `site/robot` names.
 
     Raises:
-        NoSuchRobotError: If there is none, or `robot` stands at several sites.
+        NoSuchRobotError: If there is none, or several sites have a robot of that name.
     """
     alive = await session.present()
     robots = sorted({Robot(key.site, key.robot) for key in alive if key.robot != WHOLE_SITE})
     found = [robot for robot in robots if text in (robot.name, str(robot))]
     if len(found) == 1:
         return found[0]
-    there = ", ".join(map(str, robots)) or "none"
+    known = ", ".join(map(str, robots)) or "none"
     if not found:
         gone = sorted(gone_sites(await lists(session)).keys() - {key.site for key in alive})
         lost = f"; gone, with all of its robots: site {', site '.join(gone)}" if gone else ""
-        raise NoSuchRobotError(f"no robot {text!r} on the mesh; there are: {there}{lost}")
+        raise NoSuchRobotError(f"no robot {text!r} on the mesh; there are: {known}{lost}")
     raise NoSuchRobotError(f"{text!r} is at several sites; say which: {', '.join(map(str, found))}")
 
 
 def print_json(value: Any) -> None:
-    """Print one line of JSON; control characters of direction are escaped, so that they act nowhere."""
+    """Print one line of JSON, with direction characters escaped."""
     line = json.dumps(value, ensure_ascii=False, allow_nan=False)
     print(line.translate(_ESCAPED), flush=True)
 
 
 def own_name() -> str:
-    """The name under which this person asks: the certificate's, or the account's as a key can hold it."""
+    """Return the operator's name: the certificate's, else the account's with characters that a key allows."""
     identity = own_identity()
     if identity is not None:
         return identity.name

@@ -15,9 +15,9 @@ class _VisibleDirections(io.TextIOWrapper):
 
 
 def show_directions() -> None:
-    """Replace standard output and error, so that foreign text cannot reorder what is printed near it.
+    """Replace standard output and error, so that foreign text cannot reorder the output.
 
-    Bytes that are written to the underlying buffer are not changed.
+    Bytes written to the underlying buffer are not changed.
     """
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)

@@ -139,7 +139,9 @@ def test_a_half_edited_file_ends_nothing(site, page, mine):
     text, before = file.read_text(), processes(site)
     lines = len(site.log)
     file.write_text(text + "[[robot]]\nname = ")
-    wait_until(lambda: any("stay as they are" in line for line in site.log[lines:]))
+    wait_until(
+        lambda: any("robots that were started before keep running" in line for line in site.log[lines:])
+    )
     assert processes(site) == before
     answer = page.post("/stop", {"name": "mine"})
     assert answer.status == 409

@@ -42,7 +42,7 @@ def test_how_near_things_are_is_told_with_what_and_coloured_by_the_robots_distan
     clearance, own, missing = near_words(near(distance), ARM, "hall/arm")
     assert clearance == (f"clearance {text} (flange - mate wrist)", style)
     assert own == ("own links 100.0 mm (base - flange)", "")
-    assert missing == ("not counted, nobody knows where: third", "bold yellow")
+    assert missing == ("not counted, at unknown positions: third", "bold yellow")
 
 
 def test_a_check_that_cannot_be_made_says_what_becomes_of_motions():

@@ -26,7 +26,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import SessionSettings, open_session
 from robomesh.topics import REQUESTS, TOPICS, Role
 from services import foxglove, kinematics, player, recorder, ros2, watch
-from services.command_line.live.listing import _Around, _collect
+from services.command_line.live.listing import _Clocks, _collect
 from services.console import app
 from services.pki import Folder, authority
 from services.recorder.settings import Settings as RecorderSettings
@@ -80,7 +80,7 @@ class Site:
         return present
 
     async def listed(self):
-        return await _collect(self.observer, _Around())
+        return await _collect(self.observer, _Clocks())
 
 
 def site_settings(folder: Path) -> dict:

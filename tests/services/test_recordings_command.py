@@ -19,7 +19,7 @@ from robots.description import load
 from robots.glb import link_meshes
 from robots.urdf.write import to_urdf
 from services.command_line.main import run
-from services.command_line.recordings.output import whole_file
+from services.command_line.recordings.output import atomic_file
 from services.kinematics.descriptions import describe
 from services.recorder.serving import RecordingServer
 from tests.conftest import run as run_async
@@ -143,7 +143,7 @@ def test_a_plot_of_too_many_values_shows_the_first_64(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["out.txt"], "a name ends in .csv (joints and tool), .mp4 (video)"),
+        (["out.txt"], "the name must end in .csv (joints and tool), .mp4 (video)"),
         (["out.csv", "--from", "9"], "--from 9: moving.mcap goes from 0 to 2.000 s"),
         (["out.mp4", "--view", "inside"], "no view 'inside'; there are"),
         (["out.mp4", "--size", "161x120"], "--size 161x120: even, and from 64 to 4096 a side"),
@@ -173,7 +173,7 @@ def test_an_interrupted_write_leaves_no_file(tmp_path):
     out = tmp_path / "out.csv"
 
     def write():
-        with whole_file(out) as partial:
+        with atomic_file(out) as partial:
             partial.write_text("half")
             raise KeyboardInterrupt
 
@@ -191,7 +191,7 @@ def test_a_cut_file_is_recovered_once(tmp_path, capsys):
     info = json.loads(capsys.readouterr().out)
     assert (info["problem"], info["recovered"]) == ("", True)
     assert run(["recordings", "recover", str(path)]) == 0
-    assert "whole already" in capsys.readouterr().out
+    assert "complete already" in capsys.readouterr().out
 
 
 def test_recovery_of_an_open_recording_is_refused(tmp_path, capsys):
@@ -201,7 +201,7 @@ def test_recovery_of_an_open_recording_is_refused(tmp_path, capsys):
         capture.write_out()
         before = path.stat().st_ino, path.read_bytes()
         assert run(["recordings", "recover", str(path)]) == 2
-        assert "trial.mcap: is being recorded now" in capsys.readouterr().err
+        assert "trial.mcap: is still being recorded" in capsys.readouterr().err
         assert (path.stat().st_ino, path.read_bytes()) == before
         assert run(["recordings", "info", str(path), "--json"]) == 0
         info = json.loads(capsys.readouterr().out)
@@ -211,7 +211,7 @@ def test_recovery_of_an_open_recording_is_refused(tmp_path, capsys):
 
 
 def test_a_recording_of_a_site_has_one_name_for_every_command(mesh, router, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("services.command_line.recordings.fetch._MOST_WAIT_S", 0.1)
+    monkeypatch.setattr("services.command_line.recordings.fetch._LONGEST_WAIT_S", 0.1)
     refusals = [None, QuotaError("more than one name may have: ask again in 30.0 s", again_s=30.0)]
 
     def check(client):
@@ -249,7 +249,7 @@ def test_a_recording_of_a_site_has_one_name_for_every_command(mesh, router, tmp_
     assert header.split() == ["recorded", "length", "size", "robot", "name"]
     assert row.split()[-3:] == ["MB", "site/arm", "2026_trial"]
     assert "2026_trial.mcap waits: more than one name may have: ask again in 30.0 s" in printed.err
-    assert "no recording 'no', neither a file here nor in robomesh recordings list" in printed.err
+    assert "no recording 'no', neither a file of this machine nor in robomesh recordings list" in printed.err
     assert (tmp_path / "2026_trial.mcap").read_bytes() == source.read_bytes()
     assert len((tmp_path / "out.csv").read_text().splitlines()) == 51
 
@@ -292,7 +292,7 @@ def test_a_recorder_cannot_choose_the_folder_of_a_fetched_file(mesh, router, tmp
             assert await asyncio.to_thread(run, arguments) == 2
 
     run_async(main())
-    assert "'../taken.mcap', which is no file's name" in capsys.readouterr().err
+    assert "'../taken.mcap', which is not a plain file name" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["own"]
     assert not list(folder.iterdir())
 

@@ -99,7 +99,7 @@ def sent(li):
 
     async def main():
         async with control(li, *robot, "li") as own:
-            return await send._to_its_end(li, robot, "li", request, own.renewing)
+            return await send._send_and_wait(li, robot, "li", request, own.renewing)
 
     return asyncio.create_task(main())
 
@@ -137,18 +137,18 @@ def test_a_gateway_that_began_anew_is_told_with_what_to_do_and_warnings_come_bef
 
     accepted, text = run(main())
     assert not accepted
-    assert text.startswith("the gateway began anew: nobody runs the program any more")
+    assert text.startswith("the gateway restarted, so the program no longer runs")
     assert "`robomesh send hall/arm stop`" in text
-    assert text.endswith("; mind: arm touches post")
+    assert text.endswith("; warning: arm touches post")
     first, *rest = capsys.readouterr().err.splitlines()
-    assert first == "mind: arm touches post"
+    assert first == "warning: arm touches post"
     assert all(line == "step 7 of 90, line 2: wait 1" for line in rest)
 
 
 def test_what_to_do_about_a_refusal_is_told_as_a_command_to_type():
     def said(reason, text=""):
         error = RefusedError(reason, text=text)
-        return send.in_words_of_the_command_line(error, discovery.Robot("hall", "arm"))
+        return send.with_commands(error, discovery.Robot("hall", "arm"))
 
     assert said(codes.STOP_LATCHED(id=3, by="li", reason="with another lease")) == (
         "stop 3 is latched (li: with another lease): see to it, then `robomesh send hall/arm reset`"

@@ -1,4 +1,4 @@
-"""`robomesh doctor`: what is missing on this machine, and how to mend it."""
+"""`robomesh doctor`: checks of this machine, with fixes for what is missing."""
 
 import asyncio
 import http.client
@@ -23,36 +23,33 @@ _EXTRAS = {
     "keys": ("cryptography",),
 }
 _FREE_BYTES = 1 << 30
-# For a site that runs here to say so.
+# Timeout for a site that runs on this machine.
 _ANSWER_S = 3.0
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at; `mend` says what to do where it is not right."""
+    """The result of one check; `fix` says what to do if it failed."""
 
     what: str
-    right: bool
+    ok: bool
     text: str
-    mend: str = ""
+    fix: str = ""
 
 
 def run(as_json: bool = False) -> None:
     """Print every finding; exit status 1 when something is missing."""
-    findings = [finding for look in (_python, _roles, _open_gl, _page, _ports, _disk) for finding in look()]
+    findings = [
+        finding for check in (_python, _extras, _open_gl, _page, _ports, _disk) for finding in check()
+    ]
     if as_json:
-        rows = [
-            {"what": each.what, "ok": each.right, "text": each.text, "mend": each.mend} for each in findings
-        ]
-        print(json.dumps({"ok": all(each.right for each in findings), "findings": rows}))
-        findings_said: list[Finding] = []
-    else:
-        findings_said = findings
-    for finding in findings_said:
-        print(f"{'ok     ' if finding.right else 'MISSING'}  {finding.what}: {finding.text}")
-        if not finding.right:
-            print(f"         {finding.mend}")
-    if not all(finding.right for finding in findings):
+        rows = [{"what": each.what, "ok": each.ok, "text": each.text, "mend": each.fix} for each in findings]
+        print(json.dumps({"ok": all(each.ok for each in findings), "findings": rows}))
+    for finding in () if as_json else findings:
+        print(f"{'ok     ' if finding.ok else 'MISSING'}  {finding.what}: {finding.text}")
+        if not finding.ok:
+            print(f"         {finding.fix}")
+    if not all(finding.ok for finding in findings):
         raise typer.Exit(1)
 
 
@@ -61,32 +58,32 @@ def _python() -> list[Finding]:
     return [Finding("Python", sys.version_info >= (3, 11), version, "install Python 3.11 or newer")]
 
 
-def _roles() -> list[Finding]:
+def _extras() -> list[Finding]:
     findings = []
-    for role, packages in _EXTRAS.items():
-        absent = [package for package in packages if importlib.util.find_spec(package) is None]
+    for extra, packages in _EXTRAS.items():
+        missing = [package for package in packages if importlib.util.find_spec(package) is None]
         findings.append(
             Finding(
-                f"role {role}",
-                not absent,
-                "its packages are here" if not absent else f"no {', '.join(absent)}",
-                f"pip install 'robomesh[{role}]', or ./dev up, which installs everything",
+                f"role {extra}",
+                not missing,
+                "its packages are installed" if not missing else f"no {', '.join(missing)}",
+                f"pip install 'robomesh[{extra}]', or ./dev up, which installs all extras",
             )
         )
     return findings
 
 
 def _open_gl() -> list[Finding]:
-    mend = "apt-get install libegl1 libgl1; everything but the renderer runs without it"
+    fix = "apt-get install libegl1 libgl1; everything but the renderer runs without it"
     try:
         from renderer.errors import RendererError
         from renderer.opengl import open_context
     except ImportError as error:
-        return [Finding("OpenGL", False, f"its packages are not here: {error}", mend)]
+        return [Finding("OpenGL", False, f"its packages are missing: {error}", fix)]
     try:
         context = open_context()
     except RendererError as error:
-        return [Finding("OpenGL", False, str(error), mend)]
+        return [Finding("OpenGL", False, str(error), fix)]
     name = context.info["GL_RENDERER"]
     context.release()
     return [Finding("OpenGL", True, f"off screen, by {name or 'a device without a name'}")]
@@ -106,14 +103,14 @@ def _ports() -> list[Finding]:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             free = _succeeds(lambda probe=probe, port=port: probe.bind(("127.0.0.1", port)))  # type: ignore[misc]
         ours = not free and (_is_router(port) if port == 7447 else _is_console(port))
-        state = "is free" if free else "is a running site's" if ours else "is taken by another program"
-        mend = "end that program, or name another port in the site file"
-        findings.append(Finding(what, free or ours, f"127.0.0.1:{port} {state}", mend))
+        state = "is free" if free else "is used by a running site" if ours else "is taken by another program"
+        fix = "end that program, or name another port in the site file"
+        findings.append(Finding(what, free or ours, f"127.0.0.1:{port} {state}", fix))
     return findings
 
 
 def _is_router(port: int) -> bool:
-    """Return whether a Zenoh router answers there, by TCP or, with this person's keys, by TLS."""
+    """Return whether a Zenoh router answers on the port, by TCP or, with `--keys`, by TLS."""
     from robomesh.errors import BusError
     from services.command_line import discovery
 
@@ -128,7 +125,7 @@ def _is_router(port: int) -> bool:
 
 
 def _is_console(port: int) -> bool:
-    """Return whether a console's page answers there."""
+    """Return whether a console answers on the port."""
     try:
         with urllib.request.urlopen(f"http://127.0.0.1:{port}/health", timeout=_ANSWER_S) as answer:
             return isinstance(json.loads(answer.read(100_000)), dict)
@@ -144,7 +141,7 @@ def _disk() -> list[Finding]:
             "disk",
             writable and free > _FREE_BYTES,
             f"{free / 1e9:.1f} GB free here" + ("" if writable else ", and not writable"),
-            "recordings and the audit log need room: without audit no motion",
+            "free space for recordings and the audit log: without audit no motion is allowed",
         )
     ]
 

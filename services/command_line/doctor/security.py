@@ -1,11 +1,11 @@
 """`robomesh doctor --security`: every role against every key, tried on the live mesh.
 
-It is tried on keys of a robot that does not exist, of its replay, by a wildcard that means it, and of
-another site; publishing and deleting on the site's real robots too. No service takes any of it: what is
-published has no header, and answers are empty. `security_probes` tries leases, commands and tokens of real
-robots. Where no harmless probe exists (presence of services, which everybody would see; stops, other
-requests, reading and answering on real robots), the file of rules is compared with what principals.toml
-gives, and nothing is tried. What should be comes from the table.
+The keys are those of a robot that does not exist, of its replay, of a wildcard that matches it, and of
+another site; publishing and deleting is also tried on the site's real robots. No service accepts a trial:
+published messages have no header, and answers are empty. `security_probes` tries leases, commands and tokens
+of real robots. Without a harmless probe (presence of services, which every client would see; stops, other
+requests, reading and answering on real robots), nothing is tried, and the file of rules is compared with
+principals.toml. The topic table gives the expected result.
 """
 
 import json
@@ -47,27 +47,25 @@ _WORDS: dict[Act, str] = {
 
 
 def run(keys: Folder, connect: tuple[str, ...], as_json: bool) -> int:
-    """Print the matrix; 1: something differs from the table.
+    """Print the matrix; return 1 if it differs from the topic table.
 
     Raises:
-        KeysError: If there are no keys, or no router takes them.
+        KeysError: If there are no keys, or no router accepts them.
     """
     principals = authority.principals_of(keys)
     routers = connect or principals.routers
     if not routers:
-        raise KeysError(f"{keys.principals} names no routers: --connect tls/HOST:PORT says where they are")
-    with ExitStack() as opened:
+        raise KeysError(f"{keys.principals} names no routers: give --connect tls/HOST:PORT")
+    with ExitStack() as sessions:
         people = [
-            Person(entry, opened.enter_context(open_as(routers, file)))
+            Person(entry, sessions.enter_context(open_as(routers, file)))
             for entry, file in with_files(keys, principals)
         ]
         robots = sorted({robot for each in principals.entries for robot in each.robots or ()})
         trials = _trials(people, principals.site, robots)
         witness = next((each for each in people if each.principal.role is Role.ROUTER), None)
         if witness is None:
-            raise KeysError(
-                "the router's own certificate is needed to see what goes through: keys/router.pem"
-            )
+            raise KeysError("the router's certificate is needed to observe the trials: keys/router.pem")
         done = _try(people, witness, principals.site, trials)
         probed = probe(people, witness, principals.site, robots)
         trials |= probed.trials
@@ -92,7 +90,7 @@ def run(keys: Folder, connect: tuple[str, ...], as_json: bool) -> int:
     for problem in rules:
         print(f"WRONG: {keys.access}: {problem}")
     print(
-        f"{len(trials)} acts of {len(people)} certificates tried: "
+        f"{len(trials)} operations of {len(people)} certificates tried: "
         + (f"{len(wrong)} wrong" if wrong else "all as the table says")
     )
     absent = sorted({role.value for role in Role} - {each.role.value for each in roles.values()})
@@ -110,7 +108,7 @@ def run(keys: Folder, connect: tuple[str, ...], as_json: bool) -> int:
     return 1 if wrong or rules else 0
 
 
-# -------------------------------------------------------------- what is tried
+# ---------------------------------------------------------------------- trials
 
 
 def _trials(people: list[Person], site: str, robots: Iterable[str]) -> set[Trial]:
@@ -127,7 +125,7 @@ def _trials(people: list[Person], site: str, robots: Iterable[str]) -> set[Trial
 
 
 def _try(people: list[Person], witness: Person, site: str, trials: set[Trial]) -> set[Trial]:
-    """What went through."""
+    """Return the trials that succeeded."""
     keys = {act: sorted({trial.key for trial in trials if trial.act == act}) for act in _WORDS}
     by_name = {each.principal.name: each for each in people}
     done: set[Trial] = set()
@@ -137,16 +135,16 @@ def _try(people: list[Person], witness: Person, site: str, trials: set[Trial]) -
             trial.key for trial in trials if trial.who == person.principal.name and trial.act == act
         )
 
-    # Published: the witness hears it, with the name of who did.
+    # Publishing: the witness receives the message, with the name of its publisher.
     def hear(sample: zenoh.Sample) -> None:
-        # A real robot's own messages have a header there, which is no text.
+        # The attachment of a real robot's messages is a header, not text.
         mark = sample.attachment.to_bytes() if sample.attachment is not None else b""
         if (name := mark.decode(errors="replace")) in by_name:
             act: Act = "delete" if sample.kind == zenoh.SampleKind.DELETE else "put"
             done.add(Trial(name, act, str(sample.key_expr)))
 
     with ExitStack() as declared:
-        # Whole keys: who listens to all of a robot makes its cameras draw.
+        # Exact keys: a subscription to all keys of a robot would start its video.
         for key in {*keys["put"], *keys["delete"]}:
             declared.enter_context(witness.session.declare_subscriber(key, hear))
         settle(witness, site)
@@ -158,13 +156,13 @@ def _try(people: list[Person], witness: Person, site: str, trials: set[Trial]) -
             settle(person, site)
         time.sleep(_QUIET_S)
     done -= {trial for trial in done if trial not in trials}
-    # Read: the witness publishes everything once.
+    # Reading: the witness publishes on every key once.
     with ExitStack() as declared:
         for person in people:
 
             def note(sample: zenoh.Sample, person: Person = person) -> None:
                 if sample.attachment is not None and sample.attachment.to_bytes() == b"witness":
-                    person.heard.add(str(sample.key_expr))
+                    person.received.add(str(sample.key_expr))
 
             for key in of(person, "declare_subscriber"):
                 declared.enter_context(person.session.declare_subscriber(key, note))
@@ -173,9 +171,9 @@ def _try(people: list[Person], witness: Person, site: str, trials: set[Trial]) -
             witness.session.put(key, b"", attachment="witness")
         for person in people:
             wanted = set(of(person, "declare_subscriber"))
-            wait_until(partial(wanted.issubset, person.heard))
-            done |= {Trial(person.principal.name, "declare_subscriber", key) for key in person.heard}
-    # Answered: the witness asks. By a wildcard alone: a session with both would answer as either.
+            wait_until(partial(wanted.issubset, person.received))
+            done |= {Trial(person.principal.name, "declare_subscriber", key) for key in person.received}
+    # Answering: the witness queries. Wildcards separately: a session with both would answer with either.
     answered = keys["declare_queryable"]
     for vague in (False, True):
         with ExitStack() as declared:
@@ -186,7 +184,7 @@ def _try(people: list[Person], witness: Person, site: str, trials: set[Trial]) -
                 settle(person, site)
             asked = who_answers(witness, (key for key in answered if not has_wildcard(key)))
             done |= {Trial(name, "declare_queryable", key) for name, key in chain(*asked.values())}
-    # Asked: the witness answers.
+    # Requesting: the witness answers.
     with ExitStack() as declared:
         for key in keys["query"]:
             declared.enter_context(_answering(witness, key))
@@ -205,15 +203,15 @@ def _answering(person: Person, key: str) -> zenoh.Queryable[None]:
     return person.session.declare_queryable(key, reply)
 
 
-# ------------------------------------------------------------------- printed
+# ---------------------------------------------------------------------- output
 
 
 def _print(people: list[Principal], site: str, done: set[Trial]) -> None:
-    """A row a topic or request, a column a certificate: what each can do."""
+    """Print a row for each topic or request, a column for each certificate, with the rights found."""
     heads = [each.name.rpartition(".")[0] for each in people]
     width = max(len(row.name) for row in ROWS) + 2
     columns = [max(len(name), 2) + 1 for name in heads]
-    print("p: publishes, r: reads, o: answers as its owner, a: asks\n")
+    print("p: publishes, r: reads, o: answers as owner, a: requests\n")
     print(" " * width + "".join(f"{name:<{size}}" for name, size in zip(heads, columns, strict=True)))
     for row in ROWS:
         letters: dict[Act, str] = (

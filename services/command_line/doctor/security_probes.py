@@ -1,14 +1,14 @@
-"""Probes of a running site: what a gateway or a router answers, and harms nothing if it gets through.
+"""Probes of a running site, which do no harm if a router lets them through.
 
 - `lease/request/NAME` of a real robot: RENEW with a secret that no lease has. The gateway refuses it.
-- `command/NAME` of a real robot: COMMAND_UNSPECIFIED without a lease. The gateway refuses it unjudged.
+- `command/NAME` of a real robot: COMMAND_UNSPECIFIED without a lease. The gateway refuses it unevaluated.
 - `alive/operator/NAME.doctor-probe-...` of a real robot: a token of a session that holds no lease and has
-  opened no replay. It is withdrawn at once; then gateway and player look for what that session held: nothing.
-- `@/**`: the router's own state is read, nothing is written.
+  opened no replay. It is withdrawn immediately; gateway and player then find nothing that the session held.
+- `@/**`: the router's state is read, nothing is written.
 
-A gateway writes each request that reaches it into its audit log, as refused. No probe is a stop, takes
-control, moves anything or publishes. A robot whose gateway does not answer is left out: there a token would
-show a robot that is not running, and a request without an answer says nothing about the rules.
+A gateway writes each request that it receives into its audit log, as refused. No probe is a stop,
+takes control, moves a robot or publishes. Robots whose gateway does not answer are left out: a token would
+show a robot that does not run, and a missing answer says nothing about the rules.
 """
 
 import time
@@ -39,7 +39,7 @@ _QUIET_S = 0.3
 
 
 class Probed(NamedTuple):
-    """What was tried on the running site, what went through, and the robots without a gateway."""
+    """The trials on the running site, those that succeeded, and the robots without a gateway."""
 
     trials: set[Trial]
     done: set[Trial]
@@ -47,10 +47,10 @@ class Probed(NamedTuple):
 
 
 def probe(people: list[Person], witness: Person, site: str, robots: Iterable[str]) -> Probed:
-    """Try requests and tokens on real robots, in each one's own and in every operator's name, and `@/**`.
+    """Try requests and tokens on real robots, in the own and in every operator's name, and `@/**`.
 
     Args:
-        witness: The router's certificate: it may ask everything, and sees every token.
+        witness: Has the router's certificate, which may request everything and sees every token.
     """
     robots = list(robots)
     running = _running(witness, site, robots)
@@ -64,12 +64,12 @@ def probe(people: list[Person], witness: Person, site: str, robots: Iterable[str
                 trials |= {Trial(who, "query", f"{base}/{request}/{name}") for request in _REQUESTS}
                 session = f"{name}.doctor-probe-{who.replace('.', '-')}"
                 trials.add(Trial(who, "liveliness_token", f"{base}/alive/operator/{session}"))
-    done = _ask(tried, trials) | _be_present(tried, witness, site, trials)
+    done = _ask(tried, trials) | _declare_tokens(tried, witness, site, trials)
     return Probed(trials, done, [robot for robot in robots if robot not in running])
 
 
 def _running(witness: Person, site: str, robots: Iterable[str]) -> list[str]:
-    """Robots whose gateway answers."""
+    """Return the robots whose gateway answers."""
     name = witness.principal.name
     keys = {f"robomesh/{site}/{robot}/lease/request/{name}": robot for robot in robots}
     answered: set[str] = set()
@@ -79,7 +79,7 @@ def _running(witness: Person, site: str, robots: Iterable[str]) -> list[str]:
 
 
 def _ask(people: list[Person], trials: set[Trial]) -> set[Trial]:
-    """Requests that were answered: a gateway answers in words what it refuses, a router nothing."""
+    """Return the requests that were answered: a gateway answers a refusal, a router drops the request."""
     done: set[Trial] = set()
     for person in people:
         who = person.principal.name
@@ -97,8 +97,8 @@ def _payload(key: str) -> bytes | None:
     return next((payload for request, payload in _REQUESTS.items() if f"/{request}/" in key), None)
 
 
-def _be_present(people: list[Person], witness: Person, site: str, trials: set[Trial]) -> set[Trial]:
-    """Tokens that the witness sees."""
+def _declare_tokens(people: list[Person], witness: Person, site: str, trials: set[Trial]) -> set[Trial]:
+    """Return the tokens that the witness sees."""
     tokens = {trial.key: trial for trial in trials if trial.act == "liveliness_token"}
     roles = {person.principal.name: person.principal for person in people}
     expected = {each for each in tokens.values() if should(roles[each.who], each.act, each.key)}

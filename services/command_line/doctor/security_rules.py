@@ -1,4 +1,4 @@
-"""The routers' file of rules, compared with what the list of principals gives."""
+"""A comparison of the routers' file of rules with the list of principals."""
 
 import json
 from typing import Any
@@ -9,7 +9,7 @@ from services.router.router import AccessError, read_access
 
 
 def wrong_rules(keys: Folder, principals: Principals) -> list[str]:
-    """Return what differs, in words; none: the rules are exactly what `principals.toml` gives."""
+    """Return the differences, in words; empty: the rules are those of `principals.toml`."""
     try:
         found = read_access(keys.access)
     except AccessError as error:
@@ -18,14 +18,12 @@ def wrong_rules(keys: Folder, principals: Principals) -> list[str]:
     if found == wanted:
         return []
     problems = []
-    has, gives = _allowed(found), _allowed(wanted)
-    for entry in sorted(has - gives):
-        problems.append(
-            f"{_words(entry)}: principals.toml gives no such rule; robomesh up writes the rules anew"
-        )
-    for entry in sorted(gives - has):
-        problems.append(f"{_words(entry)} is missing; robomesh up writes the rules anew")
-    return problems or ["it is not what principals.toml gives: robomesh up writes it anew"]
+    actual, expected = _allowed(found), _allowed(wanted)
+    for entry in sorted(actual - expected):
+        problems.append(f"{_words(entry)}: not a rule of principals.toml; robomesh up rewrites the rules")
+    for entry in sorted(expected - actual):
+        problems.append(f"{_words(entry)} is missing; robomesh up rewrites the rules")
+    return problems or ["it differs from principals.toml: robomesh up rewrites it"]
 
 
 def _lines(text: str) -> list[str]:
@@ -33,7 +31,7 @@ def _lines(text: str) -> list[str]:
 
 
 def _allowed(sections: Any) -> set[tuple[str, str, str, str]]:
-    """Permission, message, key and the certificate's name, one by one."""
+    """Return each combination of permission, message, key and certificate name."""
     control = sections.get("access_control", {})
     rules = {rule.get("id"): rule for rule in control.get("rules", ())}
     names = {each.get("id"): each.get("cert_common_names", ["*"]) for each in control.get("subjects", ())}

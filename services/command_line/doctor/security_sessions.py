@@ -1,4 +1,4 @@
-"""Sessions of the site's certificates, and what `doctor --security` does with each of them."""
+"""Sessions with the site's certificates, and the queries of `doctor --security`."""
 
 import json
 import time
@@ -21,7 +21,7 @@ TIMEOUT_S = 10.0
 
 @dataclass(frozen=True)
 class Trial:
-    """Somebody's act on a key, and whether it went through."""
+    """An operation of a principal on a key."""
 
     who: str
     act: Act
@@ -30,20 +30,20 @@ class Trial:
 
 @dataclass
 class Person:
-    """Who tries."""
+    """A principal, its session, and the keys that it received messages on."""
 
     principal: Principal
     session: zenoh.Session
-    heard: set[str] = field(default_factory=set)
+    received: set[str] = field(default_factory=set)
 
 
 def with_files(keys: Folder, principals: Principals) -> Iterator[tuple[Principal, Path]]:
-    """Everybody of the site whose certificate lies here and is good."""
+    """Yield the principals of the site whose certificate is in the folder and valid."""
     now = authority.now()
     for entry in principals.entries:
         file = Path(authority.file_of(keys, principals.site, entry))
-        good = entry.revoked is None and entry.expires is not None and entry.expires > now
-        if good and not entry.sites and file.is_file():
+        valid = entry.revoked is None and entry.expires is not None and entry.expires > now
+        if valid and not entry.sites and file.is_file():
             yield entry.principal, file
 
 
@@ -51,22 +51,19 @@ def open_as(routers: tuple[str, ...], file: Path) -> zenoh.Session:
     """Open a session with a certificate.
 
     Raises:
-        KeysError: If no router takes it.
+        KeysError: If no router accepts it.
     """
     config = client_config(routers, bundle(file))
-    # One link: what is tried and the question that ends it keep their order.
+    # One link, so that a trial and the query after it keep their order.
     config.insert_json5("connect/endpoints", json.dumps(list(routers)))
     try:
         return zenoh.open(config)
     except zenoh.ZError as error:
-        raise KeysError(f"no router at {', '.join(routers)} takes {file}: {first_line(error)}") from None
+        raise KeysError(f"no router at {', '.join(routers)} accepts {file}: {first_line(error)}") from None
 
 
 def settle(person: Person, site: str) -> None:
-    """Wait until the router has judged what was sent.
-
-    A question that everybody may ask comes back behind it.
-    """
+    """Wait until the router has processed what was sent: every client may make this query, which is last."""
     list(person.session.get(f"robomesh/{site}/{PROBE_ROBOT}/recordings/list", timeout=TIMEOUT_S))
 
 
@@ -77,10 +74,10 @@ def ask_all(
     *,
     of: zenoh.Locality = zenoh.Locality.ANY,
 ) -> None:
-    """Ask each key with its payload (protobuf), all at once, and wait until all are answered or refused.
+    """Query each key with its payload (protobuf), all in parallel, and wait until all queries are finished.
 
     Args:
-        of: Who may answer. A session answers some questions about `@/**` itself.
+        of: Which queryables may answer. A session answers some queries of `@/**` itself.
     """
     left, done = len(questions), Condition()
 
@@ -110,7 +107,7 @@ def ask_all(
 
 
 def who_answers(person: Person, keys: Iterable[str]) -> dict[str, set[tuple[str, str]]]:
-    """Return for each key who answered, and as what."""
+    """Return for each key the principals that answered, with the key of their queryable."""
     answers: dict[str, set[tuple[str, str]]] = {key: set() for key in keys}
 
     def on_reply(key: str, reply: zenoh.Reply) -> None:
@@ -122,8 +119,8 @@ def who_answers(person: Person, keys: Iterable[str]) -> dict[str, set[tuple[str,
     return answers
 
 
-def wait_until(there: Callable[[], bool], within_s: float = 1.0) -> None:
-    """Wait until something is there, or the time is over."""
+def wait_until(condition: Callable[[], bool], within_s: float = 1.0) -> None:
+    """Wait until a condition is true, or the time is over."""
     deadline = time.monotonic() + within_s
-    while not there() and time.monotonic() < deadline:
+    while not condition() and time.monotonic() < deadline:
         time.sleep(0.01)

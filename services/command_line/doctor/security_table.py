@@ -1,6 +1,6 @@
-"""What the table of topics gives a certificate, act by act: what `doctor --security` expects.
+"""The rights of each certificate by the topic table, as `doctor --security` expects them.
 
-Written apart from the rules' generator (`robomesh/access.py`), which it judges.
+Written independently of the generator of the rules (`robomesh/access.py`), which it verifies.
 """
 
 from collections.abc import Iterable
@@ -12,15 +12,15 @@ from robomesh.keys import has_wildcard, is_replay, parse_expression, replay_name
 from robomesh.topics import REQUESTS, TOPICS, Request, Role, Topic
 
 ROWS: tuple[Topic | Request, ...] = (*TOPICS.values(), *REQUESTS.values())
-# Means the robot that nobody has, and would mean another's whose name begins so.
+# Matches the robot that no site has, and robots whose name begins with its name.
 VAGUE = f"{PROBE_ROBOT}$*"
-# Of routers themselves: no rule gives it to anybody.
+# Keys of routers themselves, which no rule allows.
 ROUTERS_OWN = "@/**"
 ROBOTS = (PROBE_ROBOT, replay_name(PROBE_ROBOT), VAGUE)
 
 
 def names(row: Topic | Request, who: Principal) -> list[str]:
-    """A row's names as somebody might use them: in the own name, in another's, in a request's."""
+    """Return the names of a row that a principal might use: with its own name, another's, a request's."""
     if isinstance(row, Request) and row.in_name:
         stem = row.name.rpartition("/")[0].replace("*", PROBE_ROBOT)
         called = [each.name for each in REQUESTS.values() if each.wildcard]
@@ -33,19 +33,19 @@ def names(row: Topic | Request, who: Principal) -> list[str]:
 
 
 def names_of_operators(people: Iterable[Principal]) -> set[str]:
-    """Return in whose names control is asked for, and the name of an operator of another site."""
+    """Return the names of operators, and the name of an operator of another site for each."""
     askers = REQUESTS["lease/request/*"].askers
     own = [who for who in people if who.role in askers]
     return {who.name for who in own} | {f"nobody.{who.site}x" for who in own}
 
 
 def tried_on_real(row: Topic | Request) -> tuple[Act, ...]:
-    """Return what is tried on robots that there are: what no subscriber takes, for it has no header."""
+    """Return the operations that do no harm on real robots: subscribers ignore messages without a header."""
     return ("put", "delete") if isinstance(row, Topic) else ()
 
 
 def tried(row: Topic | Request, robot: str) -> tuple[Act, ...]:
-    """What is tried on a row; by a wildcard only what would be said for robots of others."""
+    """Return the operations to try on a row; with a wildcard, those that would affect other robots."""
     if isinstance(row, Request):
         return ("declare_queryable",) if has_wildcard(robot) else ("query", "declare_queryable")
     if has_wildcard(robot):
@@ -54,12 +54,12 @@ def tried(row: Topic | Request, robot: str) -> tuple[Act, ...]:
 
 
 def should(who: Principal, act: Act, key: str) -> bool:
-    """Whether somebody may do that."""
+    """Return whether a principal may perform an operation on a key."""
     if key == ROUTERS_OWN:
         return False
     site, robot, name = parse_expression(key)
     if who.role is Role.ROUTER:
-        return True  # it brings what it has let in
+        return True  # it forwards what its own site allowed
     if act == "delete" or site != who.site:
         return False
     if act == "query":
@@ -79,7 +79,7 @@ def should(who: Principal, act: Act, key: str) -> bool:
 
 
 def _speakers(name: str) -> frozenset[Role]:
-    """Who publishes a topic, or answers a request."""
+    """Return the roles that publish a topic, or answer a request."""
     try:
         return topics.topic(name).publishers
     except UnknownTopicError:

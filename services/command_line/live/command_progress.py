@@ -1,4 +1,4 @@
-"""A command on its way: its answer, then its motion or program to the end, unless Ctrl-C comes before."""
+"""The progress of a command: its answer, then the end of its motion or program, unless Ctrl-C is first."""
 
 import asyncio
 import contextlib
@@ -11,19 +11,19 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 from services.command_line import discovery
 
-# `lease` and `program` beat each second: without them the gateway is gone.
+# The gateway publishes `lease` and `program` each second.
 _SILENCE_S = 5.0
-_WORDS_S = 1.5
-_MIND = "; mind: "
+_REASON_WITHIN_S = 1.5
+_WARNING = "; mind: "
 
 
 class Interrupted(Exception):
-    """Ctrl-C, while something was waited for."""
+    """Ctrl-C was pressed."""
 
 
 @contextlib.contextmanager
 def interrupt() -> Iterator[asyncio.Event]:
-    """Set by Ctrl-C, from before the command leaves: the arm may move before its answer is here."""
+    """Yield an event that Ctrl-C sets; enter before sending, because the arm may move before the answer."""
     interrupted = asyncio.Event()
     loop = asyncio.get_running_loop()
     loop.add_signal_handler(signal.SIGINT, interrupted.set)
@@ -34,7 +34,7 @@ def interrupt() -> Iterator[asyncio.Event]:
 
 
 async def stop(session: Session, robot: discovery.Robot, operator: str, reason: str) -> tuple[bool, str]:
-    """Ask for a stop: whether it was sent, and the gateway's words."""
+    """Request a stop; return whether the gateway sent it, and its text."""
     request = schema.StopRequest(by=operator, reason=reason)
     answer = await session.ask(robot_key(*robot, "stop"), request)
     assert isinstance(answer, schema.StopAnswer)
@@ -49,10 +49,10 @@ async def answered(
     *,
     timeout_s: float,
 ) -> schema.CommandAnswer:
-    """A command's answer.
+    """Return a command's answer.
 
     Raises:
-        Interrupted: If Ctrl-C came first: what was asked for may yet begin.
+        Interrupted: If Ctrl-C came first: the motion may still begin.
     """
     asked = asyncio.create_task(session.ask(key, request, timeout_s=timeout_s))
     pressed = asyncio.create_task(interrupted.wait())
@@ -70,9 +70,9 @@ async def answered(
 
 
 def warning_of(answer: schema.CommandAnswer) -> str:
-    """Return what an accepted command's answer warns of; empty: nothing."""
-    # An earlier gateway has the warning in its sentence alone.
-    return answer.warning.text or (answer.text.partition(_MIND)[2] if answer.accepted else "")
+    """Return the warning in an accepted command's answer; empty: none."""
+    # An earlier gateway has the warning only in its sentence.
+    return answer.warning.text or (answer.text.partition(_WARNING)[2] if answer.accepted else "")
 
 
 async def until_done(
@@ -84,7 +84,7 @@ async def until_done(
     *,
     runs: bool = False,
 ) -> tuple[bool, str]:
-    """Wait until the gateway says that the holder's motion, or program, has ended.
+    """Wait until the gateway reports the end of the operator's motion or program.
 
     Raises:
         Interrupted: If Ctrl-C came first.
@@ -97,8 +97,8 @@ async def until_done(
         if interrupted.is_set():
             raise Interrupted
         if renewing.done():
-            # The gateway's own words come right behind; a namesake may have control, and then none come.
-            await asyncio.wait((ended,), timeout=_WORDS_S)
+            # The gateway's reason follows shortly; not if another session of that name has control.
+            await asyncio.wait((ended,), timeout=_REASON_WITHIN_S)
             if not ended.done():
                 return False, f"control ended before the motion did: {await renewing}"
         return await ended or (True, "done")
@@ -108,7 +108,7 @@ async def until_done(
 
 
 async def _motion_ended(session: Session, robot: discovery.Robot, operator: str) -> tuple[bool, str] | None:
-    """None: ended well; otherwise what ended it."""
+    """Wait for the end of the motion; return None if it ended well, else False and the reason."""
     leases = session.subscribe(robot_key(*robot, "lease"), newest=20)
     while True:
         try:
@@ -117,20 +117,20 @@ async def _motion_ended(session: Session, robot: discovery.Robot, operator: str)
         except TimeoutError:
             return (
                 False,
-                f"the gateway fell silent: nobody knows what {robot} does; the dead-man stop is its own",
+                f"the gateway fell silent: only its dead-man stop can stop {robot} now",
             )
         lease = sample.message()
         assert isinstance(lease, schema.Lease)
         if not sample.live:
             continue
         if lease.holder != operator:
-            return False, f"control ended before the motion did: {lease.ended or 'nobody says why'}"
+            return False, f"control ended before the motion did: {lease.ended or 'for an unknown reason'}"
         if not lease.motion:
-            return await _how_it_ended(session, robot)
+            return await _motion_result(session, robot)
 
 
 async def _program_ended(session: Session, robot: discovery.Robot, operator: str) -> tuple[bool, str] | None:
-    """None: it is done; otherwise what ended it, and where."""
+    """Wait for the end of the program; return None if it is done, else False, the line and the reason."""
     states = session.subscribe(robot_key(*robot, "program"), newest=20)
     line = 0
     while True:
@@ -138,18 +138,18 @@ async def _program_ended(session: Session, robot: discovery.Robot, operator: str
             async with asyncio.timeout(_SILENCE_S):
                 sample = await anext(states)
         except TimeoutError:
-            return False, f"the gateway fell silent: nobody knows what {robot} does. {_make_sure(robot)}"
+            return False, f"the gateway fell silent: the state of {robot} is unknown. {_advice(robot)}"
         program = sample.message()
         assert isinstance(program, schema.ProgramState)
         if not sample.live:
             continue
         match program.outcome:
             case schema.ProgramState.OUTCOME_UNSPECIFIED:
-                return False, _began_anew(robot, line)
+                return False, _restarted(robot, line)
             case schema.ProgramState.ENDED:
                 return False, f"ended at line {program.line}: {program.text}"
             case schema.ProgramState.DONE:
-                # At its last target, but it may move yet: to give control back now would stop it.
+                # The robot may still move to the last target: releasing control now would stop it.
                 return await _motion_ended(session, robot, operator)
         if program.line != line:
             line = program.line
@@ -157,19 +157,19 @@ async def _program_ended(session: Session, robot: discovery.Robot, operator: str
             print(f"{step}, line {line}: {program.statement}", file=sys.stderr, flush=True)
 
 
-def _began_anew(robot: discovery.Robot, line: int) -> str:
+def _restarted(robot: discovery.Robot, line: int) -> str:
     seen = f", which was last seen at line {line}" if line else ""
-    return f"the gateway began anew: nobody runs the program any more{seen}. {_make_sure(robot)}"
+    return f"the gateway restarted, so the program no longer runs{seen}. {_advice(robot)}"
 
 
-def _make_sure(robot: discovery.Robot) -> str:
+def _advice(robot: discovery.Robot) -> str:
     return (
-        f"`robomesh send {robot} stop` makes sure that the robot stands, "
+        f"`robomesh send {robot} stop` makes sure that the robot stands still, "
         f"`robomesh send {robot} reset` lets it move again"
     )
 
 
-async def _how_it_ended(session: Session, robot: discovery.Robot) -> tuple[bool, str] | None:
+async def _motion_result(session: Session, robot: discovery.Robot) -> tuple[bool, str] | None:
     state = await session.last(robot_key(*robot, "controller"))
     if isinstance(state, schema.ControllerState):
         if state.HasField("stop"):

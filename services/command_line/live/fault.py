@@ -1,4 +1,4 @@
-"""`robomesh fault`: a simulated controller misbehaves on request, and behaves again."""
+"""`robomesh fault`: faults of a simulated controller, begun and ended on request."""
 
 from robomesh.keys import robot_key
 from robomesh.schemas.robomesh_pb2 import FaultAnswer, FaultRequest
@@ -7,8 +7,8 @@ from services.simulator.fault_table import FAULTS
 
 
 def run(robot: str, name: str, off: bool, router: str, as_json: bool) -> None:
-    """Begin or end a fault; without a name, say which there are."""
-    answer = discovery.run(_ask(robot, FaultRequest(fault=name, off=off), router))
+    """Begin or end a fault; without a name, list all faults."""
+    answer = discovery.run(_request(robot, FaultRequest(fault=name, off=off), router))
     if as_json:
         discovery.print_json({"active": list(answer.active), "known": list(answer.known)})
     elif name:
@@ -19,7 +19,7 @@ def run(robot: str, name: str, off: bool, router: str, as_json: bool) -> None:
             print(f"{mark} {known:<8} {FAULTS[known].effect if known in FAULTS else ''}".rstrip())
 
 
-async def _ask(name: str, request: FaultRequest, router: str) -> FaultAnswer:
+async def _request(name: str, request: FaultRequest, router: str) -> FaultAnswer:
     async with discovery.attached(router) as session:
         robot = await discovery.find(session, name)
         answer = await session.ask(robot_key(*robot, "simulator/fault"), request)

@@ -1,4 +1,4 @@
-"""`robomesh list`: sites, robots, services, who watches, who controls, how old, how far away."""
+"""`robomesh list`: sites, robots and services, with monitors, control, ages and round trips."""
 
 import asyncio
 import contextlib
@@ -16,42 +16,42 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.session import Session
 from services.command_line import discovery
 from services.command_line.alarm_lists import gone_sites, lists
-from services.command_line.live.listing_text import picture
+from services.command_line.live.listing_text import listing_text
 from services.command_line.live.monitor_text import replay_record
 
 _State = schema.ControllerState
 _Alarm = schema.Alarm
-# The quickest of so many questions, as many at once.
+# Requests per process, of which the quickest counts; requests in parallel; timeout.
 _CLOCKS, _CLOCKS_AT_ONCE, _CLOCK_S = 3, 8, 0.7
 _AGAIN_S = 2.0
 
 
 @dataclass
-class _Around:
-    """What is kept from one look to the next."""
+class _Clocks:
+    """Clock readings, kept from one collection to the next."""
 
-    clocks: dict[str, Clock] = field(default_factory=dict)
+    by_id: dict[str, Clock] = field(default_factory=dict)
 
 
 def run(router: str, as_json: bool, watch: bool = False) -> None:
-    """Print what is on the mesh: once, or again and again until Ctrl-C."""
+    """Print what is on the mesh, once, or repeatedly until Ctrl-C."""
     with contextlib.suppress(KeyboardInterrupt):
         discovery.run(_watch(router, as_json) if watch else _once(router, as_json))
 
 
 async def _once(router: str, as_json: bool) -> None:
     async with discovery.attached(router) as session:
-        found = await _collect(session, _Around())
+        found = await _collect(session, _Clocks())
     if as_json:
         discovery.print_json(found)
         return
     if not found["services"]:
-        print("nobody is on the mesh")
+        print("no service is on the mesh")
         return
     from rich.console import Console
 
     console = Console()
-    console.print(picture(found, console.width))
+    console.print(listing_text(found, console.width))
 
 
 async def _watch(router: str, as_json: bool) -> None:
@@ -59,22 +59,22 @@ async def _watch(router: str, as_json: bool) -> None:
     from rich.live import Live
 
     async with discovery.attached(router) as session:
-        around = _Around()
+        clocks = _Clocks()
         if as_json:
             while True:
-                discovery.print_json(await _collect(session, around))
+                discovery.print_json(await _collect(session, clocks))
                 await asyncio.sleep(_AGAIN_S)
         console = Console()
-        while not console.is_terminal:  # Live draws on a screen alone, and a pipe has none
-            console.print(picture(await _collect(session, around), console.width))
+        while not console.is_terminal:  # Live needs a screen
+            console.print(listing_text(await _collect(session, clocks), console.width))
             await asyncio.sleep(_AGAIN_S)
         with Live(console=console, screen=False, auto_refresh=False, vertical_overflow="crop") as live:
             while True:
-                live.update(picture(await _collect(session, around), console.width), refresh=True)
+                live.update(listing_text(await _collect(session, clocks), console.width), refresh=True)
                 await asyncio.sleep(_AGAIN_S)
 
 
-async def _collect(session: Session, around: _Around) -> dict[str, Any]:
+async def _collect(session: Session, clocks: _Clocks) -> dict[str, Any]:
     alive = await session.present()
     robots = sorted({(key.site, key.robot) for key in alive if key.robot != WHOLE_SITE})
     rows, health, listed = await asyncio.gather(
@@ -82,29 +82,29 @@ async def _collect(session: Session, around: _Around) -> dict[str, Any]:
         last_values(session, f"{ROOT}/*/{WHOLE_SITE}/health/*"),
         lists(session),
     )
-    told = {each.id: each for each in health.values() if isinstance(each, schema.ServiceHealth)}
-    processes = {key.id: key.site for key in alive if key.service not in SILENT and key.id in told}
-    await _read_clocks(session, processes, around)
+    by_process = {each.id: each for each in health.values() if isinstance(each, schema.ServiceHealth)}
+    processes = {key.id: key.site for key in alive if key.service not in SILENT and key.id in by_process}
+    await _read_clocks(session, processes, clocks)
     return {
         "robots": list(rows),
-        "services": [_service(key, told.get(key.id), around.clocks.get(key.id)) for key in alive],
+        "services": [_service(key, by_process.get(key.id), clocks.by_id.get(key.id)) for key in alive],
         "sites": _sites(alive, listed),
     }
 
 
-async def _read_clocks(session: Session, processes: dict[str, str], around: _Around) -> None:
-    turns = asyncio.Semaphore(_CLOCKS_AT_ONCE)
+async def _read_clocks(session: Session, processes: dict[str, str], clocks: _Clocks) -> None:
+    slots = asyncio.Semaphore(_CLOCKS_AT_ONCE)
 
     async def read(identity: str, site: str) -> None:
-        clock = around.clocks.setdefault(identity, Clock())
-        async with turns:
+        clock = clocks.by_id.setdefault(identity, Clock())
+        async with slots:
             for _ in range(_CLOCKS):
                 try:
                     clock.readings.append(await read_clock(session, site, identity, timeout_s=_CLOCK_S))
                 except NoAnswerError:
                     return
 
-    around.clocks = {identity: clock for identity, clock in around.clocks.items() if identity in processes}
+    clocks.by_id = {identity: clock for identity, clock in clocks.by_id.items() if identity in processes}
     await asyncio.gather(*(read(identity, site) for identity, site in processes.items()))
 
 
@@ -129,27 +129,27 @@ def _service(key: PresenceKey, health: schema.ServiceHealth | None, clock: Clock
 
 
 def _age_s(health: schema.ServiceHealth, best: Reading | None) -> float | None:
-    """Of what a process told last, by its own clock; None: nobody knows what that says."""
+    """Return the age of the process's last report, by its own clock; None: its clock's offset is unknown."""
     if best is None:
         return None
-    told_s = health.timestamp.ToNanoseconds() * 1e-9 - best.offset_s
-    return max(time.time() - told_s, 0.0)
+    sent_s = health.timestamp.ToNanoseconds() * 1e-9 - best.offset_s
+    return max(time.time() - sent_s, 0.0)
 
 
 def _sites(alive: list[PresenceKey], listed: list[schema.AlarmList]) -> list[dict[str, Any]]:
-    """Those that are there, and those of which a watch says that they are gone."""
+    """Return the sites that are present, and those that a watch reports as gone."""
     found = {each.site: each for each in listed}
-    there, gone = {key.site for key in alive}, gone_sites(listed)
+    present, gone = {key.site for key in alive}, gone_sites(listed)
     rows = []
-    for site in sorted(there | gone.keys()):
-        # A site that is gone cannot say what its alarms are.
-        held = found[site].alarms if site in found and site in there else None
+    for site in sorted(present | gone.keys()):
+        # The alarms of a site that is gone are unknown.
+        held = found[site].alarms if site in found and site in present else None
         states = None if held is None else Counter(_Alarm.State.Name(each.state).lower() for each in held)
         unseen = [each for each in held or () if each.state == _Alarm.UNACKNOWLEDGED]
         rows.append(
             {
                 "site": site,
-                "gone_since": None if site in there else gone[site].since.ToNanoseconds() * 1e-9,
+                "gone_since": None if site in present else gone[site].since.ToNanoseconds() * 1e-9,
                 "alarms": None if states is None else dict(states),
                 "most_urgent": {"id": unseen[0].id, "text": unseen[0].text} if unseen else None,
                 "monitors": len({key.id for key in alive if key.site == site and key.service == "monitor"}),
@@ -160,14 +160,14 @@ def _sites(alive: list[PresenceKey], listed: list[schema.AlarmList]) -> list[dic
 
 async def _row(session: Session, site: str, robot: str) -> dict[str, Any]:
     if is_replay(robot):
-        # What its controller and holder were when it was recorded is not so now.
-        return _nobody(site, robot, "replay") | {"replay": await _replayed(session, site, robot)}
+        # Its recorded controller and holder are not current.
+        return _row_without_gateway(site, robot, "replay") | {"replay": await _replayed(session, site, robot)}
     state, lease = await asyncio.gather(
         session.last(robot_key(site, robot, "controller"), timeout_s=1.5),
         session.last(robot_key(site, robot, "lease"), timeout_s=1.5),
     )
     if not isinstance(state, _State):
-        return _nobody(site, robot, "no gateway")
+        return _row_without_gateway(site, robot, "no gateway")
     return {
         "site": site,
         "robot": robot,
@@ -183,7 +183,7 @@ async def _row(session: Session, site: str, robot: str) -> dict[str, Any]:
     }
 
 
-def _nobody(site: str, robot: str, link: str) -> dict[str, Any]:
+def _row_without_gateway(site: str, robot: str, link: str) -> dict[str, Any]:
     return {
         "site": site,
         "robot": robot,
@@ -200,6 +200,6 @@ def _nobody(site: str, robot: str, link: str) -> dict[str, Any]:
 
 
 async def _replayed(session: Session, site: str, robot: str) -> dict[str, Any]:
-    """What a replay plays, and where it is."""
+    """Return a replay's recording and position."""
     state = await session.last(robot_key(site, robot, "replay"), timeout_s=1.5)
     return replay_record(state if isinstance(state, schema.ReplayState) else schema.ReplayState())

@@ -1,4 +1,4 @@
-"""`robomesh list` for people: a table of robots, a table of services, a line a site."""
+"""The text of `robomesh list`: a table of robots, a table of services, a line for each site."""
 
 from collections.abc import Iterable
 from datetime import datetime
@@ -10,19 +10,19 @@ if TYPE_CHECKING:
     from rich.console import Group
     from rich.table import Table
 
-# The longest word of a column.
+# Least column widths: the longest word of each.
 _LEAST = {"mode": len("automatic"), "in control": len("control")}
-# Below this a terminal has no room for all that there is.
+# A narrower terminal shows fewer columns.
 _WIDE = 96
 _CLOCK_OFF_S = 0.5
 
 
-def picture(found: dict[str, Any], width: int) -> "Group":
-    """Everything that was found.
+def listing_text(found: dict[str, Any], width: int) -> "Group":
+    """Return the tables and lines of a listing.
 
     Args:
-        found: As `--json` prints it.
-        width: Of the terminal, in characters.
+        found: The listing as `--json` prints it.
+        width: Width of the terminal, in characters.
     """
     from rich.console import Group
     from rich.text import Text
@@ -52,7 +52,7 @@ def _robots(found: dict[str, Any], width: int) -> "Table":
 
 
 def _services(services: Iterable[dict[str, Any]], width: int) -> "Table":
-    """A row a process; one of many robots is one."""
+    """Return a table with one row for each process, which may serve several robots."""
     rows: dict[str, dict[str, Any]] = {}
     robots: dict[str, list[str]] = {}
     for each in services:
@@ -88,7 +88,7 @@ def _table(names: Iterable[str], width: int, *, right: tuple[str, ...] = ("age",
 
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for name in names:
-        # What has no room goes on in the next line, whole.
+        # Fold long cells into the next line instead of cutting them.
         table.add_column(
             name,
             no_wrap=name in ("robot", "service") and width >= _WIDE,
@@ -110,7 +110,7 @@ def _number(value: float | None, form: str, factor: float = 1.0) -> str:
 
 
 def _clock(row: dict[str, Any]) -> str:
-    """How far ahead its clock is, and how sure that is."""
+    """Return how far the process's clock is ahead, with its uncertainty."""
     if row["clock_offset_s"] is None:
         return "-"
     offset_ms, about_ms = 1000 * row["clock_offset_s"], 500 * row["round_trip_s"]
@@ -122,7 +122,7 @@ def _clock(row: dict[str, Any]) -> str:
 def _site(row: dict[str, Any]) -> str:
     if row["gone_since"] is not None:
         return f"{row['site']} — gone since {since(row['gone_since'])}"
-    words = "no watch: nobody holds alarms"
+    words = "no watch, so no alarms"
     if row["alarms"] is not None:
         counts = [f"{count} {state}" for state, count in sorted(row["alarms"].items())]
         words = f"alarms: {', '.join(counts)}" if counts else "no alarms"
@@ -133,15 +133,15 @@ def _site(row: dict[str, Any]) -> str:
 
 
 def since(at_s: float) -> str:
-    """A time of today as a clock shows it, else with its date."""
+    """Format a time of today as a time, an earlier one with its date."""
     at = datetime.fromtimestamp(at_s).astimezone()
     today = at.date() == datetime.now().astimezone().date()
     return f"{at:%H:%M:%S}" if today else f"{at:%Y-%m-%d %H:%M}"
 
 
 def _alarm_style(row: dict[str, Any]) -> str:
-    wrong = row["gone_since"] is not None or (row["alarms"] or {}).get("unacknowledged")
-    return "bold red" if wrong else ""
+    urgent = row["gone_since"] is not None or (row["alarms"] or {}).get("unacknowledged")
+    return "bold red" if urgent else ""
 
 
 def _robot_style(row: dict[str, Any]) -> str | None:
@@ -154,7 +154,7 @@ def _replay(row: dict[str, Any]) -> str:
 
 
 def _state(row: dict[str, Any]) -> str:
-    """What the robot does, and what keeps it from doing it."""
+    """Return the robot's activity, and what blocks its motion."""
     words = [row["activity"]]
     if row["stop_id"] is not None:
         words.append(f"stop {row['stop_id']} latched")

@@ -1,4 +1,4 @@
-"""`robomesh monitor`: a robot in the terminal, live: a table with bars, or a line of JSON a state."""
+"""`robomesh monitor`: a live table of a robot with bars, or a line of JSON for each state."""
 
 import asyncio
 import contextlib
@@ -38,18 +38,18 @@ if TYPE_CHECKING:
 _State = schema.ControllerState
 _ROTARY = schema.Description.Joint.ROTARY
 _REDRAW_HZ = 10
-_BAR_CELLS, _LEAST_BAR_CELLS, _BESIDE_BAR_CELLS = 40, 5, 42
-# What a line of JSON tells beside the joints.
-_BESIDE = ("controller", "lease", "kinematics", "program")
-# Of a replay: what its controller and holder were when it was recorded is not so now.
-_BESIDE_REPLAY = ("replay", "kinematics", "program")
+_BAR_CELLS, _LEAST_BAR_CELLS, _OTHER_CELLS = 40, 5, 42
+# Topics that a line of JSON adds to the joints.
+_TOPICS = ("controller", "lease", "kinematics", "program")
+# A replay's recorded controller and holder are not current.
+_TOPICS_OF_REPLAY = ("replay", "kinematics", "program")
 _FIRST_S = 1.0
 
 
 def run(robot: str, router: str, as_json: bool, count: int | None) -> None:
     """Watch until Ctrl-C, or for `count` states."""
     with contextlib.suppress(KeyboardInterrupt):
-        # A pipe has no screen to draw on.
+        # The table needs a terminal.
         lines = as_json or not sys.stdout.isatty()
         discovery.run(_json(robot, router, count) if lines else _live(robot, router, count))
 
@@ -59,9 +59,9 @@ async def _json(name: str, router: str, count: int | None) -> None:
         robot = await discovery.find(session, name)
         session.declare_presence(robot.site, WHOLE_SITE, MONITOR)
         states = session.subscribe(robot_key(*robot, "joints"), newest=1000)
-        newest = _Newest(session, robot, _BESIDE_REPLAY if is_replay(robot.name) else _BESIDE)
-        async with newest.followed():
-            await newest.first()
+        newest = _Newest(session, robot, _TOPICS_OF_REPLAY if is_replay(robot.name) else _TOPICS)
+        async with newest.following():
+            await newest.wait_for_values()
             printed = 0
             async for sample in states:
                 discovery.print_json(_record(sample, states) | newest.record())
@@ -88,26 +88,26 @@ async def _live(name: str, router: str, count: int | None) -> None:
 
     async with discovery.attached(router) as session:
         robot = await discovery.find(session, name)
-        # Everybody sees who watches.
+        # Other clients list this monitor.
         session.declare_presence(robot.site, WHOLE_SITE, MONITOR)
-        beside = _BESIDE_REPLAY if is_replay(robot.name) else _BESIDE
-        newest = _Newest(session, robot, {"joints", "description", "controller", *beside})
-        # A screen of its own, drawn whole: nothing is left over when the window changes its size.
+        topics = _TOPICS_OF_REPLAY if is_replay(robot.name) else _TOPICS
+        newest = _Newest(session, robot, {"joints", "description", "controller", *topics})
+        # On the alternate screen, redrawn whole, so that a resized window keeps no old text.
         live = Live(screen=True, auto_refresh=False)
         width = live.console.width
         try:
             with live:
-                async with newest.followed():
+                async with newest.following():
                     while count is None or newest.states < count:
                         width = live.console.width
-                        live.update(newest.picture(width), refresh=True)
+                        live.update(newest.rendered(width), refresh=True)
                         await asyncio.sleep(1 / _REDRAW_HZ)
         finally:
-            live.console.print(newest.picture(width))
+            live.console.print(newest.rendered(width))
 
 
 class _Newest:
-    """The newest value of each topic that is shown."""
+    """The newest value of each displayed topic."""
 
     def __init__(self, session: Session, robot: discovery.Robot, names: Iterable[str]) -> None:
         self.robot = robot
@@ -118,25 +118,25 @@ class _Newest:
         self._values: dict[str, Any] = {}
 
     @asynccontextmanager
-    async def followed(self) -> AsyncIterator[None]:
-        """What comes is taken as long as the block lasts."""
-        followed = (*self.subscriptions.values(), self._alarms)
-        followers = [asyncio.create_task(self._follow(each)) for each in followed]
+    async def following(self) -> AsyncIterator[None]:
+        """Receive values while the block runs."""
+        subscriptions = (*self.subscriptions.values(), self._alarms)
+        followers = [asyncio.create_task(self._follow(each)) for each in subscriptions]
         try:
             yield
         finally:
             for follower in followers:
                 follower.cancel()
 
-    async def first(self) -> None:
-        """Wait for a value of each topic; but not for a service that is not there."""
+    async def wait_for_values(self) -> None:
+        """Wait for a value of each topic, up to a limit, because a service may be missing."""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(_FIRST_S):
                 while len(self._values) < len(self.subscriptions):
                     await asyncio.sleep(0.02)
 
     def record(self) -> dict[str, Any]:
-        """What is known beside the joints; null: nobody says so now."""
+        """Return the values besides the joints; null: unknown or stale."""
         lease, kinematics, program = (
             None if name not in self.subscriptions or self._stale(name) else self._values.get(name)
             for name in ("lease", "kinematics", "program")
@@ -154,19 +154,19 @@ class _Newest:
             self.states += subscription.topic.name == "joints"
 
     def age_s(self, name: str) -> float | None:
-        """Age of a topic [s]: since its last number, plus what the gateway says of the controller."""
+        """Return a topic's age [s]; of joints at least the age reported by a gateway whose link is down."""
         own = self.subscriptions[name].age_s(robot_key(*self.robot, name))
         if own is None or name != "joints":
             return own
         state = self._values.get("controller")
-        told = state.last_unit_age_s if state is not None and state.link != _State.UP else 0.0
-        return max(own, told)
+        reported = state.last_unit_age_s if state is not None and state.link != _State.UP else 0.0
+        return max(own, reported)
 
-    def picture(self, width: int) -> "Group":
-        """As it is now.
+    def rendered(self, width: int) -> "Group":
+        """Return the current display.
 
         Args:
-            width: Of the terminal, in characters.
+            width: Width of the terminal, in characters.
         """
         from rich.console import Group
         from rich.text import Text
@@ -181,7 +181,9 @@ class _Newest:
             head.append("live", style="green")
         if self.replayed:
             head.append(f"   {replay_words(self._values.get('replay'))}", style="magenta")
-            return Group(head, self._table(stale, width), *self._around(), *self._alarmed(), self._foot())
+            return Group(
+                head, self._table(stale, width), *self._surroundings(), *self._alarm_lines(), self._foot()
+            )
         state, lease = self._values.get("controller"), self._values.get("lease")
         if state is not None:
             head.append(f"   link {_word(_State.Link, state.link)}")
@@ -194,14 +196,16 @@ class _Newest:
                 head.append(f"   STOP REQUESTED by {state.stop.by}", style="bold red")
         if lease is not None:
             head.append(f"   control: {lease.holder or 'nobody'}")
-        return Group(head, self._table(stale, width), *self._around(), *self._alarmed(), self._foot())
+        return Group(
+            head, self._table(stale, width), *self._surroundings(), *self._alarm_lines(), self._foot()
+        )
 
     def _table(self, stale: bool, width: int) -> Any:
         from rich import box
         from rich.table import Table
 
-        # Name, position and limits come first; what is left is the bar's.
-        cells = min(max(width - _BESIDE_BAR_CELLS, 0), _BAR_CELLS)
+        # The bar gets the width that name, position and limits leave.
+        cells = min(max(width - _OTHER_CELLS, 0), _BAR_CELLS)
         table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
         for column, justify in (("joint", "left"), ("position", "right"), ("", "left"), ("limits", "left")):
             table.add_column(column, justify=justify, no_wrap=True)  # type: ignore[arg-type]
@@ -222,8 +226,8 @@ class _Newest:
             )
         return table
 
-    def _around(self) -> list[Any]:
-        """A line on what is near, and one on what is checked and what runs."""
+    def _surroundings(self) -> list[Any]:
+        """Return a line with clearances, and one with the check mode and the program."""
         from rich.text import Text
 
         state, kinematics, program = (
@@ -240,18 +244,18 @@ class _Newest:
         if state is not None and not self.replayed:
             runs.append(check_words(state))
         ran = None if program is None else program_words(program, stale=self._stale("program"))
-        # It ran when this was recorded.
+        # The program ran when this was recorded.
         runs.append((f"then: {ran[0]}", OLD) if ran is not None and self.replayed else ran)
         lines = [near, [words for words in runs if words is not None]]
         return [Text("   ").join(Text(*each) for each in line) for line in lines if line]
 
-    def _alarmed(self) -> list[Any]:
-        """A line for each alarm of the robot and its site that nobody has put aside; the first few."""
+    def _alarm_lines(self) -> list[Any]:
+        """Return a line for each of the first alarms of the robot and its site that are not shelved."""
         from rich.text import Text
 
         listed = self._values.get("alarms")
-        told = alarm_words(listed.alarms if listed is not None else (), self.robot.name)
-        return [Text(*each) for each in told]
+        lines = alarm_words(listed.alarms if listed is not None else (), self.robot.name)
+        return [Text(*each) for each in lines]
 
     def _stale(self, name: str) -> bool:
         age = self.age_s(name)
@@ -263,18 +267,18 @@ class _Newest:
         kinematics, state = self._values.get("kinematics"), self._values.get("controller")
         joints = self.subscriptions["joints"]
         key = robot_key(*self.robot, "joints")
-        told = []
+        values = []
         if kinematics is not None:
             x, y, z = (kinematics.tool_to_base[index] * 1000 for index in (3, 7, 11))
-            told.append(f"tool {x:.1f} {y:.1f} {z:.1f} mm")
+            values.append(f"tool {x:.1f} {y:.1f} {z:.1f} mm")
         if state is not None and not self.replayed:
-            told.append(f"controller: {link_words(state)}")
+            values.append(f"controller: {link_words(state)}")
         own = f"missed here: {joints.lost(key)}   {time.strftime('%H:%M:%S')}   Ctrl-C ends"
-        return Text("\n".join(["   ".join(told), own] if told else [own]), style="dim")
+        return Text("\n".join(["   ".join(values), own] if values else [own]), style="dim")
 
 
 def link_words(state: schema.ControllerState) -> str:
-    """How well the controller's link does, briefly: only what is known of it, and what is wrong."""
+    """Return the health of the controller's link: known values, and counters that are not 0."""
     health, counters = state.health, state.counters
     words = [f"{state.rate_hz:.0f} units/s"] if state.HasField("rate_hz") else []
     for name in ("jitter", "network_round_trip", "answer"):
@@ -294,7 +298,7 @@ def link_words(state: schema.ControllerState) -> str:
 
 
 def _bar(position: float, lower: float, upper: float, cells: int) -> str:
-    """Where in its range; nothing where there is no room for it."""
+    """Draw a position within its limits; empty if the terminal is too narrow."""
     if cells < _LEAST_BAR_CELLS:
         return ""
     span = upper - lower

@@ -1,4 +1,4 @@
-"""What `robomesh monitor` says beside the joints: how near things are, what is checked, what runs."""
+"""Texts and JSON values of `robomesh monitor` besides the joints: clearances, checks, programs, replays."""
 
 from collections.abc import Iterable
 from datetime import datetime
@@ -19,13 +19,13 @@ _CHECKS = {
 }
 _STYLES = ("", "bold yellow", "bold red")
 
-# A text, and its style.
+# A text and its style.
 Words = tuple[str, str]
 OLD = "dim strike"
 
 
 def replay_words(state: schema.ReplayState | None) -> str:
-    """What is played, and where in it we are; None: its player has not told yet."""
+    """Describe a replay's recording and position; without a state just as a replay."""
     if state is None:
         return "REPLAY"
     how = f"{state.speed:g} x" if state.playing else "paused"
@@ -36,7 +36,7 @@ def replay_words(state: schema.ReplayState | None) -> str:
 
 
 def replay_record(state: schema.ReplayState | None) -> dict[str, Any]:
-    """What is played, and where in it we are, for programs; empty: its player has not told yet."""
+    """Return a replay's recording and position as JSON values; empty without a state."""
     if state is None:
         return {}
     return {
@@ -51,14 +51,14 @@ def replay_record(state: schema.ReplayState | None) -> dict[str, Any]:
 
 
 def _recorded(state: schema.ReplayState) -> datetime:
-    """When what is shown now was so, local time."""
+    """Return when the current position was recorded, in local time."""
     return datetime.fromtimestamp(state.start.ToNanoseconds() * 1e-9 + state.position_s).astimezone()
 
 
 def near_words(
     state: schema.KinematicState, description: schema.Description | None, robot: str
 ) -> list[Words]:
-    """How near an arm is to things, each with its style.
+    """Return clearances and singularity margin, each with its style.
 
     Args:
         robot: `<site>/<robot>`.
@@ -77,12 +77,12 @@ def near_words(
     if state.HasField("singularity_margin"):
         words.append((f"singularity margin {state.singularity_margin:.3f}", ""))
     if state.not_counted:
-        words.append((f"not counted, nobody knows where: {', '.join(state.not_counted)}", _STYLES[1]))
+        words.append((f"not counted, at unknown positions: {', '.join(state.not_counted)}", _STYLES[1]))
     return words
 
 
 def alarm_words(alarms: Iterable[schema.Alarm], robot: str) -> list[Words]:
-    """The most urgent alarms of a robot and of its whole site that nobody put aside, a line each."""
+    """Return a line for each of the most urgent alarms of a robot and its site that are not shelved."""
     own = [each for each in alarms if each.robot in (robot, WHOLE_SITE) and each.state != _Alarm.SHELVED]
     words = []
     for alarm in own[:_MOST_ALARMS]:
@@ -97,7 +97,7 @@ def alarm_words(alarms: Iterable[schema.Alarm], robot: str) -> list[Words]:
 
 
 def check_words(state: schema.ControllerState) -> Words | None:
-    """Whether motions are checked before they are made; None: the gateway does not say."""
+    """Describe the check of motions; None: the gateway does not report it."""
     if state.check not in _CHECKS:
         return None
     if state.check_text:
@@ -107,15 +107,15 @@ def check_words(state: schema.ControllerState) -> Words | None:
 
 
 def program_words(state: schema.ProgramState, *, stale: bool = False) -> Words | None:
-    """The program that runs, or ran last; None: none was run."""
+    """Describe the running or last program; None: no program ran."""
     where = f"line {state.line}: {state.statement}"
     match state.outcome:
         case _Program.RUNNING:
-            gone_s = (state.timestamp.ToNanoseconds() - state.since.ToNanoseconds()) * 1e-9
+            elapsed_s = (state.timestamp.ToNanoseconds() - state.since.ToNanoseconds()) * 1e-9
             of = f" of {clock(state.duration_s)}" if state.duration_s > 0 else ""
             return (
                 f"program {state.name}: step {state.step} of {state.steps}, {where}; "
-                f"by {state.operator}, {clock(gone_s)}{of}"
+                f"by {state.operator}, {clock(elapsed_s)}{of}"
             ), OLD if stale else "bold"
         case _Program.DONE:
             return f"program {state.name}: done, by {state.operator}", ""
@@ -125,7 +125,7 @@ def program_words(state: schema.ProgramState, *, stale: bool = False) -> Words |
 
 
 def clearance_record(state: schema.KinematicState | None, robot: str) -> dict[str, Any] | None:
-    """What is nearest to an arm, for programs; None: nobody knows, or nothing stands around.
+    """Return an arm's least clearance as JSON values; None: unknown, or nothing is around the arm.
 
     Args:
         robot: `<site>/<robot>`.
@@ -139,12 +139,12 @@ def clearance_record(state: schema.KinematicState | None, robot: str) -> dict[st
 
 
 def program_record(state: schema.ProgramState | None) -> dict[str, Any] | None:
-    """The program that runs, or ran last, for programs; None: none was run, or nobody says so."""
+    """Return the running or last program as JSON values; None: no program ran, or unknown."""
     if state is None or state.outcome == _Program.OUTCOME_UNSPECIFIED:
         return None
     outcome = _Program.Outcome.Name(state.outcome).lower()
-    told = {name: getattr(state, name) for name in ("name", "operator", "line", "step", "steps", "text")}
-    return {"outcome": outcome, **told}
+    values = {name: getattr(state, name) for name in ("name", "operator", "line", "step", "steps", "text")}
+    return {"outcome": outcome, **values}
 
 
 def _distance(clearance: schema.Clearance, robot: str) -> str:
@@ -158,5 +158,5 @@ def _distance(clearance: schema.Clearance, robot: str) -> str:
 
 
 def clock(seconds: float) -> str:
-    """A duration as a clock shows it: 00:12."""
+    """Format a duration as minutes and seconds: 00:12."""
     return f"{int(seconds) // 60:02d}:{int(seconds) % 60:02d}"

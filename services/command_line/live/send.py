@@ -1,4 +1,4 @@
-"""`robomesh send`: one command to a robot, under a lease that lives as long as its motion."""
+"""`robomesh send`: one command to a robot, under a lease held until its motion ends."""
 
 import asyncio
 import sys
@@ -25,7 +25,7 @@ from services.command_line.live.command_progress import (
 from services.errors import ServiceError
 
 _Command = schema.CommandRequest
-_LATEST_NS = 3_000_000_000
+_VALID_NS = 3_000_000_000
 _MOTIONS = (_Command.HOME, _Command.MOVE_ABSOLUTE, _Command.MOVE_RELATIVE, _Command.RESUME)
 _WORDS = {
     ("home",): _Command.HOME,
@@ -37,18 +37,18 @@ _WORDS = {
 }
 _USAGE = "home, stop, hold, resume, reset, trace on, trace off, speed N, move Q... (degrees, mm), or run FILE"
 # The gateway plans and checks a whole program before it begins.
-_PROGRAM_S = 60.0
-_RECORDER_S = 0.5
+_PROGRAM_TIMEOUT_S = 60.0
+_RECORDER_TIMEOUT_S = 0.5
 
 
 class WordsError(ServiceError):
-    """Words that are no command."""
+    """The words are not a command."""
 
 
 def run(robot: str, words: list[str], router: str, operator: str, as_json: bool) -> None:
-    """Send; exit status 1 when it is refused."""
+    """Send a command; exit status 1 when it is refused."""
     if words != ["stop"]:
-        _parse(words, None)  # before anything is asked of anybody
+        _parse(words, None)  # before any request
     accepted, text = discovery.run(_send(robot, words, router, check_chunk(operator or discovery.own_name())))
     if as_json:
         discovery.print_json({"accepted": accepted, "text": text})
@@ -68,63 +68,63 @@ async def _send(name: str, words: list[str], router: str, operator: str) -> tupl
         if known is None and words[0] == "move":
             return (
                 False,
-                f"nobody tells what {robot} is, so degrees and mm mean nothing: start its kinematics",
+                f"{robot} has no description to convert degrees and mm with: start its kinematics",
             )
         request = _parse(words, known)
         try:
             async with control(session, *robot, operator) as own:
                 request.lease = own.lease
                 request.id = 1
-                # By the gateway's clock: what is held up on the way must not move an arm later.
+                # By the gateway's clock: a delayed command must not move an arm later.
                 runs = request.command == _Command.RUN_PROGRAM
-                waits_ns = round(_PROGRAM_S * 1e9) if runs else _LATEST_NS
+                waits_ns = round(_PROGRAM_TIMEOUT_S * 1e9) if runs else _VALID_NS
                 request.not_after.FromNanoseconds(own.now_ns + waits_ns)
                 if request.command == _Command.RESET:
                     request.stop_id = await _latched_stop(session, robot)
-                accepted, text = await _to_its_end(session, robot, operator, request, own.renewing)
+                accepted, text = await _send_and_wait(session, robot, operator, request, own.renewing)
                 if accepted and request.command == _Command.TRACE_ON:
                     text += await joined(session, robot)
         except RefusedError as error:
-            accepted, text = False, in_words_of_the_command_line(error, robot)
+            accepted, text = False, with_commands(error, robot)
         return accepted, text
 
 
-async def _to_its_end(
+async def _send_and_wait(
     session: Session,
     robot: discovery.Robot,
     operator: str,
     request: schema.CommandRequest,
     renewing: asyncio.Task[str],
 ) -> tuple[bool, str]:
-    """Send a command, and stay until what it began has ended; Ctrl-C stops the robot, at any time."""
+    """Send a command and wait until its motion or program ends; Ctrl-C stops the robot."""
     runs = request.command == _Command.RUN_PROGRAM
     with interrupt() as interrupted:
         try:
             key = robot_key(*robot, f"command/{operator}")
-            timeout_s = _PROGRAM_S if runs else 2.0
+            timeout_s = _PROGRAM_TIMEOUT_S if runs else 2.0
             answer = await answered(session, key, request, interrupted, timeout_s=timeout_s)
             if not answer.accepted or not (runs or request.command in _MOTIONS):
                 return answer.accepted, answer.text
             warning = warning_of(answer)
             if warning:
-                print(f"mind: {warning}", file=sys.stderr, flush=True)
+                print(f"warning: {warning}", file=sys.stderr, flush=True)
             done, text = await until_done(session, robot, operator, renewing, interrupted, runs=runs)
-            return done, f"{text}; mind: {warning}" if warning else text
+            return done, f"{text}; warning: {warning}" if warning else text
         except Interrupted:
             _, said = await stop(session, robot, operator, "Ctrl-C in robomesh send")
             return False, f"interrupted: {said}"
 
 
 async def joined(session: Session, robot: discovery.Robot) -> str:
-    """Into whose recording a trace goes that began while one ran: it gets none of its own."""
-    last = await session.last(robot_key(*robot, "recording"), timeout_s=_RECORDER_S)
+    """Return the recording that a trace joins, in words; empty: the trace has its own."""
+    last = await session.last(robot_key(*robot, "recording"), timeout_s=_RECORDER_TIMEOUT_S)
     if isinstance(last, schema.Recording) and last.open and last.started_by == "request":
         return f"; recorded in {last.name!r}, which is being recorded already"
     return ""
 
 
-def in_words_of_the_command_line(error: RefusedError, robot: discovery.Robot) -> str:
-    """Return a refusal's sentence with what to do next as a command to type."""
+def with_commands(error: RefusedError, robot: discovery.Robot) -> str:
+    """Return a refusal's sentence, with its advice as a command to type."""
     text, reason = str(error), error.reason
     if reason.code in (codes.STOP_LATCHED.name, codes.STOP_OTHER.name):
         advice = f"send RESET with stop_id {reason.values.get('id')}"
@@ -138,16 +138,16 @@ def in_words_of_the_command_line(error: RefusedError, robot: discovery.Robot) ->
 
 
 async def _latched_stop(session: Session, robot: discovery.Robot) -> int:
-    """The stop that a RESET is to name; 0 where none is latched, and the controller itself is stopped."""
+    """Return the id of the stop for a RESET; 0: none is latched, only the controller itself is stopped."""
     state = await session.last(robot_key(*robot, "controller"))
     return state.stop.id if isinstance(state, schema.ControllerState) else 0
 
 
 def _parse(words: list[str], description: schema.Description | None) -> schema.CommandRequest:
-    """The request that the words mean; joint positions in SI only once the robot is known.
+    """Return the request for the words; its joint positions are in SI only with a description.
 
     Raises:
-        WordsError: If they mean none.
+        WordsError: If the words are not a command.
     """
     command = _WORDS.get(tuple(words))
     if command is not None:
@@ -172,7 +172,7 @@ def _parse(words: list[str], description: schema.Description | None) -> schema.C
                     for value, joint in zip(positions, description.joints, strict=True)
                 ]
             return _Command(command=_Command.MOVE_ABSOLUTE, joint_positions=positions)
-    raise WordsError(f"{' '.join(words)!r} is no command: {_USAGE}")
+    raise WordsError(f"{' '.join(words)!r} is not a command: {_USAGE}")
 
 
 def _program(path: Path) -> str:
@@ -187,4 +187,4 @@ def _number(text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise WordsError(f"{text!r} is no number: {_USAGE}") from None
+        raise WordsError(f"{text!r} is not a number: {_USAGE}") from None

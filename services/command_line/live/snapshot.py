@@ -1,4 +1,4 @@
-"""`robomesh snapshot`: a rendered picture in a file."""
+"""`robomesh snapshot`: a rendered picture, saved to a file."""
 
 from pathlib import Path
 
@@ -8,16 +8,16 @@ from services.command_line import discovery
 from services.command_line.live.views import view_of
 from services.errors import ServiceError
 
-# A robot of many parts, first drawn on a busy machine, takes a while.
+# On a busy machine the first picture of a robot with many parts takes seconds.
 _TIMEOUT_S = 15.0
 
 
 class NoPictureError(ServiceError):
-    """There is no picture, or no file for it."""
+    """No picture arrived, or it cannot be written."""
 
 
 def run(robot: str, view: str, out: Path, size: tuple[int, int], router: str) -> None:
-    """Save the picture; PNG, JPEG or whatever else the file's name says.
+    """Save the picture, in the format of the file's ending.
 
     Args:
         size: Width and height [px]; 0: the renderer's own.
@@ -31,13 +31,13 @@ def run(robot: str, view: str, out: Path, size: tuple[int, int], router: str) ->
 
         image = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
         if image is None:
-            raise NoPictureError(f"what came for {view!r} is no picture")
+            raise NoPictureError(f"view {view!r}: the renderer sent no valid picture")
         try:
             done, encoded = cv2.imencode(out.suffix or ".png", image)
         except cv2.error:
             done = False
         if not done:
-            raise NoPictureError(f"{out}: no picture format {out.suffix!r}; .png and .jpg are right")
+            raise NoPictureError(f"{out}: unknown picture format {out.suffix!r}; .png and .jpg are right")
         data = encoded.tobytes()
     try:
         out.write_bytes(data)
@@ -53,6 +53,6 @@ async def _picture(name: str, view: str, size: tuple[int, int], router: str) -> 
         message = await session.last(keys.image, timeout_s=_TIMEOUT_S)
         if not isinstance(message, CompressedImage):
             raise NoPictureError(
-                f"no picture of {robot} from {view!r} came within {_TIMEOUT_S:g} s: the renderer's log tells"
+                f"no picture of {robot} from {view!r} within {_TIMEOUT_S:g} s: see the renderer's log"
             )
         return bytes(message.data)

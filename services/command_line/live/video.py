@@ -1,4 +1,4 @@
-"""`robomesh video`: a view's video in an MP4 file, the packets as they come, without a second encode."""
+"""`robomesh video`: a view's video packets, saved to an MP4 file without a second encode."""
 
 import asyncio
 import contextlib
@@ -19,18 +19,18 @@ from services.command_line import discovery
 from services.command_line.live.views import view_of
 from services.errors import ServiceError
 
-# A view in which nothing moves comes twice a second.
+# The renderer sends a view without motion twice a second.
 _SILENT_S = 10.0
-_RING = 64
+_NEWEST = 64
 
 
 class VideoError(ServiceError):
-    """No video, or no file for it, or it ended by itself."""
+    """No video arrives, or it cannot be written."""
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is to be saved; 0: until Ctrl-C, and in the renderer's own size and rate."""
+    """The requested length, size and rate; 0: until Ctrl-C, and the renderer's own."""
 
     seconds: float = 0.0
     width: int = 0
@@ -39,11 +39,11 @@ class Wanted:
 
 
 def run(robot: str, view: str, out: Path, wanted: Wanted, router: str, as_json: bool) -> None:
-    """Save video until it is enough, or Ctrl-C."""
+    """Save video for the requested time, or until Ctrl-C."""
     if out.suffix.lower() != ".mp4":
         raise VideoError(f"{out}: video is written as .mp4")
     if not 0 <= wanted.seconds < float("inf"):
-        raise VideoError(f"--seconds {wanted.seconds:g}: 0 (until Ctrl-C) and more is possible")
+        raise VideoError(f"--seconds {wanted.seconds:g}: 0 (until Ctrl-C) or more is right")
     file = _File(out)
     try:
         discovery.run(_save(robot, view, file, wanted, router))
@@ -67,10 +67,10 @@ def run(robot: str, view: str, out: Path, wanted: Wanted, router: str, as_json: 
 
 
 class _File:
-    """The file, which is there from its first picture on, and can be played from then on.
+    """The MP4 file: created with the first picture, and playable from then on.
 
     Attributes:
-        fps: Highest rate of the view [1/s]; 0: it is not told.
+        fps: Highest rate of the view [1/s]; 0: unknown.
     """
 
     def __init__(self, path: Path) -> None:
@@ -82,7 +82,7 @@ class _File:
 
     @property
     def words(self) -> str:
-        """What was written."""
+        """Describe what was written."""
         if not self.bytes:
             return "nothing was written"
         most = f" (up to {self.fps:g} while it moves)" if self.fps else ""
@@ -93,7 +93,7 @@ class _File:
 
     @property
     def pictures_per_s(self) -> float:
-        """How many came a second."""
+        """Mean rate of the written pictures [1/s]."""
         return self.mp4.pictures / self.mp4.duration_s if self.mp4.pictures else 0.0
 
     def add(self, packet: bytes, time_ns: int) -> None:
@@ -120,7 +120,7 @@ async def _save(name: str, view: str, file: _File, wanted: Wanted, router: str) 
         robot = await discovery.find(session, name)
         keys = await view_of(session, robot, view, width=wanted.width, height=wanted.height, fps=wanted.fps)
         file.fps = keys.fps
-        video = session.subscribe(keys.video, newest=_RING, history=False)
+        video = session.subscribe(keys.video, newest=_NEWEST, history=False)
         taking = asyncio.create_task(_take(video, file, wanted.seconds))
         with _on_interrupt(taking):
             await asyncio.wait([taking])
@@ -137,12 +137,12 @@ async def _take(video: Subscription, file: _File, seconds: float) -> None:
                 sample = await anext(video)
                 message = sample.message()
         except TimeoutError:
-            raise VideoError(f"no picture came for {_SILENT_S:g} s") from None
+            raise VideoError(f"no picture arrived for {_SILENT_S:g} s") from None
         except MessageError:
             continue
         if not isinstance(message, CompressedVideo):
             continue
-        # After a gap, what follows shows nothing right until the next key frame.
+        # After a gap, packets cannot be decoded correctly until the next key frame.
         missed = video.missed(sample.key)
         whole = (whole and missed == lost) or is_key_frame(message.data)
         lost = missed
@@ -152,7 +152,7 @@ async def _take(video: Subscription, file: _File, seconds: float) -> None:
 
 @contextlib.contextmanager
 def _on_interrupt(task: asyncio.Task[None]) -> Iterator[None]:
-    """The first Ctrl-C ends the task; a second one ends the program."""
+    """Cancel the task on the first Ctrl-C; a second one ends the program."""
     loop = asyncio.get_running_loop()
 
     def end(number: int) -> None:

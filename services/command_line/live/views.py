@@ -1,4 +1,4 @@
-"""A view of a robot, for a command that saves what it shows."""
+"""The keys of a robot's view, for a command that saves its video or pictures."""
 
 import contextlib
 from typing import NamedTuple
@@ -16,11 +16,11 @@ _RATE_TIMEOUT_S = 1.0
 
 
 class NoRendererError(ServiceError):
-    """Nobody draws the robot."""
+    """No renderer draws the robot."""
 
 
 class View(NamedTuple):
-    """The keys of a view's video and stills; its highest rate [1/s], 0: it is not told."""
+    """The keys of a view's video and pictures, and its highest rate [1/s]; 0: unknown."""
 
     video: str
     image: str
@@ -30,36 +30,40 @@ class View(NamedTuple):
 async def view_of(
     session: Session, robot: discovery.Robot, name: str, *, width: int = 0, height: int = 0, fps: float = 0.0
 ) -> View:
-    """A view by its name, in a size and at a rate of one's own where they are named.
+    """Return a view by its name, in the requested size and rate if given.
 
     Raises:
-        RefusedError: If there is none of that name, or not of that size; the text says what there is.
-        NoRendererError: If nobody draws the robot.
+        RefusedError: If the renderer has no view of that name or size; the text lists its views.
+        NoRendererError: If no renderer answers.
     """
     check_chunk(name, "view")
     try:
         if width or height or fps:
             request = ViewRequest(of=name, width=width, height=height, fps=fps)
-            answer = await session.ask(_views(session, robot), request, timeout_s=_TIMEOUT_S)
+            answer = await session.ask(_views_key(session, robot), request, timeout_s=_TIMEOUT_S)
             assert isinstance(answer, ViewAnswer)
             return View(robot_key(*robot, answer.topic), robot_key(*robot, answer.image), answer.fps)
         view = View(robot_key(*robot, f"video/{name}"), robot_key(*robot, f"image/{name}"))
-        # Who draws no such view says which there are.
+        # A renderer without the view refuses, and lists its views.
         key = f"{view.video}/keyframe/{session.own_name}"
         await session.ask(key, KeyFrameRequest(), timeout_s=_TIMEOUT_S)
         return view._replace(fps=await _rate(session, robot, name))
     except NoAnswerError:
-        raise NoRendererError(f"nobody draws {robot}: is the renderer of {robot.site} running?") from None
+        raise NoRendererError(
+            f"no renderer draws {robot}: is the renderer of {robot.site} running?"
+        ) from None
 
 
-def _views(session: Session, robot: discovery.Robot) -> str:
+def _views_key(session: Session, robot: discovery.Robot) -> str:
     return robot_key(*robot, f"views/{session.own_name}")
 
 
 async def _rate(session: Session, robot: discovery.Robot, name: str) -> float:
-    """A view's highest rate [1/s]; 0: no renderer has it, it is a recording's."""
+    """Return a view's highest rate [1/s]; 0: a recording's view, without a renderer."""
     with contextlib.suppress(BusError):
-        answer = await session.ask(_views(session, robot), ViewRequest(of=name), timeout_s=_RATE_TIMEOUT_S)
+        answer = await session.ask(
+            _views_key(session, robot), ViewRequest(of=name), timeout_s=_RATE_TIMEOUT_S
+        )
         assert isinstance(answer, ViewAnswer)
         return answer.fps
     return 0.0

@@ -1,1 +1,1 @@
-"""`robomesh record` and `robomesh recordings`: what is recorded, played back, exported."""
+"""`robomesh record` and `robomesh recordings`: record, list, play, export and fetch."""

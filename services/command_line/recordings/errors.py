@@ -1,11 +1,11 @@
 """Errors of the commands about recordings.
 
 ServiceError
-└── ExportError             what cannot be made of a recording, or fetched
+└── ExportError             a recording cannot be exported, fetched or played
 """
 
 from services.errors import ServiceError
 
 
 class ExportError(ServiceError):
-    """What cannot be made of a recording, or fetched."""
+    """A recording cannot be exported, fetched or played."""

@@ -1,4 +1,4 @@
-"""`robomesh recordings export`: a recording as a table, video or plots, by the name's ending."""
+"""`robomesh recordings export`: a recording as a table, video or plots, by the file's ending."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,8 +6,8 @@ from pathlib import Path
 from mcap_files.reading import RecordingFile
 from services.command_line import discovery
 from services.command_line.recordings.errors import ExportError
-from services.command_line.recordings.fetch import here
-from services.command_line.recordings.output import whole_file
+from services.command_line.recordings.fetch import local_file
+from services.command_line.recordings.output import atomic_file
 from services.command_line.recordings.span import Span, span_of
 
 _PLOTS = (".png", ".pdf", ".svg")
@@ -15,15 +15,15 @@ _PLOTS = (".png", ".pdf", ".svg")
 
 @dataclass(frozen=True, kw_only=True)
 class Wanted:
-    """What is to be made of a recording.
+    """The requested part of a recording, and options of its video.
 
     Attributes:
-        begin_s: From the recording's start.
-        end_s: None: to its end.
-        view: Rendered afresh.
-        size: Of the video [px].
-        samples: Of anti-aliasing.
-        recorded: Whose recorded video is taken as it is; empty: rendered afresh.
+        begin_s: Since the recording's start.
+        end_s: Since the recording's start; None: to its end.
+        view: View to render.
+        size: Video size [px].
+        samples: Anti-aliasing samples.
+        recorded: View whose recorded video is copied; empty: render `view`.
     """
 
     begin_s: float = 0.0
@@ -39,17 +39,17 @@ def run(source: str, out: Path, wanted: Wanted, router: str, as_json: bool) -> N
     """Export a file of this machine, or a recording of a site.
 
     Raises:
-        ExportError: If it cannot be.
+        ExportError: If the recording cannot be exported as requested.
         RecordingError: If the recording cannot be read.
     """
     kind = out.suffix.lower()
     if kind not in (".csv", ".mp4", *_PLOTS):
         raise ExportError(
-            f"{out}: a name ends in .csv (joints and tool), .mp4 (video), {', '.join(_PLOTS)} (plots)"
+            f"{out}: the name must end in .csv (joints and tool), .mp4 (video), {', '.join(_PLOTS)} (plots)"
         )
-    with here(source, router) as path, RecordingFile(path) as file:
+    with local_file(source, router) as path, RecordingFile(path) as file:
         span = span_of(file, wanted.begin_s, wanted.end_s)
-        with whole_file(out) as partial:
+        with atomic_file(out) as partial:
             words, values = _write(file, span, partial, kind, wanted)
     if as_json:
         discovery.print_json({"file": str(out), "bytes": out.stat().st_size, **values})

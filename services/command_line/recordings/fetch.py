@@ -1,4 +1,4 @@
-"""`robomesh recordings fetch`: a recording from its site's recorder, over the mesh, with resume."""
+"""`robomesh recordings fetch`: a recording from its site's recorder over the mesh, with resume."""
 
 import asyncio
 import contextlib
@@ -20,30 +20,30 @@ from services.command_line.recordings.output import progress
 
 _PIECE = 1 << 20
 _TIMEOUT_S, _TRIES = 10.0, 2
-# A quota is a minute's worth: by then it has given something back.
-_MOST_WAIT_S = 60.0
+# A quota counts one minute: after that some of it is free again.
+_LONGEST_WAIT_S = 60.0
 
 
 def run(what: str, out: Path, router: str, as_json: bool) -> None:
-    """Fetch `[SITE/]NAME` or `[SITE/]FILE`; what was broken off goes on, if it is still the same.
+    """Fetch `[SITE/]NAME` or `[SITE/]FILE`, and resume an earlier fetch of the same version.
 
     Raises:
-        ExportError: If there is none, it cannot be written, or changes meanwhile.
+        ExportError: If no recording has the name, it cannot be written, or it changes during the fetch.
     """
     done = _run(what, out, router)
     if as_json:
-        discovery.print_json({"file": str(done.file), "bytes": done.total, "resumed_at": done.begun})
+        discovery.print_json({"file": str(done.file), "bytes": done.total, "resumed_at": done.resumed_at})
     else:
-        begun = f", from byte {done.begun} on" if done.begun else ""
+        begun = f", from byte {done.resumed_at} on" if done.resumed_at else ""
         print(f"{done.file}: {done.total / 1e6:.2f} MB{begun}")
 
 
 @contextlib.contextmanager
-def here(what: str, router: str) -> Iterator[Path]:
-    """A file of this machine, or a site's recording, fetched for as long as the block lasts.
+def local_file(what: str, router: str) -> Iterator[Path]:
+    """Yield a file of this machine, or a site's recording in a temporary file.
 
     Raises:
-        ExportError: If there is none.
+        ExportError: If neither exists.
     """
     if Path(what).is_file():
         yield Path(what)
@@ -54,7 +54,7 @@ def here(what: str, router: str) -> Iterator[Path]:
 
 class _Fetched(NamedTuple):
     file: Path
-    begun: int
+    resumed_at: int
     total: int
 
 
@@ -69,41 +69,41 @@ async def _fetch(what: str, out: Path, router: str, *, into: bool) -> _Fetched:
     async with attached_for(what, router) as session:
         site, recording = await found(session, what)
         name = recording.file
-        # It comes from whoever answered there: nothing but a name may become a path here.
+        # The name comes from another machine: accept no path.
         if name in ("", ".", "..") or Path(name).name != name:
-            raise ExportError(f"{what}: its recorder names the file {name!r}, which is no file's name")
+            raise ExportError(f"{what}: its recorder names the file {name!r}, which is not a plain file name")
         out = out / name if into else out
         key = robot_key(site, WHOLE_SITE, f"recordings/piece/{session.own_name}")
         first = await _piece(session, key, schema.PieceRequest(file=name, length=1))
-        # Its version in the name: what belongs to another is never gone on with.
+        # With the version in the name, a fetch never resumes another version's file.
         version = hashlib.sha256(first.version.encode()).hexdigest()[:12]
         partial = out.with_name(f".{out.name}.{version}.part")
         begun = partial.stat().st_size if partial.exists() else 0
-        with partial.open("ab") as stream, progress(name) as tell:
+        with partial.open("ab") as stream, progress(name) as report:
             at = begun
             while at < first.total:
                 length = min(_PIECE, first.total - at)
                 piece = await _piece(session, key, schema.PieceRequest(file=name, offset=at, length=length))
                 if piece.version != first.version or not piece.data:
-                    raise ExportError(f"{name} was written again meanwhile: fetch it once more")
+                    raise ExportError(f"{name} changed during the fetch: fetch it again")
                 stream.write(piece.data)
                 at += len(piece.data)
-                tell(at / first.total)
+                report(at / first.total)
         partial.replace(out)
         return _Fetched(out, begun, first.total)
 
 
-async def _piece(session: Session, key: str, asked: schema.PieceRequest) -> schema.Piece:
+async def _piece(session: Session, key: str, request: schema.PieceRequest) -> schema.Piece:
     tries = _TRIES
     while True:
         try:
-            piece = await session.ask(key, asked, timeout_s=_TIMEOUT_S)
+            piece = await session.ask(key, request, timeout_s=_TIMEOUT_S)
             assert isinstance(piece, schema.Piece)
             return piece
         except QuotaError as error:
-            # Above the progress, where there is one.
-            print(f"{asked.file} waits: {error}", file=sys.stderr)
-            await asyncio.sleep(min(error.again_s, _MOST_WAIT_S))
+            # Standard error, so that it appears above the progress bar.
+            print(f"{request.file} waits: {error}", file=sys.stderr)
+            await asyncio.sleep(min(error.again_s, _LONGEST_WAIT_S))
         except NoAnswerError:
             if not tries:
                 raise

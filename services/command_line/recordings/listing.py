@@ -1,4 +1,4 @@
-"""`robomesh recordings list` and `info`: what is recorded, and what a file holds."""
+"""`robomesh recordings list` and `info`: the recordings of all sites, and the content of one."""
 
 import asyncio
 import sys
@@ -27,7 +27,7 @@ def list_all(router: str, as_json: bool) -> None:
 
     recordings = discovery.run(main())
     for site, recording in recordings:
-        # Where it is, also of a file that says nothing of itself.
+        # A file without metadata does not name its site.
         recording.site = recording.site or site
         if as_json:
             show(recording, as_json)
@@ -37,7 +37,7 @@ def list_all(router: str, as_json: bool) -> None:
 
 def _print_table(recordings: list[schema.Recording]) -> None:
     if not recordings:
-        print("nothing is recorded")
+        print("no recordings")
         return
     rows = [("recorded", "length", "size", "robot", "name", "")]
     for each in recordings:
@@ -62,21 +62,21 @@ def _print_table(recordings: list[schema.Recording]) -> None:
             row[5],
         )
         print("  ".join(columns).rstrip())
-    print("robomesh recordings info NAME tells what is in one")
+    print("robomesh recordings info NAME shows the content of one")
 
 
 class Listed(NamedTuple):
-    """A recording, and the site whose recorder has it."""
+    """A recording and the site of its recorder."""
 
     site: str
     recording: schema.Recording
 
 
 async def listed(session: Session) -> list[Listed]:
-    """The recordings of every site, the newest first; a recorder that does not answer hides no other's.
+    """Return the recordings of every site, newest first, without those of recorders that do not answer.
 
     Raises:
-        BusError: If none answers.
+        BusError: If no recorder answers.
     """
     sites = sorted({key.site for key in await session.present() if key.service == "recorder"})
     answers = await asyncio.gather(*(_of_site(session, site) for site in sites), return_exceptions=True)
@@ -99,39 +99,41 @@ async def _of_site(session: Session, site: str) -> schema.RecordingList:
 
 
 async def found(session: Session, what: str, *, closed: bool = False) -> Listed:
-    """The newest recording that `[SITE/]NAME` or `[SITE/]FILE` means.
+    """Return the newest recording that `[SITE/]NAME` or `[SITE/]FILE` names.
 
     Args:
-        closed: None that is being recorded now.
+        closed: Skip recordings that are still being written.
 
     Raises:
-        ExportError: If there is none.
+        ExportError: If no recording has the name.
     """
     site, _, name = what.rpartition("/")
     for each in await listed(session):
         recording = each.recording
-        means = name in (recording.name, recording.file) and site in ("", each.site)
-        if means and not (closed and recording.open):
+        matches = name in (recording.name, recording.file) and site in ("", each.site)
+        if matches and not (closed and recording.open):
             return each
-    raise ExportError(f"no recording {what!r}, neither a file here nor in robomesh recordings list")
+    raise ExportError(
+        f"no recording {what!r}, neither a file of this machine nor in robomesh recordings list"
+    )
 
 
 @asynccontextmanager
 async def attached_for(what: str, router: str) -> AsyncIterator[Session]:
-    """A session to look for a recording that is no file of this machine.
+    """Open a session to look for a recording that is not a file of this machine.
 
     Raises:
-        ExportError: If there is no mesh either.
+        ExportError: If no router answers.
     """
     try:
         async with discovery.attached(router) as session:
             yield session
     except SessionError as error:
-        raise ExportError(f"{what}: no such file here, and no site to ask: {error}") from None
+        raise ExportError(f"{what}: no such file on this machine, and no mesh to look on: {error}") from None
 
 
 def info(what: str, router: str, as_json: bool) -> None:
-    """Print what a file of this machine, or a recording of a site, holds."""
+    """Print the content of a file of this machine, or of a recording of a site."""
 
     async def ask() -> schema.Recording:
         async with attached_for(what, router) as session:
@@ -155,7 +157,7 @@ def _described(file: Path) -> schema.Recording:
 
 
 def show(recording: schema.Recording, as_json: bool) -> None:
-    """Print one recording, a line and what is in it."""
+    """Print one recording: a line, then its content."""
     values = _values(recording)
     if as_json:
         discovery.print_json(values)
@@ -186,7 +188,7 @@ def _state(recording: schema.Recording) -> str:
 
 
 def _rate(topic: schema.Recording.TopicCount, duration_s: float) -> str:
-    """How many pictures a second its video has."""
+    """Return the rate of a video topic, as text; empty for other topics."""
     return (
         f", {topic.messages / duration_s:.1f} pictures/s" if "/video/" in topic.topic and duration_s else ""
     )
@@ -197,7 +199,7 @@ def _start(recording: schema.Recording) -> datetime:
 
 
 def summary(recording: schema.Recording) -> str:
-    """One line for who has just recorded it: how long, how much, what is missing, where."""
+    """Return one line about a finished recording: length, size, losses, file."""
     lost = sum(topic.lost for topic in recording.topics)
     part = f" part {recording.part}" if recording.part else ""
     return (

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all, and how far their making is."""
+"""Files that appear complete or not at all, and a progress bar."""
 
 import contextlib
 import sys
@@ -9,13 +9,13 @@ from services.command_line.recordings.errors import ExportError
 
 
 @contextlib.contextmanager
-def whole_file(out: Path) -> Iterator[Path]:
-    """A file beside `out` to be written; it takes its name at the end, and is gone if that never comes.
+def atomic_file(out: Path) -> Iterator[Path]:
+    """Yield a temporary path next to `out`; the block's end renames it, an error removes it.
 
     Raises:
-        ExportError: If it cannot be written there.
+        ExportError: If the file cannot be written.
     """
-    # The ending stays: it tells some writers what to write.
+    # Keep the ending, from which some writers choose the format.
     partial = out.with_name(f".{out.stem}.part{out.suffix}")
     try:
         yield partial
@@ -29,7 +29,7 @@ def whole_file(out: Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def progress(what: str) -> Iterator[Callable[[float], None]]:
-    """Shows how far it is, from 0 to 1, where somebody looks: on a terminal."""
+    """Show a progress bar on a terminal; yield a function that sets it, from 0 to 1."""
     if not sys.stderr.isatty():
         yield lambda share: None
         return

@@ -19,18 +19,18 @@ from services.command_line.recordings.listing import attached_for, found
 from services.command_line.recordings.output import progress
 
 _OPEN_WITHIN_S = 20.0
-# A player tells where it is five times a second, paused too.
+# A player publishes its position five times a second, also when paused.
 _SILENT_S = 5.0
 
 
-def run(what: str, asked: schema.PlayRequest, router: str) -> None:
-    """Play a file of this machine, or a recording of a site by its name, and tell how far it is."""
-    discovery.run(_play(what, Path(what) if Path(what).is_file() else None, asked, router))
+def run(what: str, request: schema.PlayRequest, router: str) -> None:
+    """Play a file of this machine, or a recording of a site by its name, with a progress bar."""
+    discovery.run(_play(what, Path(what) if Path(what).is_file() else None, request, router))
 
 
-async def _play(what: str, path: Path | None, asked: schema.PlayRequest, router: str) -> None:
+async def _play(what: str, path: Path | None, request: schema.PlayRequest, router: str) -> None:
     async with attached_for(what, router) as session:
-        opened = _of_file(session, path, asked) if path is not None else _of_site(session, what, asked)
+        opened = _of_file(session, path, request) if path is not None else _of_site(session, what, request)
         async with opened as (site, state):
             print(f"playing {state.file} as {site}/{state.robot}; Ctrl-C ends it", flush=True)
             print(
@@ -42,15 +42,15 @@ async def _play(what: str, path: Path | None, asked: schema.PlayRequest, router:
 
 @asynccontextmanager
 async def _of_file(
-    session: Session, path: Path, asked: schema.PlayRequest
+    session: Session, path: Path, request: schema.PlayRequest
 ) -> AsyncIterator[tuple[str, schema.ReplayState]]:
-    """Played by this process: the file need not be in any recorder's folder."""
+    """Play a file in this process, because it may be in no recorder's folder."""
     from services.player.player import open_replay
 
     site = await _site_for(session, path)
-    # Longer than a player's, so that the two never meet.
+    # Longer than the identities of a player, so that the two never collide.
     identity = secrets.token_hex(3)
-    replay = await asyncio.to_thread(open_replay, session, site, path, asked, identity=identity)
+    replay = await asyncio.to_thread(open_replay, session, site, path, request, identity=identity)
     running = asyncio.create_task(replay.run())
     try:
         yield site, replay.describe()
@@ -60,7 +60,7 @@ async def _of_file(
 
 
 async def _site_for(session: Session, path: Path) -> str:
-    """Its own site where somebody is; else one where somebody can see it."""
+    """Return the recording's own site if present; else a present site, where the replay is visible."""
     from mcap_files.files import describe_file
 
     own = (await asyncio.to_thread(describe_file, path)).site
@@ -70,15 +70,15 @@ async def _site_for(session: Session, path: Path) -> str:
 
 @asynccontextmanager
 async def _of_site(
-    session: Session, what: str, asked: schema.PlayRequest
+    session: Session, what: str, request: schema.PlayRequest
 ) -> AsyncIterator[tuple[str, schema.ReplayState]]:
-    """Played by the site's player, for as long as this process is there."""
+    """Let the site's player play a recording while this process is present."""
     site, newest = await found(session, what, closed=True)
-    asked.file, asked.session = newest.file, session_of(session.own_name)
-    token = session.declare_presence_of(site, WHOLE_SITE, OPERATOR, asked.session)
+    request.file, request.session = newest.file, session_of(session.own_name)
+    token = session.declare_presence_of(site, WHOLE_SITE, OPERATOR, request.session)
     try:
         key = robot_key(site, WHOLE_SITE, "player/open")
-        state = await session.ask(key, asked, timeout_s=_OPEN_WITHIN_S)
+        state = await session.ask(key, request, timeout_s=_OPEN_WITHIN_S)
         assert isinstance(state, schema.ReplayState)
         try:
             yield site, state
@@ -91,17 +91,17 @@ async def _of_site(
 
 
 async def _until_ended(session: Session, key: str) -> None:
-    """Until Ctrl-C.
+    """Wait until Ctrl-C.
 
     Raises:
-        ExportError: If it ends by itself, with the reason.
+        ExportError: If the replay ends before, with the reason.
     """
     ended = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, ended.set)
     subscription = session.subscribe(key)
-    with progress("playing") as tell:
+    with progress("playing") as report:
 
         async def follow() -> None:
             while True:
@@ -111,11 +111,9 @@ async def _until_ended(session: Session, key: str) -> None:
                 except StopAsyncIteration:
                     return
                 except TimeoutError:
-                    raise ExportError(
-                        "the replay has ended: somebody closed it, or its player is gone"
-                    ) from None
+                    raise ExportError("the replay has ended: it was closed, or its player is gone") from None
                 assert isinstance(state, schema.ReplayState)
-                tell(state.position_s / state.duration_s if state.duration_s else 1.0)
+                report(state.position_s / state.duration_s if state.duration_s else 1.0)
                 if state.text:
                     raise ExportError(state.text)
 

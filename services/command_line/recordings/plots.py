@@ -1,4 +1,4 @@
-"""Plots of a recording: joints, tool and clearance over time, with what happened marked."""
+"""Plots of a recording: joints, tool and clearance over time, with events marked."""
 
 from datetime import datetime
 from pathlib import Path
@@ -26,7 +26,7 @@ _MARKS = {
 _CLEARANCE = "clearance"
 _POINTS = 2000
 _MOST_EVENTS, _MOST_NAMED, _MOST_LABELS = 60, 12, 10
-# A clearance is looked at from touching on, and no closer than so far: noise is no danger [mm].
+# Least range of the clearance axis, which starts at 0: a narrower one would magnify noise [mm].
 _LEAST_CLEARANCE_MM = 50.0
 
 
@@ -42,10 +42,10 @@ class _Mark(NamedTuple):
 
 
 def write_plots(file: RecordingFile, span: Span, target: Path) -> int:
-    """Draw them as PNG, PDF or SVG; how many there are.
+    """Draw the plots as PNG, PDF or SVG; return their number.
 
     Raises:
-        ExportError: If there is nothing to draw, or no matplotlib.
+        ExportError: If the recording has nothing to plot, or matplotlib is missing.
         RecordingError: If the file is damaged.
     """
     try:
@@ -56,13 +56,13 @@ def write_plots(file: RecordingFile, span: Span, target: Path) -> int:
 
     panels = _panels(known_values(file))
     if not panels:
-        raise ExportError(f"{file.path.name}: no joints, tool or clearance in it to be plotted")
+        raise ExportError(f"{file.path.name}: it holds no joints, tool or clearance to plot")
     reader, events = SeriesReader(), _events(file, span)
     with (
         mpl.rc_context(
             {"font.size": 8.5, "svg.hashsalt": "robomesh", "axes.edgecolor": _LINE, "text.color": _TEXT}
         ),
-        progress("plots") as tell,
+        progress("plots") as report,
     ):
         figure = Figure(
             figsize=(10, 2.1 * len(panels) + 1.0), dpi=130, facecolor="white", layout="constrained"
@@ -76,7 +76,7 @@ def write_plots(file: RecordingFile, span: Span, target: Path) -> int:
                 words = f"the first {len(drawn)} of {len(panel.values)}"
                 axes.set_title(words, loc="right", fontsize=8, color=_MARKS[schema.Event.WARNING])
             _mark(axes, events, named=number == 0)
-            tell((number + 1) / len(panels))
+            report((number + 1) / len(panels))
         zero = file.layout.start_ns
         all_axes[-1].set_xlim((span.start_ns - zero) * 1e-9, (span.end_ns - zero) * 1e-9)
         all_axes[-1].set_xlabel("seconds since the recording's start")
@@ -109,7 +109,7 @@ def _draw(axes: Any, title: str, found: list[Series]) -> None:
         color = _CURVES[number % len(_CURVES)]
         low, high = each.lowest * factor, each.highest * factor
         axes.plot(each.times_s, (low + high) / 2, color=color, linewidth=1.0, label=_label(each.name))
-        # Between the lowest and the highest of what one point stands for: no peak is lost.
+        # Fill from the lowest to the highest value of each point, so that no peak is lost.
         axes.fill_between(each.times_s, low, high, color=color, alpha=0.35, linewidth=0)
     if all(not len(each.times_s) or np.ptp(each.highest) == 0 for each in found):
         axes.margins(y=0.2)
@@ -132,7 +132,7 @@ def _draw(axes: Any, title: str, found: list[Series]) -> None:
 
 
 def _label(name: str) -> str:
-    """What tells it from the others of its plot."""
+    """Return the part of a value's name that is unique in its plot."""
     parts = name.split("/")
     if parts[0] == "joints":
         return parts[1]
@@ -140,7 +140,7 @@ def _label(name: str) -> str:
 
 
 def _shown(unit: str) -> tuple[str, float]:
-    """Degrees and millimetres, as people read them."""
+    """Return the displayed unit and the factor to it: degrees and millimetres."""
     degrees = 180.0 / np.pi
     return {"rad": ("°", degrees), "rad/s": ("°/s", degrees), "m": ("mm", 1e3), "m/s": ("mm/s", 1e3)}.get(
         unit, (unit, 1.0)
@@ -148,7 +148,7 @@ def _shown(unit: str) -> tuple[str, float]:
 
 
 def _title(file: RecordingFile) -> str:
-    """Whose recording it is, which, and when it began."""
+    """Return the title: robot, name and start of the recording."""
     about = file.layout.metadata.get(ABOUT, {})
     begin = datetime.fromtimestamp(file.layout.start_ns * 1e-9).astimezone()
     robot = "/".join(about[name] for name in ("site", "robot") if about.get(name))
@@ -158,7 +158,7 @@ def _title(file: RecordingFile) -> str:
 
 
 def _events(file: RecordingFile, span: Span) -> list[_Mark]:
-    """What happened; of many the worst."""
+    """Return the events in the span; of too many, the most severe."""
     topics = [key for name, key in topics_of(file).items() if name.split("/")[0] == "events"]
     marks, times = [], PublisherTimes()
     for message in file.messages(topics, start_ns=span.start_ns, end_ns=span.end_ns + 1):

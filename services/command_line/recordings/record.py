@@ -1,4 +1,4 @@
-"""`robomesh record`: a capture until Ctrl-C."""
+"""`robomesh record`: a recording until Ctrl-C."""
 
 import asyncio
 import contextlib
@@ -20,24 +20,24 @@ from services.command_line import discovery
 from services.command_line.recordings.listing import show, summary
 
 _Request = schema.RecorderRequest
-# The recorder tells each second; after so much silence we look whether it is still there.
+# The recorder publishes each second; after this silence its presence is checked.
 _SILENCE_S = 5.0
-# A disk that takes nothing says so at once.
-_AT_ONCE_S = 0.3
+# A full disk ends a recording within this time.
+_EARLY_END_S = 0.3
 
 
 class _Done(NamedTuple):
-    """What was recorded, and why it ended without us, in words; empty: we ended it."""
+    """A finished recording, and why it ended early; empty: Ctrl-C ended it."""
 
     recording: schema.Recording
     problem: str
 
 
 def record(robot: str, name: str, views: Sequence[str], router: str, as_json: bool) -> None:
-    """Record until Ctrl-C, then print what it holds; exit status 1 when it ended before.
+    """Record until Ctrl-C, then print the content; exit status 1 when the recording ended early.
 
     Args:
-        views: Whose video is recorded too; "-": none; empty: as the site file says.
+        views: Views whose video is recorded too; "-": none; empty: those of the site file.
     """
     done = discovery.run(_record(robot, name, views, router))
     if as_json:
@@ -54,18 +54,18 @@ async def _record(text: str, name: str, views: Sequence[str], router: str) -> _D
         robot = await discovery.find(session, text)
         key = robot_key(*robot, "recorder/request")
         asked = _Request(action=_Request.TRACE_ON, name=name, views=views)
-        begun = await session.ask(key, asked, timeout_s=5.0)
-        assert isinstance(begun, schema.Recording)
+        started = await session.ask(key, asked, timeout_s=5.0)
+        assert isinstance(started, schema.Recording)
         states = session.subscribe(robot_key(*robot, "recording"))
-        ending = asyncio.create_task(_ended(session, robot, states, begun))
+        ending = asyncio.create_task(_ended(session, robot, states, started))
         pressed = asyncio.create_task(interrupted.wait())
-        await asyncio.wait((ending, pressed), timeout=_AT_ONCE_S, return_when=asyncio.FIRST_COMPLETED)
+        await asyncio.wait((ending, pressed), timeout=_EARLY_END_S, return_when=asyncio.FIRST_COMPLETED)
         if not ending.done():
-            print(f"recording {robot} as {begun.name}; Ctrl-C ends it", file=sys.stderr, flush=True)
+            print(f"recording {robot} as {started.name}; Ctrl-C ends it", file=sys.stderr, flush=True)
             await asyncio.wait((ending, pressed), return_when=asyncio.FIRST_COMPLETED)
         pressed.cancel()
         if not ending.done():
-            with contextlib.suppress(RefusedError):  # it has ended just now, and says why
+            with contextlib.suppress(RefusedError):  # it has just ended; its state has the reason
                 done = await session.ask(key, _Request(action=_Request.TRACE_OFF), timeout_s=10.0)
                 assert isinstance(done, schema.Recording)
                 ending.cancel()
@@ -74,10 +74,10 @@ async def _record(text: str, name: str, views: Sequence[str], router: str) -> _D
 
 
 async def _ended(
-    session: Session, robot: discovery.Robot, states: Subscription, begun: schema.Recording
+    session: Session, robot: discovery.Robot, states: Subscription, started: schema.Recording
 ) -> _Done:
-    """Wait until it ends without us."""
-    newest = begun
+    """Wait until the recording ends early."""
+    newest = started
     while True:
         try:
             async with asyncio.timeout(_SILENCE_S):
@@ -86,22 +86,22 @@ async def _ended(
             try:
                 alive = await session.present()
             except NoAnswerError:
-                continue  # nothing says that the recorder is gone
+                continue  # the recorder may still be present
             if not any((who.site, who.service) == (robot.site, "recorder") for who in alive):
                 return _Done(newest, _gone(newest))
             continue
         assert isinstance(state, schema.Recording)
-        if state.name != begun.name:
-            # Another one is recorded now; or none is, by a recorder that began anew.
+        if state.name != started.name:
+            # Another recording runs now; or none, because the recorder restarted.
             return _Done(
-                newest, f"recording {begun.name} was ended by another" if state.name else _gone(newest)
+                newest, f"recording {started.name} was ended by another" if state.name else _gone(newest)
             )
         newest = state
         if not state.open:
             problem = (
                 f"{state.problem}; what was written is kept" if state.problem else "was ended by another"
             )
-            return _Done(newest, f"recording {begun.name} {problem}")
+            return _Done(newest, f"recording {started.name} {problem}")
 
 
 def _gone(newest: schema.Recording) -> str:
@@ -115,21 +115,21 @@ def _gone(newest: schema.Recording) -> str:
 
 @asynccontextmanager
 async def _interrupted() -> AsyncIterator[asyncio.Event]:
-    """Set by Ctrl-C; a second one ends the program."""
+    """Yield an event that Ctrl-C sets; a second Ctrl-C ends the program."""
     pressed = asyncio.Event()
     loop = asyncio.get_running_loop()
 
-    def let_go() -> None:
+    def restore() -> None:
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.remove_signal_handler(number)
 
     def press() -> None:
         pressed.set()
-        let_go()
+        restore()
 
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, press)
     try:
         yield pressed
     finally:
-        let_go()
+        restore()

@@ -1,4 +1,4 @@
-"""Recorded video as MP4: the packets as they were recorded, without a second encode."""
+"""Export of recorded video as MP4, without a second encode."""
 
 from pathlib import Path
 
@@ -14,23 +14,23 @@ from services.command_line.recordings.span import Span, decoded, needed
 
 
 def write_recorded(file: RecordingFile, span: Span, target: Path, view: str) -> tuple[int, float]:
-    """Write a view's recorded video, from the key frame before the beginning; pictures, and seconds.
+    """Write a view's recorded video from the last key frame before the span; return pictures and seconds.
 
     Raises:
-        ExportError: If none is recorded.
-        Mp4Error: If it is no H.264, or changes on the way.
+        ExportError: If the span has no picture of the view.
+        Mp4Error: If the video is not H.264, or its format changes.
     """
     topic = needed(file, f"video/{view}")
     first = file.newest(topic, span.start_ns, holds_key_frame)
     start_ns = span.start_ns if first is None else first.received_ns
     mp4, times = FragmentedMp4(), PublisherTimes()
-    with target.open("wb") as stream, progress("video") as tell:
+    with target.open("wb") as stream, progress("video") as report:
         for message in file.messages([topic], start_ns=start_ns, end_ns=span.end_ns + 1):
             picture = decoded(CompressedVideo, message.data)
             if picture is None:
                 continue
             stream.write(mp4.add(picture.data, times.of(message)))
-            tell(span.share(message.received_ns))
+            report(span.share(message.received_ns))
     if not mp4.pictures:
         raise ExportError(f"{file.path.name}: no picture of {view!r} in that time")
     return mp4.pictures, mp4.duration_s

@@ -1,4 +1,4 @@
-"""`robomesh recordings recover`: a file whose writer was killed, made whole."""
+"""`robomesh recordings recover`: completion of a file whose writer was killed."""
 
 from pathlib import Path
 
@@ -11,24 +11,24 @@ from services.command_line.recordings.output import progress
 
 
 def run(file: Path, as_json: bool) -> None:
-    """Make it whole; the original is kept until the new one is checked.
+    """Complete a file; the original is kept until the new one is verified.
 
     Raises:
-        CaptureError: If there is nothing to recover.
-        ExportError: If it is being recorded, or the disk refuses.
+        CaptureError: If the file holds nothing to recover.
+        ExportError: If the file is still being written, or the disk refuses.
     """
     state = files.state_of(file)
     if is_being_written(file):
-        raise ExportError(f"{file}: is being recorded now: there is nothing to recover until that ends")
+        raise ExportError(f"{file}: is still being recorded: recover it after that ends")
     if state is files.State.INDEXED:
-        words, messages, cut = "whole already", sum(t.messages for t in describe_file(file).topics), False
+        words, messages, cut = "complete already", sum(t.messages for t in describe_file(file).topics), False
         damaged = 0
     else:
         try:
-            with progress("recovering") as tell:
-                found = files.recover(file, tell)
+            with progress("recovering") as report:
+                found = files.recover(file, report)
         except OSError as error:
-            raise ExportError(f"{file}: not recovered, and as it was: {error.strerror or error}") from None
+            raise ExportError(f"{file}: not recovered, and unchanged: {error.strerror or error}") from None
         words, messages, cut, damaged = "recovered", found.messages, found.cut, found.damaged
     if as_json:
         discovery.print_json(

@@ -1,4 +1,4 @@
-"""Video of a recording, rendered afresh from its joints: any view, size and rate."""
+"""Video of a recording, rendered from its joints: any view, size and rate."""
 
 import math
 from collections.abc import Iterator
@@ -32,10 +32,10 @@ _LARGEST_PX, _SMALLEST_PX = 4096, 64
 
 @dataclass(frozen=True, kw_only=True)
 class Rendering:
-    """How it is drawn.
+    """View, size and rate of the video.
 
     Attributes:
-        samples: Of anti-aliasing; 0: none.
+        samples: Anti-aliasing samples; 0: none.
     """
 
     view: str
@@ -45,11 +45,11 @@ class Rendering:
 
 
 def write_rendered(file: RecordingFile, span: Span, target: Path, rendering: Rendering) -> tuple[int, float]:
-    """Draw and write it; pictures, and seconds.
+    """Render and write the video; return pictures and seconds.
 
     Raises:
-        ExportError: If the recording does not tell what the robot is, or how it looks.
-        RendererError: If there is no such view, or nothing that draws or encodes here.
+        ExportError: If the recording has no description, or a mesh is missing.
+        RendererError: If the view does not exist, or this machine cannot render or encode.
     """
     _check(rendering)
     state = _robot(file)
@@ -62,7 +62,7 @@ def write_rendered(file: RecordingFile, span: Span, target: Path, rendering: Ren
     try:
         _take_meshes(file, state.look.description, studio)
         encoder = open_encoder(rendering.size, rendering.fps)
-        with target.open("wb") as stream, progress("video") as tell:
+        with target.open("wb") as stream, progress("video") as report:
             for number, (time_ns, ages) in enumerate(_pictures(file, span, state, rendering.fps)):
                 composition = composed(shot, state.look, Known(state, ages), ())
                 drawn = studio.draw(
@@ -76,7 +76,7 @@ def write_rendered(file: RecordingFile, span: Span, target: Path, rendering: Ren
                 write_over(drawn.picture, composition.overlay)
                 packet = encoder.encode(drawn.picture, key_frame=number % key_each == 0)
                 stream.write(mp4.add(packet.data, time_ns, usual_s=1 / rendering.fps))
-                tell(span.share(time_ns))
+                report(span.share(time_ns))
     finally:
         studio.close()
     return mp4.pictures, mp4.duration_s
@@ -95,9 +95,9 @@ def _check(rendering: Rendering) -> None:
 def _robot(file: RecordingFile) -> RobotState:
     description = description_of(file)
     if description is None or not description.urdf:
-        raise ExportError(f"{file.path.name}: it does not tell what the robot is: no description in it")
+        raise ExportError(f"{file.path.name}: it holds no description of the robot")
     _, site, robot, _ = needed(file, "joints").split("/", 3)
-    # What is drawn was recorded, whatever the time now.
+    # Mark the pictures as a replay, not as live.
     description.replay.SetInParent()
     return RobotState(site, robot, look=look_of(description))
 
@@ -116,17 +116,17 @@ def _take_meshes(file: RecordingFile, description: schema.Description, studio: S
             glb = stored_glb(body.mesh_sha256, cache_folder())
         if glb is None:
             raise ExportError(
-                f"{file.path.name}: how {body.name} looks is not in it, nor was it ever drawn here"
+                f"{file.path.name}: it holds no mesh of {body.name}, and none is in the cache of this machine"
             )
         studio.take_mesh(mesh_name(body), glb, body.color)
 
 
 def _pictures(file: RecordingFile, span: Span, state: RobotState, fps: float) -> Iterator[tuple[int, Ages]]:
-    """The times of the pictures; the robot is then as it was recorded."""
+    """Yield the time of each picture with the ages of its values, after updating the robot's state to it."""
     topics = topics_of(file)
     needed(file, "joints")
     names = {topics[name]: name for name in ("joints", "controller", "kinematics") if name in topics}
-    times, was_so = PublisherTimes(), dict[str, int]()
+    times, updated_ns = PublisherTimes(), dict[str, int]()
 
     def take(at_ns: int, message: RecordedMessage) -> None:
         name = names[message.topic]
@@ -145,20 +145,23 @@ def _pictures(file: RecordingFile, span: Span, state: RobotState, fps: float) ->
             if (kinematics := decoded(schema.KinematicState, message.data)) is None:
                 return
             state.take_kinematics(kinematics, {state.name: state})
-        was_so[name] = at_ns
+        updated_ns[name] = at_ns
 
     for message in file.state_at([*names], span.start_ns).values():
         take(times.of(message), message)
     following = file.messages([*names], start_ns=span.start_ns + 1, end_ns=span.end_ns + 1)
-    coming = ((times.of(message), message) for message in following)
-    held = next(coming, None)
+    arriving = ((times.of(message), message) for message in following)
+    pending = next(arriving, None)
     count = max(math.floor((span.end_ns - span.start_ns) * 1e-9 * fps) + 1, 1)
     for number in range(count):
         time_ns = span.start_ns + round(number / fps * 1e9)
-        while held is not None and held[0] <= time_ns:
-            take(*held)
-            held = next(coming, None)
-        age = {name: (time_ns - was_so[name]) * 1e-9 if name in was_so else None for name in names.values()}
+        while pending is not None and pending[0] <= time_ns:
+            take(*pending)
+            pending = next(arriving, None)
+        age = {
+            name: (time_ns - updated_ns[name]) * 1e-9 if name in updated_ns else None
+            for name in names.values()
+        }
         yield (
             time_ns,
             Ages(

@@ -1,4 +1,4 @@
-"""Which part of a recording, and which of its topics."""
+"""A part of a recording, and the names of its topics."""
 
 from typing import NamedTuple, TypeVar
 
@@ -19,15 +19,15 @@ class Span(NamedTuple):
     end_ns: int
 
     def share(self, time_ns: int) -> float:
-        """How far in it a time is, from 0 to 1."""
+        """Return the position of a time in the span, from 0 to 1."""
         return min(max((time_ns - self.start_ns) / max(self.end_ns - self.start_ns, 1), 0.0), 1.0)
 
 
 def span_of(file: RecordingFile, begin_s: float, end_s: float | None) -> Span:
-    """The part between two times, counted from the recording's start.
+    """Return the span between two times since the recording's start.
 
     Raises:
-        ExportError: If there is nothing between them.
+        ExportError: If the times are outside of the recording, or reversed.
     """
     first, last = file.layout.start_ns, file.layout.end_ns
     duration_s = (last - first) * 1e-9
@@ -39,7 +39,7 @@ def span_of(file: RecordingFile, begin_s: float, end_s: float | None) -> Span:
 
 
 def topics_of(file: RecordingFile) -> dict[str, str]:
-    """A robot's topics, as they are named below it, and their names in the file."""
+    """Return the robot's topics by their name below the robot, with their keys in the file."""
     found: dict[str, str] = {}
     for topic in sorted(file.topics):
         try:
@@ -64,7 +64,7 @@ def needed(file: RecordingFile, topic: str) -> str:
 
 
 def decoded(kind: type[M], data: bytes) -> M | None:
-    """A recorded message; None: one that somebody wrote wrong, which spoils no other."""
+    """Decode a recorded message; None: the message is invalid, and the others remain usable."""
     try:
         return kind.FromString(data)
     except DecodeError:

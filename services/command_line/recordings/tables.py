@@ -1,4 +1,4 @@
-"""Joints and tool as CSV: a row a recorded state, with its publisher's time."""
+"""Export of joints and tool as CSV: a row for each recorded state, with its publisher's time."""
 
 import csv
 from collections.abc import Iterator
@@ -13,14 +13,14 @@ from services.command_line.recordings.errors import ExportError
 from services.command_line.recordings.output import progress
 from services.command_line.recordings.span import Span, decoded, needed, topics_of
 
-_TELL_EACH = 5000
+_REPORT_EACH = 5000
 
 
 def write_table(file: RecordingFile, span: Span, target: Path) -> int:
-    """Write the table; the number of its rows.
+    """Write the table and return the number of rows.
 
     Raises:
-        ExportError: If there are no joints in it.
+        ExportError: If the span has no joints.
         RecordingError: If the file is damaged.
     """
     joints, kinematics = needed(file, "joints"), topics_of(file).get("kinematics")
@@ -29,19 +29,19 @@ def write_table(file: RecordingFile, span: Span, target: Path) -> int:
         raise ExportError(f"{file.path.name}: no state of joints in that time")
     table = table_of(first, description_of(file), start_ns=file.layout.start_ns)
     rows = 0
-    with target.open("w", newline="", encoding="utf-8") as stream, progress("table") as tell:
+    with target.open("w", newline="", encoding="utf-8") as stream, progress("table") as report:
         writer = csv.writer(stream)
         writer.writerow(table.header)
         for message, state in _with_tool(table, file, joints, kinematics, span):
             writer.writerow(table.row(state, message))
             rows += 1
-            if rows % _TELL_EACH == 0:
-                tell(span.share(message.received_ns))
+            if rows % _REPORT_EACH == 0:
+                report(span.share(message.received_ns))
     return rows
 
 
 def _states(file: RecordingFile, joints: str, span: Span) -> Iterator[tuple[RecordedMessage, JointStates]]:
-    """Yield the states of a span; a message that cannot be read is none."""
+    """Yield the states of a span; skip invalid messages."""
     for message in file.messages((joints,), start_ns=span.start_ns, end_ns=span.end_ns + 1):
         if (state := decoded(JointStates, message.data)) is not None:
             yield message, state
@@ -50,7 +50,7 @@ def _states(file: RecordingFile, joints: str, span: Span) -> Iterator[tuple[Reco
 def _with_tool(
     table: Table, file: RecordingFile, joints: str, kinematics: str | None, span: Span
 ) -> Iterator[tuple[RecordedMessage, JointStates]]:
-    """Yield the states of a span; the table has taken what is known of the tool at each."""
+    """Yield the states of a span, after the table has taken the tool's pose at each."""
     tools: Iterator[RecordedMessage] = iter(())
     if kinematics is not None:
         tools = file.messages((kinematics,), start_ns=span.start_ns, end_ns=span.end_ns + 1)
@@ -64,7 +64,7 @@ def _with_tool(
 
 
 def description_of(file: RecordingFile) -> schema.Description | None:
-    """What the robot is; None: the recording does not tell."""
+    """Return the robot's description; None: the recording has none."""
     topic = topics_of(file).get("description")
     newest = None if topic is None else file.newest(topic, file.layout.end_ns)
     return None if newest is None else decoded(schema.Description, newest.data)

@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """What the command line adds to a site file.
+    """Options of the command line, besides the site file's values.
 
     Attributes:
         site_file: The site file; None: the built-in site.
-        controllers: ROBOT=tcp://HOST:PORT of robots whose controller is elsewhere than the site file says.
+        controllers: ROBOT=tcp://HOST:PORT of robots whose address differs from the site file's.
         started: Run for this robot only, which was started from the page; empty: for the site's robots.
         supervised: A supervisor starts the robots that are started from the page.
     """
