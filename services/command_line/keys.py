@@ -89,7 +89,7 @@ def issue(
     """Issue a certificate with its key, as one file to hand over."""
     from services.pki import authority
 
-    where, lives = keys_folder(folder, quiet=as_json), timedelta(days=days)
+    where, lifetime = keys_folder(folder, quiet=as_json), timedelta(days=days)
     before, rules = (
         authority.principals_of(where),
         where.access.read_bytes() if where.access.is_file() else b"",
@@ -99,13 +99,13 @@ def issue(
             not name and not role and not robots,
             "--guest takes no name, --role or --robots; for a hub add --sites",
         )
-        entry = authority.issue_guest(where, guest, sites=_listed(sites), lives=lives)
+        entry = authority.issue_guest(where, guest, sites=_listed(sites), lifetime=lifetime)
     else:
         _require(
             bool(name and role), "a name and --role are needed, as in: robomesh keys issue li --role operator"
         )
         _require(not sites, "--sites is for --guest")
-        entry = authority.issue(where, name, _role(role), robots=_listed(robots) or None, lives=lives)
+        entry = authority.issue(where, name, _role(role), robots=_listed(robots) or None, lifetime=lifetime)
     file = authority.file_of(where, authority.principals_of(where).site, entry)
     if as_json:
         _print(_record(entry) | {"file": file})

@@ -1,7 +1,8 @@
-"""A site's keys: its certificate authority, who has a certificate, and what each may do.
+"""A site's keys: its certificate authority, the certificates that it issued, and their rights.
 
-Whoever only uses a folder of keys needs `folder.py`; the package `cryptography` is needed where
-certificates are made (`deeds.py`, `certificates.py`).
+Reading a folder of keys needs `folder.py` only. Making certificates (`authority.py`, `certificates.py`) needs
+the
+package `cryptography`.
 """
 
 from services.pki.folder import Folder

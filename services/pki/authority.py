@@ -1,7 +1,8 @@
-"""What is done with a site's keys: made, issued, revoked, taken from another site.
+"""Operations on a site's keys: make, issue, revoke, accept from another site.
 
-Whatever changes the list writes the routers' rules anew; a router that runs follows them. Deeds of several
-processes come one after the other.
+Each change of the list of principals also writes the routers' rules, which a running router follows.
+Operations
+of several processes run one after the other.
 """
 
 import json
@@ -24,42 +25,42 @@ from services.pki.principals import Entry, Principals, read_principals, write_pr
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
-LIVES = timedelta(days=30)
-# The gateways of robots that are started from the page. Which those may be only the routers' rules say: they
-# follow the page, and no key is there to sign.
+LIFETIME = timedelta(days=30)
+# The gateways of robots that are started from the page. Only the routers' rules name these robots: the list
+# changes with the page, when no authority key is there to sign.
 STARTED = "started"
-_EVERY_SERVICE = (
+_SERVICE_ROLES = (
     (STARTED, Role.GATEWAY),
     *((role.value, role) for role in sorted(SERVICES, key=lambda r: r.value)),
 )
 
 
-def alone(deed: "Callable[Concatenate[Folder, _P], _R]") -> "Callable[Concatenate[Folder, _P], _R]":
-    """A deed that reads the list and writes it anew while nobody else does."""
+def exclusive(operation: "Callable[Concatenate[Folder, _P], _R]") -> "Callable[Concatenate[Folder, _P], _R]":
+    """Hold the folder's lock during an operation, so that the list it reads is the list it replaces."""
 
-    @wraps(deed)
-    def done(folder: Folder, /, *arguments: _P.args, **named: _P.kwargs) -> _R:
+    @wraps(operation)
+    def locked_operation(folder: Folder, /, *arguments: _P.args, **named: _P.kwargs) -> _R:
         with locked(folder):
-            return deed(folder, *arguments, **named)
+            return operation(folder, *arguments, **named)
 
-    return done
+    return locked_operation
 
 
 def now() -> datetime:
-    """Now, in UTC, in whole seconds."""
+    """Return the current time in UTC, in whole seconds."""
     return datetime.now(UTC).replace(microsecond=0)
 
 
 def principals_of(folder: Folder) -> Principals:
-    """The list of who has a certificate.
+    """Read the list of principals.
 
     Raises:
-        KeysError: If there is none, or it is wrong.
+        KeysError: If the list is missing or invalid.
     """
     if not folder.principals.is_file():
         raise KeysError(
-            f"{folder.principals} is not there: robomesh keys init SITE.toml begins, and "
-            "--folder says where the keys lie"
+            f"{folder.principals} does not exist: robomesh keys init SITE.toml creates it; --folder names "
+            "the folder of keys"
         )
     return read_principals(read(folder.principals).decode(errors="replace"), str(folder.principals))
 
@@ -73,18 +74,18 @@ def prepare(
     routers: Sequence[str],
     started: Sequence[str] = (),
 ) -> tuple[str, ...]:
-    """Make what is not there yet: the authority, the list, a bundle for every service; write the rules.
+    """Make what is missing: the authority, the list, a bundle for every service; write the rules.
 
     Args:
-        robots: The site file's, which the site's gateway speaks for.
-        routers: Where the site's routers are.
-        started: The robots that may be started from the page.
+        robots: Robots of the site file; the site's gateway may publish for them.
+        routers: Addresses of the site's routers.
+        started: Robots that may be started from the page.
 
     Returns:
-        The names that certificates were issued to.
+        The names that got certificates.
 
     Raises:
-        KeysError: If the folder is another site's, or cannot be written.
+        KeysError: If the folder belongs to another site, or cannot be written.
     """
     check_name(site, "site")
     with locked(folder, make=True):
@@ -108,12 +109,12 @@ def _prepared(
         write(folder.authority, certificate)
     principals = Principals(site=site, border=border, routers=routers, entries=principals.entries)
     made = []
-    for name, role in _EVERY_SERVICE:
+    for name, role in _SERVICE_ROLES:
         there = principals.find(name)
         wanted = there or Entry(name=f"{name}.{site}", role=role)
         if name == Role.GATEWAY.value:
             wanted = wanted.model_copy(update={"robots": robots})
-        # A bundle without an entry is what was killed here before it wrote the list.
+        # A bundle without an entry: this function was killed before it wrote the list.
         if wanted.revoked is None and (wanted != there or not folder.service(name).is_file()):
             principals = issued(folder, principals, wanted)
             made.append(wanted.name)
@@ -122,21 +123,21 @@ def _prepared(
 
 
 def entitled(folder: Folder) -> frozenset[str]:
-    """The robots that gateways of robots started from the page may speak for.
+    """Return the robots that the gateways of started robots may publish for.
 
     Raises:
-        KeysError: If there is no list, or it is wrong.
+        KeysError: If the list is missing or invalid.
     """
     entry = principals_of(folder).find(STARTED)
     return frozenset(entry.robots or () if entry is not None else ())
 
 
-@alone
+@exclusive
 def entitle(folder: Folder, started: Sequence[str]) -> None:
-    """Let the gateways of robots that are started from the page speak for these, and for no other.
+    """Let the gateways of started robots publish for these robots only.
 
     Raises:
-        KeysError: If there is no list, or it cannot be written.
+        KeysError: If the list is missing or cannot be written.
     """
     _entitle(folder, started)
 
@@ -149,112 +150,121 @@ def _entitle(folder: Folder, started: Sequence[str]) -> None:
         save(folder, principals.replaced(entry.model_copy(update={"robots": robots})))
 
 
-@alone
+@exclusive
 def issue(
-    folder: Folder, name: str, role: Role, *, robots: Sequence[str] | None = None, lives: timedelta = LIVES
+    folder: Folder,
+    name: str,
+    role: Role,
+    *,
+    robots: Sequence[str] | None = None,
+    lifetime: timedelta = LIFETIME,
 ) -> Entry:
-    """A certificate for a person, a service, or another router or gateway of the site.
+    """Issue a certificate for a person, a service, or another router or gateway of the site.
 
     Raises:
-        KeysError: If the name cannot be, or not for that role, is taken by somebody else, or was revoked and
-            its certificate has not expired.
+        KeysError: If the name is invalid, does not fit the role, is taken, or was revoked while one of its
+            certificates is still valid.
     """
     principals = principals_of(folder)
     name = name.removesuffix("." + principals.site)
     full = f"{name}.{principals.site}"
     if folder.service(name) == folder.authority:
-        raise KeysError(f"{full} is the authority itself, and its file the authority's: take another name")
+        raise KeysError(f"{full} is the authority's own name: choose another name")
     if role is Role.ROUTER and name.partition("-")[0] != Role.ROUTER.value:
-        raise KeysError(f"{full}: other sites know a router by its name: router-2 and router-3 are right")
+        raise KeysError(f"{full}: other sites recognise a router by its name: choose router-2, router-3 ...")
     there = principals.find(full)
     if there is not None and there.role is not role and there.revoked is None:
         raise KeysError(
-            f"{full} is {there.role.value} already: names are unique; take another, as "
-            f"{_another(principals, there)}"
+            f"{full} is {there.role.value} already: names are unique; choose another, as "
+            f"{_unused_name(principals, there)}"
         )
     if robots is not None and role is not Role.GATEWAY:
         raise KeysError(f"--robots is for gateways: {full} would be {role.value}")
     if robots is None and role is Role.GATEWAY:
-        raise KeysError(f"{full}: which robots does this gateway speak for? --robots a,b")
+        raise KeysError(f"{full}: a gateway needs its robots: --robots a,b")
     if there is not None:
-        _check_free(principals, there)
+        _check_name_free(principals, there)
     entry = _entry(name=full, role=role, robots=None if robots is None else tuple(robots))
-    principals = issued(folder, principals, entry, lives)
+    principals = issued(folder, principals, entry, lifetime)
     save(folder, principals)
     found = principals.find(full)
     assert found is not None
     return found
 
 
-@alone
-def issue_guest(folder: Folder, site: str, *, sites: Sequence[str] = (), lives: timedelta = LIVES) -> Entry:
-    """A certificate that lets another site's router in.
+@exclusive
+def issue_guest(
+    folder: Folder, site: str, *, sites: Sequence[str] = (), lifetime: timedelta = LIFETIME
+) -> Entry:
+    """Issue a certificate that lets another site's router connect.
 
     Args:
-        sites: Those that it speaks for; its own unless given; `*`: all but ours (a hub).
+        sites: Sites that it may publish for; default: its own; `*`: all but this one (a hub).
 
     Raises:
-        KeysError: If it cannot be, or was revoked and its certificate has not expired.
+        KeysError: If the site is invalid, or the name was revoked while a certificate is still valid.
     """
     principals = principals_of(folder)
-    _other(principals, site)
+    _check_other_site(principals, site)
     if (there := principals.find(f"router.{site}")) is not None:
-        _check_free(principals, there)
+        _check_name_free(principals, there)
     entry = _entry(name=f"router.{site}", role=Role.ROUTER, sites=tuple(sites) or (site,))
-    principals = issued(folder, principals, entry, lives)
+    principals = issued(folder, principals, entry, lifetime)
     save(folder, principals)
     found = principals.find(entry.name)
     assert found is not None
     return found
 
 
-@alone
+@exclusive
 def accept(folder: Folder, data: bytes, *, sites: Sequence[str] = ()) -> str:
-    """Take what lets our routers in at another site; its router gets rights here, as it gives them.
+    """Accept a bundle with which this site's routers connect to another site; give its router rights here.
 
     Returns:
         The other site.
 
     Raises:
-        KeysError: If it is not such a file, not for this site, or its router was revoked here and the
-            certificate that it had has not expired.
+        KeysError: If the file is invalid, not for this site, or the other router was revoked here while its
+            certificate is still valid.
     """
     principals = principals_of(folder)
-    shown = certificates.show(data)
-    if shown.role != Role.ROUTER.value or shown.name.rpartition(".")[2] != principals.site:
+    content = certificates.read_bundle(data)
+    if content.role != Role.ROUTER.value or content.name.rpartition(".")[2] != principals.site:
         raise KeysError(
-            f"it lets {shown.name} ({shown.role}) in at site {shown.authority}: for this site "
-            f"robomesh keys issue --guest {principals.site} is right there"
+            f"it lets {content.name} ({content.role}) connect to site {content.authority}: for this site "
+            f"run robomesh keys issue --guest {principals.site} there"
         )
-    if shown.expires <= now():
-        raise KeysError(f"it expired on {shown.expires:%Y-%m-%d %H:%M} UTC: site {shown.authority} renews it")
-    _other(principals, shown.authority)
-    name = f"router.{shown.authority}"
+    if content.expires <= now():
+        raise KeysError(
+            f"it expired on {content.expires:%Y-%m-%d %H:%M} UTC: site {content.authority} renews it"
+        )
+    _check_other_site(principals, content.authority)
+    name = f"router.{content.authority}"
     there = principals.find(name)
     if there is not None:
-        _check_free(principals, there)
+        _check_name_free(principals, there)
     if there is None or there.revoked is not None or sites:
-        entry = _entry(name=name, role=Role.ROUTER, sites=tuple(sites) or (shown.authority,))
+        entry = _entry(name=name, role=Role.ROUTER, sites=tuple(sites) or (content.authority,))
         if there is not None:
             kept = {"serial": there.serial, "fingerprint": there.fingerprint, "earlier": there.earlier}
             entry = entry.model_copy(update={**kept, "issued": there.issued, "expires": there.expires})
         principals = principals.replaced(entry)
-    write(folder.link(shown.authority), data)
+    write(folder.link(content.authority), data)
     save(folder, principals)
-    return shown.authority
+    return content.authority
 
 
-@alone
+@exclusive
 def revoke(folder: Folder, name: str) -> Entry:
-    """Take a name off the routers' list; they drop whoever is there under it.
+    """Revoke a name; the routers disconnect its clients.
 
     Raises:
-        KeysError: If there is nobody of that name.
+        KeysError: If the name has no certificate.
     """
     principals = principals_of(folder)
     entry = principals.find(name)
     if entry is None:
-        raise KeysError(f"{name} has no certificate of this site: robomesh keys list shows who has")
+        raise KeysError(f"{name} has no certificate of this site: robomesh keys list shows the names")
     if entry.revoked is None:
         entry = entry.model_copy(update={"revoked": now()})
     save(folder, principals.replaced(entry))
@@ -262,17 +272,17 @@ def revoke(folder: Folder, name: str) -> Entry:
 
 
 def rules_of(principals: Principals) -> str:
-    """The text of the routers' file."""
+    """Return the text of the routers' rules."""
     sections = access_sections(principals.site, principals.allowed, principals.border)
     return (
-        f"// What everybody may do at site {principals.site}: robomesh keys writes it from principals.toml.\n"
+        f"// Rights at site {principals.site}: robomesh keys writes this file from principals.toml.\n"
         + json.dumps(sections, indent=1)
         + "\n"
     )
 
 
 def file_of(folder: Folder, site: str, entry: Entry) -> str:
-    """Where somebody's bundle lies."""
+    """Return the path of an entry's bundle."""
     name, _, of = entry.name.rpartition(".")
     if of != site:
         return str(folder.guest(of))
@@ -284,12 +294,12 @@ def _entry(**values: object) -> Entry:
         return Entry.model_validate(values)
     except ValueError:
         raise KeysError(
-            f"{values['name']} cannot be: names are letters, digits, '_' and '-', robots and sites in lower "
+            f"{values['name']} is not valid: names are letters, digits, '_' and '-', robots and sites lower "
             "case, beginning with a letter or digit"
         ) from None
 
 
-def _other(principals: Principals, site: str) -> None:
+def _check_other_site(principals: Principals, site: str) -> None:
     try:
         check_name(site, "site")
     except KeyNameError as error:
@@ -298,37 +308,39 @@ def _other(principals: Principals, site: str) -> None:
         raise KeysError(f"{site} is this site: another site's router is a guest")
 
 
-def _check_free(principals: Principals, entry: Entry) -> None:
-    """Refuse a name that was revoked while a certificate of it is good: the rules would let both in.
+def _check_name_free(principals: Principals, entry: Entry) -> None:
+    """Reject a revoked name while one of its certificates is valid: the rules would admit that one again.
 
     Raises:
-        KeysError: If it is so.
+        KeysError: If the name is not free.
     """
     if entry.revoked is None or entry.good_until is None or entry.good_until <= now():
         return
     ours = entry.name.rpartition(".")[2] == principals.site
     instead = (
-        f"issue {_another(principals, entry)} in its place"
+        f"issue {_unused_name(principals, entry)} in its place"
         if ours
-        else "before that, a new authority alone keeps the old one out"
+        else "until then only a new authority excludes the old certificate"
     )
     raise KeysError(
-        f"{entry.name} was revoked, and a certificate of that name is good until "
-        f"{entry.good_until:%Y-%m-%d %H:%M} UTC: whoever has it would be let in again; {instead}"
+        f"{entry.name} was revoked, but a certificate of that name is valid until "
+        f"{entry.good_until:%Y-%m-%d %H:%M} UTC and would be admitted again; {instead}"
     )
 
 
-def _another(principals: Principals, entry: Entry) -> str:
-    """A name that nobody has or had, made from one that somebody has."""
+def _unused_name(principals: Principals, entry: Entry) -> str:
+    """Return an unused name, made from a used one."""
     name = entry.name.rpartition(".")[0]
     return next(new for n in count(2) if principals.find(new := f"{name}-{n}") is None)
 
 
-def issued(folder: Folder, principals: Principals, entry: Entry, lives: timedelta = LIVES) -> Principals:
-    """The list with an entry's new certificate, whose bundle is written."""
+def issued(
+    folder: Folder, principals: Principals, entry: Entry, lifetime: timedelta = LIFETIME
+) -> Principals:
+    """Issue an entry's certificate, write its bundle, and return the changed list."""
     if not folder.authority_key.is_file():
         raise KeysError(
-            f"{folder.authority_key} is not there: the authority's key signs; bring it back for this"
+            f"{folder.authority_key} does not exist: the authority's key is needed to sign; restore it first"
         )
     authority = certificates.read_authority(read(folder.authority_key), read(folder.authority))
     ours = entry.name.rpartition(".")[2] == principals.site
@@ -337,7 +349,7 @@ def issued(folder: Folder, principals: Principals, entry: Entry, lives: timedelt
         entry.name,
         entry.role.value,
         now=now(),
-        lives=lives,
+        lifetime=lifetime,
         serves=ours and entry.role is Role.ROUTER,
     )
     identity = Identity(
@@ -358,7 +370,7 @@ def issued(folder: Folder, principals: Principals, entry: Entry, lives: timedelt
     )
     write(path, data)
     before = principals.find(entry.name)
-    told = {
+    changes = {
         "earlier": None if before is None else before.good_until,
         "serial": made.serial,
         "fingerprint": made.fingerprint,
@@ -366,13 +378,13 @@ def issued(folder: Folder, principals: Principals, entry: Entry, lives: timedelt
         "expires": made.expires,
         "revoked": None,
     }
-    return principals.replaced(entry.model_copy(update=told))
+    return principals.replaced(entry.model_copy(update=changes))
 
 
 def save(folder: Folder, principals: Principals) -> None:
-    """Write the list, and the routers' rules where they have changed."""
+    """Write the list, and the routers' rules if they have changed."""
     write(folder.principals, write_principals(principals).encode())
     rules = rules_of(principals).encode()
-    # A router reloads when it changes: renewed certificates alone are no reason.
+    # A router reloads when this file changes, which a renewed certificate alone does not require.
     if not folder.access.is_file() or read(folder.access) != rules:
         write(folder.access, rules)

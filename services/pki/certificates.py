@@ -1,7 +1,7 @@
 """Certificates: an authority, and what it issues (X.509, EC P-256).
 
-The common name is <name>.<site>, the organizational unit the role. Only routers of the site may serve:
-nobody else's certificate passes for a router's, whatever address it has.
+The common name is <name>.<site>, the organizational unit the role. Only a router's certificate may be used by
+a server, so no other certificate passes for a router's, whatever its address.
 """
 
 from datetime import UTC, datetime, timedelta
@@ -17,17 +17,17 @@ try:
     from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 except ImportError:
     raise KeysError(
-        "certificates are made with the package cryptography, which is not here: pip install 'robomesh[keys]'"
+        "making certificates needs the package cryptography: pip install 'robomesh[keys]'"
     ) from None
 
-# Clocks of machines that have just started may be behind.
+# The clock of a machine that has just started may be behind.
 _CLOCKS_BEHIND = timedelta(minutes=10)
-_AUTHORITY_LIVES = timedelta(days=3650)
+_AUTHORITY_LIFETIME = timedelta(days=3650)
 _AUTHORITY = "authority."
 
 
 class Issued(NamedTuple):
-    """A certificate with its private key, as PEM, and what a list says of it."""
+    """A certificate with its private key, as PEM, and its entry in the list."""
 
     key: bytes
     certificate: bytes
@@ -38,17 +38,17 @@ class Issued(NamedTuple):
 
 
 class Authority(NamedTuple):
-    """Who signs a site's certificates."""
+    """The key and certificate that sign a site's certificates."""
 
     key: ec.EllipticCurvePrivateKey
     certificate: x509.Certificate
 
 
-class Shown(NamedTuple):
-    """What a bundle's certificate says.
+class BundleContent(NamedTuple):
+    """Content of a bundle's certificate.
 
     Attributes:
-        authority: The site whose authority signed it.
+        authority: The site of the authority that signed it.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Shown(NamedTuple):
 
 
 def make_authority(site: str, now: datetime) -> tuple[bytes, bytes]:
-    """A new authority's private key and certificate, as PEM."""
+    """Make a new authority's private key and certificate, as PEM."""
     key = ec.generate_private_key(ec.SECP256R1())
     name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, _AUTHORITY + site)])
     usage = x509.KeyUsage(
@@ -73,7 +73,7 @@ def make_authority(site: str, now: datetime) -> tuple[bytes, bytes]:
         decipher_only=False,
     )
     certificate = (
-        _builder(name, name, key, now, now + _AUTHORITY_LIVES)
+        _builder(name, name, key, now, now + _AUTHORITY_LIFETIME)
         .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
         .add_extension(usage, critical=True)
         .sign(key, hashes.SHA256())
@@ -82,10 +82,10 @@ def make_authority(site: str, now: datetime) -> tuple[bytes, bytes]:
 
 
 def read_authority(key: bytes, certificate: bytes) -> Authority:
-    """An authority from its PEM files.
+    """Read an authority from its PEM files.
 
     Raises:
-        KeysError: If they are not one.
+        KeysError: If they are not a key and its certificate.
     """
     try:
         private = serialization.load_pem_private_key(key, None)
@@ -93,18 +93,18 @@ def read_authority(key: bytes, certificate: bytes) -> Authority:
     except (ValueError, TypeError) as error:
         raise KeysError(f"the authority's key or certificate cannot be read: {error}") from None
     if not isinstance(private, ec.EllipticCurvePrivateKey) or private.public_key() != public.public_key():
-        raise KeysError("the authority's key is not that of its certificate authority.pem")
+        raise KeysError("the authority's key does not belong to its certificate authority.pem")
     return Authority(private, public)
 
 
 def issue(
-    authority: Authority, name: str, role: str, *, now: datetime, lives: timedelta, serves: bool = False
+    authority: Authority, name: str, role: str, *, now: datetime, lifetime: timedelta, serves: bool = False
 ) -> Issued:
-    """A new key and certificate.
+    """Make a new key and certificate.
 
     Args:
         name: Its common name, <name>.<site>.
-        serves: Others may take it for a router: it is one of this site.
+        serves: Clients may accept it as a router of this site.
     """
     key = ec.generate_private_key(ec.SECP256R1())
     subject = x509.Name(
@@ -113,7 +113,7 @@ def issue(
             x509.NameAttribute(NameOID.ORGANIZATIONAL_UNIT_NAME, role),
         ]
     )
-    ends = min(now + lives, authority.certificate.not_valid_after_utc)
+    ends = min(now + lifetime, authority.certificate.not_valid_after_utc)
     usages = [ExtendedKeyUsageOID.CLIENT_AUTH, *([ExtendedKeyUsageOID.SERVER_AUTH] if serves else [])]
     certificate = (
         _builder(subject, authority.certificate.subject, key, now, ends)
@@ -132,11 +132,11 @@ def issue(
     )
 
 
-def show(bundle: bytes) -> Shown:
-    """What a bundle's certificate says, which its authority's certificate, in the same file, has signed.
+def read_bundle(bundle: bytes) -> BundleContent:
+    """Read a bundle's certificate and verify that the authority in the same file signed it.
 
     Raises:
-        KeysError: If it is no bundle, or not signed so.
+        KeysError: If it is not a bundle, or the signature is wrong.
     """
     try:
         serialization.load_pem_private_key(bundle, None)
@@ -147,9 +147,9 @@ def show(bundle: bytes) -> Shown:
         (issuer,) = own.issuer.get_attributes_for_oid(NameOID.COMMON_NAME)
     except (ValueError, TypeError, InvalidSignature):
         raise KeysError(
-            "no bundle of a private key, its certificate and the authority's: robomesh keys issue writes one"
+            "not a bundle of a key, its certificate and the authority's: robomesh keys issue writes one"
         ) from None
-    return Shown(
+    return BundleContent(
         str(name.value),
         str(role.value),
         str(issuer.value).removeprefix(_AUTHORITY),

@@ -4,4 +4,4 @@ from services.errors import ServiceError
 
 
 class KeysError(ServiceError):
-    """Keys, certificates or their list that are not there, not right, or not to be made so."""
+    """Keys, certificates or their list are missing, invalid or cannot be made."""

@@ -1,13 +1,13 @@
-"""Where a site's keys lie, and how they are written: whole or not at all, and for their owner only.
+"""The files of a site's keys; each is written atomically and readable by its owner only.
 
 authority/authority.key   signs; needed to issue and renew only, may be kept off the network
-authority.pem             the authority's certificate, whom everybody of the site trusts
-principals.toml           who has a certificate
-access.json5              what each of them may do, for the routers
+authority.pem             the authority's certificate, which every client of the site trusts
+principals.toml           the principals: names that have a certificate
+access.json5              the principals' rights, for the routers
 <service>.pem             a service's bundle: private key, certificate, authority's certificate
 people/<name>.pem         bundles of operators and monitors, to hand over
-guests/<site>.pem         what lets another site's router in here, to hand over
-links/<site>.pem          what lets our routers in at another site, from there
+guests/<site>.pem         bundles with which other sites' routers connect here, to hand over
+links/<site>.pem          bundles from other sites, with which this site's routers connect there
 """
 
 import fcntl
@@ -33,7 +33,7 @@ class Folder:
 
     @property
     def authority_key(self) -> Path:
-        """What signs certificates."""
+        """The key that signs certificates."""
         return self.path / "authority" / "authority.key"
 
     @property
@@ -43,59 +43,59 @@ class Folder:
 
     @property
     def principals(self) -> Path:
-        """The list of who has a certificate."""
+        """The list of principals."""
         return self.path / "principals.toml"
 
     @property
     def access(self) -> Path:
-        """What a router is told of everybody's rights."""
+        """The access rules of the routers."""
         return self.path / "access.json5"
 
     def service(self, name: str) -> Path:
-        """A service's bundle."""
+        """Return the path of a service's bundle."""
         return self.path / f"{name}.pem"
 
     def person(self, name: str) -> Path:
-        """An operator's or monitor's bundle."""
+        """Return the path of an operator's or monitor's bundle."""
         return self.path / "people" / f"{name}.pem"
 
     def guest(self, site: str) -> Path:
-        """What another site's router is let in with."""
+        """Return the path of the bundle with which another site's router connects to this site."""
         return self.path / "guests" / f"{site}.pem"
 
     def link(self, site: str) -> Path:
-        """What our routers are let in with at another site."""
+        """Return the path of the bundle with which this site's routers connect to another site."""
         return self.path / "links" / f"{site}.pem"
 
     @property
     def links(self) -> tuple[str, ...]:
-        """The sites whose routers let ours in."""
+        """The sites that accept this site's routers."""
         return tuple(sorted(file.stem for file in (self.path / "links").glob("*.pem")))
 
     def tls_of(self, service: str) -> Tls:
-        """A service's certificates.
+        """Return a service's certificates.
 
         Raises:
-            KeysError: If it has none here.
+            KeysError: If a file is missing.
         """
         file = self.service(service)
         for needed in (self.authority, file):
             if not needed.is_file():
                 raise KeysError(
-                    f"{needed} is not there: robomesh keys init SITE.toml makes what a site's services need"
+                    f"{needed} does not exist: robomesh keys init SITE.toml makes the services' files"
                 )
         return bundle(file, self.authority)
 
     def tls_of_link(self, site: str) -> Tls:
-        """The certificates for a link to another site's router.
+        """Return the certificates for a link to another site's router.
 
         Raises:
-            KeysError: If that site has not let us in.
+            KeysError: If that site has not accepted this one.
         """
         file = self.link(site)
         if not file.is_file():
             raise KeysError(
-                f"{file} is not there: robomesh keys issue --guest OURS at site {site} makes a file, "
+                f"{file} does not exist: robomesh keys issue --guest OURS at site {site} makes a file, "
                 "and robomesh keys accept FILE takes it here"
             )
         return bundle(file)
@@ -103,13 +103,13 @@ class Folder:
 
 @contextmanager
 def locked(folder: Folder, *, make: bool = False) -> Iterator[None]:
-    """Alone in a folder while the block runs: who reads the list and writes it anew loses nothing of another.
+    """Hold an exclusive lock on the folder, so that a read-modify-write of the list loses no change.
 
     Args:
-        make: Make the folder where there is none.
+        make: Make the folder if it is missing.
 
     Raises:
-        KeysError: If it is not there, or cannot be written.
+        KeysError: If the folder does not exist or cannot be written.
     """
     try:
         if make:
@@ -117,8 +117,8 @@ def locked(folder: Folder, *, make: bool = False) -> Iterator[None]:
         lock = os.open(folder.path / ".lock", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, _FILE_MODE)
     except FileNotFoundError:
         raise KeysError(
-            f"{folder.path} is not there: robomesh keys init SITE.toml begins, and --folder says where the "
-            "keys lie"
+            f"{folder.path} does not exist: robomesh keys init SITE.toml creates it, and --folder names the "
+            "folder of keys"
         ) from None
     except OSError as error:
         raise KeysError(f"{folder.path}: cannot be written: {error.strerror}") from None
@@ -130,7 +130,7 @@ def locked(folder: Folder, *, make: bool = False) -> Iterator[None]:
 
 
 def write(path: Path, data: bytes) -> None:
-    """Write a file in one step, readable by its owner only; so is its folder, when it is new.
+    """Write a file atomically, readable by its owner only; a new folder gets the same protection.
 
     Raises:
         KeysError: If it cannot be written.
@@ -143,7 +143,7 @@ def write(path: Path, data: bytes) -> None:
 
 
 def read(path: Path) -> bytes:
-    """A file's bytes.
+    """Return a file's content.
 
     Raises:
         KeysError: If it cannot be read.

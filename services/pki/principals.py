@@ -1,4 +1,4 @@
-"""The list of who has a certificate at a site: a TOML file that people can read, and edit in need."""
+"""A site's principals, the names that have a certificate: a TOML file that people can read and edit."""
 
 import tomllib
 from collections import Counter
@@ -14,7 +14,7 @@ from robomesh.topics import Role
 from robots.bounded_toml import parse_toml
 from services.pki.errors import KeysError
 
-_QUIET = ConfigDict(extra="forbid", frozen=True)
+_ENTRY_CONFIG = ConfigDict(extra="forbid", frozen=True)
 _NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]*\.[a-z0-9][a-z0-9_-]*$"
 _SITE = r"^([a-z0-9][a-z0-9_-]*|\*)$"
 _ROBOT = r"^[a-z0-9][a-z0-9_-]*$"
@@ -23,23 +23,23 @@ Robot = Annotated[str, Field(pattern=_ROBOT)]
 
 
 class Entry(BaseModel):
-    """One who has, or had, a certificate.
+    """A principal: a name that has, or had, a certificate.
 
     Attributes:
-        robots: A gateway's.
-        sites: Of another site's router: the sites that it speaks for; `*`: any but this one.
-        serial: Empty where another site's authority issued it.
-        earlier: When the last of the certificates that the name had before this one expires.
+        robots: Robots that a gateway may publish for.
+        sites: Sites that another site's router may publish for; `*`: all but this one.
+        serial: Empty if another site's authority issued the certificate.
+        earlier: Latest expiry among the name's earlier certificates.
     """
 
-    model_config = _QUIET
+    model_config = _ENTRY_CONFIG
     name: Annotated[str, Field(pattern=_NAME)]
     role: Role
     robots: tuple[Robot, ...] | None = None
     sites: tuple[Site, ...] = ()
     serial: str = ""
     fingerprint: str = ""
-    # With its zone: people may edit the file.
+    # With a time zone, because people may edit the file.
     issued: AwareDatetime | None = None
     expires: AwareDatetime | None = None
     earlier: AwareDatetime | None = None
@@ -47,22 +47,22 @@ class Entry(BaseModel):
 
     @property
     def good_until(self) -> datetime | None:
-        """When the last certificate of the name expires, renewed ones too; None: we issued none."""
+        """Latest expiry of all the name's certificates; None if this site issued none."""
         return max((end for end in (self.expires, self.earlier) if end is not None), default=None)
 
     @property
     def own_robots(self) -> frozenset[str] | None:
-        """The robots that a gateway speaks for, by their names; None: it is no gateway."""
+        """The robots that a gateway may publish for; None for other roles."""
         return frozenset(self.robots or ()) if self.role is Role.GATEWAY else None
 
     @property
     def principal(self) -> Principal:
-        """As the rules take it."""
+        """The principal as the access rules take it."""
         return Principal(name=self.name, role=self.role, robots=self.own_robots, sites=self.sites)
 
 
 class _List(BaseModel):
-    model_config = _QUIET
+    model_config = _ENTRY_CONFIG
     site: Annotated[str, Field(pattern=_ROBOT)]
     border: Border = "open"
     routers: tuple[str, ...] = ()
@@ -71,10 +71,10 @@ class _List(BaseModel):
 
 @dataclass(frozen=True, kw_only=True)
 class Principals:
-    """Everybody at a site.
+    """All principals of a site.
 
     Attributes:
-        routers: Where the site's routers are, for bundles that are handed over.
+        routers: Addresses of the site's routers, for bundles that are handed over.
     """
 
     site: str
@@ -83,12 +83,12 @@ class Principals:
     entries: tuple[Entry, ...] = ()
 
     def find(self, name: str) -> Entry | None:
-        """Who has a name, with the site or without."""
+        """Return the entry of a name, given with or without its site; None if there is none."""
         full = name if "." in name else f"{name}.{self.site}"
         return next((entry for entry in self.entries if entry.name == full), None)
 
     def replaced(self, entry: Entry) -> "Principals":
-        """With an entry anew, in the place of the one of its name."""
+        """Return the list with an entry added, in place of the one with its name."""
         others = [each for each in self.entries if each.name != entry.name]
         return Principals(
             site=self.site,
@@ -99,15 +99,15 @@ class Principals:
 
     @property
     def allowed(self) -> tuple[Principal, ...]:
-        """Those who were not revoked."""
+        """The principals that are not revoked."""
         return tuple(entry.principal for entry in self.entries if entry.revoked is None)
 
 
 def read_principals(text: str, where: str) -> Principals:
-    """The list that a file holds.
+    """Parse the list from a file's text.
 
     Raises:
-        KeysError: With the file, the key and what is wrong with it.
+        KeysError: If it is invalid; the message names the file, the key and the problem.
     """
     try:
         listed = _List.model_validate(parse_toml(text))
@@ -119,17 +119,17 @@ def read_principals(text: str, where: str) -> Principals:
         raise KeysError(f"{where}: {place} = {problem['input']!r}: {problem['msg']}") from None
     for name, count in Counter(entry.name for entry in listed.principal).items():
         if count > 1:
-            raise KeysError(f"{where}: {name} stands there twice: every name needs one entry")
+            raise KeysError(f"{where}: {name} is listed twice: every name needs one entry")
     return Principals(
         site=listed.site, border=listed.border, routers=listed.routers, entries=listed.principal
     )
 
 
 def write_principals(principals: Principals) -> str:
-    """The list as a file's text."""
-    # Names hold nothing that TOML would need escaped; addresses are quoted by us.
+    """Return the list as a file's text."""
+    # Names contain no character that TOML would escape.
     lines = [
-        f"# Who may take part at site {principals.site}. robomesh keys writes this file, and from it",
+        f"# Principals of site {principals.site}. robomesh keys writes this file, and from it",
         "# access.json5, which the site's routers follow.",
         f'site = "{principals.site}"',
         f'border = "{principals.border}"',

@@ -1,10 +1,10 @@
-"""New keys and certificates for those that have some."""
+"""Renewal of keys and certificates."""
 
 from collections.abc import Iterable
 from datetime import timedelta
 
 from robomesh.topics import PEOPLE
-from services.pki.authority import alone, issued, now, principals_of, save
+from services.pki.authority import exclusive, issued, now, principals_of, save
 from services.pki.errors import KeysError
 from services.pki.folder import Folder
 from services.pki.principals import Entry, Principals
@@ -12,18 +12,19 @@ from services.pki.principals import Entry, Principals
 RENEW_WITHIN = timedelta(days=10)
 
 
-@alone
+@exclusive
 def renew(folder: Folder, names: Iterable[str] = (), *, all_: bool = False) -> tuple[Entry, ...]:
-    """New keys and certificates, for as long as those before: of those named, or of what expires soon.
+    """Renew the given names' keys and certificates, or those that expire soon; each keeps its lifetime.
 
-    Without names the site's own services only: a person's file and a guest's are handed over by somebody,
-    and who was let in for a while is not let in for ever.
+    Without names it renews the site's own services only: a person has to hand over operators' and guests'
+    bundles,
+    and access that was granted for a limited time must not become permanent.
 
     Args:
-        all_: Without names: everybody's that has not expired, whenever it does.
+        all_: Without names: renew every certificate that has not expired.
 
     Raises:
-        KeysError: If a name has none, or was revoked.
+        KeysError: If a name has no certificate, or was revoked.
     """
     principals = principals_of(folder)
     wanted = [_renewable(principals, name) for name in names]
@@ -47,9 +48,9 @@ def renew(folder: Folder, names: Iterable[str] = (), *, all_: bool = False) -> t
 def _renewable(principals: Principals, name: str) -> Entry:
     entry = principals.find(name)
     if entry is None or not entry.serial:
-        raise KeysError(f"{name} has no certificate of this site: robomesh keys list shows who has")
+        raise KeysError(f"{name} has no certificate of this site: robomesh keys list shows the names")
     if entry.revoked is not None:
-        raise KeysError(f"{entry.name} was revoked: robomesh keys issue makes a certificate anew")
+        raise KeysError(f"{entry.name} was revoked: robomesh keys issue makes a new certificate")
     return entry
 
 

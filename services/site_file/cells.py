@@ -1,4 +1,4 @@
-"""The cells of a site file, as collision checks take them."""
+"""The site file's cells as the collision checker takes them."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,17 +13,17 @@ _MILLIMETRE = 1e-3
 
 
 def cells_of(site: Site) -> Mapping[str, CellDescription]:
-    """The cell of every robot, by the robot's name; a robot without one is alone in its own."""
-    together: dict[str, CellDescription] = {}
+    """Return the cell of every robot, by the robot's name; a robot without one is alone in its cell."""
+    shared: dict[str, CellDescription] = {}
     for name in {robot.cell for robot in site.robot if robot.cell}:
         robots = [robot for robot in site.robot if robot.cell == name]
-        together[name] = CellDescription(
+        shared[name] = CellDescription(
             robots=tuple(_robot(site, robot) for robot in robots),
             fixtures=tuple(_fixture(fixture) for fixture in site.fixture if fixture.cell == name),
             floor=_floor(robots),
         )
     return {
-        robot.name: together[robot.cell]
+        robot.name: shared[robot.cell]
         if robot.cell
         else CellDescription(robots=(_robot(site, robot),), floor=_floor([robot]))
         for robot in site.robot
@@ -31,7 +31,7 @@ def cells_of(site: Site) -> Mapping[str, CellDescription]:
 
 
 def _floor(robots: Sequence[Robot]) -> Floor | None:
-    """The floor of a cell: as one of its robots gives it, or the default."""
+    """Return the floor of a cell: given for one of its robots, or the default."""
     given = [robot.floor for robot in robots if "floor" in robot.model_fields_set]
     floor = given[0] if given else robots[0].floor
     if floor is None:
@@ -48,7 +48,7 @@ def _robot(site: Site, robot: Robot) -> CellRobot:
         name=robot.name,
         model=robot.model,
         base_to_site=pose_matrix(robot.pose, Units()),
-        # What was defined on the page reads nothing outside its own folder.
+        # A robot that was defined on the page may only read files in its folder.
         confined=Path(robot.model).absolute().is_relative_to(site.define.folder.absolute()),
         warning_m=robot.clearance.warning * _MILLIMETRE,
         stop_m=robot.clearance.stop * _MILLIMETRE,

@@ -1,40 +1,40 @@
-"""What the site file says of the page: `[console]`."""
+"""The site file's `[console]`."""
 
 from pathlib import Path
 
 from pydantic import BaseModel, StrictBool
 
-from services.site_file.part import Quiet
+from services.site_file.part import PART_CONFIG
 
 
 class ConsoleTls(BaseModel):
-    """The page's certificate, with those that signed it, and its key (PEM)."""
+    """The page's certificate with its chain, and its key (PEM)."""
 
-    model_config = Quiet
+    model_config = PART_CONFIG
     certificate: Path
     key: Path
 
 
 class Console(BaseModel):
-    """Where the page is served, and to whom."""
+    """The console's address and access."""
 
-    model_config = Quiet
+    model_config = PART_CONFIG
     listen: str = "127.0.0.1:8080"
-    # Names that people reach it by, beside addresses and localhost.
+    # Host names of the page, in addition to IP addresses and localhost.
     hosts: tuple[str, ...] = ()
-    # Who may sign in (robomesh accounts); without it whoever reaches the page may use it.
+    # File of accounts (robomesh accounts); without it the page needs no sign-in.
     accounts: Path | None = None
     tls: ConsoleTls | None = None
     insecure: StrictBool = False
 
     @property
     def scheme(self) -> str:
-        """Of the page's address."""
+        """Scheme of the page's address."""
         return "https" if self.tls is not None else "http"
 
 
-def beside(console: Console, folder: Path) -> Console:
-    """The same with its paths taken from the site file's folder."""
+def resolve_paths(console: Console, folder: Path) -> Console:
+    """Return the part with paths relative to the site file's folder."""
     changes: dict[str, object] = {}
     if console.accounts is not None:
         changes["accounts"] = folder / console.accounts

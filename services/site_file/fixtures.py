@@ -1,4 +1,4 @@
-"""The site file's part on cells: what stands in one, and how near an arm may come to it.
+"""The site file's part on cells: fixtures, and the clearance of an arm.
 
 Degrees and millimetres in the file, SI in the shapes that come of it.
 """
@@ -21,7 +21,7 @@ from robots.meshes.normals import creased
 from robots.meshes.solids import ball, box, turned
 from robots.poses import pose_matrix
 from robots.schema import Pose, Positive, Units, nearest
-from services.site_file.part import Quiet
+from services.site_file.part import PART_CONFIG
 
 _ROUND = 48
 _MILLIMETRE = 1e-3
@@ -30,9 +30,9 @@ Distance = Annotated[float, Field(strict=True, ge=0, le=10_000)]
 
 
 class Clearance(BaseModel):
-    """How near an arm may come to what stands around it [mm]."""
+    """Distances between an arm and its surroundings below which it gets a warning or a stop [mm]."""
 
-    model_config = Quiet
+    model_config = PART_CONFIG
     warning: Distance = 50.0
     stop: Distance = 10.0
 
@@ -50,10 +50,10 @@ class Floor(BaseModel):
 
     Attributes:
         height: In the site's frame; None: the height of the lowest base in the cell.
-        warning, stop: How near an arm may come to it; without them only contact counts.
+        warning, stop: Clearances of an arm from it; by default only contact counts.
     """
 
-    model_config = Quiet
+    model_config = PART_CONFIG
     height: Annotated[float, Field(strict=True, ge=-100_000, le=100_000)] | None = None
     warning: Distance = 0.0
     stop: Distance = 0.0
@@ -68,7 +68,7 @@ class Floor(BaseModel):
 
 
 class Fixture(BaseModel):
-    """Something that stands in a cell and does not move: one shape, its middle at the pose.
+    """A static object in a cell: one shape, centred on the pose.
 
     Attributes:
         box: Lengths along its x, y and z [mm].
@@ -77,11 +77,11 @@ class Fixture(BaseModel):
         mesh: A file, relative to the site file; in its own axes about the pose.
         mesh_scale: The mesh file's unit in metres.
         pose: In the site's frame.
-        exact: Checked as the mesh itself, not as its convex hull: slower, and lets an arm reach into it.
+        exact: Checked as the mesh itself, not as its convex hull: slower, but an arm may reach into it.
         ignore: Links that may touch it, as "<robot>/<link>".
     """
 
-    model_config = Quiet
+    model_config = PART_CONFIG
     cell: str
     name: str
     box: tuple[Positive, Positive, Positive] | None = None
@@ -120,14 +120,14 @@ class Fixture(BaseModel):
 
 
 def fixture_shape(fixture: Fixture) -> Shape:
-    """What a fixture looks like, in its own frame [m].
+    """Return a fixture's shape in its own frame [m].
 
-    Round ones are a little too large rather than too small: their flat faces touch the true surface.
+    Round shapes are slightly too large, not too small: their flat faces touch the true surface.
     """
     color = None if fixture.color is None else rgb(fixture.color)
     if fixture.mesh is not None:
         scale = fixture.mesh_scale
-        # Files that it refers to are read from its own folder only, as for every mesh from elsewhere.
+        # Files that the mesh refers to are read from its own folder only, as for every external mesh.
         folder = fixture.mesh.absolute().parent
         return Shape(fixture.mesh, np.diag([scale, scale, scale, 1.0]), color, within=folder)
     rounder = 1.0 / math.cos(math.pi / _ROUND)
@@ -147,19 +147,19 @@ def fixture_shape(fixture: Fixture) -> Shape:
 
 
 def fixture_to_site(fixture: Fixture) -> FloatArray:
-    """(4, 4) [m]."""
+    """Return a fixture's pose as a (4, 4) transform [m]."""
     return pose_matrix(fixture.pose, Units())
 
 
 def name_problem(fixtures: tuple[Fixture, ...], cells: dict[str, str]) -> str | None:
-    """What is wrong with fixtures' names and cells, in words; None: nothing.
+    """Return the first error in the names and cells of fixtures, or None.
 
     Args:
-        cells: The cell of each robot, by name; empty for a robot alone.
+        cells: The cell of each robot, by the robot's name; empty for a robot without one.
     """
     taken = {name: f"robot {name}" for name in cells}
     for fixture in fixtures:
-        # Of the whole site: a fixture's frame is <site>/<fixture>.
+        # Unique in the whole site, because a fixture's frame is <site>/<fixture>.
         if other := taken.get(fixture.name):
             return f"{other} and fixture {fixture.cell}/{fixture.name} have one name: each needs its own"
         taken[fixture.name] = f"fixture {fixture.cell}/{fixture.name}"
@@ -181,12 +181,12 @@ def name_problem(fixtures: tuple[Fixture, ...], cells: dict[str, str]) -> str | 
 
 
 def fixture_problem(fixtures: tuple[Fixture, ...], links: dict[str, dict[str, bool]]) -> str | None:
-    """What is wrong with fixtures' meshes, and with the links that they ignore; None: nothing.
+    """Return the first error in the meshes and ignored links of fixtures, or None.
 
-    A mesh is read now, and its GLB is kept for who serves it.
+    Each mesh is read, and its GLB is cached for the service that publishes it.
 
     Args:
-        links: Of each robot, by name.
+        links: Links of each robot, by the robot's name.
     """
     from robots.glb import shapes_glb
 
@@ -211,7 +211,7 @@ def fixture_problem(fixtures: tuple[Fixture, ...], links: dict[str, dict[str, bo
 
 
 def _missing_part(mesh: Path, within: Path | None) -> str:
-    """Return a mesh file that this one refers to and that cannot be read; empty: there is none.
+    """Return a mesh file that this one refers to and that cannot be read; empty if there is none.
 
     Only the VRML reader goes on without such a file; the others refuse the mesh.
     """

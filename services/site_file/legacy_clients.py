@@ -1,4 +1,4 @@
-"""The site file's part on old client programs: where they attach to a robot, and who of them commands."""
+"""The site file's part on legacy clients: where they connect, and which of them may command."""
 
 from typing import Annotated, Any
 
@@ -10,19 +10,19 @@ from robomesh import keys
 from robomesh.errors import KeyNameError
 from services.errors import ListenError
 from services.site_file.listen_address import check_reach, is_loopback, split_address
-from services.site_file.part import Quiet
+from services.site_file.part import PART_CONFIG
 
 
 class Commander(BaseModel):
-    """An address whose old client programs may command, and in whose name."""
+    """An address from which legacy clients may command, and the operator's name for it."""
 
-    model_config = Quiet
+    model_config = PART_CONFIG
     address: str
     operator: str = ""
 
     @model_validator(mode="before")
     @classmethod
-    def _alone(cls, value: Any) -> Any:
+    def _address_only(cls, value: Any) -> Any:
         return {"address": value} if isinstance(value, str) else value
 
     @field_validator("address")
@@ -45,14 +45,14 @@ class Commander(BaseModel):
 
     @property
     def name(self) -> str:
-        """The operator's name; an address alone commands in its own."""
+        """The operator's name; by default the address."""
         return self.operator or self.address
 
 
 class LegacyClients(BaseModel):
-    """Where old client programs attach to a robot as if the gateway were its controller."""
+    """The address on which the gateway serves legacy clients as if it were the robot's controller."""
 
-    model_config = Quiet
+    model_config = PART_CONFIG
     listen: str
     commanders: tuple[Commander, ...] = ()
     most: Annotated[int, Field(ge=1, le=1000, strict=True)] = 16
@@ -83,19 +83,19 @@ class LegacyClients(BaseModel):
         host, _ = split_address(self.listen)
         if not self.insecure and not is_loopback(host):
             raise ValueError(
-                f"others can reach {host}, and the protocol has no TLS: listen on 127.0.0.1, or write "
+                f"other machines can reach {host}, but there is no TLS: listen on 127.0.0.1, or write "
                 "insecure = true"
             )
         return self
 
     def warning(self, what: str) -> str | None:
-        """What has to be said of it at each start; None: nothing."""
+        """Return the warning to log at each start, or None."""
         host, _ = split_address(self.listen)
         return check_reach(what, host, secured=False, insecure=self.insecure)
 
     @property
     def settings(self) -> LegacySettings:
-        """As the gateway takes it."""
+        """The settings as the gateway takes them."""
         host, port = split_address(self.listen)
         commanders = {each.address: each.name for each in self.commanders}
         return LegacySettings(host=host, port=port, commanders=commanders, most=self.most)

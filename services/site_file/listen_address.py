@@ -1,4 +1,4 @@
-"""Addresses to listen on: HOST:PORT, and what may be reached from elsewhere."""
+"""Listening addresses, HOST:PORT, and whether other machines can reach them."""
 
 import ipaddress
 
@@ -6,10 +6,10 @@ from services.errors import ListenError
 
 
 def split_address(text: str) -> tuple[str, int]:
-    """Host and port of `HOST:PORT`.
+    """Split `HOST:PORT` into host and port.
 
     Raises:
-        ListenError: If it is not that.
+        ListenError: If the text has another form.
     """
     host, colon, port = text.rpartition(":")
     if not colon or not host or not port.isdigit() or int(port) > 65535:
@@ -18,7 +18,7 @@ def split_address(text: str) -> tuple[str, int]:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only this machine can reach what listens there."""
+    """Return whether only this machine can reach an address."""
     if host == "localhost":
         return True
     try:
@@ -28,20 +28,20 @@ def is_loopback(host: str) -> bool:
 
 
 def same_address(one: str, other: str) -> bool:
-    """Whether two addresses are the same; port 0 is a free one, and nobody else's.
+    """Return whether two addresses are equal; port 0 is any free port and equals no other.
 
     Raises:
-        ListenError: If one is none.
+        ListenError: If one is not an address.
     """
     (host, port), (host_2, port_2) = split_address(one), split_address(other)
     return port == port_2 != 0 and _plain(host) == _plain(host_2)
 
 
 def cannot_both_listen(one: str, other: str) -> bool:
-    """Whether two addresses are the same, or one is of every interface and holds the other.
+    """Return whether two addresses are equal, or one covers the other by listening on every interface.
 
     Raises:
-        ListenError: If one is none.
+        ListenError: If one is not an address.
     """
     (host, port), (host_2, port_2) = split_address(one), split_address(other)
     hosts = (host, host_2)
@@ -54,7 +54,7 @@ def _plain(host: str) -> str:
 
 
 def reachable(endpoint: str) -> str:
-    """A router's listening endpoint as one that its own machine can connect to."""
+    """Return a listening endpoint as an address that this machine can connect to."""
     protocol, _, rest = endpoint.partition("/")
     address, question, options = rest.partition("?")
     host, port = split_address(address)
@@ -68,32 +68,32 @@ _IN_THE_SITE_FILE = "give it tls = { ca, certificate, key }, listen on 127.0.0.1
 def check_reach(
     what: str, host: str, *, secured: bool, insecure: bool, remedy: str = _IN_THE_SITE_FILE
 ) -> str | None:
-    """The warning that listening there deserves; None where it needs none.
+    """Check who can reach an address; return a warning, or None.
 
     Args:
-        secured: TLS guards it.
-        insecure: The site file (or an option) takes the risk in so many words.
-        remedy: What to do where it may not.
+        secured: TLS protects it.
+        insecure: The site file (or an option) accepts the risk explicitly.
+        remedy: Advice for the error's text.
 
     Raises:
-        ListenError: If it is beyond loopback, not secured, and nobody took the risk.
+        ListenError: If other machines can reach it, without TLS and without `insecure`.
     """
     if is_loopback(host) or secured:
         return None
     if not insecure:
         raise ListenError(f"{what} would listen on {host}, which others can reach, without TLS: {remedy}")
-    return f"{what} listens on {host} without TLS (insecure = true): anybody who can reach it can use it"
+    return f"{what} listens on {host} without TLS (insecure = true): any machine that reaches it can use it"
 
 
 def check_page_reach(host: str, *, accounts: bool, tls: bool, insecure: bool) -> str | None:
-    """The warning that serving the page there deserves; None where it needs none.
+    """Check who can reach the page; return a warning, or None.
 
     Args:
-        accounts: Who uses it signs in.
-        insecure: The site file takes the risk in so many words.
+        accounts: Its users sign in.
+        insecure: The site file accepts the risk explicitly.
 
     Raises:
-        ListenError: If others can reach it, it has not both accounts and TLS, and nobody took the risk.
+        ListenError: If other machines can reach it, without accounts or TLS, and without `insecure`.
     """
     lacks = [what for what, there in (("accounts", accounts), ("TLS", tls)) if not there]
     if is_loopback(host) or not lacks:
@@ -105,6 +105,6 @@ def check_page_reach(host: str, *, accounts: bool, tls: bool, insecure: bool) ->
             'accounts = "accounts.toml" and tls = { certificate, key }, listen on 127.0.0.1, '
             "or write insecure = true"
         )
-    return f"the console listens on {host} without {without} (insecure = true): whoever can reach it " + (
-        "can read what is sent, passwords too" if accounts else "can use it"
+    return f"the console listens on {host} without {without} (insecure = true): anyone who reaches it " + (
+        "can read what is sent, passwords included" if accounts else "can use it"
     )

@@ -1,6 +1,6 @@
-"""What every part of the site file keeps to."""
+"""Model settings of all parts of the site file."""
 
 from pydantic import ConfigDict
 
-# A key that nobody knows is an error, and so is a number that is none.
-Quiet = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+# Unknown keys are errors, and so are NaN and infinity.
+PART_CONFIG = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)

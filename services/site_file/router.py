@@ -1,4 +1,4 @@
-"""The parts of a site file that say how its router and its services meet: addresses, links, keys."""
+"""The parts of a site file on the router and its clients: addresses, links, keys."""
 
 import re
 from pathlib import Path
@@ -15,22 +15,22 @@ from robots.bounded_toml import read_toml
 from services.pki import Folder
 from services.pki.errors import KeysError
 from services.site_file.listen_address import reachable
-from services.site_file.part import Quiet
+from services.site_file.part import PART_CONFIG
 
-# A site's robots are at #/<site>/<robot>: one of these names would hide them behind a page.
+# A robot's page is #/<site>/<robot>: a site with one of these names would collide with a page of the console.
 _PAGES = ("define", "events", "program", "recordings", "settings", "wall")
-# What else a site file may hold; `services/site_file/site.py` says what.
-OF_OTHERS = frozenset(
+# The other parts of a site file; `services/site_file/site.py` has their models.
+OTHER_PARTS = frozenset(
     {"robot", "fixture", "recorder", "renderer", "console", "define", "audit", "watch", "quotas"}
 )
-# `beijing` or `beijing=tls/10.1.0.1:7447`: a site that let us in, and where it is if not where it said.
+# `beijing` or `beijing=tls/10.1.0.1:7447`: a site that accepts ours, and its address if it has changed.
 _SITE_LINK = re.compile(r"([a-z0-9][a-z0-9_-]*)(?:=(\S+))?")
 
 
 class TlsFiles(BaseModel):
-    """Certificates of this end (PEM), made elsewhere than by `robomesh keys`."""
+    """Certificates of this end (PEM), not made by `robomesh keys`."""
 
-    model_config = Quiet
+    model_config = PART_CONFIG
     ca: Path
     certificate: Path
     key: Path
@@ -40,15 +40,16 @@ class Router(BaseModel):
     """The site's router.
 
     Attributes:
-        public: Where others find it, for certificates that are handed over; where it listens unless given.
-        connect: Other routers: an endpoint, or a site that let us in (`robomesh keys accept`).
-        access: Who may do what; that of the site's keys unless given.
-        border: `slow` lets out to other sites only what a slow line carries.
-        line_mbit: What the narrowest line to another site carries [Mbit/s], so that video waits here and not
-            in front of joint states; None: nobody knows.
+        public: Addresses for certificates that are handed over; default: the listening addresses.
+        connect: Other routers: an endpoint, or a site that accepts ours (`robomesh keys accept`).
+        access: File of access rules; default: that of the site's keys.
+        border: `slow` forwards to other sites only what a slow line can carry.
+        line_mbit: Bandwidth of the narrowest line to another site [Mbit/s], so that video queues here and not
+            in
+            front of joint states; None if unknown.
     """
 
-    model_config = Quiet
+    model_config = PART_CONFIG
     listen: Annotated[tuple[str, ...], Field(min_length=1)] = ("tcp/127.0.0.1:7447",)
     public: tuple[str, ...] = ()
     connect: tuple[str, ...] = ()
@@ -64,23 +65,23 @@ class Router(BaseModel):
         for each in connect:
             if "/" not in each.partition("=")[0] and not _SITE_LINK.fullmatch(each):
                 raise ValueError(
-                    f"{each!r}: an endpoint is right, as in tls/10.1.0.1:7447, or a site that let us in, "
+                    f"{each!r}: an endpoint is right, as in tls/10.1.0.1:7447, or a site that accepts ours, "
                     "as in beijing or beijing=tls/10.1.0.1:7447"
                 )
         return connect
 
 
 class Keys(BaseModel):
-    """The site's own certificates, which `robomesh keys` makes; with them everybody takes TLS."""
+    """The site's own certificates, made by `robomesh keys`; with them every connection uses TLS."""
 
-    model_config = Quiet
+    model_config = PART_CONFIG
     folder: Path | None = None
 
 
 class RoutedSite(BaseModel):
-    """What a site's router needs to know of its site."""
+    """The parts of a site file that its router needs."""
 
-    model_config = Quiet
+    model_config = PART_CONFIG
     site: str
     router: Router = Router()
     keys: Keys = Keys()
@@ -89,7 +90,7 @@ class RoutedSite(BaseModel):
     @classmethod
     def _site(cls, name: str) -> str:
         if name in _PAGES:
-            raise ValueError(f"the console has a page of that name, #/{name}: call the site something else")
+            raise ValueError(f"the console has a page with that name, #/{name}: choose another name")
         try:
             return check_name(name, "site")
         except KeyNameError as error:
@@ -97,36 +98,37 @@ class RoutedSite(BaseModel):
 
     @property
     def listened(self) -> tuple[str, ...]:
-        """Where the site's router listens."""
+        """The endpoints that the site's router listens on."""
         return listened(self.router, self.keys)
 
     @property
     def links(self) -> tuple[Link, ...]:
-        """The other routers that it links to."""
+        """The links to other routers."""
         return links(self.router, self.keys)
 
     def tls_of(self, service: str) -> Tls | None:
-        """The certificates of one of the site's own services; None: the site has none."""
+        """Return the certificates of one of the site's services; None if the site has none."""
         return tls_of(self.router, self.keys, service)
 
 
 def read_routed(path: Path) -> RoutedSite | None:
-    """Of a site file, quickly: a router's restart has to be over before a lease ends, and robots' numbers
-    take half of the time.
+    """Read only the router's parts of a site file.
+
+    A router's restart must end before a lease expires, and parsing the robots takes half of the time.
 
     Returns:
-        None: not in order; `services.site_file.site.load` says in words what is wrong.
+    None if the file is invalid; `services.site_file.site.load` reports why.
     """
     try:
         values = read_toml(path)
-        site = RoutedSite.model_validate({name: values[name] for name in values.keys() - OF_OTHERS})
+        site = RoutedSite.model_validate({name: values[name] for name in values.keys() - OTHER_PARTS})
     except (OSError, ValueError, ValidationError):
         return None
-    return site.model_copy(update=beside(site.router, site.keys, path.parent))
+    return site.model_copy(update=resolve_paths(site.router, site.keys, path.parent))
 
 
-def beside(router: Router, keys: Keys, folder: Path) -> dict[str, BaseModel]:
-    """Both with paths taken from the site file's folder."""
+def resolve_paths(router: Router, keys: Keys, folder: Path) -> dict[str, BaseModel]:
+    """Return both parts with paths relative to the site file's folder."""
     tls = router.tls
     if tls is not None:
         tls = TlsFiles(ca=folder / tls.ca, certificate=folder / tls.certificate, key=folder / tls.key)
@@ -139,20 +141,20 @@ def beside(router: Router, keys: Keys, folder: Path) -> dict[str, BaseModel]:
 
 
 def listened(router: Router, keys: Keys) -> tuple[str, ...]:
-    """Where the router listens: by TLS where the site has keys."""
+    """Return the endpoints that the router listens on: TLS if the site has keys."""
     return tuple(map(over_tls, router.listen)) if keys.folder is not None else router.listen
 
 
 def public(router: Router, keys: Keys) -> tuple[str, ...]:
-    """Where others find the site's routers."""
+    """Return the endpoints at which other machines reach the site's routers."""
     return router.public or tuple(map(reachable, listened(router, keys)))
 
 
 def tls_of(router: Router, keys: Keys, service: str) -> Tls | None:
-    """The certificates of one of the site's services; None: the site has none.
+    """Return the certificates of one of the site's services; None if the site has none.
 
     Raises:
-        KeysError: If the site has keys, and this service has none of them.
+        KeysError: If the site has keys, but this service has none.
     """
     if keys.folder is not None:
         return Folder(keys.folder).tls_of(service)
@@ -161,10 +163,10 @@ def tls_of(router: Router, keys: Keys, service: str) -> Tls | None:
 
 
 def links(router: Router, keys: Keys) -> tuple[Link, ...]:
-    """The other routers to link to, with what lets us in there.
+    """Return the links to other routers, with the certificates for them.
 
     Raises:
-        KeysError: If a site has not let us in, or does not say where it is.
+        KeysError: If a site does not accept ours, or its address is unknown.
     """
     return tuple(link for each in router.connect for link in _links(each, keys))
 
@@ -175,7 +177,7 @@ def _links(text: str, keys: Keys) -> list[Link]:
         return [Link(endpoint=text)]
     site, endpoint = named.groups()
     if keys.folder is None:
-        raise KeysError(f"[router] connect = {text!r} names a site, and this one has no [keys] folder")
+        raise KeysError(f"[router] connect = {text!r} names a site, which needs a [keys] folder")
     tls = Folder(keys.folder).tls_of_link(site)
     if endpoint:
         return [Link(endpoint=endpoint, tls=tls, site=site)]
@@ -189,5 +191,5 @@ def _links(text: str, keys: Keys) -> list[Link]:
 
 
 def over_tls(endpoint: str) -> str:
-    """An endpoint with TLS."""
+    """Return an endpoint with TLS."""
     return f"tls/{endpoint.removeprefix('tcp/')}" if endpoint.startswith("tcp/") else endpoint

@@ -1,6 +1,6 @@
-"""The site file: what runs at a site. Every service gets its part from here, as Settings.
+"""The site file: everything that runs at a site. Each service gets its settings from here.
 
-Degrees and millimetres in the file, SI in what is read from it.
+Units are degrees and millimetres in the file, SI in the services' settings.
 """
 
 import re
@@ -33,7 +33,7 @@ from robots.kinematic_tree import BASE, bare_links, tree_of
 from robots.schema import UrdfDescription
 from services.errors import ListenError, SiteFileError
 from services.site_file.console import Console
-from services.site_file.console import beside as console_beside
+from services.site_file.console import resolve_paths as resolve_console_paths
 from services.site_file.fixtures import Clearance, Fixture, Floor, fixture_problem, name_problem
 from services.site_file.legacy_clients import LegacyClients
 from services.site_file.listen_address import (
@@ -43,21 +43,21 @@ from services.site_file.listen_address import (
     same_address,
     split_address,
 )
-from services.site_file.part import Quiet
+from services.site_file.part import PART_CONFIG
 from services.site_file.quotas import Quotas
 from services.site_file.renderer_and_recorder import ALWAYS_RENDERED, Recorder, Renderer
-from services.site_file.router import RoutedSite, beside
+from services.site_file.router import RoutedSite, resolve_paths
 from services.site_file.validation_errors import sentence
 
 Triple = tuple[float, float, float]
-# Of a wrong site file, that are named.
-_MOST_PROBLEMS = 100
+# Maximum number of problems that an error lists.
+_MAX_PROBLEMS = 100
 
 
 class Robot(BaseModel):
     """An arm and its controller."""
 
-    model_config = Quiet
+    model_config = PART_CONFIG
     name: str
     model: str
     pose: Pose = Pose()
@@ -68,9 +68,9 @@ class Robot(BaseModel):
     accept_unknown: tuple[Literal["mode", "homed"], ...] = ()
     check: Literal["require", "warn", "off"] = "warn"
     clearance: Clearance = Clearance()
-    # None: its cell has none (`floor = false`). What one robot of a cell gives counts for all of it.
+    # None: its cell has no floor (`floor = false`). A floor given for one robot applies to its whole cell.
     floor: Floor | None = Floor()
-    # Whether somebody tried the stop unit on this controller; without that nothing is ever sent to it.
+    # True once the stop unit has been tried on this controller; the gateway sends nothing before that.
     stop_proven: StrictBool | None = None
     stale_after_s: Annotated[float, Field(gt=0.05, le=60)] = 1.0
     demo: StrictBool = False
@@ -80,11 +80,9 @@ class Robot(BaseModel):
     @classmethod
     def _name(cls, name: str) -> str:
         if keys.is_replay(name):
-            raise ValueError(
-                "replay-... is what recordings are played back as: call the robot something else"
-            )
+            raise ValueError('names that begin with "replay-" are reserved for replays: choose another name')
         if name == PROBE_ROBOT:
-            raise ValueError("rights are tried on this name: call the robot something else")
+            raise ValueError("this name is reserved for testing rights: choose another name")
         return _checked_name(name, "robot")
 
     @field_validator("protocol")
@@ -113,7 +111,7 @@ class Robot(BaseModel):
         if not isinstance(codes, dict):
             return codes
         try:
-            # TOML's keys are text.
+            # TOML keys are strings.
             return {int(code): meaning for code, meaning in codes.items()}
         except ValueError:
             raise ValueError('a code is a number, as in { 2 = "ABSOLUTE.DEG" }') from None
@@ -143,35 +141,35 @@ class Robot(BaseModel):
 
     @property
     def simulated(self) -> bool:
-        """Whether its controller is ours, and simulated."""
+        """True if the controller is the simulator."""
         return self.controller == "simulated"
 
     @property
     def can_be_stopped(self) -> bool:
-        """Whether the stop unit is proven: said so, or our own simulated controller."""
+        """True if the stop unit is proven: `stop_proven` says so, or the controller is simulated."""
         return self.simulated if self.stop_proven is None else self.stop_proven
 
 
 class Define(BaseModel):
-    """Where robots that were defined on the page are saved."""
+    """Folder of robots that were defined on the page."""
 
-    model_config = Quiet
+    model_config = PART_CONFIG
     folder: Path = Path("robots")
 
 
 class Audit(BaseModel):
-    """Where the gateway keeps what was asked of each robot."""
+    """Folder of the gateway's audit logs, one for each robot."""
 
-    model_config = Quiet
+    model_config = PART_CONFIG
     folder: Path = Path("audit")
-    # A file that has grown to this becomes an older part, and the log goes on in a new one.
+    # At this size a log file becomes an older part, and a new file begins.
     rotate_mib: Annotated[float, Field(ge=0.01, le=1024)] = 16
 
 
 class Watch(BaseModel):
-    """Where the watch keeps alarms, so that a restart forgets no acknowledgement."""
+    """Folder of the watch's alarms, so that a restart keeps acknowledgements."""
 
-    model_config = Quiet
+    model_config = PART_CONFIG
     folder: Path = Path("watch")
 
 
@@ -194,7 +192,7 @@ class Site(RoutedSite):
         names = [robot.name for robot in robots]
         for name in names:
             if names.count(name) > 1:
-                raise ValueError(f"two robots are named {name!r}: every robot needs a name of its own")
+                raise ValueError(f"two robots are named {name!r}: every robot needs a different name")
         return robots
 
     @model_validator(mode="after")
@@ -222,7 +220,7 @@ class Site(RoutedSite):
 
     @model_validator(mode="after")
     def _addresses(self) -> "Site":
-        """Every address is one thing's: two cannot listen on it, and two robots are not one controller."""
+        """Reject an address that is given twice; each listener and each controller needs its own."""
         here = [("the router", address) for address in map(_tcp_address, self.router.listen) if address]
         here.append(("the console", self.console.listen))
         linked = (_tcp_address(each.rpartition("=")[2]) for each in self.router.connect)
@@ -236,30 +234,30 @@ class Site(RoutedSite):
             *((cannot_both_listen, *pair) for pair in combinations(here, 2)),
             *((same_address, *pair) for pair in (*combinations(there, 2), *product(here, there))),
         ]
-        for meet, (what, address), (other, another) in tests:
+        for in_conflict, (what, address), (other, another) in tests:
             try:
-                met = meet(address, another)
+                conflict = in_conflict(address, another)
             except ListenError as error:
                 raise ValueError(str(error)) from None
-            if met:
+            if conflict:
                 raise ValueError(f"{another} is given twice, to {what} and to {other}: each needs its own")
         return self
 
     @property
     def recorded_views(self) -> tuple[str, ...]:
-        """Whose video is recorded unless one asks otherwise."""
+        """Views that are recorded by default."""
         if self.recorder.views is not None:
             return self.recorder.views
         return ("free",) if "free" in self.renderer.views else self.renderer.views[:1]
 
 
 def load(path: Path | None) -> Site:
-    """The site of a file; without one the built-in site `demo`.
+    """Load a site file; without a path, return the built-in site `demo`.
 
-    Paths in the file are taken from the file's own folder.
+    Paths in the file are relative to the file's folder.
 
     Raises:
-        SiteFileError: A line a problem: file, key, value, and what would be right.
+        SiteFileError: One line per problem: file, key, value and what would be right.
     """
     if path is None:
         return DEMO
@@ -273,12 +271,12 @@ def load(path: Path | None) -> Site:
         raise SiteFileError(f"{path}: not TOML: {error}") from None
     except ValidationError as error:
         found = error.errors(include_url=False)
-        sentences = [sentence(path, problem, values, Site) for problem in found[:_MOST_PROBLEMS]]
-        if len(found) > _MOST_PROBLEMS:
-            sentences.append(f"{path}: and {len(found) - _MOST_PROBLEMS} more problems")
+        sentences = [sentence(path, problem, values, Site) for problem in found[:_MAX_PROBLEMS]]
+        if len(found) > _MAX_PROBLEMS:
+            sentences.append(f"{path}: and {len(found) - _MAX_PROBLEMS} more problems")
         raise SiteFileError("\n".join(sentences)) from None
-    site = _beside(site, path.parent)
-    # What no service could run with is told before any starts.
+    site = _resolve_paths(site, path.parent)
+    # Report before the start what no service could run with.
     try:
         _check_reach(site)
     except ListenError as error:
@@ -309,10 +307,10 @@ def load(path: Path | None) -> Site:
 
 
 def _check_reach(site: Site) -> None:
-    """What others can reach is guarded, or the file takes the risk.
+    """Check that addresses which other machines can reach are secured.
 
     Raises:
-        ListenError: If not.
+        ListenError: If one is not secured and the file does not accept that.
     """
     for endpoint in site.listened:
         protocol, _, address = endpoint.partition("/")
@@ -327,26 +325,26 @@ def _check_reach(site: Site) -> None:
 
 
 def _unseen_problem(robots: tuple[Robot, ...], unseen: Mapping[str, str]) -> str | None:
-    """Why motions of a robot that requires checks could not be checked, in words; None: they can.
+    """Return why a robot that requires checks cannot be checked; None if it can.
 
     Args:
-        unseen: Robots that no check covers whole, and why.
+        unseen: By robot, the reason why checks do not cover all of it.
     """
     for robot in robots:
         if robot.check != "require":
             continue
         for other in robots:
-            met = other is robot or (robot.cell and other.cell == robot.cell)
-            if met and other.name in unseen:
-                whose = "" if other is robot else f"robot {other.name} of its cell: "
+            same_cell = other is robot or (robot.cell and other.cell == robot.cell)
+            if same_cell and other.name in unseen:
+                prefix = "" if other is robot else f"robot {other.name} of its cell: "
                 return (
-                    f'robot {robot.name}: check = "require": {whose}{unseen[other.name]}; '
+                    f'robot {robot.name}: check = "require": {prefix}{unseen[other.name]}; '
                     '"warn" and "off" are possible'
                 )
     return None
 
 
-def _beside(site: Site, folder: Path) -> Site:
+def _resolve_paths(site: Site, folder: Path) -> Site:
     robots = tuple(
         robot.model_copy(update={"model": str(folder / robot.model)})
         if robot.model.endswith((".toml", ".urdf")) and not Path(robot.model).is_absolute()
@@ -365,14 +363,14 @@ def _beside(site: Site, folder: Path) -> Site:
             "define": site.define.model_copy(update={"folder": folder / site.define.folder}),
             "audit": site.audit.model_copy(update={"folder": folder / site.audit.folder}),
             "watch": site.watch.model_copy(update={"folder": folder / site.watch.folder}),
-            "console": console_beside(site.console, folder),
-            **beside(site.router, site.keys, folder),
+            "console": resolve_console_paths(site.console, folder),
+            **resolve_paths(site.router, site.keys, folder),
         }
     )
 
 
 def _tcp_address(endpoint: str) -> str:
-    """The HOST:PORT of one of the router's endpoints; empty: it is no TCP port."""
+    """Return the HOST:PORT of a router endpoint; empty if it is not TCP."""
     protocol, _, rest = endpoint.partition("/")
     return re.split("[?#]", rest)[0] if protocol in ("tcp", "tls") else ""
 
@@ -384,7 +382,7 @@ def _checked_name(name: str, what: str) -> str:
         raise ValueError(str(error)) from None
 
 
-# What runs without a file. In a checkout the folder robots/ is the program's own.
+# The site without a file. In a checkout the folder robots/ is the program's own, hence my-robots/.
 DEMO = Site(
     site="demo",
     robot=(Robot(name="pt600", model="pt600", demo=True),),

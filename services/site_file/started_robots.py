@@ -1,7 +1,7 @@
-"""Robots that were started from the page: a small site file of additions, beside the saved robots.
+"""Robots that were started from the page: a small site file next to the saved robots.
 
-The console writes it, `robomesh up` follows it: each robot gets its simulator, gateway and kinematics
-as processes of its own, now and whenever the site comes up.
+The console writes it and `robomesh up` follows it: each robot gets its own simulator, gateway and kinematics
+processes, now and at every start of the site.
 """
 
 from pathlib import Path
@@ -18,10 +18,10 @@ STARTED_FILE = "started.toml"
 
 
 def read_started(site: Site) -> tuple[Robot, ...]:
-    """The robots that were started, whether their descriptions are right or not.
+    """Read the started robots; their descriptions are not checked.
 
     Raises:
-        SiteFileError: If the file is there and wrong, or names a robot that the site has already.
+        SiteFileError: If the file is invalid, or names a robot of the site file.
     """
     path = site.define.folder / STARTED_FILE
     try:
@@ -40,15 +40,17 @@ def read_started(site: Site) -> tuple[Robot, ...]:
         raise SiteFileError(f"{path}: {where}: {detail['msg'].removeprefix('Value error, ')}") from None
     own = {robot.name for robot in site.robot}
     if added.site != site.site:
-        raise SiteFileError(f"{path}: site = {added.site!r}: it is the site {site.site!r} that starts these")
+        raise SiteFileError(f"{path}: site = {added.site!r}: should be {site.site!r}")
     for robot in added.robot:
         if robot.name in own:
-            raise SiteFileError(f"{path}: robot {robot.name!r}: the site file has one of that name")
+            raise SiteFileError(f"{path}: robot {robot.name!r}: the site file has a robot with that name")
         if not robot.simulated:
-            raise SiteFileError(f"{path}: robot {robot.name!r}: only simulated ones are started from here")
+            raise SiteFileError(
+                f"{path}: robot {robot.name!r}: only simulated robots can be started from the page"
+            )
         if robot.cell:
             raise SiteFileError(
-                f"{path}: robot {robot.name!r}: cells are the site file's; take cell out here"
+                f"{path}: robot {robot.name!r}: cells belong in the site file; remove cell here"
             )
     return tuple(
         robot.model_copy(update={"model": str(site.define.folder / robot.model)})
@@ -59,10 +61,12 @@ def read_started(site: Site) -> tuple[Robot, ...]:
 
 
 def may_start(site: Site) -> tuple[str, ...]:
-    """Names of the robots that the page may start: started, saved, or the library's; none of the site file's.
+    """Return the names of the robots that the page may start: started, saved or library robots.
+
+    Robots of the site file are excluded.
 
     Raises:
-        SiteFileError: If the file of those that were started is wrong.
+    SiteFileError: If the file of started robots is invalid.
     """
     started = {robot.name for robot in read_started(site)}
     saved = {file.parent.name for file in site.define.folder.glob(f"[!.]*/{DESCRIPTION_FILE}")}
@@ -79,7 +83,7 @@ def _is_name(text: str) -> bool:
 
 
 def robot_to_start(site: Site, name: str) -> Robot:
-    """The entry for a saved robot, or for one of the library.
+    """Return the entry for a saved robot or a library robot.
 
     Its model is a path relative to the folder of saved robots.
     """
@@ -88,19 +92,19 @@ def robot_to_start(site: Site, name: str) -> Robot:
 
 
 def write_started(site: Site, robots: tuple[Robot, ...]) -> None:
-    """Replace the file in one step.
+    """Replace the file of started robots.
 
     Args:
-        robots: As `read_started` and `robot_to_start` give them.
+        robots: Entries from `read_started` and `robot_to_start`.
 
     Raises:
-        OSError: If it cannot be written; what was there stays.
+        OSError: If it cannot be written; the old file remains.
     """
     folder = site.define.folder
     lines = ["# Robots started from the page; robomesh up follows this file.", f'site = "{site.site}"']
     for robot in robots:
         model = Path(robot.model)
-        # Names hold nothing that TOML would need escaped.
+        # Names contain no character that TOML would escape.
         own = model.relative_to(folder).as_posix() if model.is_relative_to(folder) else robot.model
         lines += ["", "[[robot]]", f'name = "{robot.name}"', f'model = "{own}"', 'controller = "simulated"']
     folder.mkdir(parents=True, exist_ok=True)

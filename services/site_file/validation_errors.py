@@ -1,4 +1,4 @@
-"""What is wrong in a site file, in words."""
+"""Problems of a site file as sentences."""
 
 from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
@@ -9,10 +9,10 @@ from pydantic import BaseModel
 
 
 def sentence(path: Path, problem: Any, values: dict[str, Any], model: type[BaseModel]) -> str:
-    """One of pydantic's problems as one line: file, key, value and what would be right.
+    """Return one of pydantic's problems as one line: file, key, value and what would be right.
 
     Args:
-        model: Of the whole file.
+        model: Model of the whole file.
     """
     kind, place, given = problem["type"], problem["loc"], problem["input"]
     parts = list(place)
@@ -25,7 +25,7 @@ def sentence(path: Path, problem: Any, values: dict[str, Any], model: type[BaseM
     if kind == "extra_forbidden":
         keys = _keys(model, place[:-1])
         near = get_close_matches(str(parts[-1]), keys, n=1)
-        # Of few keys all may be named.
+        # All keys are listed where there are few.
         hint = (
             f": is {near[0]} meant?" if near else f": there are {', '.join(keys)}" if len(parts) > 1 else ""
         )
@@ -39,14 +39,14 @@ def sentence(path: Path, problem: Any, values: dict[str, Any], model: type[BaseM
         message = "should be a list, as in [1, 2]"
     elif kind == "model_type" and isinstance(given, list):
         message = f"there is one: write [{where}], with one bracket"
-    # A whole table tells nobody where to look; the sentence names what is wrong in it.
+    # The value of a whole table is too long to help; the sentence names the wrong key in it.
     if not where or (given and isinstance(given, dict | list | tuple)):
         return f"{path}: {where + ': ' if where else ''}{message}"
     return f"{path}: {where} = {given!r}: {message}"
 
 
 def _keys(model: type[BaseModel], place: Sequence[str | int]) -> list[str]:
-    """The keys of the table at a place."""
+    """Return the keys of the table at a place."""
     for part in place:
         if isinstance(part, str) and part in model.model_fields:
             model = next(_tables(model.model_fields[part].annotation), model)

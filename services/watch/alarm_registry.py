@@ -1,4 +1,4 @@
-"""The alarms as they are kept: changed by what happens and by people, told, and on disk."""
+"""A site's alarms: fed by conditions, events and people; published, and saved to disk."""
 
 import asyncio
 import contextlib
@@ -10,7 +10,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from services.watch import alarm_store
 from services.watch.alarms import Alarm, Alarms
 from services.watch.conditions import Condition
-from services.watch.subscriptions import Intake, alarm_of
+from services.watch.subscriptions import EventHandler, alarm_of
 
 log = logging.getLogger(__name__)
 
@@ -20,50 +20,52 @@ _P = schema.Alarm.Priority
 _SEVERITY = {_P.LOW: _S.WARNING, _P.MEDIUM: _S.WARNING, _P.HIGH: _S.ERROR, _P.CRITICAL: _S.CRITICAL}
 
 # Severity, code, text and values of an event.
-Say = Callable[[schema.Event.Severity, str, str, dict[str, str]], None]
+PublishEvent = Callable[[schema.Event.Severity, str, str, dict[str, str]], None]
 
 
-class Book:
-    """A site's alarms, and their file.
+class AlarmRegistry:
+    """A site's alarms and their file.
 
     Args:
-        say: Publishes an event.
+        publish_event: Publishes an event.
     """
 
-    def __init__(self, path: Path, say: Say) -> None:
+    def __init__(self, path: Path, publish_event: PublishEvent) -> None:
         self.alarms = Alarms()
-        self.intake = Intake(self.alarms)
-        self._path, self._say = path, say
+        self.events = EventHandler(self.alarms)
+        self._path, self._publish_event = path, publish_event
         self._saved: object = None
-        self._told: object = None
+        self._published: object = None
         self._saving = asyncio.Lock()
         self._task: asyncio.Task[None] | None = None
         self._problem = ""
 
     async def open(self) -> None:
-        """Take up what was so before a restart; a file that cannot be read is put aside and told of."""
+        """Load the alarms of the last run; an invalid file is renamed and reported by an event."""
         try:
-            self.alarms.held, self.intake.told_ns = await asyncio.to_thread(alarm_store.load, self._path)
+            self.alarms.by_id, self.events.last_event_ns = await asyncio.to_thread(
+                alarm_store.load, self._path
+            )
         except (ValueError, OSError) as error:
             aside = self._path.with_suffix(".damaged")
-            text = f"alarms from before cannot be read, who had seen what is not known: {error}"
+            text = f"saved alarms cannot be read, so acknowledgements are lost: {error}"
             log.error("%s", text)
-            self._say(_S.ERROR, "alarm.forgotten", text, {})
+            self._publish_event(_S.ERROR, "alarm.forgotten", text, {})
             if isinstance(error, ValueError):
-                with contextlib.suppress(OSError):  # a disk that refuses is told of when it is saved
+                with contextlib.suppress(OSError):  # the next save reports a disk that refuses
                     await asyncio.to_thread(self._path.replace, aside)
         self._saved = self._state()
 
     async def close(self) -> None:
-        """Save what is not yet."""
+        """Save unsaved changes."""
         if self._task is not None:
             await asyncio.gather(self._task, return_exceptions=True)
         await self._save()
 
-    # ---------------------------------------------------------- what happens
+    # ---------------------------------------------------------- inputs
 
     def conditions(self) -> dict[str, Condition]:
-        """Those that stood at the last restart, as far as an alarm tells them."""
+        """Return the conditions that were active at the last restart, as their alarms describe them."""
         return {
             alarm.id: Condition(
                 robot=alarm.robot,
@@ -72,54 +74,56 @@ class Book:
                 text=alarm.text,
                 over=f"over: {alarm.text}",
                 values=alarm.values,
-                told=alarm.source != "watch",
+                reported=alarm.source != "watch",
                 what=alarm.id.removeprefix(f"{alarm.robot}:"),
             )
-            for alarm in self.alarms.held.values()
-            if alarm.stands and alarm.by_state
+            for alarm in self.alarms.by_id.values()
+            if alarm.active and alarm.by_state
         }
 
     def begin(self, condition: Condition, now: float) -> None:
-        """It has begun to be so."""
+        """Activate a condition's alarm."""
         alarm = alarm_of(condition, now)
-        self.alarms.come(alarm, now)
-        if not condition.told:
-            self._say(_SEVERITY[alarm.priority], condition.code, condition.text, dict(condition.values))
+        self.alarms.activate(alarm, now)
+        if not condition.reported:
+            self._publish_event(
+                _SEVERITY[alarm.priority], condition.code, condition.text, dict(condition.values)
+            )
 
     def change(self, condition: Condition) -> None:
-        """It is still so, in other words."""
+        """Update the text of a condition's alarm."""
         self.alarms.change(condition.id, condition.code, condition.text, condition.values)
 
     def end(self, condition: Condition, now: float) -> None:
-        """It is so no more."""
-        self.alarms.go(condition.id, now)
-        if not condition.told:
-            self._say(_S.INFO, f"{condition.code}.over", condition.over, dict(condition.values))
+        """Clear a condition's alarm."""
+        self.alarms.clear(condition.id, now)
+        if not condition.reported:
+            self._publish_event(_S.INFO, f"{condition.code}.over", condition.over, dict(condition.values))
 
-    def conditions_of_its_own(self) -> Iterator[Condition]:
-        """What is wrong with the alarms themselves."""
+    def own_conditions(self) -> Iterator[Condition]:
+        """Yield the faults of alarm handling itself."""
         if self.alarms.flooding:
             yield Condition(
                 code="alarm.flood",
-                text="more than 10 alarms in 10 minutes: more than a person can follow",
-                over="alarms come at a rate again that a person can follow",
+                text="more than 10 alarms in 10 minutes: more than a person can handle",
+                over="the rate of alarms is normal again",
             )
         if self._problem:
             yield Condition(
                 code="alarm.not_saved",
-                text=f"alarms cannot be saved, a restart would forget them: {self._problem}",
+                text=f"alarms cannot be saved; a restart would lose them: {self._problem}",
                 over="alarms are saved again",
             )
 
-    async def change_by(self, asked: _Request, by: str, now: float) -> None:
-        """What a person does with alarms; saved when it returns, if the disk is well.
+    async def apply_request(self, asked: _Request, by: str, now: float) -> None:
+        """Apply a person's request; save before returning, if the disk allows it.
 
         Raises:
-            AlarmError: Why not.
+            AlarmError: If the alarm's state does not allow it.
         """
         alarms = self.alarms
         values = {"by": by}
-        texts = {each: alarms.held[each].text for each in asked.ids if each in alarms.held}
+        texts = {each: alarms.by_id[each].text for each in asked.ids if each in alarms.by_id}
         match asked.action:
             case _Request.ACKNOWLEDGE:
                 alarms.acknowledge(asked.ids, by, now)
@@ -135,26 +139,26 @@ class Book:
                 alarms.unshelve(asked.ids, by, now)
                 code, did = "alarm.unshelved", "put back"
         for identity, text in texts.items():
-            self._say(_S.INFO, code, f"{by} {did}: {text}", values | {"id": identity})
+            self._publish_event(_S.INFO, code, f"{by} {did}: {text}", values | {"id": identity})
         await self._save()
 
-    # ------------------------------------------------------------ what is told
+    # ------------------------------------------------------------ outputs
 
-    def look(self, now: float) -> bool:
-        """What time changes; whether anything has since the last look, and is being saved."""
-        self.alarms.look(now)
+    def update(self, now: float) -> bool:
+        """Apply what depends on time, start a save if needed, and return whether the alarms have changed."""
+        self.alarms.update(now)
         state = self._state()
         if state != self._saved and (self._task is None or self._task.done()):
             self._task = asyncio.create_task(self._save())
-        changed, self._told = state != self._told, state
+        changed, self._published = state != self._published, state
         return changed
 
     def message(self, site: str) -> schema.AlarmList:
-        """Everything, most urgent first."""
+        """Return all alarms as a message, most urgent first."""
         return schema.AlarmList(site=site, alarms=[_message(alarm, site) for alarm in self.alarms.sorted()])
 
     def _state(self) -> tuple[Alarm, ...]:
-        return tuple(self.alarms.held.values())
+        return tuple(self.alarms.by_id.values())
 
     async def _save(self) -> None:
         async with self._saving:
@@ -162,7 +166,7 @@ class Book:
             if state == self._saved:
                 return
             try:
-                await asyncio.to_thread(alarm_store.save, self._path, state, dict(self.intake.told_ns))
+                await asyncio.to_thread(alarm_store.save, self._path, state, dict(self.events.last_event_ns))
                 self._saved, self._problem = state, ""
             except OSError as error:
                 self._problem = f"{self._path}: {error.strerror or error}"

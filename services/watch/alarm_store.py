@@ -1,4 +1,4 @@
-"""Alarms in a small file, so that a restart forgets no acknowledgement."""
+"""A file of alarms, so that a restart keeps acknowledgements."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -11,14 +11,22 @@ from robomesh.schemas.robomesh_pb2 import Alarm as AlarmMessage
 from services.watch.alarms import Alarm
 
 _KINDS = {each.name: each.type for each in fields(Alarm)}
-_LAST_S = 253402300799.0  # the last second that a protobuf timestamp can tell
+# The file keeps its first version's names of these fields.
+_FILE_KEYS = {
+    "active": "stands",
+    "acknowledged": "seen",
+    "occurrences": "came",
+    "clears_at": "going_at",
+    "reporter": "told_by",
+}
+_LAST_S = 253402300799.0  # the last second that a protobuf timestamp can hold
 
 
 def load(path: Path) -> tuple[dict[str, Alarm], dict[str, int]]:
-    """The alarms that were saved, and until when each topic's events were taken; none without a file.
+    """Load the saved alarms, and by topic the time of its last handled event; both empty without a file.
 
     Raises:
-        ValueError: If the file is none of ours; its text names the file.
+        ValueError: If it is not a file of alarms; the message names the file.
         OSError: If it cannot be read.
     """
     try:
@@ -27,28 +35,35 @@ def load(path: Path) -> tuple[dict[str, Alarm], dict[str, int]]:
         return {}, {}
     try:
         values = json.loads(text)
-        json.dumps(values, ensure_ascii=False, allow_nan=False).encode()  # all of it can be told
+        json.dumps(
+            values, ensure_ascii=False, allow_nan=False
+        ).encode()  # raises if a value cannot be published
         alarms = [_alarm(entry) for entry in values["alarms"]]
         return {alarm.id: alarm for alarm in alarms}, {str(k): int(v) for k, v in values["told_ns"].items()}
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         raise ValueError(f"{path}: not a file of alarms: {error or type(error).__name__}") from None
 
 
-def save(path: Path, alarms: Iterable[Alarm], told_ns: Mapping[str, int]) -> None:
-    """Write them, the whole file or nothing of it; blocks until the disk has it.
+def save(path: Path, alarms: Iterable[Alarm], last_event_ns: Mapping[str, int]) -> None:
+    """Write the file atomically; block until the disk has it.
 
     Raises:
         OSError: If the disk refuses.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    values = {"alarms": [asdict(alarm) for alarm in alarms], "told_ns": dict(told_ns)}
+    values = {"alarms": [_entry(alarm) for alarm in alarms], "told_ns": dict(last_event_ns)}
     write_atomically(path, json.dumps(values, ensure_ascii=False, indent=1).encode())
 
 
+def _entry(alarm: Alarm) -> dict[str, Any]:
+    return {_FILE_KEYS.get(name, name): value for name, value in asdict(alarm).items()}
+
+
 def _alarm(entry: dict[str, Any]) -> Alarm:
-    values = {name: value for name, value in entry.items() if name in _KINDS}
+    fields_by_key = {_FILE_KEYS.get(name, name): name for name in _KINDS}
+    values = {fields_by_key[key]: value for key, value in entry.items() if key in fields_by_key}
     values["values"] = tuple((str(name), str(value)) for name, value in values.get("values", ()))
-    values["came"] = tuple(float(at) for at in values.get("came", ()))
+    values["occurrences"] = tuple(float(at) for at in values.get("occurrences", ()))
     for name, value in values.items():
         if not _fits(name, value):
             raise ValueError(f"{name} {value!r:.80} of an alarm")
@@ -56,7 +71,7 @@ def _alarm(entry: dict[str, Any]) -> Alarm:
 
 
 def _fits(name: str, value: object) -> bool:
-    """Whether it can be held and told: a hand or a disk may have changed it."""
+    """Return whether a value has its field's type and range; the file may be edited or damaged."""
     match value:
         case bool():
             return _KINDS[name] is bool
@@ -71,4 +86,4 @@ def _fits(name: str, value: object) -> bool:
         case str():
             return _KINDS[name] is str
         case _:
-            return name in ("values", "came")
+            return name in ("values", "occurrences")

@@ -1,20 +1,20 @@
-"""Alarms after ISA-18.2, as a pure state machine: what happened and the time go in.
+"""Alarms after ISA-18.2: a pure state machine. Events and the current time are its only inputs.
 
-Of an alarm three things are known: whether it stands, whether somebody has seen it, whether it is shelved.
+An alarm has three independent flags: active, acknowledged, shelved.
 
-    shelved   stands   seen     state
-    yes       -        -        SHELVED           put aside by a person, for a while
-    no        yes      no       UNACKNOWLEDGED    act
-    no        yes      yes      ACKNOWLEDGED      somebody does
-    no        no       no       RETURNED          gone by itself, nobody saw it
-    no        no       yes      (forgotten)
+    shelved   active   acknowledged   state
+    yes       -        -              SHELVED           hidden by a person for a limited time
+    no        yes      no             UNACKNOWLEDGED    a person must act
+    no        yes      yes            ACKNOWLEDGED      a person is acting
+    no        no       no             RETURNED          cleared before anyone acknowledged it
+    no        no       yes            (removed)
 
-    happens        does
-    comes          stands; counted; unseen, unless it stood already
-    goes           stands no more, at once; one that came three times in a minute a minute later
-    acknowledged   seen; what nothing ends (latching) stands no more
-    shelved        out of sight until then; it comes and goes and is counted meanwhile
-    unshelved      as its other two say
+    input          effect
+    activate       active; counted; unacknowledged unless it was active already
+    clear          inactive immediately; a minute later if it was activated three times within a minute
+    acknowledge    acknowledged; a latching alarm also becomes inactive
+    shelve         hidden until the given time; activations and clears still count
+    unshelve       the state follows from the other two flags
 
 Source: ANSI/ISA-18.2-2016, figure 3 (states), clauses 11 (shelving), 16 (chattering: 3 in a minute; flood:
 more than 10 in 10 minutes, over below 5).
@@ -29,15 +29,15 @@ from robomesh.schemas.robomesh_pb2 import Alarm as AlarmMessage
 
 State = AlarmMessage.State
 
-_CHATTERS, _CHATTERS_WITHIN_S = 3, 60.0
+_CHATTERING, _CHATTERING_WITHIN_S = 3, 60.0
 _FLOOD, _FLOOD_OVER, _FLOOD_WITHIN_S = 10, 5, 600.0
 LONGEST_SHELF_S = 86_400.0
-_MOST = 500
-_LONGEST_TEXT = 500
+_MAX_ALARMS = 500
+_MAX_TEXT = 500
 
 
 class AlarmError(ValueError):
-    """Something that cannot be done with an alarm; `reason` says why."""
+    """A request that the alarm's state does not allow; `reason` says why."""
 
     def __init__(self, reason: Reason) -> None:
         super().__init__(reason.text)
@@ -46,16 +46,16 @@ class AlarmError(ValueError):
 
 @dataclass(frozen=True, kw_only=True)
 class Alarm:
-    """Something that a person must act on. Times are seconds since the Unix epoch.
+    """A condition that a person must act on. Times are seconds since the Unix epoch.
 
     Attributes:
-        by_state: It is so for as long as something is; else it happened.
-        latching: Nothing will say that it is over, or it may stay so for good: to acknowledge it ends it.
-        over_after_s: Over when it has not come for so long.
-        came: Its last comings, at most three: what chatters.
-        going_at: It has gone, and is taken for gone from then on.
-        by: Who acknowledged or shelved it, `at` then.
-        told_by: The process that will say that it is over; empty: none, or it is not known which.
+        by_state: Active while a reported state lasts; otherwise an event activated it.
+        latching: No event may ever clear it, so acknowledging it clears it.
+        over_after_s: Cleared if it is not activated again within this time.
+        occurrences: Times of its last activations, at most three; they show chattering.
+        clears_at: Time at which a pending clear takes effect.
+        by: Person who acknowledged or shelved it, at the time `at`.
+        reporter: Process that will report its end; empty if there is none or it is unknown.
     """
 
     id: str
@@ -72,159 +72,170 @@ class Alarm:
     latching: bool = False
     over_after_s: float | None = None
     count: int = 1
-    stands: bool = True
-    seen: bool = False
-    came: tuple[float, ...] = ()
-    going_at: float | None = None
+    active: bool = True
+    acknowledged: bool = False
+    occurrences: tuple[float, ...] = ()
+    clears_at: float | None = None
     returned: float | None = None
     by: str = ""
     at: float | None = None
     shelved_until: float | None = None
     reason: str = ""
-    told_by: str = ""
+    reporter: str = ""
 
     @property
     def state(self) -> State:
-        """As the table above says; what is neither standing nor unseen is forgotten by then."""
+        """Return the state by the table above. Inactive, acknowledged alarms are removed, so have none."""
         if self.shelved_until is not None:
             return State.SHELVED
-        if not self.stands:
+        if not self.active:
             return State.RETURNED
-        return State.ACKNOWLEDGED if self.seen else State.UNACKNOWLEDGED
+        return State.ACKNOWLEDGED if self.acknowledged else State.UNACKNOWLEDGED
 
 
 @dataclass
 class Alarms:
-    """The alarms of a site that are not over and seen."""
+    """A site's alarms, except those that are both cleared and acknowledged."""
 
-    held: dict[str, Alarm] = field(default_factory=dict)
-    # When alarms began to ask for somebody.
-    _rings: list[float] = field(default_factory=list)
+    by_id: dict[str, Alarm] = field(default_factory=dict)
+    # Times at which alarms became unacknowledged.
+    _annunciations: list[float] = field(default_factory=list)
     flooding: bool = False
 
-    def come(self, alarm: Alarm, now: float) -> None:
-        """It is so, or has happened, once more."""
-        before = self.held.get(alarm.id)
-        going_at = None if alarm.over_after_s is None else now + alarm.over_after_s
-        came = (*(before.came if before else ()), now)[-_CHATTERS:]
+    def activate(self, alarm: Alarm, now: float) -> None:
+        """Activate an alarm, or count another activation of it."""
+        before = self.by_id.get(alarm.id)
+        clears_at = None if alarm.over_after_s is None else now + alarm.over_after_s
+        occurrences = (*(before.occurrences if before else ()), now)[-_CHATTERING:]
         alarm = replace(
-            alarm, text=alarm.text[:_LONGEST_TEXT], since=now, last=now, came=came, going_at=going_at
+            alarm,
+            text=alarm.text[:_MAX_TEXT],
+            since=now,
+            last=now,
+            occurrences=occurrences,
+            clears_at=clears_at,
         )
         if before is not None:
             kept = {name: getattr(before, name) for name in ("by", "at", "shelved_until", "reason")}
-            seen = before.seen and before.stands
-            since = before.since if before.stands else now
-            alarm = replace(alarm, count=before.count + 1, since=since, seen=seen, **kept)
+            acknowledged = before.acknowledged and before.active
+            since = before.since if before.active else now
+            alarm = replace(alarm, count=before.count + 1, since=since, acknowledged=acknowledged, **kept)
         if alarm.state is State.UNACKNOWLEDGED and (before is None or before.state is not alarm.state):
-            self._rings.append(now)
-        self.held[alarm.id] = alarm
-        self._make_room()
+            self._annunciations.append(now)
+        self.by_id[alarm.id] = alarm
+        self._evict()
 
     def change(self, identity: str, code: str, text: str, values: tuple[tuple[str, str], ...]) -> None:
-        """It stands as before, and its words have changed."""
-        alarm = self.held.get(identity)
+        """Replace the text of an active alarm."""
+        alarm = self.by_id.get(identity)
         if alarm is not None:
-            self.held[identity] = replace(alarm, code=code, text=text[:_LONGEST_TEXT], values=values)
+            self.by_id[identity] = replace(alarm, code=code, text=text[:_MAX_TEXT], values=values)
 
-    def go(self, identity: str, now: float) -> None:
-        """It is over, unless it chatters."""
-        alarm = self.held.get(identity)
-        if alarm is None or not alarm.stands:
+    def clear(self, identity: str, now: float) -> None:
+        """Clear an alarm; a chattering one is cleared later."""
+        alarm = self.by_id.get(identity)
+        if alarm is None or not alarm.active:
             return
-        chatters = len(alarm.came) == _CHATTERS and now - alarm.came[0] < _CHATTERS_WITHIN_S
-        self.held[identity] = replace(alarm, going_at=now + _CHATTERS_WITHIN_S if chatters else now)
-        self.look(now)
+        chattering = (
+            len(alarm.occurrences) == _CHATTERING and now - alarm.occurrences[0] < _CHATTERING_WITHIN_S
+        )
+        self.by_id[identity] = replace(alarm, clears_at=now + _CHATTERING_WITHIN_S if chattering else now)
+        self.update(now)
 
-    def orphan(self, identity: str, now: float) -> None:
-        """Who would say that it is over has been replaced: it is over, unless that process says so too."""
-        self.held[identity] = replace(self.held[identity], told_by="")
-        self.go(identity, now)
+    def lose_reporter(self, identity: str, now: float) -> None:
+        """Clear an alarm after its reporter was replaced; the new process does not know of it."""
+        self.by_id[identity] = replace(self.by_id[identity], reporter="")
+        self.clear(identity, now)
 
-    def look(self, now: float) -> None:
-        """What time alone changes; to be called now and then."""
-        for alarm in tuple(self.held.values()):
-            alarm = _in_reach(alarm, now)
+    def update(self, now: float) -> None:
+        """Apply pending clears and expired shelves, and update the flood flag. Call it regularly."""
+        for alarm in tuple(self.by_id.values()):
+            alarm = _limit_times(alarm, now)
             if alarm.shelved_until is not None and now >= alarm.shelved_until:
-                alarm = replace(alarm, shelved_until=None, reason="", seen=False)
-                if alarm.stands:
-                    self._rings.append(now)
-            if alarm.stands and alarm.going_at is not None and now >= alarm.going_at:
-                alarm = replace(alarm, stands=False, going_at=None, returned=now)
-            self._keep(alarm)
-        self._rings = [at for at in self._rings if abs(now - at) < _FLOOD_WITHIN_S]
-        self.flooding = len(self._rings) >= (_FLOOD_OVER if self.flooding else _FLOOD + 1)
+                alarm = replace(alarm, shelved_until=None, reason="", acknowledged=False)
+                if alarm.active:
+                    self._annunciations.append(now)
+            if alarm.active and alarm.clears_at is not None and now >= alarm.clears_at:
+                alarm = replace(alarm, active=False, clears_at=None, returned=now)
+            self._store(alarm)
+        self._annunciations = [at for at in self._annunciations if abs(now - at) < _FLOOD_WITHIN_S]
+        self.flooding = len(self._annunciations) >= (_FLOOD_OVER if self.flooding else _FLOOD + 1)
 
     def acknowledge(self, identities: Iterable[str], by: str, now: float) -> None:
-        """Somebody has seen them.
+        """Acknowledge alarms.
 
         Raises:
-            AlarmError: If there is no such alarm; then nothing is changed.
+            AlarmError: If an alarm does not exist; then nothing changes.
         """
-        for alarm in self._named(identities):
-            self._keep(replace(alarm, seen=True, by=by, at=now, stands=alarm.stands and not alarm.latching))
+        for alarm in self._find(identities):
+            self._store(
+                replace(alarm, acknowledged=True, by=by, at=now, active=alarm.active and not alarm.latching)
+            )
 
     def shelve(self, identities: Iterable[str], by: str, now: float, *, for_s: float, reason: str) -> None:
-        """Somebody puts them aside for a while.
+        """Hide alarms for a limited time.
 
         Raises:
-            AlarmError: Without a reason, for longer than a day, or of no such alarm; nothing is changed then.
+            AlarmError: If the reason is missing, the time exceeds a day or an alarm does not exist; then
+                nothing
+                changes.
         """
         if not reason.strip():
             raise AlarmError(codes.ALARM_NO_REASON())
         if not 0.0 < for_s <= LONGEST_SHELF_S:
             raise AlarmError(codes.ALARM_SHELF_TIME(seconds=for_s, most=LONGEST_SHELF_S))
-        for alarm in self._named(identities):
-            self.held[alarm.id] = replace(
-                alarm, shelved_until=now + for_s, by=by, at=now, reason=reason[:_LONGEST_TEXT]
+        for alarm in self._find(identities):
+            self.by_id[alarm.id] = replace(
+                alarm, shelved_until=now + for_s, by=by, at=now, reason=reason[:_MAX_TEXT]
             )
 
     def unshelve(self, identities: Iterable[str], by: str, now: float) -> None:
-        """Back in sight.
+        """Show shelved alarms again.
 
         Raises:
-            AlarmError: If one is not shelved, or there is none; then nothing is changed.
+            AlarmError: If an alarm is not shelved or does not exist; then nothing changes.
         """
-        alarms = self._named(identities)
+        alarms = self._find(identities)
         for alarm in alarms:
             if alarm.shelved_until is None:
                 raise AlarmError(codes.ALARM_NOT_SHELVED(id=alarm.id))
         for alarm in alarms:
-            self._keep(replace(alarm, shelved_until=None, reason="", by=by, at=now))
+            self._store(replace(alarm, shelved_until=None, reason="", by=by, at=now))
 
     def sorted(self) -> list[Alarm]:
-        """The most urgent first; of equals the newest."""
+        """Return the alarms, most urgent first, then newest first."""
         order = (State.UNACKNOWLEDGED, State.ACKNOWLEDGED, State.RETURNED, State.SHELVED)
         return sorted(
-            self.held.values(),
+            self.by_id.values(),
             key=lambda each: (order.index(each.state), -each.priority, -each.since, each.id),
         )
 
-    def _named(self, identities: Iterable[str]) -> list[Alarm]:
+    def _find(self, identities: Iterable[str]) -> list[Alarm]:
         wanted = list(dict.fromkeys(identities))
         if not wanted:
             raise AlarmError(codes.ALARM_NONE_NAMED())
         for identity in wanted:
-            if identity not in self.held:
+            if identity not in self.by_id:
                 raise AlarmError(codes.ALARM_UNKNOWN(id=identity[:80]))
-        return [self.held[identity] for identity in wanted]
+        return [self.by_id[identity] for identity in wanted]
 
-    def _keep(self, alarm: Alarm) -> None:
-        if alarm.shelved_until is None and not alarm.stands and alarm.seen:
-            self.held.pop(alarm.id, None)
+    def _store(self, alarm: Alarm) -> None:
+        if alarm.shelved_until is None and not alarm.active and alarm.acknowledged:
+            self.by_id.pop(alarm.id, None)
         else:
-            self.held[alarm.id] = alarm
+            self.by_id[alarm.id] = alarm
 
-    def _make_room(self) -> None:
-        """The least urgent go first, should there ever be too many."""
-        for alarm in self.sorted()[_MOST:] if len(self.held) > _MOST else ():
-            del self.held[alarm.id]
+    def _evict(self) -> None:
+        """Remove the least urgent alarms above the maximum."""
+        for alarm in self.sorted()[_MAX_ALARMS:] if len(self.by_id) > _MAX_ALARMS else ():
+            del self.by_id[alarm.id]
 
 
-def _in_reach(alarm: Alarm, now: float) -> Alarm:
-    """An alarm whose times to come are as near as they were, should the clock have been set back."""
-    if alarm.going_at is not None:
-        longest_s = max(alarm.over_after_s or 0.0, _CHATTERS_WITHIN_S)
-        alarm = replace(alarm, going_at=min(alarm.going_at, now + longest_s))
+def _limit_times(alarm: Alarm, now: float) -> Alarm:
+    """Limit an alarm's future times to their longest delays, in case the clock was set back."""
+    if alarm.clears_at is not None:
+        longest_s = max(alarm.over_after_s or 0.0, _CHATTERING_WITHIN_S)
+        alarm = replace(alarm, clears_at=min(alarm.clears_at, now + longest_s))
     if alarm.shelved_until is not None:
         alarm = replace(alarm, shelved_until=min(alarm.shelved_until, now + LONGEST_SHELF_S))
     return alarm

@@ -1,6 +1,6 @@
-"""What is so now and should not be, of robots: held by their gateway's own words for as long as they are so.
+"""Conditions of robots: faults that last as long as the gateway's reported state says so.
 
-A condition begins when it has been so for a while, and goes when it is so no more. Pure.
+A condition begins after it has held for a minimum time, and ends when it no longer holds. Pure.
 """
 
 from collections.abc import Iterable, Iterator
@@ -10,26 +10,27 @@ from typing import Any
 from robomesh.keys import WHOLE_SITE
 from robomesh.schemas.robomesh_pb2 import ControllerState
 
-# When a site starts, its parts come one after the other.
+# A site's services start one after the other.
 _LINK_AFTER_S = 1.0
 _CHECK_AFTER_S = 20.0
 _SILENT_AFTER_S = 6.0
-# Longer than it takes to give up a frozen controller and connect to it anew.
+# Longer than the gateway takes to drop a frozen controller and reconnect.
 _WORDS_AFTER_S = 10.0
 _LINK = {ControllerState.DOWN: "link.down", ControllerState.SILENT: "link.silent"}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Condition:
-    """Something that is so.
+    """A fault that holds now.
 
     Attributes:
-        what: With the robot and `each` its alarm's name; usually the code.
-        told: Somebody else has published an event of it.
-        latching: To acknowledge it is to know it: it may stay so for good.
-        after_s: So long it must be so to begin.
-        words_after_s: So long other words must be so to be told: why it is so may change again and again.
-        gist: What of the text must be another to be other words, where a number in it counts on.
+        what: Part of the alarm's id, with the robot and `each`; usually the code.
+        reported: Another service has published an event for it.
+        latching: It may last for good, so acknowledging its alarm clears the alarm.
+        after_s: Minimum time that it must hold before it begins.
+        words_after_s: Minimum time before a changed text is published; the cause may alternate.
+        gist: Part of the text that must change for a new publication, where a number in the text keeps
+            counting.
     """
 
     robot: str = WHOLE_SITE
@@ -40,7 +41,7 @@ class Condition:
     what: str = ""
     each: str = ""
     values: tuple[tuple[str, str], ...] = ()
-    told: bool = False
+    reported: bool = False
     latching: bool = False
     after_s: float = 0.0
     words_after_s: float = 0.0
@@ -48,46 +49,46 @@ class Condition:
 
     @property
     def id(self) -> str:
-        """Of its alarm."""
+        """Return the id of its alarm."""
         return alarm_id(self.robot, self.what or self.code, self.each)
 
     @property
     def words(self) -> tuple[str, str]:
-        """What is told anew when it changes."""
+        """Return what must change for the text to be published again."""
         return self.code, self.gist or self.text
 
 
 def alarm_id(robot: str, what: str, each: str = "") -> str:
-    """One name for the same thing each time: "pt600-1:link", "-:clock.off:host-b"."""
+    """Return a stable alarm id: "pt600-1:link", "-:clock.off:host-b"."""
     return ":".join(filter(None, (robot, what, each)))
 
 
 @dataclass
-class Judge:
-    """Which conditions have begun.
+class ConditionTracker:
+    """The conditions that have begun.
 
     Attributes:
-        begun: By their alarm's name; the text that was last told.
+        active: The conditions by alarm id, with the text that was published last.
     """
 
-    begun: dict[str, Condition] = field(default_factory=dict)
+    active: dict[str, Condition] = field(default_factory=dict)
     _since: dict[str, float] = field(default_factory=dict)
-    # Other words than those told, and since when.
+    # Changed texts that are not published yet, and the time since they hold.
     _words: dict[str, tuple[str, float]] = field(default_factory=dict)
 
-    def judge(
+    def update(
         self, conditions: Iterable[Condition], now_s: float
     ) -> tuple[list[Condition], list[Condition], list[Condition]]:
-        """What has begun, what has other words now, and what is over.
+        """Return the conditions that began, those whose text changed, and those that ended.
 
         Args:
-            now_s: On a clock that nobody sets.
+            now_s: Monotonic time [s].
         """
         there = {condition.id: condition for condition in conditions}
         self._since = {name: self._since.get(name, now_s) for name in there}
         began, changed = [], []
         for name, condition in there.items():
-            before = self.begun.get(name)
+            before = self.active.get(name)
             if before is None:
                 if now_s - self._since[name] < condition.after_s:
                     continue
@@ -96,10 +97,10 @@ class Judge:
                 if now_s - self._words_since(name, condition, now_s) < condition.words_after_s:
                     continue
                 changed.append(condition)
-            self.begun[name] = condition
-        over = [condition for name, condition in self.begun.items() if name not in there]
+            self.active[name] = condition
+        over = [condition for name, condition in self.active.items() if name not in there]
         for condition in over:
-            del self.begun[condition.id]
+            del self.active[condition.id]
             self._words.pop(condition.id, None)
         return began, changed, over
 
@@ -112,14 +113,14 @@ class Judge:
 
 
 def robot_conditions(robot: str, state: ControllerState, age_s: float) -> Iterator[Condition]:
-    """What a robot's controller is in, as its gateway told it last.
+    """Yield the faults in a robot's last reported controller state.
 
     Args:
-        age_s: Of what it told; a gateway that is gone says nothing of it being over.
+        age_s: Age of the report. A gateway that has gone reports no end.
     """
 
-    def held(code: str, text: str, **more: Any) -> Condition:
-        return Condition(robot=robot, source="gateway", code=code, text=text, told=True, **more)
+    def condition(code: str, text: str, **more: Any) -> Condition:
+        return Condition(robot=robot, source="gateway", code=code, text=text, reported=True, **more)
 
     if age_s > _SILENT_AFTER_S:
         text = f"the gateway of {robot} has said nothing for more than {_SILENT_AFTER_S:g} s"
@@ -128,19 +129,25 @@ def robot_conditions(robot: str, state: ControllerState, age_s: float) -> Iterat
     if state.link in _LINK:
         text = f"link to the controller: {state.link_text or 'not up'}"
         # One that is frozen is silent, given up and connected to, again and again: that is one alarm.
-        yield held(_LINK[state.link], text, what="link", after_s=_LINK_AFTER_S, words_after_s=_WORDS_AFTER_S)
+        yield condition(
+            _LINK[state.link], text, what="link", after_s=_LINK_AFTER_S, words_after_s=_WORDS_AFTER_S
+        )
     if state.fault or state.activity == ControllerState.FAULT:
-        yield held(
+        yield condition(
             "controller.fault", f"the controller has a fault: {state.fault or 'it does not say which'}"
         )
     if state.mode == ControllerState.LOCAL:
-        yield held("controller.local", "the controller is in local mode: nobody moves the robot from here")
+        yield condition(
+            "controller.local", "the controller is in local mode: nobody moves the robot from here"
+        )
     if state.HasField("stop"):
         stop = state.stop
-        yield held(
+        yield condition(
             "stop.latched", f"stop {stop.id} is latched: {stop.reason or 'no reason given'}, by {stop.by}"
         )
     if state.health.flooding:
-        yield held("link.flooding", "the controller sends far too much: only the newest is published")
+        yield condition("link.flooding", "the controller sends far too much: only the newest is published")
     if state.check_text and not state.check_starting:
-        yield held("check.missing", f"motions are not checked: {state.check_text}", after_s=_CHECK_AFTER_S)
+        yield condition(
+            "check.missing", f"motions are not checked: {state.check_text}", after_s=_CHECK_AFTER_S
+        )

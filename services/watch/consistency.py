@@ -1,6 +1,6 @@
-"""What of the mesh should not be so: names used twice, clocks and versions that differ, who is gone.
+"""Conditions of the mesh: duplicate names, differing clocks and versions, missing services and sites.
 
-Each names both sides. Pure.
+Each text names both sides. Pure.
 """
 
 from collections import defaultdict
@@ -13,12 +13,12 @@ from robomesh.session import CERTIFICATE
 from services.watch.conditions import Condition
 from services.watch.mesh import Mesh, Process
 
-# Of these there is one for a robot, or for a site.
-_ONE = ("gateway", "kinematics", "watch")
-# A site is not whole without these. Others come and go as people like; a simulated controller that has gone
-# is a link that is down.
-_NEEDED = frozenset({*_ONE, "router", "recorder", "player", "renderer", "console"})
-# A restart is over by then: the old one's token is gone, the new one is there.
+# One per robot or per site.
+_UNIQUE = ("gateway", "kinematics", "watch")
+# Services that must run on every site. Others are optional; a missing simulated controller shows as a link
+# that is down.
+_REQUIRED = frozenset({*_UNIQUE, "router", "recorder", "player", "renderer", "console"})
+# A restart is over by then: the old token is gone and the new one is present.
 SETTLED_S = 6.0
 _CLOCK_S, _CLOCK_OVER_S = 0.5, 0.4
 _LOSS, _LOSS_OVER, _LOSS_LEAST = 5e-3, 1e-3, 20
@@ -30,12 +30,12 @@ _EXPIRES_S = 10 * _DAY_S
 
 @dataclass
 class Expected:
-    """Who was there once, and so should be.
+    """Services and sites that were present once, and are expected to be present.
 
     Attributes:
-        services: Of the own site, by service and robot (`-`: the whole site); the process's name.
+        services: Names of the own site's processes, by service and robot (`-`: the whole site).
         sites: Other sites.
-        without_gateway: Robots whose gateway is gone, by the alarm that tells it.
+        without_gateway: Robots without a gateway, by the id of its alarm.
     """
 
     services: dict[tuple[str, str], str] = field(default_factory=dict)
@@ -43,22 +43,22 @@ class Expected:
     without_gateway: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def remember(self, conditions: Iterable[Condition]) -> None:
-        """Who was gone at the watch's own restart is gone still, until it is seen."""
+        """Restore what was missing before the watch restarted."""
         for condition in conditions:
             values = dict(condition.values)
             match condition.code:
                 case "service.gone":
                     for robot in values.get("robots", "").split():
                         service = values.get("service", "")
-                        # An alarm that an earlier version kept has the name in its text alone.
+                        # An alarm saved by an earlier version has the name only in its text.
                         name = values.get("name") or condition.text.removesuffix(" is gone")
                         self.expect(service, robot, name)
                 case "site.gone":
                     self.sites.add(values.get("site", ""))
 
     def expect(self, service: str, robot: str, name: str) -> None:
-        """It is there, and should be from now on; a replay ends when its time has come."""
-        if service in _NEEDED and not is_replay(robot):
+        """Expect a service from now on; a replay is excluded, because it ends by design."""
+        if service in _REQUIRED and not is_replay(robot):
             self.services[service, robot] = name
 
 
@@ -73,18 +73,18 @@ def mesh_conditions(
     now_s: float,
     settled_s: float = SETTLED_S,
 ) -> Iterator[Condition]:
-    """Everything that is wrong between the mesh's processes.
+    """Yield every fault between the mesh's processes.
 
     Args:
         here: This watch's own identity.
-        begun: Names of alarms that stand: what is near its threshold stays.
-        now: Since the Unix epoch [s]; `now_s`: on the clock that told when processes were heard.
-        settled_s: So long who comes and goes must have come or gone.
+        begun: Ids of active conditions; they end only below a lower threshold.
+        now: Time since the Unix epoch [s]; `now_s`: monotonic time, as in `Process.at_s`.
+        settled_s: Minimum time for which a service must be present or missing.
     """
     tokens = mesh.services()
     for condition in (
-        *_twice(mesh, [who for who in tokens if who.site == site]),
-        *_gone(mesh, tokens, site, expected),
+        *_duplicates(mesh, [who for who in tokens if who.site == site]),
+        *_missing(mesh, tokens, site, expected),
         *_versions(mesh),
     ):
         yield replace(condition, after_s=settled_s)
@@ -94,15 +94,15 @@ def mesh_conditions(
             yield from _of_process(process, begun, now, now_s)
 
 
-def _twice(mesh: Mesh, tokens: list[PresenceKey]) -> Iterator[Condition]:
+def _duplicates(mesh: Mesh, tokens: list[PresenceKey]) -> Iterator[Condition]:
     owners: dict[tuple[str, str], list[PresenceKey]] = defaultdict(list)
     for who in tokens:
-        if who.service in _ONE:
+        if who.service in _UNIQUE:
             owners[who.service, who.robot].append(who)
     for (service, robot), twins in owners.items():
         if len(twins) < 2:
             continue
-        names = " and ".join(_named(mesh, each) for each in twins)
+        names = " and ".join(_label(mesh, each) for each in twins)
         if robot == WHOLE_SITE:
             text = f"the name of site {twins[0].site} is used twice: {names}"
         else:
@@ -117,14 +117,14 @@ def _twice(mesh: Mesh, tokens: list[PresenceKey]) -> Iterator[Condition]:
         )
 
 
-def _gone(mesh: Mesh, tokens: list[PresenceKey], site: str, expected: Expected) -> Iterator[Condition]:
+def _missing(mesh: Mesh, tokens: list[PresenceKey], site: str, expected: Expected) -> Iterator[Condition]:
     here = {(who.service, who.robot) for who in tokens if who.site == site}
     for who in tokens:
         if who.site == site:
-            expected.expect(who.service, who.robot, _named(mesh, who))
+            expected.expect(who.service, who.robot, _label(mesh, who))
         else:
             expected.sites.add(who.site)
-    # A gateway of a hundred robots is gone once.
+    # A gateway of a hundred robots gives one condition.
     gone: dict[str, list[str]] = defaultdict(list)
     for (service, robot), name in expected.services.items():
         if (service, robot) not in here:
@@ -147,7 +147,7 @@ def _gone(mesh: Mesh, tokens: list[PresenceKey], site: str, expected: Expected) 
     for other in sorted(expected.sites - {who.site for who in tokens}):
         yield Condition(
             code="site.gone",
-            text=f"site {other} is gone: nothing of it is seen at {site} any more",
+            text=f"site {other} is gone: {site} sees none of its services any more",
             over=f"site {other} is there again",
             each=other,
             values=(("site", other),),
@@ -158,7 +158,7 @@ def _gone(mesh: Mesh, tokens: list[PresenceKey], site: str, expected: Expected) 
 def _clocks(mesh: Mesh, here: str, begun: frozenset[str]) -> Iterator[Condition]:
     own = mesh.processes.get(here)
     if own is None:
-        return  # nobody is told of a clock without being told whose it is not
+        return  # the text must name both clocks
     hosts: dict[str, list[tuple[float, float]]] = defaultdict(list)
     for process in mesh.processes.values():
         best = process.clock.best
@@ -201,8 +201,8 @@ def _of_process(process: Process, begun: frozenset[str], now: float, now_s: floa
     if now_s - process.at_s > _SILENT_S:
         yield Condition(
             code="service.silent",
-            text=f"{process.name} is there and has said nothing for more than {_SILENT_S:g} s",
-            over=f"{process.name} says something again",
+            text=f"{process.name} is present but has reported nothing for more than {_SILENT_S:g} s",
+            over=f"{process.name} reports again",
             each=f"{health.service}.{health.id}",
         )
     received, lost = process.lost_lately
@@ -213,7 +213,7 @@ def _of_process(process: Process, begun: frozenset[str], now: float, now_s: floa
         yield Condition(
             code="mesh.loss",
             text=f"{process.name} lost {100 * share:.1f} % of what was sent to it within a minute",
-            over=f"{process.name} loses nothing worth telling any more",
+            over=f"{process.name} no longer loses messages at a notable rate",
             each=each,
             values=(("lost", str(lost)), ("received", str(received))),
             gist="loss",
@@ -222,8 +222,8 @@ def _of_process(process: Process, begun: frozenset[str], now: float, now_s: floa
     if links < wanted:
         yield Condition(
             code="router.unlinked",
-            text=f"{process.name} reaches {links:.0f} of the {wanted:.0f} routers that it is to link to",
-            over=f"{process.name} reaches every router that it is to link to",
+            text=f"{process.name} reaches {links:.0f} of the {wanted:.0f} routers that it should link to",
+            over=f"{process.name} reaches every router that it should link to",
             each=health.id,
             after_s=_UNLINKED_AFTER_S,
         )
@@ -240,6 +240,6 @@ def _of_process(process: Process, begun: frozenset[str], now: float, now_s: floa
         )
 
 
-def _named(mesh: Mesh, who: PresenceKey) -> str:
+def _label(mesh: Mesh, who: PresenceKey) -> str:
     process = mesh.processes.get(who.id)
     return process.name if process is not None else f"{who.service} of {who.site} ({who.id})"

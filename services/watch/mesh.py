@@ -1,4 +1,4 @@
-"""The mesh as one site's watch sees it: who is there, how far away, what clocks say, what goes lost."""
+"""The mesh as a site's watch observes it: processes, their clocks, hop times and message loss."""
 
 from collections import defaultdict, deque
 from collections.abc import Iterable
@@ -13,17 +13,17 @@ from robomesh.schemas.robomesh_pb2 import MeshState, ServiceHealth
 _LOSS_OVER = 30  # health messages: a minute
 _HOPS_KEPT = 200
 _MOST_HOPS = 500
-# Who is heard, and is not present so long after, is not about to come.
-_COMES_WITHIN_S = 5.0
+# A process whose health arrives without its presence token within this time has gone.
+_TOKEN_WITHIN_S = 5.0
 
 
 @dataclass
 class Process:
-    """A process of the mesh that told its health.
+    """A process of the mesh that has reported its health.
 
     Attributes:
-        at_s: When it did so last, on the watch's own clock that never goes back.
-        counts: What it received and lost until then, the newest last.
+        at_s: Monotonic time of its last report.
+        counts: Messages received and lost at each report, newest last.
     """
 
     site: str
@@ -34,14 +34,14 @@ class Process:
 
     @property
     def name(self) -> str:
-        """For people: which, whose, and where."""
+        """Return a label for people: service, site, robots and host."""
         robots = ", ".join(self.health.robots[:3]) + (", ..." if len(self.health.robots) > 3 else "")
         whose = f"{self.site}/{robots}" if robots else self.site
         return f"{self.health.service} of {whose} at {self.health.host} ({self.health.id})"
 
     @property
     def lost_lately(self) -> tuple[int, int]:
-        """Messages that it received, and that it lost, in the last minute."""
+        """Return the messages received and lost in the last minute."""
         if not self.counts:
             return 0, 0
         (received, lost), (received_now, lost_now) = self.counts[0], self.counts[-1]
@@ -50,51 +50,51 @@ class Process:
 
 @dataclass
 class Mesh:
-    """Who is present, and what they told; by identity, which is new at each start of a process."""
+    """Present processes and their reports, by identity; a process has a new identity at each start."""
 
     present: dict[str, set[PresenceKey]] = field(default_factory=dict)
     processes: dict[str, Process] = field(default_factory=dict)
-    # Zenoh ids of the sessions that answered.
-    _nodes: dict[str, str] = field(default_factory=dict)
+    # By the Zenoh id of the session that answered, the process's identity.
+    _identities: dict[str, str] = field(default_factory=dict)
     _hops: dict[tuple[str, str], deque[float]] = field(default_factory=dict)
 
-    def see(self, site: str, health: ServiceHealth, now_s: float) -> None:
-        """A process told its health."""
+    def record_health(self, site: str, health: ServiceHealth, now_s: float) -> None:
+        """Record a process's health."""
         process = self.processes.get(health.id)
         if process is None:
             process = self.processes[health.id] = Process(site, health, now_s)
         process.health, process.at_s = health, now_s
         process.counts.append((health.received, health.lost))
 
-    def come(self, who: PresenceKey) -> None:
-        """Somebody is there."""
+    def add_presence(self, who: PresenceKey) -> None:
+        """Add a presence token."""
         self.present.setdefault(who.id, set()).add(who)
 
-    def go(self, who: PresenceKey) -> None:
-        """Somebody is there no more, for one robot or at all."""
+    def remove_presence(self, who: PresenceKey) -> None:
+        """Remove a presence token; a process without any has gone."""
         tokens = self.present.get(who.id, set())
         tokens.discard(who)
         if not tokens:
             self.present.pop(who.id, None)
             self.processes.pop(who.id, None)
 
-    def read(self, identity: str, reading: Reading) -> None:
-        """A process answered for its clock."""
+    def record_clock(self, identity: str, reading: Reading) -> None:
+        """Record a clock reading and its hops."""
         if (process := self.processes.get(identity)) is None:
             return
         process.clock.readings.append(reading)
         if reading.hops:
-            self._nodes[reading.hops[-1][1]] = identity
+            self._identities[reading.hops[-1][1]] = identity
         for near, far, seconds in reading.hops:
             if len(self._hops) < _MOST_HOPS or (near, far) in self._hops:
                 self._hops.setdefault((near, far), deque(maxlen=_HOPS_KEPT)).append(seconds)
 
     def services(self) -> list[PresenceKey]:
-        """Tokens of all that are no people."""
+        """Return the tokens of services, without those of people."""
         return sorted(who for tokens in self.present.values() for who in tokens if who.service not in SILENT)
 
     def serving(self, site: str, service: str, robot: str) -> set[str]:
-        """The processes that are a service for a robot of a site, or for all of that."""
+        """Return the processes of a service that serve a robot, or the whole of its site."""
         return {
             who.id
             for tokens in self.present.values()
@@ -103,25 +103,25 @@ class Mesh:
         }
 
     def forget_gone(self, now_s: float) -> None:
-        """Whose last words came after it had gone."""
+        """Remove processes whose last report arrived after their token had gone."""
         for name in [name for name in self.processes if name not in self.present]:
-            if now_s - self.processes[name].at_s > _COMES_WITHIN_S:
+            if now_s - self.processes[name].at_s > _TOKEN_WITHIN_S:
                 del self.processes[name]
 
     def forget_losses(self) -> None:
-        """Count anew what processes receive and lose."""
+        """Restart the loss counters."""
         for process in self.processes.values():
             process.counts.clear()
 
     def forget_hops(self) -> None:
-        """Of ways that nobody takes any more."""
-        self._nodes = {node: each for node, each in self._nodes.items() if each in self.processes}
-        known = {*self._nodes, *(process.health.zenoh_id for process in self.processes.values())}
+        """Remove hop times between processes that have gone."""
+        self._identities = {node: each for node, each in self._identities.items() if each in self.processes}
+        known = {*self._identities, *(process.health.zenoh_id for process in self.processes.values())}
         for pair in [pair for pair in self._hops if not known & {*pair}]:
             del self._hops[pair]
 
     def state(self, site: str, here: str, now_s: float) -> MeshState:
-        """What is told to everybody.
+        """Return the state to publish.
 
         Args:
             here: The watch's own Zenoh id.
@@ -155,8 +155,10 @@ class Mesh:
         return state
 
     def _named_hops(self, here: str, own: str) -> dict[tuple[str, str], list[float]]:
-        """By who is at both ends, for people; a router's own session is the router."""
-        names = {node: self.processes[each] for node, each in self._nodes.items() if each in self.processes}
+        """Return hop times by the labels of both ends; a router's status session counts as the router."""
+        names = {
+            node: self.processes[each] for node, each in self._identities.items() if each in self.processes
+        }
         names |= {process.health.zenoh_id: process for process in self.processes.values()}
         named: dict[tuple[str, str], list[float]] = defaultdict(list)
         for pair, taken in self._hops.items():
@@ -179,7 +181,7 @@ class Mesh:
 
 
 def _quantiles(values: Iterable[float]) -> tuple[float, float]:
-    """The median and the 99th percentile."""
+    """Return the median and the 99th percentile."""
     ordered = sorted(values)
     if len(ordered) == 1:
         return ordered[0], ordered[0]

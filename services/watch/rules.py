@@ -1,11 +1,12 @@
-"""Which events are alarms, how urgent, what ends them, and what to do: the rationalisation of ISA-18.2.
+"""Alarm rules: which events are alarms, their priority, what clears them and the advice (ISA-18.2).
 
-An alarm asks a person to act. What asks nobody (a setting, what another alarm says already) is none, and
-stands here all the same, so that one sees that it was thought of.
+An alarm requires a person to act. Codes that need no action (a setting, or a fault that another alarm
+reports)
+are listed without a priority, to show that they were considered.
 
-    ended by     events whose code ends it: "link.up"; also its own code or code + ".over" told as INFO
-    over after   over when it has not come again for so long
-    neither      stands until somebody acknowledges it: it happened, and nothing will say that it is over
+    ended by     codes of events that clear it: "link.up"; also its own code or code + ".over" as INFO
+    over after   cleared if it is not activated again within this time
+    neither      active until acknowledged: a single event, whose end is never reported
 
 Source: ANSI/ISA-18.2-2016, clause 10 (rationalisation) and annex (latching alarms).
 """
@@ -22,12 +23,14 @@ _MINUTE_S = 60.0
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """What is done with events of one code, or with a state that has this code.
+    """Handling of events, or of a state, with one code.
 
     Attributes:
-        priority: None: it is no alarm.
-        advice: What to do, for people.
-        each: Of the event's values: an alarm for each; of "table/plate" the part before the slash.
+        priority: None if it is not an alarm.
+        advice: Recommended action.
+        each: Name of an event value: each of its values is an alarm of its own; of "table/plate" the part
+            before
+            the slash counts.
     """
 
     priority: Alarm.Priority | None
@@ -40,22 +43,24 @@ class Rule:
 _NONE = Rule(None)
 _LINK = "Look at the controller's power, its network cable and its address in the site file."
 _DISK = "Make room in the recorder's folder, or move it to a larger disk."
-_WHO = "Find out who moves the robot; keep away from it until you know."
+_WHO = "Find out what moves the robot; keep away from it until you know."
 
 RULES: Mapping[str, Rule] = MappingProxyType(
     {
-        # The controller's link and state: held by `conditions.py` for as long as they are so.
+        # The controller's link and state: `conditions.py` keeps these active while they hold.
         "link.down": Rule(HIGH, _LINK),
         "link.silent": Rule(HIGH, _LINK),
-        "link.deluge": Rule(HIGH, "Something other than a controller sends there, or it is broken."),
+        "link.deluge": Rule(
+            HIGH, "A device other than a controller sends there, or the controller is broken."
+        ),
         "controller.joint_count": Rule(HIGH, "The site file names another model than the controller has."),
         "link.flooding": Rule(MEDIUM, "Lower the controller's rate; only the newest of it is published."),
         "controller.fault": Rule(HIGH, "Clear the fault at the controller, then reset."),
-        "controller.local": Rule(LOW, "People at the controller move the robot: ask them."),
-        "stop.latched": Rule(MEDIUM, "See why it was stopped; who has control resets it."),
+        "controller.local": Rule(LOW, "People at the controller move the robot: contact them."),
+        "stop.latched": Rule(MEDIUM, "Find out why it was stopped; the operator who has control resets it."),
         "check.missing": Rule(HIGH, "Motions are not checked as they should be; see the gateway's log."),
-        "gateway.silent": Rule(HIGH, "The gateway hangs or its machine does: restart it."),
-        # What the gateway notices.
+        "gateway.silent": Rule(HIGH, "The gateway or its machine hangs: restart it."),
+        # Reported by the gateway.
         "joints.gone": Rule(
             HIGH,
             "The controller sends, but no positions: see what its own display says.",
@@ -63,16 +68,16 @@ RULES: Mapping[str, Rule] = MappingProxyType(
         ),
         "status.gone": Rule(
             MEDIUM,
-            "The controller sends no status any more: see what its own display says.",
+            "The controller no longer sends its status: see what its own display says.",
             ended_by=("status.back", "link.up", "link.down", "link.silent"),
         ),
         "unit.malformed": Rule(LOW, "If it goes on, look at the cable and the protocol.", (), _MINUTE_S),
         "controller.refused": Rule(LOW, "See what was asked for, and its reason.", (), _MINUTE_S),
         "robot.read_only": _NONE,
-        "stop.remembered": _NONE,  # the state says so
+        "stop.remembered": _NONE,  # the controller state reports it
         "stop.sent": _NONE,
         "stop.not_sent": Rule(CRITICAL, "The stop did not reach the controller: use its emergency stop."),
-        "stop.disobeyed": Rule(CRITICAL, "The robot moves on: use its emergency stop."),
+        "stop.disobeyed": Rule(CRITICAL, "The robot still moves: use its emergency stop."),
         "motion.foreign": Rule(HIGH, _WHO),
         "lease.ended": Rule(LOW, "Control was not given back; see who had it.", (), 5 * _MINUTE_S),
         "program.ended": Rule(
@@ -104,10 +109,10 @@ RULES: Mapping[str, Rule] = MappingProxyType(
         "kinematics.clearance.stop": Rule(HIGH, "Too near: move away from it.", each="second"),
         "kinematics.collision": Rule(HIGH, "They touch: look before anything moves.", each="second"),
         "kinematics.not_counted": Rule(
-            MEDIUM, "Nobody knows where that robot is: clearance leaves it out.", each="robot"
+            MEDIUM, "The position of that robot is unknown: clearance leaves it out.", each="robot"
         ),
         "kinematics.floor": Rule(
-            LOW, "Measure where the floor is; write it into the site file as told.", (), 5 * _MINUTE_S
+            LOW, "Measure the floor's height; write it into the site file.", (), 5 * _MINUTE_S
         ),
         # The recorder.
         "recorder.gives_up": Rule(HIGH, _DISK),
@@ -122,35 +127,37 @@ RULES: Mapping[str, Rule] = MappingProxyType(
         "recorder.flight_ended": Rule(HIGH, _DISK),
         # The renderer.
         "renderer.slow": Rule(LOW, "Ask for fewer or smaller views.", ("renderer.keeps_up",)),
-        # The router and the console: who comes without a right.
+        # The router and the console: clients without rights.
         "router.without_rights": Rule(
             MEDIUM,
-            "Its certificate is revoked, or foreign: find out whose it is, and who uses it.",
+            "Its certificate is revoked or unknown: find out which machine and which person use it.",
             (),
             5 * _MINUTE_S,
         ),
-        "router.imposter": Rule(HIGH, "See what stands at that address; then start the router again."),
-        "router.rules": Rule(MEDIUM, "The file of rules cannot be read: robomesh keys writes it anew."),
+        "router.imposter": Rule(HIGH, "Check the machine at that address; then restart the router."),
+        "router.rules": Rule(MEDIUM, "The rules file cannot be read: robomesh keys writes it again."),
         "account.refused": Rule(
             LOW,
-            "Ask whose account it is whether it was they; if not, disable it or give it a new password.",
+            "Ask the account's owner about these attempts; if in doubt, disable it or change its password.",
             (),
             5 * _MINUTE_S,
         ),
-        "accounts.unreadable": Rule(MEDIUM, "Mend the accounts file; the accounts stay as they were."),
-        # The mesh itself: held by `quarrels.py`.
+        "accounts.unreadable": Rule(
+            MEDIUM, "Repair the accounts file; until then the last valid one applies."
+        ),
+        # The mesh itself: `consistency.py` keeps these active while they hold.
         "service.gone": Rule(MEDIUM, "See its log; start it again.", each="service"),
         "service.silent": Rule(
             MEDIUM, "It hangs, or its line is full: see its log, then start it again.", each="id"
         ),
-        "site.gone": Rule(MEDIUM, "The line to it is cut, or it is off: ask its people.", each="site"),
+        "site.gone": Rule(MEDIUM, "The link to it is cut, or it is off: contact its operators.", each="site"),
         "router.unlinked": Rule(LOW, "See [router] connect, and whether that site's router runs.", each="id"),
         "clock.off": Rule(MEDIUM, "Set the clocks by NTP; times in recordings disagree.", each="host"),
         "mesh.versions": Rule(LOW, "Bring all to one version."),
-        "mesh.twice": Rule(HIGH, "Two answer to one name: end or rename one of them.", each="name"),
+        "mesh.twice": Rule(HIGH, "Two services have the same name: stop or rename one of them.", each="name"),
         "mesh.loss": Rule(LOW, "The line loses messages: look for what fills it.", each="id"),
         "certificate.expires": Rule(MEDIUM, "Renew it: robomesh keys renew.", each="id"),
-        "alarm.not_saved": Rule(MEDIUM, "Make room, or see who may write in the watch's folder."),
+        "alarm.not_saved": Rule(MEDIUM, "Make room, or check the permissions of the watch's folder."),
         "alarm.flood": Rule(MEDIUM, "Begin with the oldest of the most urgent: others may follow from it."),
     }
 )
@@ -163,11 +170,11 @@ _UNKNOWN = {
 
 
 def rule_of(code: str, severity: Event.Severity) -> Rule:
-    """The rule of an event; what nobody rationalised goes by its severity, and never gets lost."""
+    """Return the rule of an event. Codes without a rule use the event's severity."""
     return RULES.get(code) or _UNKNOWN.get(severity, _NONE)
 
 
 def ends(code: str) -> frozenset[str]:
-    """The codes of alarms that an event ends which is no alarm itself."""
+    """Return the codes of the alarms that an event clears, if it is not an alarm itself."""
     by_table = {alarm for alarm, rule in RULES.items() if code in rule.ended_by}
     return frozenset({code, code.removesuffix(".over"), *by_table})

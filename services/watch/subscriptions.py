@@ -1,4 +1,4 @@
-"""Events as they come, made alarms by the rules; what was told before the watch came is not told twice."""
+"""Turns events into alarms by the rules; skips events that were handled before a restart."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -9,46 +9,46 @@ from services.watch.alarms import Alarm, Alarms
 from services.watch.conditions import Condition, alarm_id
 from services.watch.rules import LOW, RULES, ends, rule_of
 
-# Held by states, for as long as they are so: their events are not needed.
+# Alarms by state: `conditions.py` keeps them active, so their events are skipped.
 _BY_STATE = frozenset(
     {"link.down", "link.silent", "link.flooding", "controller.fault", "controller.local", "stop.latched"}
 )
-# A watch that starts for the first time takes what was told while the site started.
-_NEWS_S = 600.0
+# A watch's first start handles events from the site's own start.
+_START_S = 600.0
 _WARNING = Event.WARNING
 
 
 @dataclass
-class Intake:
-    """What came until now.
+class EventHandler:
+    """Handler of events.
 
     Attributes:
-        told_ns: By topic, the time of the event that came last, by its publisher's clock.
+        last_event_ns: By topic, the time of the last handled event, by its publisher's clock.
     """
 
     alarms: Alarms
-    told_ns: dict[str, int] = field(default_factory=dict)
+    last_event_ns: dict[str, int] = field(default_factory=dict)
 
-    def live(self, key: Key, event: Event, now: float, *, told_by: str = "") -> None:
-        """An event that has just come; `told_by`: the process, where it is known."""
-        self.told_ns[_name(key)] = _time_ns(event)
-        self._take(key.robot, event, now, told_by)
+    def handle(self, key: Key, event: Event, now: float, *, reporter: str = "") -> None:
+        """Handle a new event; `reporter` is its process, where it is known."""
+        self.last_event_ns[_name(key)] = _time_ns(event)
+        self._apply(key.robot, event, now, reporter)
 
-    def remembered(self, key: Key, events: Sequence[Event], now: float, *, told_by: str = "") -> None:
-        """Events that its publisher tells who comes late, the oldest first."""
-        told_ns = self.told_ns.get(_name(key), round((now - _NEWS_S) * 1e9))
+    def handle_history(self, key: Key, events: Sequence[Event], now: float, *, reporter: str = "") -> None:
+        """Handle those events of a publisher's history that are new; oldest first."""
+        last_event_ns = self.last_event_ns.get(_name(key), round((now - _START_S) * 1e9))
         times_ns = [_time_ns(event) for event in events]
-        if told_ns in times_ns:
-            # Whatever clocks do: the order holds.
-            new = events[len(times_ns) - times_ns[::-1].index(told_ns) :]
-        elif told_ns > now * 1e9:
-            new = events  # dated in the future it says nothing about those that came after it
+        if last_event_ns in times_ns:
+            # By order, not by time: clocks may be set.
+            new = events[len(times_ns) - times_ns[::-1].index(last_event_ns) :]
+        elif last_event_ns > now * 1e9:
+            new = events  # a date in the future cannot separate old from new
         else:
-            new = [event for event, at_ns in zip(events, times_ns, strict=True) if at_ns > told_ns]
+            new = [event for event, at_ns in zip(events, times_ns, strict=True) if at_ns > last_event_ns]
         for event in new:
-            self.live(key, event, now, told_by=told_by)
+            self.handle(key, event, now, reporter=reporter)
 
-    def _take(self, robot: str, event: Event, now: float, told_by: str) -> None:
+    def _apply(self, robot: str, event: Event, now: float, reporter: str) -> None:
         if event.source == "watch" or event.code in _BY_STATE:
             return
         values = dict(event.values)
@@ -56,13 +56,13 @@ class Intake:
         if event.severity < _WARNING:
             for code in ends(event.code):
                 each = values.get(RULES[code].each, "") if code in RULES else ""
-                self.alarms.go(alarm_id(robot, code, each.partition("/")[0]), now)
+                self.alarms.clear(alarm_id(robot, code, each.partition("/")[0]), now)
         if event.severity < _WARNING or rule.priority is None:
             return
         for code in ends(event.code) - {event.code}:
-            self.alarms.go(alarm_id(robot, code), now)
+            self.alarms.clear(alarm_id(robot, code), now)
         each = values.get(rule.each, "").partition("/")[0]
-        self.alarms.come(
+        self.alarms.activate(
             Alarm(
                 id=alarm_id(robot, event.code, each),
                 robot=robot,
@@ -74,16 +74,16 @@ class Intake:
                 since=now,
                 last=now,
                 values=tuple(values.items()),
-                latching=rule.over_after_s is None and not _is_ended(event.code),
+                latching=rule.over_after_s is None and not _end_is_reported(event.code),
                 over_after_s=rule.over_after_s,
-                told_by=told_by if _is_ended(event.code) else "",
+                reporter=reporter if _end_is_reported(event.code) else "",
             ),
             now,
         )
 
 
 def alarm_of(condition: Condition, now: float) -> Alarm:
-    """The alarm that a condition begins."""
+    """Return the alarm that a condition begins."""
     rule = rule_of(condition.code, _WARNING)
     return Alarm(
         id=condition.id,
@@ -101,9 +101,9 @@ def alarm_of(condition: Condition, now: float) -> Alarm:
     )
 
 
-def _is_ended(code: str) -> bool:
-    """Whether anything will say that it is over."""
-    return bool(RULES[code].ended_by) or code.startswith(_OVER_IS_TOLD) if code in RULES else False
+def _end_is_reported(code: str) -> bool:
+    """Return whether an event will report the alarm's end."""
+    return bool(RULES[code].ended_by) or code.startswith(_END_IS_REPORTED) if code in RULES else False
 
 
 def _name(key: Key) -> str:
@@ -111,14 +111,14 @@ def _name(key: Key) -> str:
 
 
 def _time_ns(event: Event) -> int:
-    """When an event was, by its publisher's clock; 0: it tells no time that there is."""
+    """Return the time of an event by its publisher's clock; 0 if it has no valid time."""
     try:
         return event.timestamp.ToNanoseconds()
     except ValueError:
         return 0
 
 
-_OVER_IS_TOLD = (
+_END_IS_REPORTED = (
     "kinematics.",
     "recorder.gives_up",
     "recorder.disk_slow",

@@ -1,4 +1,4 @@
-"""The watch service: holds a site's alarms, looks at the mesh, and tells both."""
+"""The watch service: keeps a site's alarms, observes the mesh, and publishes both."""
 
 import asyncio
 import contextlib
@@ -18,24 +18,24 @@ from robomesh.session import Session
 from robomesh.subscription import Subscription
 from robomesh.texts import one_line
 from robomesh.topics import check_operator
-from services.watch.alarm_registry import Book
+from services.watch.alarm_registry import AlarmRegistry
 from services.watch.alarms import AlarmError
-from services.watch.conditions import Condition, Judge, robot_conditions
+from services.watch.conditions import Condition, ConditionTracker, robot_conditions
 from services.watch.consistency import SETTLED_S, Expected, mesh_conditions
 from services.watch.mesh import Mesh
 
 log = logging.getLogger(__name__)
 
-_LOOK_S = 0.25
-_ALARMS_EACH, _MESH_EACH = 4, 8  # looks
+_ROUND_S = 0.25
+_ALARMS_EACH, _MESH_EACH = 4, 8  # rounds of `_run_checks`
 _CLOCKS_EACH_S = 2.0
 _CLOCKS_AT_ONCE = 4
-# Of other sites only these are asked for their clocks: of a thousand sites all would be too many.
+# Clocks of other sites: only these services are read, because thousands of services would be too many.
 _ASKED_ELSEWHERE = ("router", "watch")
-# So long after everybody has settled nobody knows yet what is so: what stood before the start stands on.
+# Until this long after presence has settled, conditions from before the start count as active.
 _KNOWN_AFTER_S = 2.0
 _NAMES_MOST = 200
-# Keys that fit no key of the contract: so many are events, the rest is counted in the services' health.
+# Keys outside the contract: this many become events; the services' health counts all.
 _MOST_IGNORED, _LONGEST_IGNORED = 64, 200
 
 
@@ -44,8 +44,8 @@ class Settings:
     """A site's watch.
 
     Attributes:
-        folder: Where alarms outlive a restart.
-        settled_s: So long somebody must be gone, or twice there, to be told of [s].
+        folder: Folder of the alarms' file.
+        settled_s: Minimum time for which a service is missing or duplicate before an alarm begins [s].
     """
 
     site: str
@@ -54,7 +54,7 @@ class Settings:
 
 
 async def serve(session: Session, settings: Settings) -> None:
-    """Watch until cancelled."""
+    """Watch a site until cancelled."""
     check_name(settings.site, "site")
     await _Watch(session, settings).run()
 
@@ -67,25 +67,27 @@ class _Watch:
         self._mesh = Mesh()
         self._expected = Expected()
         self._states: dict[str, schema.ControllerState] = {}
-        self._book = Book(settings.folder / f"{settings.site}.json", self._say)
-        self._judge = Judge()
+        self._registry = AlarmRegistry(settings.folder / f"{settings.site}.json", self._publish_event)
+        self._conditions = ConditionTracker()
         self._events = session.declare_publisher(settings.site, WHOLE_SITE, "events/watch")
         self._alarms_topic = session.declare_publisher(settings.site, WHOLE_SITE, "alarms")
         self._mesh_topic = session.declare_publisher(settings.site, WHOLE_SITE, "mesh")
         self._controllers = session.subscribe(f"{ROOT}/{self._site}/*/controller", newest=1000)
         self._blind_until_s = self._unsettled_until_s = 0.0
-        # Alarms whose teller has been replaced, and since when.
+        # Alarms without their reporter, which was replaced, and since when.
         self._orphans: dict[str, float] = {}
         self._ignored: set[str] = set()
         self._zenoh_id = str(session.zenoh_session.info.zid())
-        session.measure("alarms", "Alarms that are not over and seen", lambda: len(self._book.alarms.held))
+        session.measure(
+            "alarms", "Alarms that are not over and seen", lambda: len(self._registry.alarms.by_id)
+        )
         session.measure("processes", "Processes of the mesh", lambda: len(self._mesh.processes))
 
     async def run(self) -> None:
-        """Until cancelled."""
-        await self._book.open()
-        before = self._book.conditions()
-        self._judge.begun = dict(before)
+        """Run until cancelled."""
+        await self._registry.open()
+        before = self._registry.conditions()
+        self._conditions.active = dict(before)
         self._expected.remember(before.values())
         self._session.answer(self._site, WHOLE_SITE, "alarms/request/*", self._answer)
         session, events = self._session, f"{ROOT}/{self._site}/*/events"
@@ -96,21 +98,21 @@ class _Watch:
             self._follow_health(session.subscribe(f"{ROOT}/*/{WHOLE_SITE}/health/*", newest=1000)),
             self._follow_presence(),
             self._read_clocks(),
-            self._look(before),
+            self._run_checks(before),
         ]
         try:
             async with asyncio.TaskGroup() as group:
                 for each in work:
                     group.create_task(each)
         finally:
-            await self._book.close()
+            await self._registry.close()
 
-    # ------------------------------------------------------------ what comes
+    # ------------------------------------------------------------ inputs
 
     async def _follow_states(self) -> None:
         async for sample in self._controllers:
             if is_replay(sample.parsed.robot):
-                continue  # it was so then
+                continue  # a replay, not the present
             try:
                 state = sample.message()
             except MessageError as error:
@@ -122,21 +124,21 @@ class _Watch:
     async def _follow_events(self, subscription: Subscription) -> None:
         async for sample in subscription:
             if is_replay(sample.parsed.robot):
-                continue  # it happened then
+                continue  # a replay, not the present
             try:
                 message = sample.message()
             except MessageError as error:
                 log.warning("%s: %s", sample.key, error)
                 continue
-            now, key, intake = time.time(), sample.parsed, self._book.intake
+            now, key, events = time.time(), sample.parsed, self._registry.events
             if isinstance(message, schema.EventList):
-                told_by = self._teller(key.robot, message.events[-1].source) if message.events else ""
-                intake.remembered(key, message.events, now, told_by=told_by)
+                reporter = self._reporter(key.robot, message.events[-1].source) if message.events else ""
+                events.handle_history(key, message.events, now, reporter=reporter)
             elif isinstance(message, schema.Event):
-                intake.live(key, message, now, told_by=self._teller(key.robot, message.source))
+                events.handle(key, message, now, reporter=self._reporter(key.robot, message.source))
 
-    def _teller(self, robot: str, service: str) -> str:
-        """The process that says something as a service; empty: it is none, or one of several."""
+    def _reporter(self, robot: str, service: str) -> str:
+        """Return the process that is a robot's service; empty if there is none or several."""
         serving = self._mesh.serving(self._site, service, robot)
         return serving.pop() if len(serving) == 1 else ""
 
@@ -149,27 +151,29 @@ class _Watch:
                 continue
             assert isinstance(health, schema.ServiceHealth)
             if sample.parsed.topic != f"health/{health.service}.{health.id}":
-                # What it says of itself names keys that it is asked on.
+                # Its service and id become keys of requests, so they must match the key that it used.
                 self._session.ignored.note(PUBLICATION, f"{sample.key} of another process's name")
                 continue
             if sample.parsed.site == self._site:
-                self._say_ignored(health.ignored_examples)
-            # The last words of who has gone are no sign of life.
+                self._publish_ignored(health.ignored_examples)
+            # A last report that arrives after its sender has gone is no sign of life.
             if sample.live or health.id in self._mesh.present:
-                self._mesh.see(sample.parsed.site, health, sample.received)
+                self._mesh.record_health(sample.parsed.site, health, sample.received)
 
     async def _follow_presence(self) -> None:
         async for who, alive in self._session.watch_presence():
-            (self._mesh.come if alive else self._mesh.go)(who)
+            (self._mesh.add_presence if alive else self._mesh.remove_presence)(who)
 
     async def _read_clocks(self) -> None:
         turns = asyncio.Semaphore(_CLOCKS_AT_ONCE)
 
         async def read(site: str, identity: str) -> None:
             async with turns:
-                # Its health says whether it is there; a time that is none is no reading.
+                # Health shows whether it runs; an invalid time is no reading.
                 with contextlib.suppress(NoAnswerError, ValueError):
-                    self._mesh.read(identity, await read_clock(self._session, site, identity, hops=True))
+                    self._mesh.record_clock(
+                        identity, await read_clock(self._session, site, identity, hops=True)
+                    )
 
         while True:
             asked = [
@@ -182,30 +186,30 @@ class _Watch:
             self._mesh.forget_hops()
             await asyncio.sleep(_CLOCKS_EACH_S)
 
-    # ------------------------------------------------------ what is made of it
+    # ------------------------------------------------------ results
 
-    async def _look(self, before: dict[str, Condition]) -> None:
-        looks, begun_s = 0, time.monotonic()
+    async def _run_checks(self, before: dict[str, Condition]) -> None:
+        rounds, begun_s = 0, time.monotonic()
         while True:
             now, now_s = time.time(), time.monotonic()
             if now_s - begun_s > self._settled_s + _KNOWN_AFTER_S:
                 before = {}
-            self._say_ignored(tuple(self._session.ignored.examples))
-            self._forget_robots()
+            self._publish_ignored(tuple(self._session.ignored.examples))
+            self._forget_offline_robots()
             self._mesh.forget_gone(now_s)
-            if self._sees(now_s):
-                self._weigh(now, now_s, before)
-            if self._book.look(now) or looks % _ALARMS_EACH == 0:
-                self._alarms_topic.put(self._book.message(self._site))
-            if looks % _MESH_EACH == 0:
+            if self._can_observe(now_s):
+                self._update_alarms(now, now_s, before)
+            if self._registry.update(now) or rounds % _ALARMS_EACH == 0:
+                self._alarms_topic.put(self._registry.message(self._site))
+            if rounds % _MESH_EACH == 0:
                 self._mesh_topic.put(self._mesh.state(self._site, self._zenoh_id, now_s))
-            looks += 1
-            await asyncio.sleep(_LOOK_S)
+            rounds += 1
+            await asyncio.sleep(_ROUND_S)
 
-    def _sees(self, now_s: float) -> bool:
-        """Whether what is not seen is not there: no while our own router is not reached, and a moment after.
+    def _can_observe(self, now_s: float) -> bool:
+        """Return whether a missing service really is missing, not merely out of reach.
 
-        What a line lost while it was cut is no loss of a line that stands.
+        The service also waits a moment after its router is back: messages lost during a cut are not losses.
         """
         if not self._session.connected:
             self._blind_until_s = now_s + self._settled_s
@@ -216,11 +220,11 @@ class _Watch:
             self._mesh.forget_losses()
         return now_s >= self._blind_until_s
 
-    def _weigh(self, now: float, now_s: float, before: dict[str, Condition]) -> None:
-        """Conditions that have begun are alarms; what is over is told.
+    def _update_alarms(self, now: float, now_s: float, before: dict[str, Condition]) -> None:
+        """Activate alarms for conditions that began; clear those that ended.
 
         Args:
-            before: What stood before a restart, as long as it is not known whether it still does.
+            before: Conditions from before a restart, until it is known whether they still hold.
         """
         conditions = [
             condition
@@ -232,41 +236,41 @@ class _Watch:
             self._site,
             here=self._session.identity,
             expected=self._expected,
-            begun=frozenset(self._judge.begun),
+            begun=frozenset(self._conditions.active),
             now=now,
             now_s=now_s,
             settled_s=self._settled_s,
         )
-        conditions += self._book.conditions_of_its_own()
+        conditions += self._registry.own_conditions()
         there = {condition.id for condition in conditions}
         conditions += [condition for name, condition in before.items() if name not in there]
-        began, changed, over = self._judge.judge(conditions, now_s)
+        began, changed, over = self._conditions.update(conditions, now_s)
         for condition in began:
-            self._book.begin(condition, now)
+            self._registry.begin(condition, now)
         for condition in changed:
-            self._book.change(condition)
+            self._registry.change(condition)
         for condition in over:
-            self._book.end(condition, now)
-        self._end_orphans(now, now_s)
+            self._registry.end(condition, now)
+        self._clear_orphans(now, now_s)
 
-    def _end_orphans(self, now: float, now_s: float) -> None:
-        """Who has taken another's place does not know what that one had told, and ends none of it."""
-        alarms, orphans = self._book.alarms, {}
-        for alarm in alarms.held.values():
-            if alarm.stands and alarm.told_by:
+    def _clear_orphans(self, now: float, now_s: float) -> None:
+        """Clear alarms after their reporter was replaced: the new process will not report their end."""
+        alarms, orphans = self._registry.alarms, {}
+        for alarm in alarms.by_id.values():
+            if alarm.active and alarm.reporter:
                 serving = self._mesh.serving(self._site, alarm.source, alarm.robot)
-                if serving and alarm.told_by not in serving:
+                if serving and alarm.reporter not in serving:
                     orphans[alarm.id] = self._orphans.get(alarm.id, now_s)
         self._orphans = orphans
         for name, since_s in orphans.items():
             if now_s - since_s >= self._settled_s:
-                alarms.orphan(name, now)
+                alarms.lose_reporter(name, now)
 
-    def _forget_robots(self) -> None:
-        """Whose gateway is gone, once somebody knows: nothing will say what they are in."""
+    def _forget_offline_robots(self) -> None:
+        """Forget the state of robots without a gateway, once its alarm has been handled."""
         for name, robots in self._expected.without_gateway.items():
-            alarm = self._book.alarms.held.get(name)
-            if name in self._judge.begun and (alarm is None or not alarm.stands):
+            alarm = self._registry.alarms.by_id.get(name)
+            if name in self._conditions.active and (alarm is None or not alarm.active):
                 for robot in robots:
                     self._states.pop(robot, None)
 
@@ -274,34 +278,36 @@ class _Watch:
         age_s = self._controllers.age_s(f"{ROOT}/{self._site}/{robot}/controller")
         return 0.0 if age_s is None else age_s
 
-    def _say_ignored(self, examples: Iterable[str]) -> None:
-        """Make each key that a process has ignored one event, however many processes have."""
+    def _publish_ignored(self, examples: Iterable[str]) -> None:
+        """Publish one event for each ignored key, however many processes have ignored it."""
         for example in examples:
             shown = one_line(example, _LONGEST_IGNORED)
             if shown not in self._ignored and len(self._ignored) < _MOST_IGNORED:
                 self._ignored.add(shown)
-                text = f"ignored: {shown}: it fits no key of the mesh; a program uses a wrong name"
-                self._say(schema.Event.WARNING, "mesh.key_ignored", text, {"key": shown})
+                text = f"ignored: {shown}: not a key of the mesh; a program uses a wrong name"
+                self._publish_event(schema.Event.WARNING, "mesh.key_ignored", text, {"key": shown})
 
-    def _say(self, severity: schema.Event.Severity, code: str, text: str, values: dict[str, str]) -> None:
+    def _publish_event(
+        self, severity: schema.Event.Severity, code: str, text: str, values: dict[str, str]
+    ) -> None:
         event = schema.Event(severity=severity, code=code, text=text, source="watch", values=values)
         event.timestamp.GetCurrentTime()
         self._events.put(event)
         log.log(logging.INFO if severity == schema.Event.INFO else logging.WARNING, "%s", text)
 
     async def _answer(self, request: Request) -> schema.AlarmList:
-        """Acknowledge, shelve, unshelve; on disk before it is answered.
+        """Acknowledge, shelve or unshelve alarms; reply after the change is on disk.
 
         Raises:
-            RefusedError: Why not.
+            RefusedError: If the alarm's state does not allow it.
         """
         asked = request.message
         assert isinstance(asked, schema.AlarmRequest)
         by = check_operator(request.chunk[:_NAMES_MOST])
         try:
-            await self._book.change_by(asked, by, time.time())
+            await self._registry.apply_request(asked, by, time.time())
         except AlarmError as error:
             raise RefusedError(error.reason) from None
-        message = self._book.message(self._site)
+        message = self._registry.message(self._site)
         self._alarms_topic.put(message)
         return message

@@ -12,7 +12,7 @@ from robomesh.schemas.robomesh_pb2 import Alarm as Message
 from robomesh.schemas.robomesh_pb2 import Event
 from services.watch import alarm_store
 from services.watch.alarms import LONGEST_SHELF_S, Alarm, AlarmError, Alarms
-from services.watch.subscriptions import Intake
+from services.watch.subscriptions import EventHandler
 
 UNACKNOWLEDGED, ACKNOWLEDGED = Message.UNACKNOWLEDGED, Message.ACKNOWLEDGED
 RETURNED, SHELVED = Message.RETURNED, Message.SHELVED
@@ -68,9 +68,9 @@ def do(alarms: Alarms, what: str, now: float) -> None:
     name = ["arm:link"]
     match what:
         case "come":
-            alarms.come(alarm(), now)
+            alarms.activate(alarm(), now)
         case "go":
-            alarms.go("arm:link", now)
+            alarms.clear("arm:link", now)
         case "ack":
             alarms.acknowledge(name, "li", now)
         case "shelve":
@@ -78,36 +78,36 @@ def do(alarms: Alarms, what: str, now: float) -> None:
         case "unshelve":
             alarms.unshelve(name, "li", now)
         case "an hour":
-            alarms.look(now + 3600.0)
+            alarms.update(now + 3600.0)
 
 
 def test_an_alarm_that_comes_and_goes_is_counted_and_not_repeated():
     alarms = Alarms()
-    alarms.come(alarm(), 0.0)
+    alarms.activate(alarm(), 0.0)
     alarms.acknowledge(["arm:link"], "li", 1.0)
     # Acknowledged and gone it is forgotten, and comes as a new one; three times in a minute is chatter.
-    alarms.go("arm:link", 2.0)
-    alarms.come(alarm(), 3.0)
+    alarms.clear("arm:link", 2.0)
+    alarms.activate(alarm(), 3.0)
     for second in range(5, 60, 5):
-        alarms.go("arm:link", second)
-        alarms.come(alarm(), second + 1.0)
+        alarms.clear("arm:link", second)
+        alarms.activate(alarm(), second + 1.0)
     alarms.acknowledge(["arm:link"], "li", 61.0)
     for second in range(62, 120, 5):
-        alarms.go("arm:link", second)
-        alarms.come(alarm(), second + 1.0)
+        alarms.clear("arm:link", second)
+        alarms.activate(alarm(), second + 1.0)
         assert states(alarms) == {"arm:link": ACKNOWLEDGED}
-    assert alarms.held["arm:link"].count == 1 + 11 + 12
-    alarms.go("arm:link", 125.0)
-    alarms.look(180.0)
+    assert alarms.by_id["arm:link"].count == 1 + 11 + 12
+    alarms.clear("arm:link", 125.0)
+    alarms.update(180.0)
     assert states(alarms) == {"arm:link": ACKNOWLEDGED}
-    alarms.look(186.0)
+    alarms.update(186.0)
     assert states(alarms) == {}
 
 
 def test_what_only_happened_stands_until_somebody_acknowledges_it():
     alarms = Alarms()
-    alarms.come(alarm(by_state=False, latching=True), 0.0)
-    alarms.look(1e6)
+    alarms.activate(alarm(by_state=False, latching=True), 0.0)
+    alarms.update(1e6)
     assert states(alarms) == {"arm:link": UNACKNOWLEDGED}
     alarms.acknowledge(["arm:link"], "li", 1e6)
     assert states(alarms) == {}
@@ -115,34 +115,34 @@ def test_what_only_happened_stands_until_somebody_acknowledges_it():
 
 def test_what_is_over_by_its_silence_returns_then_and_not_before():
     alarms = Alarms()
-    alarms.come(alarm(by_state=False, over_after_s=60.0), 0.0)
-    alarms.come(alarm(by_state=False, over_after_s=60.0), 50.0)
-    alarms.look(109.0)
+    alarms.activate(alarm(by_state=False, over_after_s=60.0), 0.0)
+    alarms.activate(alarm(by_state=False, over_after_s=60.0), 50.0)
+    alarms.update(109.0)
     assert states(alarms) == {"arm:link": UNACKNOWLEDGED}
-    alarms.look(111.0)
+    alarms.update(111.0)
     assert states(alarms) == {"arm:link": RETURNED}
-    assert alarms.held["arm:link"].returned == 111.0
+    assert alarms.by_id["arm:link"].returned == 111.0
 
 
 def test_more_than_ten_in_ten_minutes_is_a_flood_until_they_are_few():
     alarms = Alarms()
     for number in range(10):
-        alarms.come(alarm(f"arm:{number}"), float(number))
-    alarms.look(10.0)
+        alarms.activate(alarm(f"arm:{number}"), float(number))
+    alarms.update(10.0)
     assert not alarms.flooding
-    alarms.come(alarm("arm:10"), 11.0)
-    alarms.look(12.0)
+    alarms.activate(alarm("arm:10"), 11.0)
+    alarms.update(12.0)
     assert alarms.flooding
-    alarms.look(604.0)
+    alarms.update(604.0)
     assert alarms.flooding  # seven of them are not ten minutes old
-    alarms.look(609.5)
+    alarms.update(609.5)
     assert not alarms.flooding
 
 
 def test_the_most_urgent_stand_first_and_what_is_shelved_last():
     alarms = Alarms()
     for number, priority in enumerate((Message.LOW, Message.CRITICAL, Message.HIGH, Message.CRITICAL)):
-        alarms.come(alarm(f"arm:{number}", priority=priority), float(number))
+        alarms.activate(alarm(f"arm:{number}", priority=priority), float(number))
     alarms.acknowledge(["arm:3"], "li", 10.0)
     alarms.shelve(["arm:1"], "li", 10.0, for_s=60.0, reason="service")
     assert [each.id for each in alarms.sorted()] == ["arm:2", "arm:0", "arm:3", "arm:1"]
@@ -160,7 +160,7 @@ def test_the_most_urgent_stand_first_and_what_is_shelved_last():
 )
 def test_a_shelf_needs_a_reason_and_an_end(for_s, reason, said):
     alarms = Alarms()
-    alarms.come(alarm(), 0.0)
+    alarms.activate(alarm(), 0.0)
     with pytest.raises(AlarmError, match=said):
         alarms.shelve(["arm:link"], "li", 1.0, for_s=for_s, reason=reason)
     assert states(alarms) == {"arm:link": UNACKNOWLEDGED}
@@ -168,7 +168,7 @@ def test_a_shelf_needs_a_reason_and_an_end(for_s, reason, said):
 
 def test_a_name_that_is_no_alarm_changes_nothing_of_the_others():
     alarms = Alarms()
-    alarms.come(alarm(), 0.0)
+    alarms.activate(alarm(), 0.0)
     with pytest.raises(AlarmError, match="arm:nothing"):
         alarms.acknowledge(["arm:link", "arm:nothing"], "li", 1.0)
     with pytest.raises(AlarmError, match="name at least one"):
@@ -180,11 +180,11 @@ def test_a_name_that_is_no_alarm_changes_nothing_of_the_others():
 
 def test_what_cannot_all_be_held_goes_least_urgent_first():
     alarms = Alarms()
-    alarms.come(alarm("arm:urgent", priority=Message.CRITICAL), 0.0)
+    alarms.activate(alarm("arm:urgent", priority=Message.CRITICAL), 0.0)
     for number in range(600):
-        alarms.come(alarm(f"arm:{number}", priority=Message.LOW), float(number))
-    assert len(alarms.held) == 500
-    assert "arm:urgent" in alarms.held
+        alarms.activate(alarm(f"arm:{number}", priority=Message.LOW), float(number))
+    assert len(alarms.by_id) == 500
+    assert "arm:urgent" in alarms.by_id
 
 
 STEPS = st.lists(
@@ -205,19 +205,19 @@ def test_whatever_happens_nothing_unseen_is_forgotten(steps):
     unseen, counts = set(), {"a": 0, "b": 0}
     for what, name, passes in steps:
         now += passes
-        alarms.look(now)
-        counts[name] = counts[name] if name in alarms.held else 0
+        alarms.update(now)
+        counts[name] = counts[name] if name in alarms.by_id else 0
         match what:
             case "come":
-                standing = name in alarms.held and alarms.held[name].stands
-                if not (standing and alarms.held[name].seen):
+                standing = name in alarms.by_id and alarms.by_id[name].active
+                if not (standing and alarms.by_id[name].acknowledged):
                     unseen.add(name)
-                alarms.come(alarm(name), now)
+                alarms.activate(alarm(name), now)
                 counts[name] += 1
             case "go":
-                alarms.go(name, now)
+                alarms.clear(name, now)
             case "look":
-                alarms.look(now)
+                alarms.update(now)
             case _:
                 try:
                     if what == "ack":
@@ -229,20 +229,20 @@ def test_whatever_happens_nothing_unseen_is_forgotten(steps):
                         alarms.unshelve([name], "li", now)
                 except AlarmError:
                     pass
-        assert unseen <= alarms.held.keys()
-        for held in alarms.held.values():
+        assert unseen <= alarms.by_id.keys()
+        for held in alarms.by_id.values():
             assert held.count == counts[held.id]
             assert held.shelved_until is None or held.shelved_until > now - 1e-9
-            assert held.stands or not held.seen or held.shelved_until is not None
+            assert held.active or not held.acknowledged or held.shelved_until is not None
 
 
 def test_alarms_survive_in_their_file_as_they_were(tmp_path):
     path = tmp_path / "watch" / "site.json"
     alarms = Alarms()
-    alarms.come(alarm(values=(("joint", "Hüfte"),)), 5.0)
+    alarms.activate(alarm(values=(("joint", "Hüfte"),)), 5.0)
     alarms.acknowledge(["arm:link"], "li", 6.0)
-    alarm_store.save(path, alarms.held.values(), {"arm/events": 12345})
-    assert alarm_store.load(path) == (alarms.held, {"arm/events": 12345})
+    alarm_store.save(path, alarms.by_id.values(), {"arm/events": 12345})
+    assert alarm_store.load(path) == (alarms.by_id, {"arm/events": 12345})
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[]", '{"alarms": [{}], "told_ns": {}}', '{"alarms": 3}', "\x00"])
@@ -282,33 +282,33 @@ def test_a_file_of_alarms_with_a_value_that_cannot_be_is_named(tmp_path, name, v
 
 def test_a_clock_that_is_set_back_keeps_no_alarm_standing_for_longer():
     alarms, now = Alarms(), 1_000_000.0
-    alarms.come(alarm("arm:refused", over_after_s=300.0, by_state=False), now)
-    alarms.come(alarm("arm:shelved"), now)
+    alarms.activate(alarm("arm:refused", over_after_s=300.0, by_state=False), now)
+    alarms.activate(alarm("arm:shelved"), now)
     alarms.shelve(["arm:shelved"], "li", now, for_s=LONGEST_SHELF_S, reason="service")
     now -= 500_000.0
-    alarms.look(now)
-    alarms.look(now + 299.0)
+    alarms.update(now)
+    alarms.update(now + 299.0)
     assert states(alarms)["arm:refused"] == UNACKNOWLEDGED
-    alarms.look(now + 301.0)
+    alarms.update(now + 301.0)
     assert states(alarms)["arm:refused"] == RETURNED
-    alarms.look(now + LONGEST_SHELF_S + 1.0)
+    alarms.update(now + LONGEST_SHELF_S + 1.0)
     assert states(alarms)["arm:shelved"] == UNACKNOWLEDGED
 
 
 def test_an_event_whose_time_is_none_is_an_alarm_all_the_same():
-    key, intake = parse_key("robomesh/s/arm/events"), Intake(Alarms())
+    key, events = parse_key("robomesh/s/arm/events"), EventHandler(Alarms())
     event = Event(severity=Event.ERROR, code="live")
     event.timestamp.nanos = 2_000_000_000
     behind = Event(severity=Event.ERROR, code="behind")
     behind.timestamp.FromSeconds(1001)
-    intake.live(key, event, 1000.0)
-    intake.remembered(key, [event, behind], 1002.0)
-    assert {"arm:live", "arm:behind"} == intake.alarms.held.keys()
+    events.handle(key, event, 1000.0)
+    events.handle_history(key, [event, behind], 1002.0)
+    assert {"arm:live", "arm:behind"} == events.alarms.by_id.keys()
 
 
 def test_one_event_of_the_future_silences_nothing_and_none_is_told_twice():
     now, key = 1000.0, parse_key("robomesh/s/arm/events")
-    intake = Intake(Alarms())
+    events = EventHandler(Alarms())
 
     def event(code: str, at_s: int) -> Event:
         told = Event(severity=Event.ERROR, code=code)
@@ -316,12 +316,12 @@ def test_one_event_of_the_future_silences_nothing_and_none_is_told_twice():
         return told
 
     before, ahead, away = event("before", 900), event("ahead", 5000), event("while.away", 1010)
-    intake.live(key, before, now)
-    intake.live(key, ahead, now)
-    intake.remembered(key, [before, ahead, away], now + 20.0)
-    counts = {each.code: each.count for each in intake.alarms.held.values()}
+    events.handle(key, before, now)
+    events.handle(key, ahead, now)
+    events.handle_history(key, [before, ahead, away], now + 20.0)
+    counts = {each.code: each.count for each in events.alarms.by_id.values()}
     assert counts == {"before": 1, "ahead": 1, "while.away": 1}
     # Nor when the list holds it no more.
-    intake.live(key, ahead, now + 30.0)
-    intake.remembered(key, [event("later", 1040)], now + 50.0)
-    assert "arm:later" in intake.alarms.held
+    events.handle(key, ahead, now + 30.0)
+    events.handle_history(key, [event("later", 1040)], now + 50.0)
+    assert "arm:later" in events.alarms.by_id

@@ -358,7 +358,7 @@ def test_a_revoked_name_is_given_to_nobody_while_a_certificate_of_it_is_good(mad
 
 def test_a_revoked_name_is_free_when_its_certificates_have_expired(made):
     folder = Folder(made / "keys")
-    authority.issue(folder, "zhou", Role.OPERATOR, lives=timedelta(seconds=-60))
+    authority.issue(folder, "zhou", Role.OPERATOR, lifetime=timedelta(seconds=-60))
     authority.revoke(folder, "zhou")
     assert authority.issue(folder, "zhou", Role.MONITOR).revoked is None
 

@@ -7,7 +7,7 @@ from robomesh.keys import PresenceKey
 from robomesh.schemas.robomesh_pb2 import ControllerState, ServiceHealth
 from services.errors import SiteFileError
 from services.site_file import site as site_file
-from services.watch.conditions import Condition, Judge, robot_conditions
+from services.watch.conditions import Condition, ConditionTracker, robot_conditions
 from services.watch.consistency import Expected, mesh_conditions
 from services.watch.mesh import Mesh
 
@@ -18,8 +18,8 @@ EPOCH = 1795348800.0
 def mesh_of(*told: ServiceHealth, site: str = "s") -> Mesh:
     mesh = Mesh()
     for health in told:
-        mesh.come(PresenceKey(site, "-", health.service, health.id))
-        mesh.see(site, health, 0.0)
+        mesh.add_presence(PresenceKey(site, "-", health.service, health.id))
+        mesh.record_health(site, health, 0.0)
     return mesh
 
 
@@ -46,14 +46,14 @@ def test_a_process_that_is_there_and_says_nothing_hangs():
 def test_losses_are_told_above_a_mark_and_until_another():
     mesh = mesh_of(health(received=1000))
     name = "-:mesh.loss:recorder.a1"
-    mesh.see("s", health(received=2000, lost=4), 1.0)
+    mesh.record_health("s", health(received=2000, lost=4), 1.0)
     assert found(mesh) == {}  # a few
-    mesh.see("s", health(received=3000, lost=40), 2.0)
+    mesh.record_health("s", health(received=3000, lost=40), 2.0)
     assert "2.0 %" in found(mesh)[name]
     for second in range(40):
-        mesh.see("s", health(received=13000 + 100 * second, lost=50), 3.0 + second)
+        mesh.record_health("s", health(received=13000 + 100 * second, lost=50), 3.0 + second)
     assert name not in found(mesh)
-    mesh.see("s", health(received=18000, lost=60), 43.0)
+    mesh.record_health("s", health(received=18000, lost=60), 43.0)
     assert name not in found(mesh)
     assert name in found(mesh, begun=frozenset({name}))
 
@@ -80,34 +80,34 @@ def test_a_router_that_misses_a_link_is_told():
 
 
 def test_an_alarm_keeps_its_words_while_only_a_number_in_them_counts_on():
-    mesh, judge = mesh_of(health(received=1000)), Judge()
-    mesh.read("a1", Reading(offset_s=2.0, round_trip_s=0.01))
+    mesh, tracker = mesh_of(health(received=1000)), ConditionTracker()
+    mesh.record_clock("a1", Reading(offset_s=2.0, round_trip_s=0.01))
 
     def judged(now_s: float, left_s: float, received: int, lost: int) -> tuple[list[Condition], ...]:
         told = health(values={"certificate_seconds": left_s}, received=received, lost=lost)
-        mesh.see("s", told, now_s)
-        mesh.see("s", ServiceHealth(service="watch", id="me", host="host-b", version="1.0"), now_s)
+        mesh.record_health("s", told, now_s)
+        mesh.record_health("s", ServiceHealth(service="watch", id="me", host="host-b", version="1.0"), now_s)
         conditions = mesh_conditions(
             mesh,
             "s",
             here="me",
             expected=Expected(),
-            begun=frozenset(judge.begun),
+            begun=frozenset(tracker.active),
             now=EPOCH + now_s,
             now_s=now_s,
         )
-        return judge.judge(conditions, now_s)
+        return tracker.update(conditions, now_s)
 
     day_s = 86400.0
     began, _, _ = judged(1.0, 9 * day_s, 2000, 40)
     assert {each.code for each in began} == {"clock.off", "mesh.loss", "certificate.expires"}
     mesh.processes["a1"].clock.readings.clear()
-    mesh.read("a1", Reading(offset_s=2.4, round_trip_s=0.01))
+    mesh.record_clock("a1", Reading(offset_s=2.4, round_trip_s=0.01))
     assert judged(2.0 + day_s, 8 * day_s, 3000, 90) == ([], [], [])
     _, changed, _ = judged(3.0 + 9 * day_s, -1.0, 4000, 120)
     assert [each.text.endswith("expired on 2026-12-01 at 12:00 UTC") for each in changed] == [True]
     mesh.processes["a1"].clock.readings.clear()
-    mesh.read("a1", Reading(offset_s=-2.0, round_trip_s=0.01))
+    mesh.record_clock("a1", Reading(offset_s=-2.0, round_trip_s=0.01))
     _, changed, _ = judged(4.0 + 9 * day_s, -2.0, 5000, 150)
     assert [each.text for each in changed] == [
         "the clock of host-a is 2.0 s behind that of host-b (the watch's)"
@@ -116,8 +116,8 @@ def test_an_alarm_keeps_its_words_while_only_a_number_in_them_counts_on():
 
 def test_whose_last_words_come_after_it_has_gone_does_not_hang():
     mesh = mesh_of(health())
-    mesh.go(PresenceKey("s", "-", "recorder", "a1"))
-    mesh.see("s", health(), 1.0)
+    mesh.remove_presence(PresenceKey("s", "-", "recorder", "a1"))
+    mesh.record_health("s", health(), 1.0)
     mesh.forget_gone(2.0)
     assert "a1" in mesh.processes, "it may be about to come"
     mesh.forget_gone(11.0)
@@ -126,22 +126,22 @@ def test_whose_last_words_come_after_it_has_gone_does_not_hang():
 
 
 def test_a_site_that_is_seen_no_more_is_gone_once():
-    mesh, expected, judge = mesh_of(health("router"), site="beijing"), Expected(), Judge()
+    mesh, expected, tracker = mesh_of(health("router"), site="beijing"), Expected(), ConditionTracker()
 
     def judged(now_s: float) -> tuple[list[Condition], list[Condition]]:
         conditions = mesh_conditions(
             mesh, "s", here="me", expected=expected, begun=frozenset(), now=EPOCH, now_s=now_s, settled_s=5.0
         )
-        began, _, over = judge.judge(conditions, now_s)
+        began, _, over = tracker.update(conditions, now_s)
         return began, over
 
     assert judged(0.0) == ([], [])
-    mesh.go(PresenceKey("beijing", "-", "router", "a1"))
+    mesh.remove_presence(PresenceKey("beijing", "-", "router", "a1"))
     assert judged(1.0) == ([], [])
     (gone,), _ = judged(6.0)
     assert gone.id == "-:site.gone:beijing"
     assert judged(7.0) == ([], [])
-    mesh.come(PresenceKey("beijing", "-", "router", "b2"))
+    mesh.add_presence(PresenceKey("beijing", "-", "router", "b2"))
     _, (over,) = judged(8.0)
     assert over.over == "site beijing is there again"
 
@@ -167,9 +167,9 @@ def test_who_is_ended_on_purpose_is_not_missed(service, robot, missed):
         )
         return [condition.code for condition in conditions]
 
-    mesh.come(who)
+    mesh.add_presence(who)
     assert gone() == []
-    mesh.go(who)
+    mesh.remove_presence(who)
     assert gone() == ["service.gone"] * missed
     # Nor is one that was missed at the watch's restart, by a file of before.
     then = Condition(
@@ -198,10 +198,13 @@ def test_a_check_that_is_getting_ready_is_no_alarm_and_one_that_fails_is():
 
 
 def test_a_frozen_controller_that_is_connected_to_again_and_again_is_one_alarm_in_the_same_words():
-    judge, state = Judge(), ControllerState(link=ControllerState.SILENT, link_text="10.0.0.7 sends nothing")
+    tracker, state = (
+        ConditionTracker(),
+        ControllerState(link=ControllerState.SILENT, link_text="10.0.0.7 sends nothing"),
+    )
 
     def judged(now_s: float) -> tuple[list[str], list[Condition], list[str]]:
-        began, changed, over = judge.judge(robot_conditions("arm", state, 0.0), now_s)
+        began, changed, over = tracker.update(robot_conditions("arm", state, 0.0), now_s)
         return [each.text for each in began], changed, [each.code for each in over]
 
     assert judged(0.0) == ([], [], [])
@@ -213,10 +216,13 @@ def test_a_frozen_controller_that_is_connected_to_again_and_again_is_one_alarm_i
 
 
 def test_a_link_that_stays_down_for_another_reason_is_told_with_that_reason():
-    judge, state = Judge(), ControllerState(link=ControllerState.DOWN, link_text="connecting to 10.0.0.7")
+    tracker, state = (
+        ConditionTracker(),
+        ControllerState(link=ControllerState.DOWN, link_text="connecting to 10.0.0.7"),
+    )
 
     def changed(now_s: float) -> list[str]:
-        return [each.text for each in judge.judge(robot_conditions("arm", state, 0.0), now_s)[1]]
+        return [each.text for each in tracker.update(robot_conditions("arm", state, 0.0), now_s)[1]]
 
     assert [changed(now_s) for now_s in (0.0, 1.0)] == [[], []]
     state.link_text = "cannot connect to 10.0.0.7: Connection refused"

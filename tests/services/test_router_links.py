@@ -137,7 +137,7 @@ def test_a_neighbour_that_shows_one_of_our_own_names_is_cut_off_and_our_own_rout
         # The other site's authority signs what it likes.
         other = certificates.read_authority(here.authority_key.read_bytes(), here.authority.read_bytes())
         made = certificates.issue(
-            other, name, "router", now=authority.now(), lives=timedelta(days=1), serves=True
+            other, name, "router", now=authority.now(), lifetime=timedelta(days=1), serves=True
         )
         forged = here.service("forged")
         forged.write_bytes(made.key + made.certificate + here.authority.read_bytes())

@@ -162,7 +162,7 @@ def test_what_are_no_rules_at_all_is_told_so(tmp_path, text):
 
 def test_an_expired_certificate_is_refused_by_its_holder_in_words_and_by_the_router(tmp_path):
     folder, endpoint = prepared(tmp_path)
-    authority.issue(folder, "old", Role.MONITOR, lives=timedelta(seconds=-60))
+    authority.issue(folder, "old", Role.MONITOR, lifetime=timedelta(seconds=-60))
     # As made elsewhere: nobody at this end sees its date.
     text = folder.person("old").read_text()
     unsaid = tmp_path / "unsaid.pem"
@@ -182,7 +182,7 @@ def test_an_expired_certificate_is_refused_by_its_holder_in_words_and_by_the_rou
 
 def test_a_link_ends_with_its_certificate_and_comes_back_with_the_renewed_one(tmp_path):
     folder, endpoint = prepared(tmp_path)
-    authority.issue(folder, "mo", Role.MONITOR, lives=timedelta(seconds=3))
+    authority.issue(folder, "mo", Role.MONITOR, lifetime=timedelta(seconds=3))
     with zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access))):
 
         async def main():
@@ -289,7 +289,7 @@ def test_the_configuration_for_zenohd_is_what_our_router_runs_with(tmp_path):
 def test_a_certificate_shows_whose_it_is_and_who_signed_it(tmp_path):
     folder, _ = prepared(tmp_path)
     entry = authority.issue(folder, "li", Role.OPERATOR)
-    shown = certificates.show(folder.person("li").read_bytes())
+    shown = certificates.read_bundle(folder.person("li").read_bytes())
     assert (shown.name, shown.role, shown.authority) == ("li.here", "operator", "here")
     assert entry.expires == shown.expires
 
@@ -360,14 +360,14 @@ def test_rules_that_zenoh_refuses_are_not_said_to_be_followed(tmp_path, caplog):
 
 def test_a_renewed_certificate_is_told_without_a_restart(tmp_path):
     folder, endpoint = prepared(tmp_path)
-    authority.issue(folder, "mo", Role.MONITOR, lives=timedelta(hours=1))
+    authority.issue(folder, "mo", Role.MONITOR, lifetime=timedelta(hours=1))
     with zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access))):
 
         async def main():
             async with attached(endpoint, folder.person("mo")) as mo:
                 (left,) = (each.read for each in mo.measures if each.name == CERTIFICATE)
                 assert 3500 < left() <= 3600
-                authority.issue(folder, "mo", Role.MONITOR, lives=timedelta(hours=2))
+                authority.issue(folder, "mo", Role.MONITOR, lifetime=timedelta(hours=2))
                 assert 7100 < left() <= 7200
                 folder.person("mo").unlink()
                 assert 3500 < left() <= 3600

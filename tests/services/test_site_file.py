@@ -7,7 +7,7 @@ import pytest
 from services.errors import ListenError, SiteFileError
 from services.site_file import site
 from services.site_file.listen_address import check_reach, split_address
-from services.site_file.router import OF_OTHERS, RoutedSite, read_routed
+from services.site_file.router import OTHER_PARTS, RoutedSite, read_routed
 from services.site_file.started_robots import read_started, robot_to_start, write_started
 
 ROBOT = '[[robot]]\nname = "arm"\nmodel = "pt600"\n'
@@ -54,7 +54,7 @@ def test_codes_are_numbers(tmp_path):
     [
         ("", "site is missing"),
         ('site = "Hall"', "site = 'Hall': site 'Hall' cannot be used: lower-case"),
-        ('site = "define"', "the console has a page of that name, #/define"),
+        ('site = "define"', "the console has a page with that name, #/define"),
         ('site = "hall"\nrobots = 1', "robots is not a key"),
         (f'site = "hall"\n{ROBOT}{ROBOT}', "two robots are named 'arm'"),
         (
@@ -63,7 +63,7 @@ def test_codes_are_numbers(tmp_path):
         ),
         (
             'site = "hall"\n[[robot]]\nname = "replay-1"\nmodel = "pt600"',
-            "replay-... is what recordings are played back as",
+            "reserved for replays",
         ),
         ('site = "hall"\n[quotas]\nviews = 0', "quotas.views = 0: should be greater than or equal to 1"),
         (
@@ -300,7 +300,7 @@ def test_a_router_reads_of_its_site_what_everybody_reads_of_it(tmp_path):
     read, whole = read_routed(path), site.load(path)
     assert read is not None
     assert (read.site, read.router, read.keys) == (whole.site, whole.router, whole.keys)
-    assert set(site.Site.model_fields) == set(RoutedSite.model_fields) | OF_OTHERS
+    assert set(site.Site.model_fields) == set(RoutedSite.model_fields) | OTHER_PARTS
 
 
 @pytest.mark.parametrize("more", ['[rooter]\nlisten = ["tcp/127.0.0.1:7450"]', "[router]\nlisten = 3", "[[["])
