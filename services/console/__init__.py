@@ -1,1 +1,1 @@
-"""TBD."""
+"""The console: serves the page, and connects browsers to the mesh."""

@@ -1,4 +1,4 @@
-"""The console's server: the built page, the WebSocket behind it, the meshes it draws."""
+"""The console's server: serves the built page and connects its WebSockets to the mesh."""
 
 import asyncio
 import functools
@@ -24,8 +24,8 @@ from robomesh import keys, topics
 from robomesh.keys import PresenceKey
 from robomesh.schemas.robomesh_pb2 import Event, ToPage
 from robomesh.session import Session
-from services.console.accounts.auth_middleware import SIGNED_OUT, Gate, cookie_name
-from services.console.accounts.auth_service import Desk
+from services.console.accounts.auth_middleware import SIGNED_OUT, AuthMiddleware, cookie_name
+from services.console.accounts.auth_service import AuthService
 from services.console.accounts.rights import operator_name
 from services.console.accounts.routes import AccountRoutes
 from services.console.accounts.sessions import MOST_PAGES, SignedIn
@@ -46,30 +46,31 @@ from services.console.http.uvicorn_server import (
 )
 from services.console.requested_views import Views
 from services.console.websocket.page_connection import Browser
-from services.console.websocket.shared_subscriptions import Feeds
+from services.console.websocket.shared_subscriptions import SharedSubscriptions
 from services.site_file.listen_address import check_page_reach, split_address
 
 log = logging.getLogger(__name__)
 
 PAGE = Path(__file__).parent / "page"  # built from `web/`
 
-_CONNECTED_EACH_S = 0.5
+_CONNECTION_CHECK_EVERY_S = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Where the page is served.
+    """Address, security and content of the console.
 
     Attributes:
         site: The console's own site; the page shows every site that its router reaches.
-        listen: `HOST:PORT`; port 0 takes a free one.
-        insecure: Beyond loopback without TLS or accounts, at the site's own risk.
-        accounts: File of those who may sign in; None: whoever reaches the page may use it, where the console
-            has a certificate in the console's name alone.
-        certificate: With `key`: served over TLS (PEM).
-        hosts: Names that the console is known by, beside `localhost` and addresses.
+        listen: `HOST:PORT`; port 0 takes a free port.
+        insecure: Accept other machines without TLS or accounts, at the site's own risk.
+        accounts: File of accounts for sign-in; None: every client may use the page, under the console's own
+            name if
+            the console has a certificate.
+        certificate: With `key`: serve over TLS (PEM).
+        hosts: Host names of the console, in addition to `localhost` and IP addresses.
         page: Folder of the built page.
-        define: Of the page's Define; none: robots cannot be defined here.
+        define: Settings of the page's Define; None: robots cannot be defined here.
     """
 
     site: str
@@ -86,15 +87,15 @@ class Settings:
 async def serve(
     session: Session, settings: Settings, *, on_ready: Callable[[str], None] | None = None
 ) -> None:
-    """Serves the page until it is cancelled.
+    """Serve the page until cancelled.
 
     Args:
-        on_ready: Told the page's address once it can be opened.
+        on_ready: Called with the page's address once it can be opened.
 
     Raises:
-        ListenError: If it cannot listen there, or may not.
-        AccountsError: If nobody could sign in.
-        PageNotBuiltError: If there is no page.
+        ListenError: If the address is in use, or must not be served insecurely.
+        AccountsError: If the accounts file is invalid.
+        PageNotBuiltError: If the page is not built.
     """
     if not (settings.page / "index.html").exists():
         raise PageNotBuiltError(f"no page in {settings.page}: build it with `python web/build_page.py`")
@@ -115,10 +116,10 @@ async def serve(
 
 
 def reach_warning(settings: Settings, host: str) -> str | None:
-    """The warning that listening there deserves; None where it needs none.
+    """Return the warning about an insecure address, or None.
 
     Raises:
-        ListenError: If others can reach it, it has not both accounts and TLS, and nobody took the risk.
+        ListenError: If other machines can reach it, without accounts or TLS, and without `insecure`.
     """
     return check_page_reach(
         host,
@@ -129,7 +130,7 @@ def reach_warning(settings: Settings, host: str) -> str | None:
 
 
 class Hub:
-    """What all browsers share: the feeds, who is alive, the meshes."""
+    """State that all browsers share: subscriptions, presence, meshes, accounts."""
 
     def __init__(
         self, session: Session, settings: Settings, *, exposed: bool, tls: ssl.SSLContext | None = None
@@ -137,15 +138,15 @@ class Hub:
         self.session = session
         self.settings = settings
         self.meshes = MeshCache()
-        self.feeds = Feeds(session)
+        self.subscriptions = SharedSubscriptions(session)
         self.views = Views(session)
-        self.pictures = Pictures(self.feeds, self.views, self.asker)
+        self.pictures = Pictures(self.subscriptions, self.views, self.asker)
         self._alive: set[PresenceKey] = set()
         self._browsers: set[Browser] = set()
-        self._before = Counter[str]()  # of browsers that have gone
+        self._closed_browsers = Counter[str]()  # samples of closed browsers
         self.exposed = exposed
         self._tls = tls
-        self.desk = None if settings.accounts is None else self._open_desk(settings.accounts)
+        self.auth = None if settings.accounts is None else self._open_auth(settings.accounts)
         self._tasks: list[asyncio.Task[None]] = []
         self.define = None if settings.define is None else Define(settings.define)
         session.measure("browsers", "Pages that are open", lambda: len(self._browsers))
@@ -157,8 +158,8 @@ class Hub:
     async def __aenter__(self) -> "Hub":
         work = self._watch_presence(), self._watch_router(), asyncio.to_thread(png.prepare)
         self._tasks = [asyncio.create_task(each) for each in work]
-        if self.desk is not None:
-            self._tasks.append(asyncio.create_task(self.desk.follow()))
+        if self.auth is not None:
+            self._tasks.append(asyncio.create_task(self.auth.follow()))
         certificate, key = self.settings.certificate, self.settings.key
         if self._tls is not None and certificate is not None and key is not None:
             self._tasks.append(asyncio.create_task(follow_certificate(self._tls, certificate, key)))
@@ -167,66 +168,67 @@ class Hub:
     async def __aexit__(self, *_: object) -> None:
         for task in self._tasks:
             task.cancel()
-        self.feeds.close()
-        if self.desk is not None:
-            self.desk.close()
+        self.subscriptions.close()
+        if self.auth is not None:
+            self.auth.close()
         if self.define is not None:
             await self.define.close()
 
     async def browse(self, websocket: WebSocket) -> None:
-        """Serves one browser."""
-        who: SignedIn | None = websocket.scope.get("signed_in")
-        if who is not None and len(who.pages) >= MOST_PAGES:
+        """Serve one browser's WebSocket."""
+        user: SignedIn | None = websocket.scope.get("signed_in")
+        if user is not None and len(user.pages) >= MOST_PAGES:
             await websocket.close(SIGNED_OUT)
             return
         await websocket.accept()
         browser = Browser(
             self.session,
-            self.feeds,
+            self.subscriptions,
             self.views,
             greet=self._hello,
             site=self.settings.site,
-            who=who,
-            own_name=self._own_name(who),
+            user=user,
+            own_name=self._own_name(user),
         )
         for each in self._alive:
-            browser.tell(_presence(each, alive=True))
+            browser.send_message(_presence(each, alive=True))
         self._browsers.add(browser)
         try:
-            if who is None:
+            if user is None:
                 await browser.run(websocket)
             else:
-                await _serve_signed_in(browser, who, websocket)
+                await _serve_signed_in(browser, user, websocket)
         finally:
             self._browsers.discard(browser)
-            self._before.update(offered=browser.offered, sent=browser.sent)
+            self._closed_browsers.update(offered=browser.offered, sent=browser.sent)
 
     def _count(self, name: str) -> int:
         now: int = sum(getattr(browser, name) for browser in tuple(self._browsers))
-        return self._before[name] + now
+        return self._closed_browsers[name] + now
 
-    def _open_desk(self, accounts: Path) -> Desk:
+    def _open_auth(self, accounts: Path) -> AuthService:
         events = self.session.declare_publisher(self.settings.site, keys.WHOLE_SITE, "events/console")
 
-        def tell(severity: Event.Severity, code: str, text: str, values: Mapping[str, str]) -> None:
+        def publish_event(severity: Event.Severity, code: str, text: str, values: Mapping[str, str]) -> None:
             event = Event(severity=severity, code=code, text=text, source="console", values=values)
             event.timestamp.GetCurrentTime()
             events.put(event)
 
-        return Desk(accounts, self.settings.site, tell)
+        return AuthService(accounts, self.settings.site, publish_event)
 
     def asker(self, scope: Scope) -> str:
-        """In whose name something is asked for over HTTP: the account's, else that of the whole console."""
+        """Return the name for requests over HTTP: the account's, otherwise the console's."""
         return self._own_name(scope.get("signed_in")) or self.session.own_name
 
-    def _own_name(self, who: SignedIn | None) -> str:
-        """The one operator that a page asks as; empty: any, where no certificate says who is who.
+    def _own_name(self, user: SignedIn | None) -> str:
+        """Return the operator that a page acts as; empty if it may use any name, without certificates.
 
-        The router lets a console ask in every name of its site, for its accounts: it must know whose. So
-        without accounts all its pages ask in its own, and share that name's quotas.
+        The router lets a console act under every name of its site, for its accounts. Without accounts all
+        pages act
+        under the console's own name, and share its quotas.
         """
-        if who is not None:
-            return operator_name(who.account.name, self.settings.site)
+        if user is not None:
+            return operator_name(user.account.name, self.settings.site)
         return "" if self.session.principal is None else self.session.principal.name
 
     def _hello(self, browser: Browser) -> ToPage:
@@ -236,50 +238,52 @@ class Hub:
             insecure=self.exposed,
             connected=self.session.connected,
             session=browser.operator.id,
-            may_command=browser.who is None or browser.who.may_command,
+            may_command=browser.user is None or browser.user.may_command,
             operator=browser.own_name,
         )
-        if browser.who is not None:
-            hello.account = browser.who.account.name
+        if browser.user is not None:
+            hello.account = browser.user.account.name
         for name, row in topics.TOPICS.items():
             if row.stale_after_s is not None:
                 hello.stale.add(topic=name, after_s=row.stale_after_s)
         return ToPage(hello=hello)
 
     async def _watch_presence(self) -> None:
-        async for who, alive in self.session.watch_presence():
-            (self._alive.add if alive else self._alive.discard)(who)
+        async for token, alive in self.session.watch_presence():
+            (self._alive.add if alive else self._alive.discard)(token)
             for browser in self._browsers:
-                browser.tell(_presence(who, alive=alive))
+                browser.send_message(_presence(token, alive=alive))
 
     async def _watch_router(self) -> None:
         connected = self.session.connected
         while True:
-            await asyncio.sleep(_CONNECTED_EACH_S)
+            await asyncio.sleep(_CONNECTION_CHECK_EVERY_S)
             if self.session.connected is not connected:
                 connected = not connected
                 for browser in self._browsers:
                     browser.greet()
 
 
-async def _serve_signed_in(browser: Browser, who: SignedIn, websocket: WebSocket) -> None:
-    """Serves a page for as long as its session lasts, and says why it ends."""
+async def _serve_signed_in(browser: Browser, user: SignedIn, websocket: WebSocket) -> None:
+    """Serve a page as long as its session lasts; close it with the reason when the session ends."""
     try:
-        with who.serving(), who.with_page(browser):
+        with user.serving(), user.with_page(browser):
             await browser.run(websocket)
     except asyncio.CancelledError:
-        if not who.ended:
+        if not user.ended:
             raise
-        await websocket.close(SIGNED_OUT, who.ended)
+        await websocket.close(SIGNED_OUT, user.ended)
 
 
 def application(hub: Hub) -> ASGIApp:
-    """The routes: `/mesh` (WebSocket), `/mesh/<site>/<robot>/<name>`, pictures, recordings, Define,
-    `/account`, `/health`, the page; behind the gate, where there are accounts.
+    """Return the app with all its routes; with accounts, every request passes the authentication middleware.
+
+    `/mesh` (WebSocket), `/mesh/<site>/<robot>/<name>`, pictures, recordings,
+    Define, `/account`, `/health`, the page.
     """
     settings, secure = hub.settings, hub.settings.certificate is not None
     cookie = cookie_name(settings.site, secure=secure)
-    account = AccountRoutes(hub.desk, site=settings.site, cookie=cookie, secure=secure, insecure=hub.exposed)
+    account = AccountRoutes(hub.auth, site=settings.site, cookie=cookie, secure=secure, insecure=hub.exposed)
 
     async def mesh(request: Request) -> Response:
         return await mesh_response(request, hub.session, hub.meshes)
@@ -304,26 +308,26 @@ def application(hub: Hub) -> ASGIApp:
         exclude_content_types=(*DEFAULT_EXCLUDED_CONTENT_TYPES, MJPEG, "application/octet-stream"),
     )
     app = Starlette(routes=routes, middleware=[packed])
-    return app if hub.desk is None else Gate(app, hub.desk.sessions, cookie)
+    return app if hub.auth is None else AuthMiddleware(app, hub.auth.sessions, cookie)
 
 
 class PageFiles(StaticFiles):
-    """The built page: hashed assets for ever, the rest asked for each time."""
+    """The built page; browsers may cache hashed assets, and fetch the rest each time."""
 
     async def get_response(self, path: str, scope: Scope) -> Response:
-        """A file, with how long it may be kept."""
+        """Return a file with its caching headers."""
         response = await super().get_response(path, scope)
         hashed = path.startswith("assets/") and response.status_code == 200
         response.headers["Cache-Control"] = "public, max-age=31536000, immutable" if hashed else "no-store"
         return response
 
 
-def _presence(who: PresenceKey, *, alive: bool) -> ToPage:
-    key = keys.presence_key(who.site, who.robot, who.service, who.id)
+def _presence(token: PresenceKey, *, alive: bool) -> ToPage:
+    key = keys.presence_key(token.site, token.robot, token.service, token.id)
     return ToPage(presence=ToPage.Presence(key=key, alive=alive))
 
 
-@functools.cache  # it reads the package's metadata, and every page is told
+@functools.cache  # reads the package's metadata; each page needs it
 def _version() -> str:
     try:
         return version("robomesh")

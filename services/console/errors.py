@@ -1,22 +1,22 @@
 """Errors of the console.
 
 services.errors.ServiceError
-├── AccountsError           an accounts file, or a change of it, that cannot be
-├── SignInBusyError         too many passwords wait to be looked at
-├── PageNotBuiltError       there is no page to serve
-├── PictureError            a picture that cannot be given, with HTTP's status
-├── RecordingChangedError   a recording that was written again while it was sent
-└── WatchError              a browser asked for a key that it cannot watch
+├── AccountsError           an accounts file, or a change to it, is invalid
+├── SignInBusyError         too many sign-ins wait for verification
+├── PageNotBuiltError       the page is not built
+├── PictureError            a picture is not available; has an HTTP status
+├── RecordingChangedError   a recording was replaced during a download
+└── WatchError              a browser watches an invalid key
 """
 
 from services.errors import ServiceError
 
 
 class AccountsError(ServiceError):
-    """An accounts file that says something wrong, or a change of it that cannot be.
+    """An accounts file, or a change to it, is invalid.
 
     Attributes:
-        word: Which, for the page, which has words of its own; "refused": its text is all there is.
+        word: Identifies the error for the page, which has its own text; "refused": show the error's text.
     """
 
     def __init__(self, text: str, word: str = "refused") -> None:
@@ -25,27 +25,27 @@ class AccountsError(ServiceError):
 
 
 class SignInBusyError(ServiceError):
-    """Too many passwords wait to be looked at."""
+    """Too many sign-ins wait for verification."""
 
 
 class PageNotBuiltError(ServiceError):
-    """There is no page to serve."""
+    """The page is not built."""
 
 
 class WatchError(ServiceError):
-    """A browser asked for a key that it cannot watch; the text says what it can."""
+    """A browser watches an invalid key; the text says which are valid."""
 
 
 class RecordingChangedError(ServiceError):
-    """A recording that was written again while it was sent."""
+    """A recording was replaced during a download."""
 
 
 class PictureError(ServiceError):
-    """A picture that cannot be given; the text says why and what can.
+    """A picture is not available; the text says why, and which are.
 
     Attributes:
-        status: HTTP's.
-        again_s: When to ask again [s]; None: nobody knows.
+        status: HTTP status.
+        again_s: Time after which to retry [s]; None if unknown.
     """
 
     def __init__(self, status: int, text: str, *, again_s: float | None = None) -> None:

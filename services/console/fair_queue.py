@@ -1,4 +1,4 @@
-"""Jobs of several askers, taken in turn: one who sends many delays the own ones alone."""
+"""A queue that serves askers in turn, so that an asker's many jobs delay only its own."""
 
 from collections import OrderedDict, deque
 from typing import Generic, TypeVar
@@ -7,7 +7,7 @@ Job = TypeVar("Job")
 
 
 class AskerQueue(Generic[Job]):
-    """Queued jobs by asker. No I/O and no clock."""
+    """Queued jobs, grouped by asker. No I/O and no clock."""
 
     def __init__(self) -> None:
         self._askers: OrderedDict[str, deque[Job]] = OrderedDict()
@@ -28,12 +28,12 @@ class AskerQueue(Generic[Job]):
         self._askers.setdefault(asker, deque()).append(job)
 
     def take(self) -> Job | None:
-        """Remove and return the oldest job of the next asker; None: there is none."""
+        """Remove and return the oldest job of the next asker; None if the queue is empty."""
         if not self._askers:
             return None
         asker, jobs = next(iter(self._askers.items()))
         job = jobs.popleft()
-        # To the end: the others come first, also before an asker who has one job and sends the next at once.
+        # To the end: the other askers are next, even if this one queues another job immediately.
         self._askers.move_to_end(asker)
         self._forget_empty(asker)
         return job

@@ -1,4 +1,4 @@
-"""Views of one's own, asked of the renderer: another size or rate, and less of a view for a slow line."""
+"""Views on request: the renderer draws another size or rate, or a reduced view for a slow line."""
 
 from collections import OrderedDict
 
@@ -12,24 +12,24 @@ TIMEOUT_S = 3.0
 _MOST_KNOWN = 512
 _SMALLEST_PX = 64
 
-# What each step down from what was asked for keeps: of width and height, of the rate; and at most so
-# many bits a second.
+# Reduction at each step, relative to the request: share of width and height, share of the rate, and highest
+# bit rate [bit/s] (0: no limit).
 _STEPS = ((1.0, 1.0, 0.0), (0.5, 0.5, 800e3), (0.375, 0.25, 250e3))
 LOWEST_STEP = len(_STEPS) - 1
 
 
 class Views:
-    """What the renderer was asked for, and what came of it."""
+    """Requests to the renderer, and its answers."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
         self._known: OrderedDict[str, tuple[ViewRequest, ViewAnswer]] = OrderedDict()
 
     async def ask(self, robot_key: str, request: ViewRequest, asker: str) -> ViewAnswer:
-        """The topics of a view of one's own, asked for in somebody's name.
+        """Request a view in an asker's name, and return its topics.
 
         Raises:
-            RefusedError: With the renderer's reason.
+            RefusedError: If the renderer rejects it.
             NoAnswerError: If no renderer answers.
         """
         answer = await self._session.ask(f"{robot_key}/views/{asker}", request, timeout_s=TIMEOUT_S)
@@ -39,7 +39,7 @@ class Views:
         return answer
 
     def learn(self, robot_key: str, request: ViewRequest, answer: ViewAnswer) -> None:
-        """Keeps what a view is, so that there can be less of it."""
+        """Remember a view's request, so that it can be reduced later."""
         key = f"{robot_key}/{answer.topic}"
         self._known[key] = (request, answer)
         self._known.move_to_end(key)
@@ -47,12 +47,12 @@ class Views:
             self._known.popitem(last=False)
 
     async def reduced(self, key: str, step: int, asker: str) -> str:
-        """The key of a view's video, reduced by so many steps; all slow browsers share it.
+        """Return the key of a view's video, reduced by the given steps; all slow browsers share it.
 
-        It is asked for in the name of the one that needs it; whoever was first has it counted.
+        The request counts against the quota of the first asker.
 
         Raises:
-            RefusedError: If there is no less of it: it is a recording's.
+            RefusedError: If it cannot be reduced, because it is a recording's.
             NoAnswerError: If no renderer answers.
         """
         if step == 0:
@@ -62,12 +62,12 @@ class Views:
         if known is None:
             request = ViewRequest(of=view)
             known = request, await self.ask(robot_key, request, asker)
-        answer = await self.ask(robot_key, less(*known, step), asker)
+        answer = await self.ask(robot_key, reduced_request(*known, step), asker)
         return f"{robot_key}/{answer.topic}"
 
 
-def less(request: ViewRequest, answer: ViewAnswer, step: int) -> ViewRequest:
-    """A request for the same view with less of everything; `answer` tells how much that was."""
+def reduced_request(request: ViewRequest, answer: ViewAnswer, step: int) -> ViewRequest:
+    """Return a request for the same view, reduced from what `answer` says."""
     share, rate, bits = _STEPS[step]
     smaller = ViewRequest()
     smaller.CopyFrom(request)
@@ -78,14 +78,14 @@ def less(request: ViewRequest, answer: ViewAnswer, step: int) -> ViewRequest:
 
 
 def even(pixels: float) -> int:
-    """The nearest size that a picture can have [px]: H.264 halves the resolution of colour."""
+    """Return the nearest possible picture size [px]: H.264 halves the resolution of colour."""
     return max(2 * round(pixels / 2), _SMALLEST_PX)
 
 
 def robot_key(site: str, robot: str) -> str:
-    """`robomesh/<site>/<robot>`.
+    """Return `robomesh/<site>/<robot>`.
 
     Raises:
-        KeyNameError: If a name cannot be one.
+        KeyNameError: If a name is invalid.
     """
     return keys.robot_key(site, robot, "views").removesuffix("/views")

@@ -1,4 +1,4 @@
-"""A site's router: every service and monitor of the site is its client; sites link router to router."""
+"""A site's router: services and monitors are its clients; routers of several sites link to each other."""
 
 from services.router.router import Settings, serve, write_config
 

@@ -1,8 +1,8 @@
-"""What certificates a router is shown: who is attached without a right, who is not who he should be.
+"""Audit of peers' certificates: clients without rights, and impostors on links to other sites.
 
-A link to another site trusts that site's authority, which could sign any name: also one of ours, whose
-rights our rules would give it. So links to other sites are cut, and stay so, when one of them shows another
-name than that site's router.
+A link to another site trusts that site's authority, which could sign any name, even one of this site, and
+would get that name's rights. If a link shows another name than that site's router, all links to other sites
+are cut until the router is restarted.
 """
 
 import ipaddress
@@ -18,39 +18,39 @@ from robomesh.topics import Role
 _ADDRESS = re.compile(r"/\[?([^\]/?#]*)\]?:(\d+)(?:[?#]|$)")
 
 
-def imposters(
+def find_impostors(
     router: zenoh.Session, listen: tuple[str, ...], links: tuple[str | Link, ...], site: str
 ) -> list[str]:
-    """Names that were shown on links which we opened, and that nobody may have there.
+    """Return the names of peers on outgoing links that are not a router of the linked site.
 
     Args:
-        site: Our own, whose authority signs for links that name no site; empty: nobody knows.
+        site: This site, which links without a site belong to; empty if unknown.
     """
-    far = {(_address(endpoint), of) for endpoint, of in _ends(links, site)}
-    if all(of == site for _, of in far):
+    linked = {(_address(endpoint), of) for endpoint, of in _ends(links, site)}
+    if all(of == site for _, of in linked):
         return []
-    ours = {_address(endpoint)[1] for endpoint in listen}
+    own_ports = {_address(endpoint)[1] for endpoint in listen}
     found = set()
     for link in router.info.links():
         name, end = link.auth_identifier or "", _address(str(link.dst))
-        if name and _address(str(link.src))[1] not in ours:
-            sites = {of for address, of in far if _may_be(address, end)} or {of for _, of in far}
+        if name and _address(str(link.src))[1] not in own_ports:
+            sites = {of for address, of in linked if _may_be(address, end)} or {of for _, of in linked}
             found |= set() if _is_router_of(name, sites) else {name}
     return sorted(found)
 
 
 def to_other_sites(link: str | Link) -> bool:
-    """Whether a link is by another site's authority."""
+    """Return whether a link uses another site's authority."""
     return isinstance(link, Link) and bool(link.site)
 
 
 def without_rights(router: zenoh.Session, rules: Mapping[str, Any]) -> set[str]:
-    """Names that are attached, and that no rule is for: revoked, or never known. They can do nothing."""
+    """Return the names of connected clients without a rule: revoked, or unknown. They have no rights."""
     if "access_control" not in rules:
         return set()
     subjects = rules["access_control"].get("subjects", ())
     known = {name for subject in subjects for name in subject.get("cert_common_names", ())}
-    return {link.auth_identifier or "somebody without a certificate" for link in router.info.links()} - known
+    return {link.auth_identifier or "a client without a certificate" for link in router.info.links()} - known
 
 
 def _is_router_of(name: str, sites: set[str]) -> bool:
@@ -68,7 +68,7 @@ def _address(endpoint: str) -> tuple[str, str]:
 
 
 def _may_be(configured: tuple[str, str], end: tuple[str, str]) -> bool:
-    """Whether a link with that end may be one that was asked for; hosts' names are not looked up."""
+    """Return whether a link's end may be a configured one; host names are not resolved."""
     try:
         same_host = ipaddress.ip_address(configured[0]) == ipaddress.ip_address(end[0])
     except ValueError:

@@ -1,4 +1,4 @@
-"""Several routers of a site open anew one after the other, so that one of them always serves."""
+"""Rolling restart: several routers of a site restart one after the other, so that one always serves."""
 
 import asyncio
 
@@ -7,14 +7,14 @@ import zenoh
 from robomesh.certificate_identity import read_identity
 from robomesh.endpoints import Tls
 
-_LONGEST_S = 10.0
-# Its clients come back to it within this.
+_MAX_WAIT_S = 10.0
+# Its clients reconnect within this time.
 _SETTLED_S = 2.0
-_LOOK_S = 0.1
+_CHECK_EVERY_S = 0.1
 
 
 def neighbours(router: zenoh.Session, tls: Tls | None) -> frozenset[str]:
-    """Ids of the other routers of the site that are linked to this one, by the certificates they show."""
+    """Return the ids of the site's other routers that are linked to this one, by their certificates."""
     own = None if tls is None else read_identity(tls.certificate)
     if own is None:
         return frozenset()
@@ -26,20 +26,20 @@ def neighbours(router: zenoh.Session, tls: Tls | None) -> frozenset[str]:
     )
 
 
-async def our_turn(
+async def wait_for_turn(
     router: zenoh.Session, tls: Tls | None, others: frozenset[str], *, settled_s: float = _SETTLED_S
 ) -> None:
-    """Wait for those of the others whose ids are lower than ours, until each has been opened anew.
+    """Wait until the other routers with lower ids have restarted; a restarted router has a new id.
 
-    Each opening has a new id. Whoever does not come back is waited for ten seconds; who does has
-    `settled_s` for its clients.
+    The wait ends after ten seconds if one does not return. `settled_s` is the time for its clients to
+    reconnect.
     """
     before = {zid for zid in others if zid < str(router.info.zid())}
-    deadline = asyncio.get_running_loop().time() + _LONGEST_S
+    deadline = asyncio.get_running_loop().time() + _MAX_WAIT_S
     while before and asyncio.get_running_loop().time() < deadline:
-        await asyncio.sleep(_LOOK_S)
+        await asyncio.sleep(_CHECK_EVERY_S)
         now = await asyncio.to_thread(neighbours, router, tls)
-        # Gone, and somebody in its place.
+        # The old ids are gone, and as many routers are present.
         if not before & now and len(now) >= len(others):
             await asyncio.sleep(settled_s)
             return

@@ -1,7 +1,7 @@
-"""The embedded router: a Zenoh session in router mode, opened anew when its rules or keys change.
+"""The embedded router: a Zenoh session in router mode, reopened when its rules or keys change.
 
-Zenoh takes no new rules while it runs. What opens a router anew takes milliseconds, and clients come back
-by themselves; whoever was revoked comes back to nothing.
+Zenoh accepts no new rules while it runs. Reopening takes milliseconds, and clients reconnect; a revoked
+client has no rights afterwards.
 """
 
 import asyncio
@@ -24,28 +24,28 @@ from robomesh.errors import BusError
 from robomesh.schemas.robomesh_pb2 import Event
 from robomesh.session import SessionSettings
 from services.errors import ListenError, ServiceError
-from services.router.peer_audit import imposters, to_other_sites, without_rights
-from services.router.rolling_restart import neighbours, our_turn
-from services.router.status import Telling
+from services.router.peer_audit import find_impostors, to_other_sites, without_rights
+from services.router.rolling_restart import neighbours, wait_for_turn
+from services.router.status import StatusPublisher
 from services.site_file.listen_address import check_reach, reachable, split_address
 
 log = logging.getLogger(__name__)
 
-_LOOK_S = 0.5
-_AGAIN_S = 0.2
+_CHECK_EVERY_S = 0.5
+_RETRY_S = 0.2
 _REVOKED = "its certificate was revoked, or the rules do not name it"
-_GOES_ON = "the router goes on with the rules and keys that it has"
+_KEEPS_CURRENT = "the router keeps its current rules and keys"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What a router listens on, whom it links to, and who may do what.
+    """A router's addresses, links and access rules.
 
     Attributes:
-        site: Whose router it is, which its health is told for; empty: it tells nobody.
-        access: Sections of Zenoh's configuration that `robomesh keys` wrote; None: everybody may everything.
-        metrics: Host and port at which Prometheus may ask; None: nowhere.
-        line_bps: What the lines to other routers carry [bit/s]; None: nobody knows.
+        site: Site for which it publishes its health; empty: it publishes nothing.
+        access: File of access rules, written by `robomesh keys`; None: every client has all rights.
+        metrics: Host and port for Prometheus; None: no metrics.
+        line_bps: Bandwidth of the lines to other routers [bit/s]; None if unknown.
     """
 
     site: str = ""
@@ -59,28 +59,28 @@ class Settings:
 
 
 class AccessError(ServiceError):
-    """Rules for a router that cannot be read, or that Zenoh does not take."""
+    """A router's rules cannot be read, or Zenoh rejects them."""
 
 
 async def serve(settings: Settings, *, ready: Callable[[str], None] | None = None) -> None:
-    """Route until cancelled, by the rules and keys as they are in their files now.
+    """Route until cancelled, by the current rules and keys in their files.
 
     Raises:
-        ListenError: If an address is taken, or beyond loopback without TLS and `insecure`.
-        SessionError: If an endpoint is not one of Zenoh's.
+        ListenError: If an address is in use, or other machines can reach it without TLS and `insecure`.
+        SessionError: If an endpoint is invalid.
         AccessError: If the rules cannot be read.
     """
     check_listen(settings)
-    seen = _stamps(settings)
+    seen = _file_versions(settings)
     rules, site = read_access(settings.access), _own_site(settings)
     router = await _open(settings, rules)
-    told = Telling()
+    status = StatusPublisher()
     tasks = []
     if settings.site:
         mesh = SessionSettings(connect=tuple(map(reachable, settings.listen)), tls=settings.tls)
         tasks.append(
             asyncio.create_task(
-                told.tell(
+                status.run(
                     settings.site,
                     mesh,
                     metrics=settings.metrics,
@@ -89,44 +89,48 @@ async def serve(settings: Settings, *, ready: Callable[[str], None] | None = Non
                 )
             )
         )
-    strangers: set[str] = set()
+    reported: set[str] = set()
     try:
         if ready is not None:
             ready("routing on " + ", ".join(settings.listen))
         while True:
-            await asyncio.sleep(_LOOK_S)
+            await asyncio.sleep(_CHECK_EVERY_S)
             unknown = await asyncio.to_thread(without_rights, router, rules)
-            for name in sorted(unknown - strangers):
-                told.say(
-                    Event.WARNING, "without_rights", f"{name} is attached, and has no right here: {_REVOKED}"
+            for name in sorted(unknown - reported):
+                status.publish_event(
+                    Event.WARNING, "without_rights", f"{name} is connected, but has no right here: {_REVOKED}"
                 )
-            strangers = unknown
-            false = await asyncio.to_thread(imposters, router, settings.listen, settings.connect, site)
-            if false:
-                told.say(Event.ERROR, "imposter", _cut(false, settings))
+            reported = unknown
+            impostors = await asyncio.to_thread(
+                find_impostors, router, settings.listen, settings.connect, site
+            )
+            if impostors:
+                status.publish_event(Event.ERROR, "imposter", _cut_text(impostors, settings))
                 own = tuple(link for link in settings.connect if not to_other_sites(link))
                 settings = replace(settings, connect=own)
                 await asyncio.to_thread(router.close)
-                router, rules = await _open_again(settings, rules, rules)
-            # After a cut there are fewer files: that is no change.
-            if (stamps := _stamps(settings)).items() <= seen.items():
+                router, rules = await _reopen(settings, rules, rules)
+            # After a cut there are fewer files, which is not a change.
+            if (versions := _file_versions(settings)).items() <= seen.items():
                 continue
-            seen = stamps
+            seen = versions
             try:
                 wanted = read_access(settings.access)
                 _check_keys(settings.tls)
                 router_config(settings.listen, settings.connect, settings.tls, wanted, settings.line_bps)
             except (AccessError, BusError) as error:
-                told.say(Event.ERROR, "rules", f"{error}; {_GOES_ON}")
+                status.publish_event(Event.ERROR, "rules", f"{error}; {_KEEPS_CURRENT}")
                 continue
             others = await asyncio.to_thread(neighbours, router, settings.tls)
-            await our_turn(router, settings.tls, others)
+            await wait_for_turn(router, settings.tls, others)
             await asyncio.to_thread(router.close)
-            router, rules = await _open_again(settings, wanted, rules)
+            router, rules = await _reopen(settings, wanted, rules)
             if rules is wanted:
-                told.say(Event.INFO, "rules", "the router follows the new rules and keys")
+                status.publish_event(Event.INFO, "rules", "the router follows the new rules and keys")
             else:
-                told.say(Event.ERROR, "rules", f"{settings.access}: Zenoh does not take it; {_GOES_ON}")
+                status.publish_event(
+                    Event.ERROR, "rules", f"{settings.access}: Zenoh rejects it; {_KEEPS_CURRENT}"
+                )
     finally:
         for task in tasks:
             task.cancel()
@@ -135,10 +139,10 @@ async def serve(settings: Settings, *, ready: Callable[[str], None] | None = Non
 
 
 def read_access(path: Path | None) -> Mapping[str, Any]:
-    """The sections of a router's configuration that a file of rules holds.
+    """Read the sections of Zenoh's configuration in a rules file.
 
     Raises:
-        AccessError: If it cannot be read, or holds something else.
+        AccessError: If it cannot be read, or has other content.
     """
     if path is None:
         return MappingProxyType({})
@@ -150,21 +154,21 @@ def read_access(path: Path | None) -> Mapping[str, Any]:
             f"{path}: cannot be read: {error.strerror}; robomesh keys init SITE.toml writes it"
         ) from None
     except ValueError as error:
-        raise AccessError(f"{path}: not JSON: {error}; robomesh keys writes it anew") from None
+        raise AccessError(f"{path}: not JSON: {error}; robomesh keys writes a new one") from None
     control = sections.get("access_control") if isinstance(sections, dict) else None
     if not isinstance(control, dict) or control.get("default_permission") != "deny":
         raise AccessError(
-            f'{path}: access_control with default_permission "deny" is missing: robomesh keys writes it anew'
+            f'{path}: access_control has no default_permission "deny": robomesh keys writes a new one'
         )
     if control.get("enabled") is not True:
         raise AccessError(
-            f"{path}: access_control is not enabled, so it keeps no rule: robomesh keys writes it anew"
+            f"{path}: access_control is not enabled, so no rule applies: robomesh keys writes a new one"
         )
     subjects = control.get("subjects")
-    # Zenoh takes a subject without names for everybody.
+    # For Zenoh a subject without names matches every client.
     if not isinstance(subjects, list) or not subjects or not all(map(_has_names, subjects)):
         raise AccessError(
-            f"{path}: access_control needs subjects with cert_common_names: robomesh keys writes it anew"
+            f"{path}: access_control needs subjects with cert_common_names: robomesh keys writes a new one"
         )
     return sections  # type: ignore[no-any-return]
 
@@ -174,20 +178,20 @@ def _has_names(subject: Any) -> bool:
 
 
 def write_config(settings: Settings, out: Path) -> str:
-    """Write what this router runs with as a configuration for zenohd.
+    """Write this router's configuration for zenohd.
 
     Returns:
-        What zenohd does otherwise, for people.
+        A text on what zenohd does differently.
 
     Raises:
-        AccessError: If the rules cannot be read, or the file not written.
-        SessionError: If an endpoint is not one of Zenoh's.
+        AccessError: If the rules cannot be read, or the file cannot be written.
+        SessionError: If an endpoint is invalid.
     """
     values = router_values(
         settings.listen, settings.connect, settings.tls, read_access(settings.access), settings.line_bps
     )
-    # Refuses what Zenoh would not take, and says with how many threads a router runs: zenohd takes them from
-    # its environment, like ours.
+    # Validates the configuration, and sets the number of threads in the environment, from which zenohd
+    # takes it, too.
     router_config(settings.listen, settings.connect, settings.tls)
     threads = shlex.quote(os.environ["ZENOH_RUNTIME"])
     tree: dict[str, Any] = {}
@@ -197,25 +201,25 @@ def write_config(settings: Settings, out: Path) -> str:
         for parent in parents:
             node = node.setdefault(parent, {})
         node[last] = value
-    # zenohd enables its admin space whatever is said here; nobody may read what is in it.
+    # zenohd always enables its admin space; without permissions no client can read it.
     tree["adminspace"] = {"enabled": False, "permissions": {"read": False, "write": False}}
     try:
         out.write_text(json.dumps(tree, indent=1) + "\n", encoding="utf-8")
     except OSError as error:
         raise AccessError(f"{out}: cannot be written: {error.strerror}") from None
     return (
-        f"{out}: ZENOH_RUNTIME={threads} zenohd --config {out} routes as robomesh router does, "
-        "but reads its rules and certificates at its start only: write this file anew and restart it after "
-        "robomesh keys issue, renew or revoke. It tells nobody that it is there, and does not look at what "
-        "certificates other sites' routers show"
+        f"{out}: ZENOH_RUNTIME={threads} zenohd --config {out} routes like robomesh router, "
+        "but reads its rules and certificates at its start only: write this file again and restart it after "
+        "robomesh keys issue, renew or revoke. It publishes no presence, and does not audit the "
+        "certificates of other sites' routers"
     )
 
 
-def _cut(names: list[str], settings: Settings) -> str:
+def _cut_text(names: list[str], settings: Settings) -> str:
     sites = sorted({each.site for each in settings.connect if isinstance(each, Link)})
     return (
-        f"where a router of site {' or '.join(sites)} should be, somebody shows a certificate of "
-        f"{', '.join(names)}: all links to other sites are cut until this router is started again"
+        f"the peer on the link to site {' or '.join(sites)} has a certificate of {', '.join(names)}, not of "
+        "that site's router: all links to other sites are cut until this router is restarted"
     )
 
 
@@ -227,10 +231,10 @@ def _own_site(settings: Settings) -> str:
 
 
 def check_listen(settings: Settings) -> None:
-    """Warn of what anybody can reach.
+    """Log a warning for each address that every machine can reach.
 
     Raises:
-        ListenError: If that is beyond loopback without TLS and `insecure`.
+        ListenError: If other machines can reach one without TLS and `insecure`.
     """
     for endpoint in settings.listen:
         protocol, _, address = endpoint.partition("/")
@@ -249,49 +253,49 @@ async def _open(settings: Settings, rules: Mapping[str, Any]) -> zenoh.Session:
     except zenoh.ZError as error:
         raise ListenError(
             f"the router cannot listen on {', '.join(settings.listen)}: {first_line(error)}; "
-            "is another one running there? Name another under [router] listen"
+            "is another router running? Choose another address under [router] listen"
         ) from None
 
 
-async def _open_again(
+async def _reopen(
     settings: Settings, wanted: Mapping[str, Any], before: Mapping[str, Any]
 ) -> tuple[zenoh.Session, Mapping[str, Any]]:
-    """With the new rules; with those before where Zenoh takes no new ones, until it opens."""
+    """Reopen with the new rules, or with the old ones if Zenoh rejects those; retry until it opens."""
     while True:
-        for rules in (wanted, wanted, before):  # twice: the first time an address may still be taken
+        for rules in (wanted, wanted, before):  # twice: at first the address may still be in use
             try:
                 return await _open(settings, rules), rules
             except ListenError as error:
                 log.error("%s", error)
-            await asyncio.sleep(_AGAIN_S)
+            await asyncio.sleep(_RETRY_S)
 
 
 def _check_keys(tls: Tls | None) -> None:
-    """Whether a router could listen with its certificate as it is now.
+    """Check that a router could listen with its current certificate.
 
     Raises:
-        AccessError: If not: it is not there, is half copied, or has another's key.
+        AccessError: If the certificate is missing or incomplete, or the key belongs to another.
     """
     if tls is None:
         return
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     try:
         context.load_verify_locations(tls.ca)
-        context.load_cert_chain(tls.certificate, tls.key, password="")  # it asks nobody for one
-    except OSError as error:  # OpenSSL's own among them
-        raise AccessError(f"{tls.certificate} cannot be taken: {error}") from None
+        context.load_cert_chain(tls.certificate, tls.key, password="")  # never prompt for a password
+    except OSError as error:  # includes OpenSSL's errors
+        raise AccessError(f"{tls.certificate} cannot be used: {error}") from None
 
 
-def _stamps(settings: Settings) -> dict[Path, tuple[int, int]]:
-    """When the files that the router was opened with were written."""
+def _file_versions(settings: Settings) -> dict[Path, tuple[int, int]]:
+    """Return the versions of the files that the router uses."""
     files = [settings.access] if settings.access is not None else []
     for tls in (settings.tls, *(link.tls for link in settings.connect if isinstance(link, Link))):
         if tls is not None:
             files += [tls.ca, tls.certificate, tls.key]
-    return {file: _stamp(file) for file in files}
+    return {file: _file_version(file) for file in files}
 
 
-def _stamp(file: Path) -> tuple[int, int]:
+def _file_version(file: Path) -> tuple[int, int]:
     try:
         stat = file.stat()
     except OSError:

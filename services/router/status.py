@@ -1,4 +1,4 @@
-"""What a router tells of itself: that it is there, and what it sees, as events of its site."""
+"""A router's presence, health and events, published for its site."""
 
 import asyncio
 import logging
@@ -21,27 +21,27 @@ _LEVEL = {
     schema.Event.WARNING: logging.WARNING,
     schema.Event.ERROR: logging.ERROR,
 }
-_MOST_WAITING = 100
+_MAX_QUEUED = 100
 
 
-class Telling:
-    """Takes what the router has to say, and says it over a session of its own.
+class StatusPublisher:
+    """Queues the router's events, and publishes them over a session.
 
-    A router is nobody's client; this session comes back to it as every client does.
+    A router is not a client of itself; this session reconnects to it like every other client.
     """
 
     def __init__(self) -> None:
-        self._waiting: asyncio.Queue[schema.Event] = asyncio.Queue(_MOST_WAITING)
+        self._queue: asyncio.Queue[schema.Event] = asyncio.Queue(_MAX_QUEUED)
 
-    def say(self, severity: Severity, code: str, text: str) -> None:
-        """An event of the router's site, and a line of its log."""
+    def publish_event(self, severity: Severity, code: str, text: str) -> None:
+        """Queue an event of the router's site, and log it."""
         log.log(_LEVEL.get(severity, logging.ERROR), "%s", text)
         event = schema.Event(severity=severity, code=f"router.{code}", text=text, source=SERVICE)
         event.timestamp.GetCurrentTime()
-        if not self._waiting.full():
-            self._waiting.put_nowait(event)
+        if not self._queue.full():
+            self._queue.put_nowait(event)
 
-    async def tell(
+    async def run(
         self,
         site: str,
         mesh: SessionSettings,
@@ -50,11 +50,11 @@ class Telling:
         router: Callable[[], zenoh.Session],
         links: int,
     ) -> None:
-        """Be present for the site, as every service is, until cancelled.
+        """Declare presence and publish events until cancelled.
 
         Args:
-            router: As it is now: it is opened anew when its rules change.
-            links: How many other routers it is to link to.
+            router: Returns the current session; it is reopened when the rules change.
+            links: Number of configured links.
         """
 
         def zenoh_id() -> str:
@@ -67,13 +67,13 @@ class Telling:
                 session.measure("links_wanted", "Routers that it is to link to", lambda: links)
                 publisher = session.declare_publisher(site, WHOLE_SITE, f"events/{SERVICE}")
                 while True:
-                    publisher.put(await self._waiting.get())
+                    publisher.put(await self._queue.get())
         except BusError as error:
-            log.error("the router cannot tell of itself: %s", error)
+            log.error("the router cannot publish its status: %s", error)
 
 
 def _links(router: zenoh.Session) -> int:
     try:
         return len(router.info.routers_zid())
-    except zenoh.ZError:  # it is just being opened anew
+    except zenoh.ZError:  # it is being reopened
         return 0

@@ -185,17 +185,17 @@ def test_a_session_with_a_page_open_lasts_for_days_and_no_longer_than_a_week(ses
     token, signed_in = opened(sessions)
     watched(signed_in)
     for hour in range(160):
-        sessions.look(hour * 3600.0)
-    assert sessions.of(token, 160 * 3600.0) is signed_in
-    assert sessions.of(token, LASTS_S + 1) is None
+        sessions.expire(hour * 3600.0)
+    assert sessions.find(token, 160 * 3600.0) is signed_in
+    assert sessions.find(token, LASTS_S + 1) is None
     assert signed_in.ended == "expired"
 
 
 def test_a_session_that_nobody_looks_at_ends_within_the_hour(sessions):
     token, signed_in = opened(sessions)
-    assert sessions.of(token, IDLE_S - 1) is signed_in
-    assert sessions.of(token, 2 * IDLE_S - 2) is signed_in
-    assert sessions.of(token, 3 * IDLE_S) is None
+    assert sessions.find(token, IDLE_S - 1) is signed_in
+    assert sessions.find(token, 2 * IDLE_S - 2) is signed_in
+    assert sessions.find(token, 3 * IDLE_S) is None
     assert signed_in.ended == "idle"
 
 
@@ -203,17 +203,17 @@ def test_the_right_to_command_rests_once_nobody_touched_the_page_until_the_passw
     token, signed_in = opened(sessions)
     page = watched(signed_in)
     sessions.touched(signed_in, 1000.0)
-    sessions.look(1000.0 + COMMANDS_UNTOUCHED_S - 1)
+    sessions.expire(1000.0 + COMMANDS_UNTOUCHED_S - 1)
     assert signed_in.may_command
-    sessions.look(1000.0 + COMMANDS_UNTOUCHED_S + 1)
+    sessions.expire(1000.0 + COMMANDS_UNTOUCHED_S + 1)
     assert (signed_in.may_command, signed_in.resting, len(page.told)) == (False, True, 1)
     # Touching it gives nothing back: whoever touches may be another.
     sessions.touched(signed_in, 1000.0 + COMMANDS_UNTOUCHED_S + 2)
     assert not signed_in.may_command
     fresh = sessions.unlock(signed_in, 5000.0)
     assert (signed_in.may_command, len(page.told)) == (True, 2)
-    assert sessions.of(token, 5000.0) is None
-    assert sessions.of(fresh, 5000.0) is signed_in
+    assert sessions.find(token, 5000.0) is None
+    assert sessions.find(fresh, 5000.0) is signed_in
 
 
 def test_the_right_to_command_rests_half_a_day_after_the_password_however_often_it_is_touched(sessions):
@@ -228,27 +228,27 @@ def test_whoever_is_in_control_keeps_it_however_long_nothing_is_touched(sessions
     _, signed_in = opened(sessions)
     page = watched(signed_in, in_control=True)
     for hour in range(24):
-        sessions.look(hour * 3600.0)
+        sessions.expire(hour * 3600.0)
     assert signed_in.may_command
     page.in_control = False
-    sessions.look(24 * 3600.0)
+    sessions.expire(24 * 3600.0)
     assert not signed_in.may_command
 
 
 def test_an_account_has_so_many_sessions_and_the_least_used_goes(sessions):
     tokens = [opened(sessions, now=float(n))[0] for n in range(MOST_OF_ACCOUNT)]
-    sessions.of(tokens[0], 100.0)
+    sessions.find(tokens[0], 100.0)
     opened(sessions, now=101.0)
-    assert sessions.of(tokens[1], 102.0) is None
-    assert sessions.of(tokens[0], 102.0) is not None
+    assert sessions.find(tokens[1], 102.0) is None
+    assert sessions.find(tokens[0], 102.0) is not None
     assert len(list(sessions)) == MOST_OF_ACCOUNT
 
 
 def test_an_account_that_was_removed_and_made_anew_is_another_one(sessions):
     token, signed_in = opened(sessions)
     other = Account(name="li", role=AccountRole.ADMIN, hash=hashed(), created=AT.replace(hour=9))
-    sessions.take_up({"li": other})
-    assert (sessions.of(token, 1.0), signed_in.ended) == (None, "removed")
+    sessions.apply_accounts({"li": other})
+    assert (sessions.find(token, 1.0), signed_in.ended) == (None, "removed")
 
 
 # ------------------------------------------------------------------------------ the tries
@@ -327,7 +327,7 @@ def test_accounts_are_kept_from_the_command_line_with_passwords_from_standard_in
     assert do("remove", site, "li")[0] == 0
     for arguments, line, says in (
         (("add", site, "wang"), "short\n", "too short"),
-        (("add", site, "wang"), "shanghai2026\n", "tried first"),
+        (("add", site, "wang"), "shanghai2026\n", "easy to guess"),
         (("add", site, "wang"), "", "no password on standard input"),
         (("add", site, "Wang Li"), PASSWORD, "cannot be used"),
         (("add", site, "wang", "--role", "king"), PASSWORD, "there are monitor, operator, admin"),

@@ -237,7 +237,7 @@ def test_what_is_no_json_or_not_what_it_should_be_is_refused_in_words(mesh, page
 def test_a_request_that_does_not_come_to_its_end_is_cut_off_and_others_are_answered(
     mesh, page, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(Connection, "whole_within_s", 0.3)
+    monkeypatch.setattr(Connection, "request_timeout_s", 0.3)
 
     async def main():
         async with guarded(mesh, page, tmp_path) as (client, _, _):

@@ -8,7 +8,7 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from robomesh import topics
 from robomesh.header import Header
 from robomesh.subscription import Sample
-from services.console.websocket.send_queues import lane_for, thinned
+from services.console.websocket.send_queues import drop_outdated, queue_for
 
 KEY = b"\0\0\0\1\x67\x42\xc0\x1f\0\0\0\1\x68\xce\0\0\0\1\x65\x88"
 DELTA = b"\0\0\0\1\x41\x9a\x01"
@@ -23,29 +23,29 @@ def frame(number, data, *, live=True):
     return sample(number, data, topic="video/top", live=live)
 
 
-def numbers(lane):
+def numbers(queue):
     out = []
-    while (each := lane.pop()) is not None:
+    while (each := queue.pop()) is not None:
         out.append(each.header.sequence)
     return out
 
 
 def test_of_state_only_the_newest_waits():
-    lane = lane_for(topics.topic("joints"))
+    queue = queue_for(topics.topic("joints"))
     for number in range(1, 100):
-        lane.push(sample(number))
-    assert numbers(lane) == [99]
+        queue.push(sample(number))
+    assert numbers(queue) == [99]
 
 
 def test_of_state_that_came_in_one_burst_all_is_passed_on():
-    lane, now = lane_for(topics.topic("joints")), time.monotonic() + 3600.0
-    lane.push(sample(1))
+    queue, now = queue_for(topics.topic("joints")), time.monotonic() + 3600.0
+    queue.push(sample(1))
     for number in range(2, 6):
-        lane.push(replace(sample(number), received=now))
-    assert numbers(lane) == [2, 3, 4, 5]
+        queue.push(replace(sample(number), received=now))
+    assert numbers(queue) == [2, 3, 4, 5]
     for number in range(1000):
-        lane.push(replace(sample(number), received=now))
-    assert len(lane.held()) < 10
+        queue.push(replace(sample(number), received=now))
+    assert len(queue.held()) < 10
 
 
 def test_of_what_a_stall_held_back_the_last_moment_and_the_newest_of_each_key_are_passed_on():
@@ -53,71 +53,71 @@ def test_of_what_a_stall_held_back_the_last_moment_and_the_newest_of_each_key_ar
     old = [sample(number) for number in range(5)]
     other = replace(sample(5), key="robomesh/s/other/joints")
     new = [replace(sample(number), received=now) for number in range(6, 9)]
-    assert thinned(row, [*old, other, *new]) == [other, *new]
-    assert thinned(row, [*old, other]) == [old[-1], other]
-    assert thinned(row, new) == new
-    assert thinned(topics.topic("events"), old) == old
+    assert drop_outdated(row, [*old, other, *new]) == [other, *new]
+    assert drop_outdated(row, [*old, other]) == [old[-1], other]
+    assert drop_outdated(row, new) == new
+    assert drop_outdated(topics.topic("events"), old) == old
 
 
 def test_events_keep_their_order_and_are_bounded():
-    lane = lane_for(topics.topic("events"))
-    lane.push(sample(7, topic="events", live=False))
+    queue = queue_for(topics.topic("events"))
+    queue.push(sample(7, topic="events", live=False))
     for number in range(8, 12):
-        lane.push(sample(number, topic="events"))
-    assert numbers(lane) == [7, 8, 9, 10, 11]
+        queue.push(sample(number, topic="events"))
+    assert numbers(queue) == [7, 8, 9, 10, 11]
     for number in range(1000):
-        lane.push(sample(number, topic="events"))
-    assert numbers(lane) == list(range(800, 1000))
+        queue.push(sample(number, topic="events"))
+    assert numbers(queue) == list(range(800, 1000))
 
 
 def test_a_list_of_another_publisher_stands_for_all_before_it():
-    lane = lane_for(topics.topic("events"), hold=True)
+    queue = queue_for(topics.topic("events"), hold=True)
     for number in range(5):
-        lane.push(sample(number, topic="events"))
-    lane.push(replace(sample(5, topic="events", live=False), header=Header(2, 5, 0)))
-    assert [each.header.sequence for each in lane.held()] == [5]
+        queue.push(sample(number, topic="events"))
+    queue.push(replace(sample(5, topic="events", live=False), header=Header(2, 5, 0)))
+    assert [each.header.sequence for each in queue.held()] == [5]
 
 
 def test_a_list_of_what_was_missed_in_an_outage_follows_what_came_before_it():
-    lane = lane_for(topics.topic("events"), hold=True)
+    queue = queue_for(topics.topic("events"), hold=True)
     for number in range(5):
-        lane.push(sample(number, topic="events"))
-    lane.push(sample(7, topic="events", live=False))
-    assert [each.header.sequence for each in lane.held()] == [0, 1, 2, 3, 4, 7]
+        queue.push(sample(number, topic="events"))
+    queue.push(sample(7, topic="events", live=False))
+    assert [each.header.sequence for each in queue.held()] == [0, 1, 2, 3, 4, 7]
 
 
 def test_video_begins_with_a_key_frame():
-    lane = lane_for(topics.topic("video/top"))
-    lane.push(frame(1, DELTA))
-    assert lane.starved
-    assert numbers(lane) == []
-    lane.push(frame(2, KEY))
-    lane.push(frame(3, DELTA))
-    assert not lane.starved
-    assert numbers(lane) == [2, 3]
+    queue = queue_for(topics.topic("video/top"))
+    queue.push(frame(1, DELTA))
+    assert queue.starved
+    assert numbers(queue) == []
+    queue.push(frame(2, KEY))
+    queue.push(frame(3, DELTA))
+    assert not queue.starved
+    assert numbers(queue) == [2, 3]
 
 
 def test_slow_video_goes_on_at_the_next_key_frame():
-    lane = lane_for(topics.topic("video/top"))
-    lane.push(frame(1, KEY))
+    queue = queue_for(topics.topic("video/top"))
+    queue.push(frame(1, KEY))
     for number in range(2, 20):
-        lane.push(frame(number, DELTA))
-    lane.push(frame(20, KEY))
-    lane.push(frame(21, DELTA))
-    assert numbers(lane) == [20, 21]
+        queue.push(frame(number, DELTA))
+    queue.push(frame(20, KEY))
+    queue.push(frame(21, DELTA))
+    assert numbers(queue) == [20, 21]
 
 
 def test_video_without_key_frames_does_not_grow_but_asks_for_one():
-    lane = lane_for(topics.topic("video/top"))
-    lane.push(frame(1, KEY))
+    queue = queue_for(topics.topic("video/top"))
+    queue.push(frame(1, KEY))
     for number in range(2, 1000):
-        lane.push(frame(number, DELTA))
-    assert numbers(lane) == []
-    assert lane.starved
+        queue.push(frame(number, DELTA))
+    assert numbers(queue) == []
+    assert queue.starved
 
 
 def test_who_joins_gets_the_frames_since_the_last_key_frame():
-    held = lane_for(topics.topic("video/top"), hold=True)
+    held = queue_for(topics.topic("video/top"), hold=True)
     for number, data in enumerate([KEY, DELTA, DELTA, KEY, DELTA], start=1):
         held.push(frame(number, data))
     assert [each.header.sequence for each in held.held()] == [4, 5]

@@ -18,8 +18,8 @@ from robomesh.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
 from robomesh.subscription import Sample
 from services.console.http import pictures
 from services.console.http.streaming import Streamed
-from services.console.websocket.framing import Moment
-from services.console.websocket.send_queues import NewestLane
+from services.console.websocket.framing import SampleBatch
+from services.console.websocket.send_queues import NewestQueue
 from tests.conftest import run
 from tests.services.test_console import console, get, page  # noqa: F401
 
@@ -227,10 +227,10 @@ def test_a_still_is_the_newest_picture_as_jpeg_or_png(mesh, page):  # noqa: F811
         ("video/s/r/back.mjpeg", 404, "no view 'back'; there are front"),
         ("video/s/r/back.mp4", 404, "no view 'back'; there are front"),
         ("image/s/r/front.jpg?width=2000&height=1000", 400, "up to 1920 are possible"),
-        ("image/s/r/front.jpg?width=wide", 400, "width='wide' is no number of pixels"),
+        ("image/s/r/front.jpg?width=wide", 400, "width='wide' is not a number of pixels"),
         ("image/s/r/front.jpg?width=1920", 503, "no room: 1 views were asked for already"),
         ("image/s/r/front.jpg?width=640", 429, "li has had its views"),
-        ("video/s/r/front.mp4?fps=fast", 400, "fps='fast' is no number"),
+        ("video/s/r/front.mp4?fps=fast", 400, "fps='fast' is not a number"),
         ("video/s/r/front.mp4?quality=5", 400, "width, height and fps"),
         ("image/S!/r/front.jpg", 404, "S!"),
     ],
@@ -253,7 +253,7 @@ def test_without_a_renderer_the_answer_says_so(mesh, page, monkeypatch):  # noqa
         async with console(mesh, page) as (address, _):
             status, _, body = await get(address, "/image/s/r/front.jpg")
             assert status == 503
-            assert "no renderer draws s/r" in body.decode()
+            assert "no renderer answers for s/r" in body.decode()
 
     run(main())
 
@@ -279,16 +279,16 @@ def test_more_streams_than_there_is_room_for_are_refused_and_room_comes_back(mes
 
 
 def test_what_a_slow_reader_is_given_next_is_the_newest():
-    class Feeds:
+    class SharedSubscriptions:
         def join(self, key, sink):
             self.sink = sink
 
     async def main():
-        feeds = Feeds()
-        watch = pictures._Watch(feeds, "robomesh/s/r/image/front", NewestLane())
+        feeds = SharedSubscriptions()
+        watch = pictures._Watch(feeds, "robomesh/s/r/image/front", NewestQueue())
         for number in range(100):
             sample = Sample("robomesh/s/r/image/front", b"", Header(1, number, 0), True, 0.0)
-            feeds.sink(Moment([sample]))
+            feeds.sink(SampleBatch([sample]))
         assert (await watch.next(1.0)).header.sequence == 99
         assert await watch.next(0.01) is None
 

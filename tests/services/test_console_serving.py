@@ -9,9 +9,9 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from robomesh.header import Header
 from robomesh.schemas.robomesh_pb2 import FromPage, ToPage
 from robomesh.subscription import Sample
-from services.console.websocket.framing import Moment, frame, moments, state_frame
+from services.console.websocket.framing import SampleBatch, batches, frame, state_frame
 from services.console.websocket.page_connection import Browser
-from services.console.websocket.write_scheduler import Turns
+from services.console.websocket.write_scheduler import WriteScheduler
 from tests.conftest import run
 
 KEY, VIDEO = "robomesh/s/r/joints", "robomesh/s/r/video/top"
@@ -38,11 +38,11 @@ def numbers(frames):
     return found
 
 
-class Feeds:
+class SharedSubscriptions:
     """One feed."""
 
     def __init__(self):
-        self.turns, self.sinks = Turns(), []
+        self.scheduler, self.sinks = WriteScheduler(), []
 
     def join(self, _, sink):
         self.sinks.append(sink)
@@ -51,13 +51,13 @@ class Feeds:
         self.sinks.remove(sink)
 
     async def give(self, *samples):
-        for moment in moments(samples):
+        for moment in batches(samples):
             for sink in self.sinks:
                 sink(moment)
-        await self.turns.over()
+        await self.scheduler.over()
 
 
-class Line:
+class WebSocketTransport:
     """A line that may take nothing."""
 
     def __init__(self):
@@ -93,7 +93,10 @@ def test_who_keeps_step_gets_all_in_one_write_and_who_does_not_the_newest_until_
     )  # a busy machine's turn may be long
 
     async def main():
-        feeds, lines = Feeds(), [Line(), Line(), Line()]
+        feeds, lines = (
+            SharedSubscriptions(),
+            [WebSocketTransport(), WebSocketTransport(), WebSocketTransport()],
+        )
         browsers = [
             Browser(None, feeds, None, greet=lambda _: ToPage(hello=ToPage.Hello()), site="s") for _ in lines
         ]
@@ -140,7 +143,7 @@ class Asked:
 
 def test_who_takes_nothing_has_no_key_frames_made_for_all_who_watch():
     async def main():
-        feeds, line, session = Feeds(), Line(), Asked()
+        feeds, line, session = SharedSubscriptions(), WebSocketTransport(), Asked()
         browser = Browser(session, feeds, None, greet=lambda _: ToPage(), site="s", own_name="li")
         serving = asyncio.create_task(browser.run(Socket(line, VIDEO)))
         while not feeds.sinks:
@@ -159,7 +162,7 @@ def test_who_takes_nothing_has_no_key_frames_made_for_all_who_watch():
 
 
 def test_the_same_bytes_are_sent_to_all_for_a_moment_then_the_age_is_told_anew(monkeypatch):
-    moment = Moment([sample(1, received=time.monotonic() - 2.0)])
+    moment = SampleBatch([sample(1, received=time.monotonic() - 2.0)])
     first = moment.frames()
     assert moment.frames() is first or time.monotonic() - moment._at > 0.005
     later = time.monotonic() + 1.0
@@ -171,21 +174,21 @@ def test_the_same_bytes_are_sent_to_all_for_a_moment_then_the_age_is_told_anew(m
 
 def test_what_is_given_to_a_line_at_once_is_little_and_in_order():
     samples = [sample(number, payload=bytes(1000)) for number in range(20)]
-    pieces = list(moments(samples))
+    pieces = list(batches(samples))
     assert [each for piece in pieces for each in piece.samples] == samples
     assert max(len(piece.frames()) for piece in pieces) < 5000
     assert len(pieces) == 5
-    assert list(moments([])) == []
+    assert list(batches([])) == []
 
 
 def test_a_page_that_cannot_be_served_takes_nobody_elses_turn(caplog):
     async def main():
-        turns, served = Turns(), []
-        turns.due(lambda: 1 / 0)
-        turns.due(lambda: served.append(1))
-        await turns.over()
+        scheduler, served = WriteScheduler(), []
+        scheduler.due(lambda: 1 / 0)
+        scheduler.due(lambda: served.append(1))
+        await scheduler.over()
         assert served == [1]
-        await turns.over()
+        await scheduler.over()
 
     run(main())
     assert "could not be served" in caplog.text

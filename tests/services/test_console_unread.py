@@ -7,7 +7,7 @@ from robomesh.schemas.robomesh_pb2 import FromPage, ToPage
 from robomesh.session import open_session
 from services.console.requested_views import Views
 from services.console.websocket.page_connection import Browser
-from services.console.websocket.shared_subscriptions import Feeds
+from services.console.websocket.shared_subscriptions import SharedSubscriptions
 from tests.conftest import run
 from tests.services.test_console import browse, console, page
 
@@ -47,7 +47,7 @@ def test_a_page_that_asks_and_never_reads_is_cut_off(mesh, monkeypatch):
 
     async def main():
         async with open_session(mesh) as session:
-            feeds, deaf = Feeds(session), Deaf()
+            feeds, deaf = SharedSubscriptions(session), Deaf()
             browser = Browser(session, feeds, Views(session), greet=lambda _: ToPage(), site="s")
             async with asyncio.timeout(30.0):
                 await browser.run(deaf)

@@ -11,10 +11,10 @@ from robomesh.header import Header
 from robomesh.schemas.robomesh_pb2 import ViewAnswer, ViewRequest
 from robomesh.session import open_session
 from robomesh.subscription import Sample
-from services.console.requested_views import LOWEST_STEP, Views, less
+from services.console.requested_views import LOWEST_STEP, Views, reduced_request
 from services.console.websocket import adaptive_video, send_queues
-from services.console.websocket.adaptive_video import SteppedVideo
-from services.console.websocket.framing import Moment
+from services.console.websocket.adaptive_video import AdaptiveVideo
+from services.console.websocket.framing import SampleBatch
 from tests.conftest import run
 
 KEY = "robomesh/s/r/video/top"
@@ -29,7 +29,7 @@ def sample(number, data, key=KEY):
 
 @pytest.mark.parametrize("step", range(1, LOWEST_STEP + 1))
 def test_each_step_is_smaller_slower_and_of_fewer_bits_than_the_one_above(step):
-    above, below = (less(ViewRequest(of="top"), WHOLE, each) for each in (step - 1, step))
+    above, below = (reduced_request(ViewRequest(of="top"), WHOLE, each) for each in (step - 1, step))
     assert below.of == "top"
     assert below.width < above.width
     assert below.height < above.height
@@ -39,11 +39,11 @@ def test_each_step_is_smaller_slower_and_of_fewer_bits_than_the_one_above(step):
 
 
 def test_a_small_view_is_never_reduced_to_a_size_that_no_picture_has():
-    small = less(ViewRequest(), ViewAnswer(width=64, height=64, fps=1), LOWEST_STEP)
+    small = reduced_request(ViewRequest(), ViewAnswer(width=64, height=64, fps=1), LOWEST_STEP)
     assert (small.width, small.height, small.fps) == (64, 64, 1.0)
 
 
-class Feeds:
+class SharedSubscriptions:
     """Who watches what."""
 
     def __init__(self):
@@ -61,7 +61,7 @@ class Feeds:
 
     def give(self, key, sample):
         for sink in tuple(self.joined[key]):
-            sink(Moment([sample]))
+            sink(SampleBatch([sample]))
 
     def give_all(self, sample):
         for key in tuple(self.joined):
@@ -89,7 +89,7 @@ class Clock:
 
 
 def watch(feeds, views=None):
-    return SteppedVideo(
+    return AdaptiveVideo(
         KEY, feeds, views or Steps(), asker="li", on_frame=lambda: None, on_starved=lambda key: None
     )
 
@@ -101,7 +101,7 @@ async def settled():
 
 def test_who_takes_every_frame_is_never_reduced(monkeypatch):
     async def main():
-        clock, feeds = Clock(monkeypatch), Feeds()
+        clock, feeds = Clock(monkeypatch), SharedSubscriptions()
         video = watch(feeds)
         for number in range(300):
             clock.now += 0.033
@@ -117,7 +117,7 @@ def test_who_takes_every_frame_is_never_reduced(monkeypatch):
 
 def test_who_takes_too_little_is_stepped_down_and_is_sent_nothing_old(monkeypatch):
     async def main():
-        clock, feeds = Clock(monkeypatch), Feeds()
+        clock, feeds = Clock(monkeypatch), SharedSubscriptions()
         video = watch(feeds)
         for number in range(40):
             clock.now += 0.033
@@ -141,7 +141,7 @@ def test_who_takes_too_little_is_stepped_down_and_is_sent_nothing_old(monkeypatc
 
 def test_for_who_takes_nothing_at_all_nothing_smaller_is_drawn(monkeypatch):
     async def main():
-        clock, feeds, steps = Clock(monkeypatch), Feeds(), Steps()
+        clock, feeds, steps = Clock(monkeypatch), SharedSubscriptions(), Steps()
         video = watch(feeds, steps)
         for number in range(300):
             clock.now += 0.033
@@ -158,7 +158,7 @@ def test_for_who_takes_nothing_at_all_nothing_smaller_is_drawn(monkeypatch):
 
 def test_a_view_that_cannot_be_reduced_goes_on_at_key_frames(monkeypatch):
     async def main():
-        clock, feeds = Clock(monkeypatch), Feeds()
+        clock, feeds = Clock(monkeypatch), SharedSubscriptions()
         video = watch(feeds, Steps(refused=True))
         for number in range(40):
             clock.now += 0.033
@@ -177,7 +177,7 @@ def test_a_view_that_cannot_be_reduced_goes_on_at_key_frames(monkeypatch):
 
 def test_who_cannot_be_given_less_is_not_asked_about_with_every_picture(monkeypatch):
     async def main():
-        clock, feeds, steps = Clock(monkeypatch), Feeds(), Steps(refused=True)
+        clock, feeds, steps = Clock(monkeypatch), SharedSubscriptions(), Steps(refused=True)
         video = watch(feeds, steps)
         for number in range(300):
             clock.now += 0.033
@@ -194,7 +194,7 @@ def test_who_cannot_be_given_less_is_not_asked_about_with_every_picture(monkeypa
 def test_who_takes_all_again_is_given_more_later_and_less_soon_after_too_much(monkeypatch):
     async def main():
         monkeypatch.setattr(adaptive_video, "_MIND_EACH_S", 0.0)
-        clock, feeds = Clock(monkeypatch), Feeds()
+        clock, feeds = Clock(monkeypatch), SharedSubscriptions()
         video = watch(feeds)
 
         async def choke():

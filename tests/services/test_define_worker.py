@@ -58,7 +58,7 @@ def test_a_hanging_worker_is_ended_and_the_next_request_is_answered(page):
     assert page.post("/check", draft).status == 200
     assert asking.is_alive()
     asking.join(30.0)
-    assert (answers[0].status, answers[0].text) == (422, "this took more than 5 s and was ended")
+    assert (answers[0].status, answers[0].text) == (422, "this took more than 5 s and was stopped")
     assert not alive(slow)
     assert page.post("/mesh", mesh | {"file": "meshes/forearm.3ds"}).status == 200
 
@@ -85,7 +85,7 @@ def test_a_request_over_which_every_worker_dies_is_told_so(mesh, tmp_path):
     with defining(mesh, tmp_path, limits=Limits(memory_bytes=20 * 1024**2)) as page:
         answer = page.post("/check", page.draft())
         assert answer.status == 422
-        assert "ended the process that reads" in answer.text
+        assert "crashed the worker process twice" in answer.text
         assert page.get("/robots").status == 200
 
 
@@ -104,7 +104,7 @@ def test_what_a_hanging_worker_started_is_ended_with_it(mesh, tmp_path):
         # Open CASCADE, in a process of the worker's, hangs on a length that is no number.
         endless = step_box((10, 20, 30)).replace("10.000000", "nan").encode()
         answer = page.post("/mesh", {"file": "a.step", "files": {"a.step": page.upload(endless, "a.step")}})
-        assert (answer.status, answer.text) == (422, "this took more than 4 s and was ended")
+        assert (answer.status, answer.text) == (422, "this took more than 4 s and was stopped")
         everything = subprocess.run(["ps", "-ww", "-eo", "args="], capture_output=True, text=True).stdout
         mine = [line for line in everything.splitlines() if str(tmp_path) in line]
         assert mine == []
@@ -137,8 +137,8 @@ def test_what_nobody_waits_for_any_more_is_not_done(tmp_path):
         async def nobody():
             return False
 
-        with pytest.raises(RefusedRequest, match="nobody waits"):
-            await worker.do("check", kept.folder, {}, wanted=nobody)
+        with pytest.raises(RefusedRequest, match="has disconnected"):
+            await worker.run("check", kept.folder, {}, wanted=nobody)
         assert worker.pid is None
         await worker.close()
 
@@ -162,7 +162,7 @@ def comb(teeth):
 
 async def stopped_workers(workshop, folder):
     """The process ids of the main and the brief worker for slow jobs, started and then stopped."""
-    started = [workshop.slow.do("mesh", folder, {"file": "box.wrl"}) for _ in range(2)]
+    started = [workshop.slow.run("mesh", folder, {"file": "box.wrl"}) for _ in range(2)]
     await asyncio.gather(*started)
     main, brief = workshop.slow.pids
     for pid in (main, brief):
@@ -181,9 +181,9 @@ def test_a_small_file_waits_for_no_slow_one(tmp_path):
         try:
             first, second = await stopped_workers(workshop, folder)
             os.kill(second, signal.SIGCONT)
-            slow = asyncio.create_task(workshop.slow.do("mesh", folder, {"file": "comb.wrl"}))
+            slow = asyncio.create_task(workshop.slow.run("mesh", folder, {"file": "comb.wrl"}))
             await asyncio.sleep(0)
-            assert (await workshop.slow.do("mesh", folder, {"file": "box.wrl"}))["glb"]
+            assert (await workshop.slow.run("mesh", folder, {"file": "box.wrl"}))["glb"]
             assert not slow.done()
             os.kill(first, signal.SIGCONT)
             assert (await slow)["glb"]
@@ -203,7 +203,7 @@ def test_two_slow_files_hold_up_no_third_asker_and_both_are_read(tmp_path):
         workshop = Workshop(kept.folder, Limits(slow_s=60.0, brief_s=5.0))
 
         def ask(asker, file):
-            return asyncio.create_task(workshop.slow.do("mesh", folder, {"file": file}, asker=asker))
+            return asyncio.create_task(workshop.slow.run("mesh", folder, {"file": file}, asker=asker))
 
         try:
             first, second = await stopped_workers(workshop, folder)
@@ -234,8 +234,8 @@ def test_askers_take_turns(tmp_path):
                 await begin.wait()
                 return False
 
-            with pytest.raises(RefusedRequest, match="nobody waits"):
-                await workers.do("mesh", kept.folder, {}, asker=asker, wanted=wanted)
+            with pytest.raises(RefusedRequest, match="has disconnected"):
+                await workers.run("mesh", kept.folder, {}, asker=asker, wanted=wanted)
 
         asked = [asyncio.create_task(ask(asker)) for asker in ("flood", "flood", "flood", "flood", "other")]
         gone = asyncio.create_task(ask("gone"))
@@ -266,11 +266,11 @@ def test_a_cancelled_request_leaves_no_answer_for_the_next(tmp_path):
     async def main():
         workshop = Workshop(kept.folder, LIMITS)
         try:
-            first = asyncio.create_task(workshop.slow.do("mesh", folder, {"file": "a.wrl"}))
+            first = asyncio.create_task(workshop.slow.run("mesh", folder, {"file": "a.wrl"}))
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(first, 0.05)
             with pytest.raises(RefusedRequest, match=r"none\.wrl"):
-                await workshop.slow.do("mesh", folder, {"file": "none.wrl"})
+                await workshop.slow.run("mesh", folder, {"file": "none.wrl"})
         finally:
             await workshop.close()
 
@@ -354,7 +354,7 @@ def test_the_console_reads_no_urdf_itself_to_list_a_robot(mesh, tmp_path):
         def joints():
             return {row["name"]: row["joints"] for row in page.get("/robots").json["robots"]}["outside"]
 
-        assert joints() == 0, "it is outside of the robot's own folder"
+        assert joints() == 0, "it is outside of the robot's folder"
         (tmp_path / "arm.urdf").rename(robot / "arm.urdf")
         (robot / "robot.toml").write_text('name = "outside"\nurdf = "arm.urdf"\n')
         assert joints() == 6

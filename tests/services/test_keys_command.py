@@ -272,21 +272,21 @@ def test_keys_are_found_where_a_site_file_says_or_beside_or_around_ones_own_and_
     [
         (("issue", "li"), "a name and --role are needed"),
         (("issue", "li", "--role", "boss"), "--role boss: there are gateway, kinematics"),
-        (("issue", "li.wang", "--role", "operator"), "li.wang.hall cannot be: names are letters, digits"),
+        (("issue", "li.wang", "--role", "operator"), "li.wang.hall is not valid: names are letters, digits"),
         (("issue", "gateway", "--role", "operator"), "gateway.hall is gateway already"),
-        (("issue", "two", "--role", "gateway"), "which robots does this gateway speak for? --robots a,b"),
+        (("issue", "two", "--role", "gateway"), "a gateway needs its robots: --robots a,b"),
         (("issue", "li", "--role", "operator", "--robots", "a"), "--robots is for gateways"),
         (("issue", "--guest", "hall"), "hall is this site"),
         (("issue", "--guest", "Hall"), "site 'Hall' cannot be used"),
         (("issue", "li", "--guest", "there"), "--guest takes no name, --role or --robots"),
         (("revoke", "nobody"), "nobody has no certificate of this site"),
         (("renew", "nobody"), "nobody has no certificate of this site"),
-        (("accept", "site.toml"), "site.toml: no bundle of a private key"),
+        (("accept", "site.toml"), "site.toml: not a bundle of a key"),
         (("accept", "not-there.pem"), "not-there.pem: cannot be read"),
         (("accept", "keys/router.pem"), "hall is this site"),
-        (("issue", "authority", "--role", "watch"), "authority.hall is the authority itself"),
-        (("issue", "spare", "--role", "router"), "spare.hall: other sites know a router by its name"),
-        (("list", "--folder", "elsewhere"), "elsewhere/principals.toml is not there"),
+        (("issue", "authority", "--role", "watch"), "authority.hall is the authority's own name"),
+        (("issue", "spare", "--role", "router"), "spare.hall: other sites recognise a router by its name"),
+        (("list", "--folder", "elsewhere"), "elsewhere/principals.toml does not exist"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(made, monkeypatch, capsys, arguments, text):
@@ -303,7 +303,7 @@ def test_without_the_authoritys_key_nothing_is_issued_and_rules_are_still_writte
     folder = Folder(site.parent / "keys")
     folder.authority_key.unlink()
     assert keys("issue", "mo", "--role", "monitor") == 2
-    assert "the authority's key signs; bring it back for this" in capsys.readouterr().err
+    assert "the authority's key is needed to sign; restore it first" in capsys.readouterr().err
     assert keys("revoke", "li") == 0
     assert authority.principals_of(folder).find("li").revoked is not None
 
@@ -348,10 +348,10 @@ def test_a_revoked_name_is_given_to_nobody_while_a_certificate_of_it_is_good(mad
     capsys.readouterr()
     for role in ("operator", "monitor"):
         assert keys("issue", "wang", "--role", role) == 2
-        assert "would be let in again; issue wang-2 in its place" in (error := capsys.readouterr().err)
+        assert "would be admitted again; issue wang-2 in its place" in (error := capsys.readouterr().err)
     listed = authority.principals_of(Folder(made / "keys")).find("wang")
     assert listed.good_until - listed.expires > timedelta(days=88)
-    assert f"is good until {listed.good_until:%Y-%m-%d %H:%M} UTC" in error
+    assert f"is valid until {listed.good_until:%Y-%m-%d %H:%M} UTC" in error
     assert keys("renew", "wang") == 2
     assert keys("issue", "wang-2", "--role", "operator") == 0
 
@@ -370,9 +370,9 @@ def test_a_revoked_guest_comes_back_neither_by_a_new_file_nor_by_one_that_its_si
     authority.issue_guest(here, "there")
     authority.issue_guest(there, "here")
     authority.revoke(here, "router.there")
-    with pytest.raises(KeysError, match="a new authority alone keeps the old one out"):
+    with pytest.raises(KeysError, match="only a new authority excludes the old certificate"):
         authority.issue_guest(here, "there")
-    with pytest.raises(KeysError, match="would be let in again"):
+    with pytest.raises(KeysError, match="would be admitted again"):
         authority.accept(here, there.guest("here").read_bytes())
     assert "router.there" not in here.access.read_text()
 

@@ -151,7 +151,7 @@ def test_a_neighbour_that_shows_one_of_our_own_names_is_cut_off_and_our_own_rout
             async with routing(settings_of(there, at_there, second, link)):
 
                 async def cut():
-                    return f"shows a certificate of {name}" in caplog.text
+                    return f"has a certificate of {name}" in caplog.text
 
                 await until(cut)
 

@@ -88,7 +88,7 @@ def test_who_is_revoked_is_cut_off_while_the_router_runs_and_who_is_issued_a_cer
                 authority.revoke(folder, "li")
                 async for event in events:
                     if "router.without_rights" in str(event.message()):
-                        assert "li.here is attached, and has no right here" in str(event.message())
+                        assert "li.here is connected, but has no right here" in str(event.message())
                         break
             await until(lambda: nobody(li))
             authority.issue(folder, "mo", Role.MONITOR)
@@ -111,7 +111,7 @@ def test_broken_rules_are_not_taken_and_the_router_goes_on(tmp_path, caplog):
     good = folder.access.read_text()
 
     async def refused():
-        return "goes on with the rules and keys that it has" in caplog.text
+        return "keeps its current rules and keys" in caplog.text
 
     async def main():
         async with routing(settings_of(folder, endpoint)), attached(endpoint, folder.person("mo")) as mo:
@@ -148,7 +148,7 @@ def test_rules_that_let_everybody_in_are_no_rules(tmp_path, changed):
     path.write_text(json.dumps({"access_control": KEPT}))
     assert read_access(path)
     path.write_text(json.dumps({"access_control": KEPT | changed}))
-    with pytest.raises(AccessError, match="robomesh keys writes it anew"):
+    with pytest.raises(AccessError, match="robomesh keys writes a new one"):
         read_access(path)
 
 
@@ -156,7 +156,7 @@ def test_rules_that_let_everybody_in_are_no_rules(tmp_path, changed):
 def test_what_are_no_rules_at_all_is_told_so(tmp_path, text):
     path = tmp_path / "access.json5"
     path.write_text(text)
-    with pytest.raises(AccessError, match="robomesh keys writes it anew"):
+    with pytest.raises(AccessError, match="robomesh keys writes a new one"):
         read_access(path)
 
 
@@ -325,7 +325,7 @@ def test_a_router_outlives_keys_that_are_gone_or_half_copied_and_takes_them_when
                 await asyncio.sleep(0.05)
 
     async def goes_on():
-        return "router.pem cannot be taken: " in caplog.text
+        return "router.pem cannot be used: " in caplog.text
 
     async def router_of(session):
         while not (routers := session.zenoh_session.info.routers_zid()):
@@ -350,7 +350,7 @@ def test_rules_that_zenoh_refuses_are_not_said_to_be_followed(tmp_path, caplog):
             await until(lambda: present(mo))
 
     async def refused():
-        return "Zenoh does not take it; the router goes on with the rules and keys that it has" in caplog.text
+        return "Zenoh rejects it; the router keeps its current rules and keys" in caplog.text
 
     async def present(session):
         return (SITE, "router") in await names(session)

@@ -221,7 +221,7 @@ def test_a_robot_cannot_require_checks_beside_one_whose_meshes_are_missing(tmp_p
 def test_what_was_started_from_the_page_stands_in_no_cell(tmp_path):
     (tmp_path / "robots").mkdir()
     (tmp_path / "robots" / "started.toml").write_text(f'site = "hall"\n{IN_A.replace("arm", "second")}')
-    with pytest.raises(SiteFileError, match="cells are the site file's"):
+    with pytest.raises(SiteFileError, match="cells belong in the site file"):
         read_started(load(tmp_path, ROBOT))
 
 

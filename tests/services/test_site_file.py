@@ -59,7 +59,7 @@ def test_codes_are_numbers(tmp_path):
         (f'site = "hall"\n{ROBOT}{ROBOT}', "two robots are named 'arm'"),
         (
             'site = "hall"\n[[robot]]\nname = "matrix-probe"\nmodel = "pt600"',
-            "rights are tried on this name",
+            "reserved for testing rights",
         ),
         (
             'site = "hall"\n[[robot]]\nname = "replay-1"\nmodel = "pt600"',
@@ -145,7 +145,7 @@ def test_old_client_programs_come_from_elsewhere_only_where_the_file_takes_the_r
     with pytest.raises(SiteFileError, match="insecure = true"):
         load(tmp_path, text + " }\n")
     found = load(tmp_path, text + ", insecure = true }\n").robot[0].legacy_clients
-    assert "anybody who can reach it" in (found.warning("robot arm: legacy_clients") or "")
+    assert "any machine that reaches it" in (found.warning("robot arm: legacy_clients") or "")
 
 
 @pytest.mark.parametrize(
@@ -227,7 +227,7 @@ def test_beyond_loopback_needs_tls_or_a_word_taken_for_it():
     assert check_reach("it", "127.0.0.1", secured=False, insecure=False) is None
     assert check_reach("it", "::1", secured=False, insecure=False) is None
     assert check_reach("it", "0.0.0.0", secured=True, insecure=False) is None
-    assert "anybody who can reach it" in (check_reach("it", "0.0.0.0", secured=False, insecure=True) or "")
+    assert "any machine that reaches it" in (check_reach("it", "0.0.0.0", secured=False, insecure=True) or "")
     for host in ("0.0.0.0", "10.0.0.7", "plant.example"):
         with pytest.raises(ListenError, match="insecure = true"):
             check_reach("it", host, secured=False, insecure=False)
@@ -275,12 +275,15 @@ def test_what_is_written_down_is_read_back(tmp_path):
     [
         ("site = [", "not TOML"),
         ("", "site: Field required"),
-        ('site = "other"', "it is the site 'hall' that starts these"),
-        ('site = "hall"\n[[robot]]\nname = "arm"\nmodel = "pt500"', "the site file has one of that name"),
+        ('site = "other"', "should be 'hall'"),
+        (
+            'site = "hall"\n[[robot]]\nname = "arm"\nmodel = "pt500"',
+            "site file has a robot with that name",
+        ),
         ('site = "hall"\n[[robot]]\nname = "b"', "robot.0.model: Field required"),
         (
             'site = "hall"\n[[robot]]\nname = "b"\nmodel = "pt500"\ncontroller = "tcp://10.0.0.7:5400"',
-            "only simulated ones",
+            "only simulated robots",
         ),
     ],
 )

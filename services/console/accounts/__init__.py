@@ -1,1 +1,1 @@
-"""Who may use the console: accounts and their roles, passwords, sessions, and what each may ask."""
+"""The console's accounts: roles, passwords, sessions and rights."""

@@ -1,6 +1,6 @@
-"""The gate: what is open to everybody, and that everything else needs a session.
+"""Authentication middleware: every path needs a session, except those listed here.
 
-Closed unless named here. A request of a session ends with it, however long it would take.
+A request is cancelled when its session ends, however long it would take.
 """
 
 import asyncio
@@ -12,36 +12,36 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from services.console.accounts.rights import PASSWORD_AGAIN, lacks_right
 from services.console.accounts.sessions import Sessions, SignedIn
 
-# The page itself is no secret; what it shows is.
+# The page's files are public; its data is not.
 _OPEN = frozenset({"/", "/index.html", "/icon.svg", "/health", "/account/me", "/account/sign-in"})
-# What changes the site for everybody.
+# Requests that change the site.
 _NEEDS_OPERATOR = frozenset({"/define/save", "/define/start", "/define/stop"})
 _OPEN_BELOW = "/assets/"
-# Of a page that is told that it is signed out; RFC 6455 leaves these to us.
+# Close code for a page without a session; RFC 6455 leaves this range to applications.
 SIGNED_OUT = 4401
 
 
 def is_open(path: str) -> bool:
-    """Whether a path needs no session."""
+    """Return whether a path needs no session."""
     return path in _OPEN or path.startswith(_OPEN_BELOW)
 
 
 def cookie_name(site: str, *, secure: bool) -> str:
-    """The cookie's name. A browser takes `__Host-` from this host over TLS alone, so nobody plants it.
+    """Return the cookie's name. Browsers accept `__Host-` cookies only from this host over TLS.
 
-    Cookies know no ports: the site keeps two consoles of one machine apart.
+    Cookies ignore the port, so the site's name distinguishes two consoles of one machine.
     """
     return f"{'__Host-' if secure else ''}robomesh-{site}"
 
 
-class Gate:
-    """ASGI middleware: finds the session (`scope["signed_in"]`), and refuses where there must be one."""
+class AuthMiddleware:
+    """ASGI middleware that finds the session (`scope["signed_in"]`) and rejects requests that need one."""
 
     def __init__(self, app: ASGIApp, sessions: Sessions, cookie: str) -> None:
         self._app, self._sessions, self._cookie = app, sessions, cookie
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes on what is allowed."""
+        """Forward a request that is allowed; reject others."""
         found = self._find(scope)
         scope["signed_in"] = found
         if found is None and not is_open(scope["path"]):
@@ -56,7 +56,7 @@ class Gate:
             reason = PASSWORD_AGAIN if account.may_command else lacks_right(account, "this")
             await PlainTextResponse(reason.text, status_code=403)(scope, receive, send)
         elif found is None or scope["type"] == "websocket" or scope["path"].startswith("/account/"):
-            await self._app(scope, receive, send)  # a page is told why its connection ends
+            await self._app(scope, receive, send)  # these end by themselves, with a reason
         else:
             try:
                 with found.serving():
@@ -72,7 +72,7 @@ class Gate:
                 continue
             for part in value.decode("latin-1").split(";"):
                 key, _, token = part.strip().partition("=")
-                # A cookie of ours planted beside the right one hides it from nobody.
-                if key == self._cookie and (found := self._sessions.of(token, now)) is not None:
+                # Try all cookies of this name: another domain may have set one, too.
+                if key == self._cookie and (found := self._sessions.find(token, now)) is not None:
                     return found
         return None

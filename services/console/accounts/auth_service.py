@@ -1,4 +1,4 @@
-"""The desk: signs people in and out, follows the accounts file, and says so on the mesh."""
+"""The authentication service: signs users in and out, follows the accounts file, publishes events."""
 
 import asyncio
 import contextlib
@@ -27,19 +27,19 @@ from services.errors import ServiceError
 
 log = logging.getLogger(__name__)
 
-_LOOK_EACH_S = 0.5
+_CHECK_EVERY_S = 0.5
 _MOST_OF_NAME = 64
-# Of what is told of refused sign-ins: a flood of them is counted, not told one by one.
-_REFUSALS_TOLD_EACH_S = 1.0
+# Rate-limit events of refused sign-ins; the next event has the number of those left out.
+_REFUSAL_EVENT_EVERY_S = 1.0
 
-Tell = Callable[[Event.Severity, str, str, Mapping[str, str]], None]
+PublishEvent = Callable[[Event.Severity, str, str, Mapping[str, str]], None]
 
 
 class SignInError(ServiceError):
-    """A sign-in that was refused.
+    """A refused sign-in.
 
     Attributes:
-        wait_s: How long until the next try [s]; 0: the name or the password was wrong.
+        wait_s: Time until the next allowed attempt [s]; 0: the name or the password was wrong.
     """
 
     def __init__(self, text: str, wait_s: float = 0.0) -> None:
@@ -48,28 +48,28 @@ class SignInError(ServiceError):
 
 
 @dataclass
-class Desk:
-    """Accounts, sessions and limits of a console.
+class AuthService:
+    """A console's accounts, sessions and sign-in limits.
 
     Args:
-        tell: Publishes an event: severity, code, text, values.
+        publish_event: Publishes an event: severity, code, text, values.
     """
 
     path: Path
     site: str
-    tell: Tell
+    publish_event: PublishEvent
     sessions: Sessions = field(init=False)
     _limits: SignInLimits = field(default_factory=SignInLimits)
     _verifier: Verifier = field(default_factory=Verifier)
     _version: tuple[int, ...] = ()
     _refusals: int = 0
-    _refusal_told_at: float = -_REFUSALS_TOLD_EACH_S
+    _refusal_published_at: float = -_REFUSAL_EVENT_EVERY_S
 
     def __post_init__(self) -> None:
-        """Reads the file.
+        """Read the accounts file.
 
         Raises:
-            AccountsError: If it is wrong, or nobody could sign in.
+            AccountsError: If it is invalid, or no account can sign in.
         """
         self._version = _version(self.path)
         accounts = read_accounts(self.path)
@@ -79,24 +79,24 @@ class Desk:
                 f"`robomesh accounts add {self.path} NAME --role admin`"
             )
         if open_to_others(self.path):
-            log.warning("%s can be read by others of this machine: chmod 600 is right", self.path)
-        self.sessions = Sessions(accounts, on_end=self._tell_end)
+            log.warning("%s is readable by other users of this machine: chmod 600 is right", self.path)
+        self.sessions = Sessions(accounts, on_end=self._publish_end)
 
     def close(self) -> None:
-        """Ends the verifying thread."""
+        """Stop the verifier's thread."""
         self._verifier.close()
 
     async def follow(self) -> None:
-        """Ends what is over and takes up changes of the file, until it is cancelled."""
+        """End expired sessions and apply changes of the file, until cancelled."""
         while True:
-            await asyncio.sleep(_LOOK_EACH_S)
-            self.sessions.look(time.monotonic())
-            self.take_up()
+            await asyncio.sleep(_CHECK_EVERY_S)
+            self.sessions.expire(time.monotonic())
+            self.reload()
 
-    def take_up(self, *, changed_by: SignedIn | None = None) -> None:
-        """Reads the file again where it has changed.
+    def reload(self, *, changed_by: SignedIn | None = None) -> None:
+        """Reload the file if it has changed.
 
-        One that is gone has no accounts; a wrong one changes none.
+        A missing file has no accounts; an invalid one changes nothing.
         """
         version = _version(self.path)
         if version == self._version:
@@ -105,26 +105,28 @@ class Desk:
         try:
             accounts: Accounts = read_accounts(self.path) if version else {}
         except AccountsError as error:
-            log.error("%s; the accounts stay as they were", error)
-            self.tell(Event.ERROR, "accounts.unreadable", f"{error}; the accounts stay as they were", {})
+            log.error("%s; the last valid accounts apply", error)
+            self.publish_event(
+                Event.ERROR, "accounts.unreadable", f"{error}; the last valid accounts apply", {}
+            )
             return
-        self.sessions.take_up(accounts, changed_by=changed_by)
+        self.sessions.apply_accounts(accounts, changed_by=changed_by)
 
     # ------------------------------------------------------------------------- sessions
 
     async def sign_in(
         self, name: str, password: str, *, address: str, agent: str, before: SignedIn | None
     ) -> tuple[str, SignedIn]:
-        """A new session and its token.
+        """Verify a sign-in; return the new session and its token.
 
         Args:
-            before: Who was signed in at that browser; ended.
+            before: Earlier session of the same browser; it ends.
 
         Raises:
-            SignInError: If it is refused, with the time to wait.
-            SignInBusyError: If too many are being looked at.
+            SignInError: If the sign-in is refused, with the time to wait.
+            SignInBusyError: If the queue is full.
         """
-        account = await self._proven(name, password, address)
+        account = await self._verify(name, password, address)
         if before is not None:
             self.sessions.end(before, "replaced")
         now = time.monotonic()
@@ -132,32 +134,32 @@ class Desk:
             account, address=address, agent=agent, now=now, at=datetime.now(UTC)
         )
         text = f"{account.name} signed in from {address} ({account.role.value})"
-        self.tell(Event.INFO, "account.signed_in", text, _values(account.name, address))
+        self.publish_event(Event.INFO, "account.signed_in", text, _values(account.name, address))
         return token, signed_in
 
-    async def unlock(self, who: SignedIn, password: str, *, address: str) -> str:
-        """The password again, for the right to command: a new token.
+    async def unlock(self, user: SignedIn, password: str, *, address: str) -> str:
+        """Verify the password again, to restore the right to command; return a new token.
 
         Raises:
-            SignInError, SignInBusyError: As for a sign-in.
+            SignInError, SignInBusyError: Like `sign_in`.
         """
-        await self._proven(who.account.name, password, address, session=who.id)
-        text = f"{who.account.name} gave the password again at {address}"
-        self.tell(Event.INFO, "account.unlocked", text, _values(who.account.name, address))
-        return self.sessions.unlock(who, time.monotonic())
+        await self._verify(user.account.name, password, address, session=user.id)
+        text = f"{user.account.name} entered the password again at {address}"
+        self.publish_event(Event.INFO, "account.unlocked", text, _values(user.account.name, address))
+        return self.sessions.unlock(user, time.monotonic())
 
-    async def _proven(self, name: str, password: str, address: str, *, session: str = "") -> Account:
-        """The account whose password that is; as slow and as talkative for a name that nobody has.
+    async def _verify(self, name: str, password: str, address: str, *, session: str = "") -> Account:
+        """Return the account if the password is right; time and error are the same for an unknown name.
 
         Args:
-            session: In which it is given again; empty: at the door.
+            session: Session in which the password is entered again; empty for a sign-in.
         """
-        name = name[:_MOST_OF_NAME]  # what is remembered of it is bounded
+        name = name[:_MOST_OF_NAME]  # bounds memory
         account = self.sessions.accounts.get(name)
         known, now = account is not None, time.monotonic()
         wait_s = self._limits.wait_s(name, address, now, known=known, session=session)
         if wait_s > 0:
-            self._tell_refusal(name if known else "", address, f"has to wait {wait_s:.0f} s")
+            self._publish_refusal(name if known else "", address, f"has to wait {wait_s:.0f} s")
             raise SignInError("too many tries", wait_s)
         self._limits.begin(name, address, now, known=known, session=session)
         hashed = account.hash if account is not None and not account.disabled else None
@@ -166,39 +168,39 @@ class Desk:
         except SignInBusyError:
             self._limits.withdraw(name, address, known=known, session=session)
             raise
-        # The file may have changed meanwhile.
+        # The file may have changed during verification.
         if not right or account is None or self.sessions.accounts.get(name) != account:
-            self._tell_refusal(name if known else "", address, "name or password wrong")
+            self._publish_refusal(name if known else "", address, "name or password wrong")
             raise SignInError("the name or the password is wrong")
         self._limits.succeed(name, address, session=session)
         return account
 
-    def sign_out(self, who: SignedIn, *, everywhere: bool) -> None:
-        """Ends a session, or all of its account."""
+    def sign_out(self, user: SignedIn, *, everywhere: bool) -> None:
+        """End a session, or all sessions of its account."""
         if everywhere:
-            self.sessions.end_all(who.account.name, "signed_out")
-        self.sessions.end(who, "signed_out")
+            self.sessions.end_all(user.account.name, "signed_out")
+        self.sessions.end(user, "signed_out")
 
     # ------------------------------------------------------------------------- accounts
 
-    async def change_password(self, who: SignedIn, old: str, new: str, *, address: str) -> None:
-        """A new password of one's own; every other session of the account ends.
+    async def change_password(self, user: SignedIn, old: str, new: str, *, address: str) -> None:
+        """Change a user's own password; every other session of the account ends.
 
         Raises:
-            SignInError, SignInBusyError: If the old one is wrong.
-            AccountsError: If the new one is none, or cannot be written.
+            SignInError, SignInBusyError: If the old password is not accepted.
+            AccountsError: If the new one is unacceptable, or cannot be written.
         """
-        await self._proven(who.account.name, old, address, session=who.id)
-        await self.set_account(who, "password", who.account.name, password=new)
+        await self._verify(user.account.name, old, address, session=user.id)
+        await self.set_account(user, "password", user.account.name, password=new)
 
     async def set_account(
         self, by: SignedIn, action: str, name: str, *, role: AccountRole | None = None, password: str = ""
     ) -> None:
-        """Changes the accounts file: `add`, `role`, `password`, `disable`, `enable`, `remove`.
+        """Change the accounts file: `add`, `role`, `password`, `disable`, `enable`, `remove`.
 
         Raises:
-            AccountsError: If that cannot be, or the file cannot be written.
-            SignInBusyError: If too many passwords wait.
+            AccountsError: If the change is invalid, or the file cannot be written.
+            SignInBusyError: If the queue is full.
         """
         check_account_name(name)
         hashed = ""
@@ -211,27 +213,27 @@ class Desk:
         )
         text = f"{by.account.name}: account {name}: {action}{f' {role.value}' if role else ''}"
         values = _values(by.account.name, by.address) | {"changed": name, "action": action}
-        self.tell(Event.INFO, "account.changed", text, values)
-        self.take_up(changed_by=by if by.account.name == name else None)
+        self.publish_event(Event.INFO, "account.changed", text, values)
+        self.reload(changed_by=by if by.account.name == name else None)
 
     # --------------------------------------------------------------------------- events
 
-    def _tell_end(self, signed_in: SignedIn) -> None:
+    def _publish_end(self, signed_in: SignedIn) -> None:
         name = signed_in.account.name
         text = f"{name} at {signed_in.address} was signed out: {signed_in.ended}"
         values = _values(name, signed_in.address) | {"reason": signed_in.ended}
-        self.tell(Event.INFO, "account.signed_out", text, values)
+        self.publish_event(Event.INFO, "account.signed_out", text, values)
 
-    def _tell_refusal(self, name: str, address: str, why: str) -> None:
-        """`name` is empty where nobody has it: it may be a password in the wrong field."""
+    def _publish_refusal(self, name: str, address: str, why: str) -> None:
+        """Publish a refusal. `name` is empty for an unknown name, which may be a mistyped password."""
         self._refusals += 1
         now = time.monotonic()
-        if now - self._refusal_told_at < _REFUSALS_TOLD_EACH_S:
+        if now - self._refusal_published_at < _REFUSAL_EVENT_EVERY_S:
             return
         more = f" (and {self._refusals - 1} more refusals)" if self._refusals > 1 else ""
-        text = f"sign-in as {name or 'somebody unknown'} from {address} refused: {why}{more}"
-        self.tell(Event.WARNING, "account.refused", text, _values(name, address))
-        self._refusals, self._refusal_told_at = 0, now
+        text = f"sign-in as {name or 'an unknown name'} from {address} refused: {why}{more}"
+        self.publish_event(Event.WARNING, "account.refused", text, _values(name, address))
+        self._refusals, self._refusal_published_at = 0, now
 
 
 def change_account(
@@ -243,14 +245,14 @@ def change_account(
     hashed: str = "",
     by_page: bool = False,
 ) -> None:
-    """Changes one account of a file.
+    """Change one account of a file.
 
     Args:
-        hashed: Of the password, for `add` and `password`.
-        by_page: The last administrator who can sign in may not go: only the command line could mend that.
+        hashed: Hash of the password, for `add` and `password`.
+        by_page: Keep at least one administrator who can sign in; only the command line could restore one.
 
     Raises:
-        AccountsError: If that cannot be, or the file cannot be written.
+        AccountsError: If the change is invalid, or the file cannot be written.
     """
     with changing(path) as accounts:
         account = accounts.get(name)
@@ -295,7 +297,7 @@ def _values(name: str, address: str) -> dict[str, str]:
 
 
 def _version(path: Path) -> tuple[int, ...]:
-    """What tells one state of the file from another; empty: there is none."""
+    """Return a value that changes with the file; empty if there is no file."""
     with contextlib.suppress(OSError):
         found = path.stat()
         return found.st_ino, found.st_mtime_ns, found.st_size

@@ -1,4 +1,4 @@
-"""The accounts of a console: a TOML file with a name, a role and a password's hash each.
+"""The accounts of a console: a TOML file with a name, a role and a password hash for each.
 
     [[account]]
     name = "li"
@@ -6,8 +6,9 @@
     hash = "$argon2id$..."
     created = 2026-11-21T08:00:00Z
 
-Written in one step, readable by its owner alone; whoever changes it holds a lock beside it, so that
-the command line and the page's administrators lose nothing of each other.
+It is written atomically and readable by its owner only. Changes hold a lock file next to it, so that the
+command
+line and the page's administrators do not overwrite each other's changes.
 """
 
 import fcntl
@@ -34,7 +35,7 @@ _KEYS = frozenset({"name", "role", "hash", "created", "disabled"})
 
 
 class AccountRole(Enum):
-    """What an account may do; each role may what those before it may."""
+    """Rights of an account; each role has those of the roles before it."""
 
     MONITOR = "monitor"
     OPERATOR = "operator"
@@ -43,10 +44,10 @@ class AccountRole(Enum):
 
 @dataclass(frozen=True, kw_only=True)
 class Account:
-    """Somebody who may sign in.
+    """An account for sign-in.
 
     Attributes:
-        hash: Of the password, argon2id in its own text form.
+        hash: Hash of the password, in argon2id's text form.
     """
 
     name: str
@@ -57,7 +58,7 @@ class Account:
 
     @property
     def may_command(self) -> bool:
-        """Whether its role may ask for control, and change what is recorded or defined."""
+        """True if its role may request control, and change what is recorded or defined."""
         return self.role is not AccountRole.MONITOR
 
 
@@ -65,10 +66,10 @@ Accounts = Mapping[str, Account]
 
 
 def check_account_name(name: str) -> str:
-    """The name itself, where an account may have it: with a dot and the site it is an operator's name.
+    """Return the name if it is valid for an account: `<name>.<site>` is an operator's name.
 
     Raises:
-        AccountsError: If it may not.
+        AccountsError: If it is not.
     """
     try:
         keys.check_name(name, "account")
@@ -80,10 +81,10 @@ def check_account_name(name: str) -> str:
 
 
 def role_of(text: str) -> AccountRole:
-    """A role by its name.
+    """Return the role with a name.
 
     Raises:
-        AccountsError: If there is none of that name.
+        AccountsError: If the role does not exist.
     """
     try:
         return AccountRole(text)
@@ -93,10 +94,10 @@ def role_of(text: str) -> AccountRole:
 
 
 def read_accounts(path: Path) -> dict[str, Account]:
-    """The accounts of a file, by name.
+    """Read the accounts of a file, by name.
 
     Raises:
-        AccountsError: File, place and what would be right.
+        AccountsError: With the file, the place and what would be right.
     """
     try:
         values = read_toml(path)
@@ -135,7 +136,7 @@ def _account(row: Any) -> Account:
     if not isinstance(name, str):
         raise AccountsError(f"name = {name!r}: should be text in quotes")
     hashed = row.get("hash")
-    # Its value is shown to nobody, not even where it is wrong.
+    # Errors never contain the hash, not even an invalid one.
     if not isinstance(hashed, str) or not hashed.startswith("$argon2id$") or not hashed.isascii():
         raise AccountsError("hash: should be argon2id, as `robomesh accounts passwd` writes it")
     if not isinstance(created, datetime) or created.tzinfo is None:
@@ -153,10 +154,10 @@ def _account(row: Any) -> Account:
 
 @contextmanager
 def changing(path: Path) -> Iterator[dict[str, Account]]:
-    """The accounts of a file, to be changed in place; written when the block ends without an error.
+    """Yield the accounts of a file for changes; write them when the block ends without an error.
 
     Raises:
-        AccountsError: If the file is wrong, or cannot be written; what was there stays.
+        AccountsError: If the file is invalid or cannot be written; the old file remains.
     """
     try:
         lock = os.open(path.with_name(f".{path.name}.lock"), os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
@@ -172,10 +173,10 @@ def changing(path: Path) -> Iterator[dict[str, Account]]:
 
 
 def _write(path: Path, accounts: Accounts) -> None:
-    lines = ["# Accounts of a console: change them with `robomesh accounts`. Taken up while it runs."]
+    lines = ["# Accounts of a console: change them with `robomesh accounts`. A running console reloads them."]
     for account in accounts.values():
         created = account.created.isoformat().replace("+00:00", "Z")
-        # None of these can hold anything that TOML would need escaped.
+        # None of these values contains a character that TOML would escape.
         lines += ["", "[[account]]", f'name = "{account.name}"', f'role = "{account.role.value}"']
         lines += [f'hash = "{account.hash}"', f"created = {created}"]
         lines += ["disabled = true"] if account.disabled else []
@@ -186,7 +187,7 @@ def _write(path: Path, accounts: Accounts) -> None:
 
 
 def open_to_others(path: Path) -> bool:
-    """Whether others of this machine may read the file."""
+    """Return whether other users of this machine may read the file."""
     try:
         return bool(path.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO))
     except OSError:

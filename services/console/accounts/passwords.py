@@ -1,8 +1,10 @@
-"""Passwords: which are good enough, and how they are kept.
+"""Password rules, and hashing.
 
-Kept as argon2id (RFC 9106: 64 MiB, three passes, one lane). Verifying is as
-expensive for a name that nobody has, so that an answer's time tells no names; one at a time, and so many
-may wait (`sign_in_queue.py`), so that a flood of sign-ins takes neither memory nor the console's own time.
+Hashes are argon2id (RFC 9106: 64 MiB, three passes, one lane). Verification takes as long for an unknown
+name, so
+that the response time reveals no names. It runs one at a time with a bounded queue (`sign_in_queue.py`), so
+that a
+flood of sign-ins exhausts neither memory nor the event loop.
 """
 
 import asyncio
@@ -25,7 +27,7 @@ SHORTEST = 10
 _LONGEST = 256
 _FEWEST_DIFFERENT = 5
 
-# What common passwords are made of, once digits, punctuation and the usual disguises are taken off.
+# Cores of common passwords, without digits, punctuation and usual substitutions.
 _COMMON_WORDS = """
 password passwort passwd pass admin administrator root user guest login welcome letmein changeme default
 secret master superman batman dragon monkey football baseball iloveyou sunshine princess qwerty qwertz
@@ -39,10 +41,10 @@ _RUNS = ("01234567890123456789", "qwertyuiopasdfghjklzxcvbnm", "abcdefghijklmnop
 
 
 def check_password(password: str, *, name: str, site: str = "") -> str:
-    """The password itself, where it may be one: length counts, not kinds of characters.
+    """Return the password if it is acceptable: length counts, not kinds of characters.
 
     Raises:
-        AccountsError: Why not, and what would be right; never with the password in it.
+        AccountsError: With the reason and advice; never with the password.
     """
     if len(password) < SHORTEST:
         raise AccountsError(
@@ -51,7 +53,7 @@ def check_password(password: str, *, name: str, site: str = "") -> str:
     if len(password.encode(errors="surrogatepass")) > _LONGEST:
         raise AccountsError(f"the password is too long: {_LONGEST} bytes at most", "long")
     if any(ord(each) < 32 or 0xD800 <= ord(each) < 0xE000 for each in password):
-        raise AccountsError("the password holds a control character: leave it out", "control")
+        raise AccountsError("the password contains a control character: leave it out", "control")
     folded = password.casefold()
     if len(set(folded)) < _FEWEST_DIFFERENT:
         raise AccountsError("the password repeats a few characters: a few words are good", "repeats")
@@ -61,8 +63,7 @@ def check_password(password: str, *, name: str, site: str = "") -> str:
     cores = {_core(folded), _core(folded.translate(_DISGUISED)), _core(ending.translate(_DISGUISED))}
     if cores & (_COMMON | {name.casefold(), site.casefold()}) or not _core(folded):
         raise AccountsError(
-            "the password is one that is tried first: a common word or a name, and digits; "
-            "a few words are good",
+            "the password is easy to guess: a common word or a name, and digits; a few words are good",
             "common",
         )
     return password
@@ -74,24 +75,24 @@ def _core(text: str) -> str:
 
 @cache
 def _hasher() -> PasswordHasher:
-    # One lane: a sign-in takes one core from whatever else must be in time there.
+    # One lane: a sign-in uses one core, and leaves the others to services with deadlines.
     return PasswordHasher(time_cost=3, memory_cost=64 * 1024, parallelism=1)
 
 
 @cache
-def _nobodys() -> str:
+def _dummy_hash() -> str:
     return _hasher().hash("nobody signs in with this")
 
 
 def hash_password(password: str) -> str:
-    """What is kept of a password."""
+    """Return the hash of a password."""
     return _hasher().hash(password)
 
 
 def verify(hashed: str | None, password: str) -> bool:
-    """Whether a password is the one that was kept; takes as long where none was (None)."""
+    """Return whether a password matches a hash; takes as long without a hash (None)."""
     try:
-        _hasher().verify(_nobodys() if hashed is None else hashed, password)
+        _hasher().verify(_dummy_hash() if hashed is None else hashed, password)
     except (VerificationError, InvalidHashError, UnicodeEncodeError):
         return False
     return hashed is not None
@@ -99,14 +100,14 @@ def verify(hashed: str | None, password: str) -> bool:
 
 @dataclass(eq=False)
 class _Job:
-    """What is done in the thread, and the future of its asker."""
+    """Work for the thread, and the future of its result."""
 
     work: Callable[[], Any]
     done: asyncio.Future[Any]
 
 
 class Verifier:
-    """Hashes and verifies beside the event loop, one after another; addresses and names take turns."""
+    """Hashes and verifies in a thread, one job at a time; addresses and names take turns."""
 
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="password")
@@ -114,18 +115,18 @@ class Verifier:
         self._serving: asyncio.Task[None] | None = None
 
     async def verify(self, hashed: str | None, password: str, *, address: str, name: str) -> bool:
-        """As `verify`, when it is the turn of this address and this name.
+        """Verify like `verify`, when it is the turn of this address and name.
 
         Raises:
-            SignInBusyError: If too many wait.
+            SignInBusyError: If the queue is full.
         """
         return await self._do(partial(verify, hashed, password), address, name)
 
     async def hash(self, password: str, *, address: str, name: str) -> str:
-        """As `hash_password`, when it is the turn of this address and this name.
+        """Hash like `hash_password`, when it is the turn of this address and name.
 
         Raises:
-            SignInBusyError: If too many wait.
+            SignInBusyError: If the queue is full.
         """
         return await self._do(partial(hash_password, password), address, name)
 
@@ -143,7 +144,7 @@ class Verifier:
         loop = asyncio.get_running_loop()
         while (job := self._queue.take()) is not None:
             if job.done.done():
-                continue  # its asker has gone
+                continue  # cancelled
             try:
                 result = await loop.run_in_executor(self._thread, job.work)
             except Exception as error:
@@ -154,7 +155,7 @@ class Verifier:
                 job.done.set_result(result)
 
     def close(self) -> None:
-        """Ends the thread."""
+        """Stop the thread."""
         if self._serving is not None:
             self._serving.cancel()
         self._thread.shutdown(wait=False, cancel_futures=True)

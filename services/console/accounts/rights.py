@@ -1,4 +1,4 @@
-"""What may be asked through a page, by whoever is signed in there: the topic table's rights of its role."""
+"""Rights of pages: the topic table's rights, limited by the account's role."""
 
 from google.protobuf.message import DecodeError
 
@@ -15,12 +15,12 @@ PASSWORD_AGAIN = codes.PASSWORD_AGAIN()
 
 
 def operator_name(account: str, site: str) -> str:
-    """The operator that an account is: the one name it asks in."""
+    """Return an account's operator name, under which its pages act."""
     return f"{account}.{site}"
 
 
 def lacks_right(account: Account, what: str) -> Reason:
-    """Return why an account that only watches may not ask for something."""
+    """Return why a monitor account may not send a request."""
     return codes.NEEDS_OPERATOR(account=account.name, role=account.role.value, what=what)
 
 
@@ -42,42 +42,42 @@ def parse_request(text: str) -> tuple[keys.Key, topics.Request]:
     return key, row
 
 
-def check_right(row: topics.Request, key: keys.Key, who: SignedIn, site: str) -> None:
-    """Whether an account may ask that now.
+def check_right(row: topics.Request, key: keys.Key, user: SignedIn, site: str) -> None:
+    """Check that an account may send a request now.
 
     Raises:
-        RefusedError: Which right is missing.
+        RefusedError: With the missing right.
     """
-    if who.ended:
+    if user.ended:
         raise RefusedError(codes.SIGNED_OUT())
-    account, everybody = who.account, Role.MONITOR in row.askers
+    account, everybody = user.account, Role.MONITOR in row.askers
     if not everybody and not account.may_command:
         what = row.name.removesuffix("/*")
         raise RefusedError(lacks_right(account, what))
-    check_own_name(row, key, operator_name(account.name, site), who=account.name)
-    if not everybody and who.resting:
+    check_own_name(row, key, operator_name(account.name, site), user=account.name)
+    if not everybody and user.resting:
         raise RefusedError(PASSWORD_AGAIN)
 
 
-def check_own_name(row: topics.Request, key: keys.Key, own: str, *, who: str = "this page") -> None:
-    """Whether a request that is made in a name is made in that one.
+def check_own_name(row: topics.Request, key: keys.Key, own: str, *, user: str = "this page") -> None:
+    """Check that a request with an operator's name uses the page's own.
 
     Raises:
-        RefusedError: If it is another's.
+        RefusedError: If it uses another name.
     """
     chunk = _last_chunk(key)
     if row.in_name and chunk != own:
-        raise RefusedError(codes.OWN_NAME_ONLY(who=who, own=own, name=chunk))
+        raise RefusedError(codes.OWN_NAME_ONLY(who=user, own=own, name=chunk))
 
 
 def in_own_name(row: topics.Request, payload: bytes, operator: str) -> bytes:
-    """A stop with the page's own name, whatever the page says; all else as it is."""
+    """Put the page's own name into a stop request; return other payloads unchanged."""
     if row.request is not StopRequest:
         return payload
     try:
         stop = StopRequest.FromString(payload)
     except DecodeError:
-        return payload  # a stop that cannot be read is a stop
+        return payload  # the gateway accepts a stop with an invalid payload
     stop.by = operator
     return stop.SerializeToString()
 

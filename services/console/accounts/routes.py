@@ -1,6 +1,6 @@
-"""`/account/*`: signing in and out, one's own sessions and password, and, for administrators, the accounts.
+"""`/account/*`: sign-in and sign-out, own sessions and password, and for administrators the accounts.
 
-JSON both ways. What is refused says so in one word for the page (`error`) and in words (`text`).
+JSON in both directions. An error has a word for the page (`error`) and a sentence (`text`).
 """
 
 import json
@@ -13,12 +13,12 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
-from services.console.accounts.auth_service import Desk, SignInError
+from services.console.accounts.auth_service import AuthService, SignInError
 from services.console.accounts.file import AccountRole, role_of
 from services.console.accounts.rights import operator_name
 from services.console.accounts.sessions import SignedIn
 from services.console.errors import AccountsError, SignInBusyError
-from services.console.http.error_responses import Handler, answered
+from services.console.http.error_responses import Handler, with_error_responses
 
 Json = dict[str, Any]
 
@@ -26,7 +26,7 @@ MOST_BODY = 16 * 1024
 
 
 class RefusedError(Exception):
-    """A request of `/account` that is refused: HTTP's status, a word for the page, a sentence."""
+    """A refused request of `/account`: HTTP status, a word for the page, a sentence."""
 
     def __init__(self, status: int, error: str, text: str, **more: object) -> None:
         super().__init__(text)
@@ -34,23 +34,25 @@ class RefusedError(Exception):
 
 
 class AccountRoutes:
-    """The routes.
+    """The routes below `/account`.
 
     Args:
-        desk: None: this console has no accounts.
+        auth: The authentication service; None: this console has no accounts.
         cookie: The cookie's name.
-        secure: Whether the page is served over TLS.
-        insecure: Whether others can reach it without.
+        secure: The page is served over TLS.
+        insecure: Other machines can reach the page without TLS.
     """
 
-    def __init__(self, desk: Desk | None, *, site: str, cookie: str, secure: bool, insecure: bool) -> None:
-        self._desk, self._site, self._cookie = desk, site, cookie
+    def __init__(
+        self, auth: AuthService | None, *, site: str, cookie: str, secure: bool, insecure: bool
+    ) -> None:
+        self._auth, self._site, self._cookie = auth, site, cookie
         self._secure, self._insecure = secure, insecure
 
     def routes(self) -> list[Route]:
-        """Everything below /account."""
+        """Return the routes."""
         here = [Route("/account/me", _answered(self.me), methods=["GET"])]
-        if self._desk is None:
+        if self._auth is None:
             return here
         return [
             *here,
@@ -66,38 +68,38 @@ class AccountRoutes:
         ]
 
     @property
-    def desk(self) -> Desk:
-        """The desk, where there are accounts."""
-        assert self._desk is not None
-        return self._desk
+    def auth(self) -> AuthService:
+        """The authentication service; there must be accounts."""
+        assert self._auth is not None
+        return self._auth
 
     async def me(self, request: Request) -> Response:
-        """Who is signed in here, if anybody, and how the page is reached."""
+        """Return the signed-in user, and how the page is served."""
         return self._me(request.scope.get("signed_in"))
 
-    def _me(self, who: SignedIn | None) -> JSONResponse:
-        account = None if who is None else who.account
+    def _me(self, user: SignedIn | None) -> JSONResponse:
+        account = None if user is None else user.account
         return JSONResponse(
             {
-                "accounts": self._desk is not None,
+                "accounts": self._auth is not None,
                 "site": self._site,
                 "secure": self._secure,
                 "insecure": self._insecure,
                 "account": "" if account is None else account.name,
                 "role": "" if account is None else account.role.value,
                 "operator": "" if account is None else operator_name(account.name, self._site),
-                "may_command": self._desk is None or (who is not None and who.may_command),
-                "resting": who is not None and who.resting,
-                "session": "" if who is None else who.id,
+                "may_command": self._auth is None or (user is not None and user.may_command),
+                "resting": user is not None and user.resting,
+                "session": "" if user is None else user.id,
             }
         )
 
     # ------------------------------------------------------------------------- sessions
 
     async def sign_in(self, request: Request) -> Response:
-        """A name and a password for a session; never the one that the browser came with."""
+        """Sign in with a name and a password; the browser gets a new token in any case."""
         asked = await _json(request, "name", "password")
-        token, signed_in = await self.desk.sign_in(
+        token, signed_in = await self.auth.sign_in(
             asked["name"].strip().lower(),
             asked["password"],
             address=_address(request),
@@ -107,37 +109,37 @@ class AccountRoutes:
         return self._with_token(self._me(signed_in), token)
 
     async def unlock(self, request: Request) -> Response:
-        """The password again, for the right to command."""
+        """Accept the password again, to restore the right to command."""
         asked = await _json(request, "password")
-        who = _who(request)
-        token = await self.desk.unlock(who, asked["password"], address=_address(request))
-        return self._with_token(self._me(who), token)
+        user = _signed_in(request)
+        token = await self.auth.unlock(user, asked["password"], address=_address(request))
+        return self._with_token(self._me(user), token)
 
     async def sign_out(self, request: Request) -> Response:
-        """Ends this session, or with `everywhere` all of the account."""
+        """End this session, or with `everywhere` all sessions of the account."""
         asked = await _json(request)
-        self.desk.sign_out(_who(request), everywhere=asked.get("everywhere") is True)
+        self.auth.sign_out(_signed_in(request), everywhere=asked.get("everywhere") is True)
         answer = self._me(None)
         answer.delete_cookie(self._cookie, path="/", secure=self._secure, httponly=True, samesite="strict")
         return answer
 
     async def active(self, request: Request) -> Response:
-        """A person touched the page: the right to command does not rest yet."""
+        """Record activity of a person, which keeps the right to command."""
         await _json(request)
-        who = _who(request)
-        self.desk.sessions.touched(who, time.monotonic())
-        return self._me(who)
+        user = _signed_in(request)
+        self.auth.sessions.touched(user, time.monotonic())
+        return self._me(user)
 
     async def password(self, request: Request) -> Response:
-        """A new password of one's own."""
+        """Change the user's own password."""
         asked = await _json(request, "password", "new")
-        who = _who(request)
-        await self.desk.change_password(who, asked["password"], asked["new"], address=_address(request))
-        return self._me(who)
+        user = _signed_in(request)
+        await self.auth.change_password(user, asked["password"], asked["new"], address=_address(request))
+        return self._me(user)
 
     async def sessions(self, request: Request) -> Response:
-        """One's own sessions; for administrators everybody's."""
-        who = _who(request)
+        """Return the user's own sessions; for administrators all sessions."""
+        user = _signed_in(request)
         return JSONResponse(
             {
                 "sessions": [
@@ -150,39 +152,39 @@ class AccountRoutes:
                         "began": each.began.isoformat(),
                         "pages": len(each.pages),
                         "resting": each.resting,
-                        "this": each is who,
+                        "this": each is user,
                     }
-                    for each in self.desk.sessions
-                    if self._may_see(who, each)
+                    for each in self.auth.sessions
+                    if self._may_see(user, each)
                 ]
             }
         )
 
     async def end_session(self, request: Request) -> Response:
-        """Ends one of the sessions that one sees."""
+        """End a session that the user may see."""
         asked = await _json(request, "end")
-        who = _who(request)
-        for each in self.desk.sessions:
-            if each.id == asked["end"] and self._may_see(who, each):
-                self.desk.sessions.end(
-                    each, "signed_out" if each.account.name == who.account.name else "ended"
+        user = _signed_in(request)
+        for each in self.auth.sessions:
+            if each.id == asked["end"] and self._may_see(user, each):
+                self.auth.sessions.end(
+                    each, "signed_out" if each.account.name == user.account.name else "ended"
                 )
                 return JSONResponse({"ended": each.id})
         raise RefusedError(404, "no_session", f"there is no session {asked['end'][:20]!r} any more")
 
     @staticmethod
-    def _may_see(who: SignedIn, other: SignedIn) -> bool:
-        return other.account.name == who.account.name or who.account.role is AccountRole.ADMIN
+    def _may_see(user: SignedIn, other: SignedIn) -> bool:
+        return other.account.name == user.account.name or user.account.role is AccountRole.ADMIN
 
     # ------------------------------------------------------------------------- accounts
 
     async def accounts(self, request: Request) -> Response:
-        """Every account, never a hash."""
+        """Return every account, without its hash."""
         _admin(request)
         return self._accounts()
 
     def _accounts(self) -> Response:
-        signed_in = [each.account.name for each in self.desk.sessions]
+        signed_in = [each.account.name for each in self.auth.sessions]
         return JSONResponse(
             {
                 "accounts": [
@@ -193,14 +195,14 @@ class AccountRoutes:
                         "disabled": each.disabled,
                         "sessions": signed_in.count(each.name),
                     }
-                    for each in self.desk.sessions.accounts.values()
+                    for each in self.auth.sessions.accounts.values()
                 ],
                 "roles": [role.value for role in AccountRole],
             }
         )
 
     async def change_account(self, request: Request) -> Response:
-        """`action`: add, role, password, disable, enable, remove; `name`; `role`, `password` where needed."""
+        """Change an account: `action` is add, role, password, disable, enable or remove, for `name`."""
         asked = await _json(request, "action", "name")
         by = _admin(request)
         if by.resting:
@@ -208,7 +210,7 @@ class AccountRoutes:
         role = role_of(asked["role"]) if isinstance(asked.get("role"), str) else None
         password = asked.get("password")
         password = password if isinstance(password, str) else ""
-        await self.desk.set_account(by, asked["action"], asked["name"], role=role, password=password)
+        await self.auth.set_account(by, asked["action"], asked["name"], role=role, password=password)
         return self._accounts()
 
     def _with_token(self, answer: Response, token: str) -> Response:
@@ -218,19 +220,19 @@ class AccountRoutes:
         return answer
 
 
-def _who(request: Request) -> SignedIn:
-    who = request.scope.get("signed_in")
-    # The gate has seen to it, but the session may have ended while the body came.
-    if not isinstance(who, SignedIn) or who.ended:
+def _signed_in(request: Request) -> SignedIn:
+    user = request.scope.get("signed_in")
+    # The middleware has checked this, but the session may have ended while the body arrived.
+    if not isinstance(user, SignedIn) or user.ended:
         raise RefusedError(401, "sign_in", "sign in first")
-    return who
+    return user
 
 
 def _admin(request: Request) -> SignedIn:
-    who = _who(request)
-    if who.account.role is not AccountRole.ADMIN:
-        raise RefusedError(403, "not_admin", f"{who.account.name} is no administrator")
-    return who
+    user = _signed_in(request)
+    if user.account.role is not AccountRole.ADMIN:
+        raise RefusedError(403, "not_admin", f"{user.account.name} is not an administrator")
+    return user
 
 
 def _address(request: Request) -> str:
@@ -238,11 +240,12 @@ def _address(request: Request) -> str:
 
 
 async def _json(request: Request, *texts: str) -> Json:
-    """A request's JSON object with these texts in it.
+    """Return a request's JSON object, which must have the given texts.
 
     Raises:
-        RefusedError: If it is none, or too large. Of another content type too: a page elsewhere can send
-            a form, but no JSON, without asking first.
+        RefusedError: If the body is invalid or too large, or has another content type: a page of another site
+            can
+            send a form without permission, but no JSON.
     """
     if request.headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
         raise RefusedError(415, "not_json", "send application/json")
@@ -259,13 +262,13 @@ async def _json(request: Request, *texts: str) -> Json:
         raise RefusedError(400, "not_json", "the request must be a JSON object")
     for name in texts:
         if not isinstance(asked.get(name), str):
-            # Never with the value in it.
+            # The text must not contain the value.
             raise RefusedError(422, "missing", f"{name}: must be a text")
     return asked
 
 
 def _answered(handler: Handler) -> Handler:
-    return answered(handler, _refused)
+    return with_error_responses(handler, _refused)
 
 
 def _refused(error: Exception) -> Response | None:

@@ -1,11 +1,15 @@
-"""Who is signed in: sessions by their tokens, and what ends them.
+"""Sessions of signed-in users, by their tokens, and the reasons that end them.
 
-A session is for watching: it lasts while a page of it is open, a week at most, because control rooms
-watch for days. The right to command is shorter: it rests half an hour after the last touch of a person,
-and twelve hours after the last password, until the password is given again. Whoever has control by then
-keeps it: no motion is stopped because its operator only watched.
+A session is for watching, since control rooms watch for days: it lasts while one of its pages is open, at
+    most a
+week. The right to command is shorter: it is suspended half an hour after the last activity, and twelve hours
+after
+the last password, until the password is entered again. An operator who has control at that time keeps it: no
+motion
+stops because its operator only watched.
 
-Kept in memory: a console that starts anew asks everybody to sign in again. Times are the caller's.
+Sessions are in memory only: after a restart of the console all users sign in again. The caller passes the
+    time.
 """
 
 import asyncio
@@ -20,7 +24,7 @@ from typing import Any, Protocol
 from services.console.accounts.file import Account, Accounts
 
 LASTS_S = 7 * 24 * 3600.0
-IDLE_S = 3600.0  # without a page open, nor any request
+IDLE_S = 3600.0  # without an open page or a request
 COMMANDS_UNTOUCHED_S = 1800.0
 COMMANDS_AFTER_PASSWORD_S = 12 * 3600.0
 MOST_OF_ACCOUNT = 16
@@ -28,25 +32,25 @@ MOST_PAGES = 32
 
 
 class Page(Protocol):
-    """A page's connection, as its session knows it."""
+    """A page's connection, as a session needs it."""
 
     @property
     def in_control(self) -> bool:
-        """Whether control was had through it, and not given back."""
+        """True if the page got control and has not released it."""
 
     def rights_changed(self) -> None:
-        """Told when the account may do more, or less."""
+        """Notify the page that its rights have changed."""
 
 
 @dataclass(eq=False, kw_only=True)
 class SignedIn:
-    """One sign-in of an account.
+    """A session of an account.
 
     Attributes:
-        account: As the accounts file has it now.
-        id: For lists and events; no secret, and no way to sign in.
-        resting: The right to command rests until the password is given again.
-        ended: Why it is over, one word for the page; empty: it is not.
+        account: The current entry of the accounts file.
+        id: Shown in lists and events; not secret, and no use for signing in.
+        resting: The right to command is suspended until the password is entered again.
+        ended: Reason of its end, a word for the page; empty while it lasts.
     """
 
     account: Account
@@ -62,17 +66,17 @@ class SignedIn:
     ended: str = ""
     pages: set[Page] = field(default_factory=set)
     _tasks: set[asyncio.Task[Any]] = field(default_factory=set)
-    # Hash of the token by which a browser is known.
+    # Hash of the session's token.
     key: bytes = b""
 
     @property
     def may_command(self) -> bool:
-        """Whether it may ask for control now."""
+        """True if it may request control now."""
         return not self.ended and self.account.may_command and not self.resting
 
     @contextmanager
     def serving(self) -> Iterator[None]:
-        """Around what the running task does for it: cancelled when the session ends."""
+        """Register the running task, which is cancelled when the session ends."""
         task = asyncio.current_task()
         assert task is not None
         self._tasks.add(task)
@@ -83,7 +87,7 @@ class SignedIn:
 
     @contextmanager
     def with_page(self, page: Page) -> Iterator[None]:
-        """Around a page's connection."""
+        """Register a page's connection."""
         self.pages.add(page)
         try:
             yield
@@ -91,14 +95,14 @@ class SignedIn:
             self.pages.discard(page)
 
     def end(self, why: str) -> None:
-        """Everything that is done for it ends."""
+        """End the session and cancel its tasks."""
         self.ended = why
         for task in tuple(self._tasks):
             task.cancel()
 
 
 def key_of(token: str) -> bytes:
-    """What a token is known by here: the tokens themselves are nowhere kept."""
+    """Return a token's key; the tokens themselves are not stored."""
     return hashlib.sha256(token.encode(errors="replace")).digest()
 
 
@@ -106,7 +110,7 @@ class Sessions:
     """All sessions of a console.
 
     Args:
-        on_end: Told of each that ends.
+        on_end: Called with each session that ends.
     """
 
     def __init__(self, accounts: Accounts, *, on_end: Callable[[SignedIn], None] = lambda _: None) -> None:
@@ -117,18 +121,18 @@ class Sessions:
     def __iter__(self) -> Iterator[SignedIn]:
         return iter(tuple(self._sessions.values()))
 
-    def of(self, token: str, now: float) -> SignedIn | None:
-        """The session of a token, if it is one."""
+    def find(self, token: str, now: float) -> SignedIn | None:
+        """Return the session of a token, or None."""
         found = self._sessions.get(key_of(token)) if token else None
         if found is not None:
-            self._look_at(found, now)
+            self._expire(found, now)
             found.seen_at = now
         return None if found is None or found.ended else found
 
     def open(
         self, account: Account, *, address: str, agent: str, now: float, at: datetime
     ) -> tuple[str, SignedIn]:
-        """A new session and its token; the account's least used ends where it has too many."""
+        """Open a session and return its token. Ends the account's least recently used one above the limit."""
         own = sorted((each for each in self if each.account.name == account.name), key=lambda s: s.seen_at)
         for old in own[: max(0, len(own) - MOST_OF_ACCOUNT + 1)]:
             self.end(old, "too_many")
@@ -145,7 +149,7 @@ class Sessions:
         return self.new_token(signed_in), signed_in
 
     def new_token(self, signed_in: SignedIn) -> str:
-        """Another token for a session; the old one is none any more."""
+        """Replace a session's token."""
         token = secrets.token_urlsafe(32)
         self._sessions.pop(signed_in.key, None)
         signed_in.key = key_of(token)
@@ -153,34 +157,34 @@ class Sessions:
         return token
 
     def end(self, signed_in: SignedIn, why: str) -> None:
-        """Ends a session, its pages and downloads at once."""
+        """End a session, with its pages and downloads."""
         if self._sessions.pop(signed_in.key, None) is not None:
             signed_in.end(why)
             self._on_end(signed_in)
 
     def end_all(self, name: str, why: str, *, but: SignedIn | None = None) -> None:
-        """Ends every session of an account."""
+        """End every session of an account."""
         for each in self:
             if each.account.name == name and each is not but:
                 self.end(each, why)
 
     def touched(self, signed_in: SignedIn, now: float) -> None:
-        """A person did something on a page of it."""
-        self._look_at(signed_in, now)
+        """Record activity of a person on one of the session's pages."""
+        self._expire(signed_in, now)
         signed_in.touched_at = now
 
     def unlock(self, signed_in: SignedIn, now: float) -> str:
-        """The password was given again: the right to command is back; a new token."""
+        """Restore the right to command after the password was entered again; return a new token."""
         signed_in.password_at = signed_in.touched_at = now
-        self._rest(signed_in, False)
+        self._suspend(signed_in, False)
         return self.new_token(signed_in)
 
-    def look(self, now: float) -> None:
-        """Ends what has lasted long enough; to be called every second or so."""
+    def expire(self, now: float) -> None:
+        """End sessions that have expired; call it about once a second."""
         for each in self:
-            self._look_at(each, now)
+            self._expire(each, now)
 
-    def _look_at(self, signed_in: SignedIn, now: float) -> None:
+    def _expire(self, signed_in: SignedIn, now: float) -> None:
         if signed_in.pages:
             signed_in.seen_at = now
         if now - signed_in.began_at > LASTS_S:
@@ -191,23 +195,23 @@ class Sessions:
             untouched = now - signed_in.touched_at > COMMANDS_UNTOUCHED_S
             long_ago = now - signed_in.password_at > COMMANDS_AFTER_PASSWORD_S
             if untouched or long_ago:
-                self._rest(signed_in, True)
+                self._suspend(signed_in, True)
 
-    def _rest(self, signed_in: SignedIn, resting: bool) -> None:
+    def _suspend(self, signed_in: SignedIn, resting: bool) -> None:
         if signed_in.resting is not resting:
             signed_in.resting = resting
-            _tell(signed_in)
+            _notify_pages(signed_in)
 
-    def take_up(self, accounts: Accounts, *, changed_by: SignedIn | None = None) -> None:
-        """The accounts have changed: who is no longer one is out, and roles hold at once.
+    def apply_accounts(self, accounts: Accounts, *, changed_by: SignedIn | None = None) -> None:
+        """Apply changed accounts: end sessions without a valid account, and apply new roles immediately.
 
         Args:
-            changed_by: Whose own new password ends none of its own session.
+            changed_by: Session that set its own new password; it does not end.
         """
         self.accounts = dict(accounts)
         for each in self:
             before, now = each.account, self.accounts.get(each.account.name)
-            # An account that was removed and made anew is another one.
+            # An account that was removed and added again is another account.
             if now is None or now.created != before.created:
                 self.end(each, "removed")
             elif now.disabled:
@@ -217,9 +221,9 @@ class Sessions:
             else:
                 each.account = now
                 if now.role is not before.role:
-                    _tell(each)
+                    _notify_pages(each)
 
 
-def _tell(signed_in: SignedIn) -> None:
+def _notify_pages(signed_in: SignedIn) -> None:
     for page in tuple(signed_in.pages):
         page.rights_changed()

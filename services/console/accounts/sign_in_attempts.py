@@ -1,6 +1,6 @@
-"""Tries to sign in: who tries too often waits, longer each time; what is remembered is bounded.
+"""Rate limits for sign-in attempts: the wait grows with each failure; memory is bounded.
 
-The time is an argument.
+The caller passes the time.
 """
 
 import ipaddress
@@ -20,11 +20,11 @@ class _Tries:
 
 
 class Attempts:
-    """Failed tries by name, or by address.
+    """Failed attempts by name, or by address.
 
     Args:
-        free: So many may fail before anybody waits.
-        longest_s: Nobody waits longer [s].
+        free: Number of failures without a wait.
+        longest_s: Longest wait [s].
     """
 
     def __init__(self, *, free: int, longest_s: float) -> None:
@@ -32,12 +32,12 @@ class Attempts:
         self._tries: OrderedDict[str, _Tries] = OrderedDict()
 
     def wait_s(self, who: str, now: float) -> float:
-        """How long until this one may try again [s]; 0: now."""
+        """Return the time until the next allowed attempt [s]; 0: now."""
         tries = self._tries.get(who)
         return 0.0 if tries is None else max(0.0, tries.again_at - now)
 
     def begin(self, who: str, now: float) -> None:
-        """Counts a try as failed before it is looked at: many at once are many."""
+        """Count an attempt as failed before it is verified, so that concurrent attempts count."""
         tries = self._tries.pop(who, None)
         if tries is None or now - tries.last > _FORGOTTEN_AFTER_S:
             tries = _Tries(0, now, now)
@@ -49,14 +49,14 @@ class Attempts:
             self._tries.popitem(last=False)
 
     def succeed(self, who: str, *, all_of_them: bool) -> None:
-        """The last try was right: it is forgotten, or all are."""
+        """Forget the last failure, or all, after a successful attempt."""
         tries = self._tries.get(who)
         if tries is not None:
             tries.failed = 0 if all_of_them else tries.failed - 1
             tries.again_at = tries.last + self._wait_s(tries.failed)
 
     def withdraw(self, who: str) -> None:
-        """Forget a try that was begun and never looked at."""
+        """Forget an attempt that was not verified."""
         tries = self._tries.get(who)
         if tries is not None:
             tries.failed -= 1
@@ -65,17 +65,18 @@ class Attempts:
     def _wait_s(self, failed: int) -> float:
         if failed < self._free:
             return 0.0
-        # The exponent is bounded: a float's is.
+        # Bounded, because a float's exponent is.
         return min(_FIRST_WAIT_S * 2.0 ** min(failed - self._free, 30), self._longest_s)
 
 
 class SignInLimits:
-    """Of an account's name, and of an address.
+    """Limits by account name and by address.
 
-    A name waits a minute at most, so that nobody can keep its owner out for long by trying it; names
-    that nobody has are counted like others, but apart: a flood of them makes no real one forgotten. A
-    password that is given again in a session is counted by the session: whoever tries names at the door
-    keeps nobody who is in from commanding.
+    A name waits a minute at most, so that failed attempts by others cannot lock its owner out for long.
+    Unknown names
+    are counted separately, so that a flood of them evicts no real one. A password that is entered again in a
+    session is
+    counted by session, so that failed sign-ins elsewhere do not keep an operator from commanding.
     """
 
     def __init__(self) -> None:
@@ -85,14 +86,14 @@ class SignInLimits:
         self._sessions = Attempts(free=3, longest_s=60.0)
 
     def wait_s(self, name: str, address: str, now: float, *, known: bool, session: str = "") -> float:
-        """How long until somebody there, or in that session, may try this name [s]."""
+        """Return the wait before this name may be tried from this address, or in this session [s]."""
         if session:
             return self._sessions.wait_s(session, now)
         names = self._names if known else self._unknown
         return max(names.wait_s(name, now), self._addresses.wait_s(network(address), now))
 
     def begin(self, name: str, address: str, now: float, *, known: bool, session: str = "") -> None:
-        """Counts a try."""
+        """Count an attempt."""
         if session:
             self._sessions.begin(session, now)
         else:
@@ -100,7 +101,7 @@ class SignInLimits:
             self._addresses.begin(network(address), now)
 
     def withdraw(self, name: str, address: str, *, known: bool, session: str = "") -> None:
-        """Forget a try that was begun and never looked at, because too many waited."""
+        """Forget an attempt that was not verified, because the queue was full."""
         if session:
             self._sessions.withdraw(session)
         else:
@@ -108,7 +109,7 @@ class SignInLimits:
             self._addresses.withdraw(network(address))
 
     def succeed(self, name: str, address: str, *, session: str = "") -> None:
-        """The try was right; of the address no other is forgiven, for one account is no key to the rest."""
+        """Record a success: it clears all failures of the name, but one of the address."""
         if session:
             self._sessions.succeed(session, all_of_them=True)
         else:
@@ -117,7 +118,7 @@ class SignInLimits:
 
 
 def network(address: str) -> str:
-    """An address, or for IPv6 the network that one household has."""
+    """Return the address; for IPv6 the /64 network, since one client has all of it."""
     try:
         parsed = ipaddress.ip_address(address.partition("%")[0])
     except ValueError:

@@ -1,6 +1,6 @@
-"""The queue of passwords that wait to be verified: addresses take turns, and names take turns in each.
+"""A bounded queue of password verifications: addresses take turns, and names take turns within an address.
 
-Whoever sends many tries at once delays, and displaces, the own ones alone. No I/O and no clock.
+A client that sends many attempts delays and displaces only its own. No I/O and no clock.
 """
 
 from typing import Generic, TypeVar
@@ -10,15 +10,15 @@ from services.console.fair_queue import AskerQueue
 
 Job = TypeVar("Job")
 
-# Tries that may wait: in all, of one address, and of one name at that address.
+# Largest number of queued attempts: in total, for one address, and for one name at an address.
 MOST_WAITING, MOST_OF_ADDRESS, MOST_OF_NAME = 64, 16, 4
 
 
 class SignInQueue(Generic[Job]):
-    """Jobs by address and name, taken in turn."""
+    """Jobs by address and name, served in turn."""
 
     def __init__(self) -> None:
-        # Each job's address, and its names' jobs.
+        # One entry per job, and by address the jobs of its names.
         self._addresses: AskerQueue[str] = AskerQueue()
         self._names: dict[str, AskerQueue[Job]] = {}
 
@@ -52,7 +52,7 @@ class SignInQueue(Generic[Job]):
         return displaced
 
     def take(self) -> Job | None:
-        """Remove and return the next job, of the next address its next name's; None: there is none."""
+        """Remove and return the next job: the next address's next name; None if the queue is empty."""
         address = self._addresses.take()
         if address is None:
             return None
@@ -73,5 +73,5 @@ class SignInQueue(Generic[Job]):
 
 
 def busy() -> SignInBusyError:
-    """Return the refusal of a try that has no place."""
+    """Return the error for an attempt that the queue rejects."""
     return SignInBusyError("too many passwords wait to be verified: try again in a moment")

@@ -1,19 +1,19 @@
 """Errors of Define's server.
 
 services.errors.ServiceError
-└── RefusedRequest      a request that is answered in words, with an HTTP status
-    └── TooSlowError    a job that took longer than its worker gives it
+└── RefusedRequest      a refused request, with an HTTP status and a sentence
+└── TooSlowError    a job exceeded its time limit
 """
 
 from services.errors import ServiceError
 
 
 class RefusedRequest(ServiceError):
-    """A request that is answered in words.
+    """A refused request.
 
     Attributes:
-        status: Of HTTP.
-        text: For people.
+        status: HTTP status.
+        text: Sentence for the user.
     """
 
     def __init__(self, status: int, text: str) -> None:
@@ -23,4 +23,4 @@ class RefusedRequest(ServiceError):
 
 
 class TooSlowError(RefusedRequest):
-    """A job took longer than its worker gives it, and was ended."""
+    """A job exceeded its time limit and was stopped."""

@@ -1,6 +1,6 @@
-"""What the worker does: each job takes a draft's folder and a request, and returns what JSON can hold.
+"""The worker's jobs: each takes a draft's folder and a request, and returns JSON values.
 
-Knowledge of robots and meshes is `robots`'s; this turns it into the page's form.
+`robots` has the logic of robots and meshes; this module converts its results for the page.
 """
 
 import zipfile
@@ -37,9 +37,9 @@ _MOST_UNZIPPED = 500_000_000
 
 
 def mesh(store: Store, folder: Path, request: Json) -> Json:
-    """A mesh file as GLB in the store, in its own units and axes, and what is in it.
+    """Convert a mesh file to GLB in the store, in its own units and axes, and summarise it.
 
-    Where all of it is in files that are not there yet, it is empty and names them.
+    If all of the mesh is in missing files, the result is empty and names them.
     """
     try:
         found = read_mesh(folder / request["file"], within=folder)
@@ -59,11 +59,11 @@ def mesh(store: Store, folder: Path, request: Json) -> Json:
 
 
 def check(_: Store, folder: Path, request: Json) -> Json:
-    """Every problem of a description, and where its links and its tool are."""
+    """Return every problem of a description, and the placements of its links and tool."""
     values = as_saved(request["description"])
     description, problems = from_values(values, folder=folder, confined=True)
     if description is None:
-        # A mesh that is still missing keeps nobody from seeing where the links are.
+        # A missing mesh does not prevent computing the placements.
         description, _ignored = from_values(_without_meshes(values), folder=folder, confined=True)
     answer: Json = {"problems": [_problem(each) for each in problems], "tool": None, "links": {}}
     if description is not None:
@@ -76,7 +76,7 @@ def check(_: Store, folder: Path, request: Json) -> Json:
 
 
 def meshes(_: Store, folder: Path, request: Json) -> Json:
-    """Every mesh of a right description that could not be drawn, as a problem where it is named."""
+    """Return every mesh of a valid description that cannot be drawn, as a problem with its place."""
     values = request["description"]
     places = {folder / name: place for place, name in named_files(values)}
     found, _odd = mesh_findings(_description(folder, values))
@@ -89,15 +89,16 @@ def meshes(_: Store, folder: Path, request: Json) -> Json:
 
 
 def joint_count(_: Store, folder: Path, request: Json) -> Json:
-    """How many joints a description has."""
+    """Return a description's number of joints."""
     return {"joints": len(joints_of(_description(folder, request["description"])))}
 
 
 def collisions(_: Store, folder: Path, request: Json) -> Json:
-    """How each pair of links is checked, or why it is not: as `robot check` says it.
+    """Return how each pair of links is checked, or why it is not, like `robot check`.
 
-    The pairs that the description itself ignores are judged like all others: the page shows these as
-    ignored, and knows what becomes of a pair that is ticked or unticked.
+    The description's own ignored pairs are judged as well: the page marks them as ignored, and can show the
+    effect
+    of changing that.
     """
     plan = plan_of(_description(folder, request["description"] | {"collision": {}}))
     return {
@@ -109,7 +110,7 @@ def collisions(_: Store, folder: Path, request: Json) -> Json:
 
 
 def unzip(store: Store, folder: Path, request: Json) -> Json:
-    """The files of a zip archive, put into the store."""
+    """Put the files of a zip archive into the store."""
     files = {}
     try:
         with zipfile.ZipFile(folder / request["file"]) as archive:
@@ -124,17 +125,17 @@ def unzip(store: Store, folder: Path, request: Json) -> Json:
             for entry in entries:
                 if reason := refused_path(entry.filename):
                     raise RefusedRequest(422, f"{entry.filename!r}: {reason}")
-                # What an entry holds beyond the size that it states is an error of zipfile's.
+                # zipfile raises an error if an entry is larger than it declares.
                 files[entry.filename] = put(store, archive.read(entry))
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, zlib.error, EOFError) as error:
-        raise RefusedRequest(422, f"is no zip archive that can be read: {error}") from None
+        raise RefusedRequest(422, f"is not a readable zip archive: {error}") from None
     return {"files": files}
 
 
 def import_robot(store: Store, folder: Path, request: Json) -> Json:
-    """A URDF as a draft of D-H rows, each link's shapes as one GLB in the link's frame.
+    """Convert a URDF to a draft of D-H rows, with each link's shapes as one GLB in the link's frame.
 
-    A robot.toml with its files, as Download zip makes it, is a draft already, unless it names a URDF.
+    A robot.toml with its files, from Download zip, is returned as a draft, unless it names a URDF.
     """
     file = request.get("file", "")
     values = request.get("description")
@@ -152,7 +153,7 @@ def import_robot(store: Store, folder: Path, request: Json) -> Json:
     values = values or {"name": robot_name(Path(file).stem), "urdf": file}
     description = _description(folder, values)
     if not isinstance(description, UrdfDescription):
-        raise RefusedRequest(422, f"{file} is no robot's URDF")
+        raise RefusedRequest(422, f"{file} is not a robot's URDF")
     found = import_as_dh(description)
     return {
         "description": found.values,
@@ -163,10 +164,10 @@ def import_robot(store: Store, folder: Path, request: Json) -> Json:
 
 
 def _description(folder: Path, values: Json) -> RobotDescription:
-    """A description in which nothing is wrong.
+    """Return a valid description.
 
     Raises:
-        DescriptionError: Otherwise.
+        DescriptionError: If it has problems.
     """
     description, problems = from_values(as_saved(values), folder=folder, confined=True)
     if description is None:
@@ -189,13 +190,13 @@ def _without_meshes(values: Mapping[str, Any]) -> Json:
 
 
 def _positions(model: RobotModel, description: RobotDescription, given: Any) -> Any:
-    """Joint positions in SI: those given in the file's units, or home."""
+    """Return joint positions in SI units: the given ones in the file's units, or home."""
     if given is None:
         return model.joints.home
     count = len(model.joints)
     numbers = [each for each in given if isinstance(each, int | float)] if isinstance(given, list) else []
     if len(numbers) != count or len(given) != count or not np.isfinite(numbers).all():
-        raise RefusedRequest(422, f"joints: one finite number a joint is asked for, {count} in all")
+        raise RefusedRequest(422, f"joints: should be one finite number for each joint, {count} in total")
     factors = [position_factor(kind, description.units) for kind in model.joints.types]
     return np.multiply(numbers, factors)
 

@@ -1,4 +1,4 @@
-"""Define's requests over HTTP: what is asked is checked here, and done by the worker or on disk.
+"""Define's HTTP requests: validated here, and executed by a worker or on disk.
 
 Errors are sentences (text/plain), or the problems of a description with their places.
 """
@@ -26,7 +26,7 @@ from services.console.define.errors import RefusedRequest
 from services.console.define.settings import DefineSettings
 from services.console.define.start import start, started_names, stop
 from services.console.define.worker_pool import Workshop
-from services.console.http.error_responses import Handler, answered
+from services.console.http.error_responses import Handler, with_error_responses
 
 log = logging.getLogger(__name__)
 
@@ -34,12 +34,12 @@ Json = dict[str, Any]
 Key = TypeVar("Key")
 Value = TypeVar("Value")
 _MOST_REMEMBERED = 256
-# What has not come whole is in no store, which would make room for it.
+# Parallel uploads: the store does not count or evict incomplete files.
 _MOST_UPLOADS = 16
 
 
 class Define:
-    """Define's server: its store, its workers, its routes."""
+    """Define's server: store, workers and routes."""
 
     def __init__(self, settings: DefineSettings) -> None:
         self.settings = settings
@@ -51,11 +51,11 @@ class Define:
         self._uploads = 0
 
     async def close(self) -> None:
-        """End the workers."""
+        """Stop the workers."""
         await self.workshop.close()
 
     def routes(self) -> Mount:
-        """Everything below /define."""
+        """Return the routes below /define."""
         return Mount(
             "/define",
             routes=[
@@ -75,10 +75,10 @@ class Define:
             ],
         )
 
-    # ------------------------------------------------------------------ what there is
+    # ------------------------------------------------------------------ robots
 
     async def robots(self, request: Request) -> Response:
-        """What can be opened, and where robots are saved."""
+        """Return the robots that can be opened, and the folder of saved robots."""
         site = self.settings.site
         running = frozenset(started_names(site)) | {robot.name for robot in site.robot}
         rows = await asyncio.to_thread(lambda: list(saved_robots.listing(site, running)))
@@ -89,7 +89,7 @@ class Define:
         return JSONResponse({"robots": rows, "can_start": self.settings.can_start, "folder": folder})
 
     async def _joint_count(self, name: str, asker: str) -> int:
-        """Of a robot whose joints are in another file than its robot.toml; 0 where it cannot be read."""
+        """Return the number of joints of a robot that has them in another file; 0 if it cannot be read."""
         revision = ""
         try:
             revision = await asyncio.to_thread(revision_of, self._folder(name))
@@ -97,24 +97,24 @@ class Define:
                 return self._joint_counts[revision]
             values, files = await self._opened(name)
             folder = await self._laid_out({"files": files})
-            found = await self.workshop.quick.do("joint_count", folder, {"description": values}, asker=asker)
+            found = await self.workshop.quick.run("joint_count", folder, {"description": values}, asker=asker)
             count: int = found["joints"]
         except (RefusedRequest, RobotError, OSError):
-            count = 0  # what is wrong with it is told when it is opened
+            count = 0  # the page shows the error when the robot is opened
         _remember(self._joint_counts, revision, count)
         return count
 
     async def robot(self, request: Request) -> Response:
-        """A robot in a draft's form; its files are in the store then."""
+        """Return a robot as a draft; its files are then in the store."""
         name = request.path_params["name"]
-        # Before it is read: what changes meanwhile is asked about when it is saved.
+        # Taken first, so that a change during reading is noticed when the draft is saved.
         revision = await asyncio.to_thread(revision_of, self._folder(name))
         values, files = await self._opened(name)
         opened = {"description": values, "files": files, "notes": []}
         if "urdf" in values:
-            # What is edited is D-H rows.
+            # The page edits D-H rows.
             folder = await self._laid_out({"files": files})
-            opened = await self.workshop.slow.do(
+            opened = await self.workshop.slow.run(
                 "import", folder, {"description": values}, asker=_asker(request)
             )
         return JSONResponse(opened | {"revision": revision})
@@ -126,7 +126,7 @@ class Define:
         return folder
 
     async def _opened(self, name: str) -> tuple[Json, dict[str, str]]:
-        """A robot's values and files, the files in the store."""
+        """Return a robot's description and files, with the files in the store."""
         folder = self._folder(name)
         values, paths = await asyncio.to_thread(read_robot, folder)
         files = {}
@@ -136,20 +136,20 @@ class Define:
         return values, files
 
     async def glb(self, request: Request) -> Response:
-        """A converted mesh."""
+        """Return a converted mesh."""
         path = store.stored(self.store, request.path_params["sha"])
         if path is None:
-            raise RefusedRequest(404, "this mesh is not here any more; load the page again")
+            raise RefusedRequest(404, "this mesh is no longer stored; load the page again")
         return FileResponse(
             path,
             media_type="model/gltf-binary",
             headers={"Cache-Control": "private, max-age=31536000, immutable"},
         )
 
-    # --------------------------------------------------------------------- a draft's
+    # --------------------------------------------------------------------- drafts
 
     async def take_file(self, request: Request) -> Response:
-        """Keep a file of a draft."""
+        """Store a file of a draft."""
         name = request.query_params.get("name", "")
         if reason := refused_path(name):
             raise RefusedRequest(422, f"name {name!r}: {reason}")
@@ -165,59 +165,59 @@ class Define:
         return JSONResponse({"sha": sha, "size": size})
 
     async def mesh(self, request: Request) -> Response:
-        """A mesh file converted, and what is in it; converted once."""
+        """Convert a mesh file and summarise it; results are cached."""
         asked = await self._json(request, file=str)
         folder = await self._laid_out(asked)
         file = self._file_of(asked)
         known = self._meshes.get((folder.name, file))
         if known is None or store.stored(self.store, known["glb"]) is None:
-            known = await self.workshop.slow.do("mesh", folder, {"file": file}, **_of(request))
+            known = await self.workshop.slow.run("mesh", folder, {"file": file}, **_job_options(request))
             _remember(self._meshes, (folder.name, file), known)
         return JSONResponse(known)
 
     async def check(self, request: Request) -> Response:
-        """Asked as one types: who has asked anew meanwhile has gone, and costs nothing."""
+        """Check a draft while the user types; a newer request cancels an older one."""
         asked = await self._json(request, description=dict)
         folder = await self._laid_out(asked)
 
         request_ = {"description": asked["description"], "joints": asked.get("joints")}
-        return JSONResponse(await self.workshop.quick.do("check", folder, request_, **_of(request)))
+        return JSONResponse(await self.workshop.quick.run("check", folder, request_, **_job_options(request)))
 
     async def collisions(self, request: Request) -> Response:
-        """How each pair of links is checked, or why it is not."""
+        """Return how each pair of links is checked, or why it is not."""
         asked = await self._json(request, description=dict)
         return await self._slow(request, "collisions", asked, {"description": asked["description"]})
 
     async def import_robot(self, request: Request) -> Response:
-        """A URDF, an OpenHRP VRML file or a robot.toml as a draft."""
+        """Convert a URDF, an OpenHRP VRML file or a robot.toml to a draft."""
         asked = await self._json(request, file=str)
         return await self._slow(
             request, "import", asked, {"file": self._file_of(asked), "files": asked["files"]}
         )
 
     async def unzip(self, request: Request) -> Response:
-        """The files of a zip archive, kept each for itself."""
+        """Store the files of a zip archive."""
         asked = await self._json(request, file=str)
         return await self._slow(request, "unzip", asked, {"file": self._file_of(asked)})
 
     async def _slow(self, request: Request, job: str, asked: Json, of: Json) -> Response:
         folder = await self._laid_out(asked)
-        return JSONResponse(await self.workshop.slow.do(job, folder, of, **_of(request)))
+        return JSONResponse(await self.workshop.slow.run(job, folder, of, **_job_options(request)))
 
     # ------------------------------------------------------------------ save and start
 
     async def save(self, request: Request) -> Response:
-        """Save a draft as a robot of the site, once nothing is wrong with it."""
+        """Save a draft as a robot of the site, if it has no problems."""
         asked = await self._json(request, description=dict)
         values, folder = asked["description"], await self._laid_out(asked)
         name = values.get("name")
-        found = await self.workshop.quick.do("check", folder, {"description": values}, asker=_asker(request))
+        found = await self.workshop.quick.run("check", folder, {"description": values}, asker=_asker(request))
         problems = found["problems"]
         if name in library_names():
             text = f"name = {name!r}: a robot of the library has that name; give yours another"
             problems.append({"path": ["name"], "text": text})
         if not problems:
-            found = await self.workshop.slow.do(
+            found = await self.workshop.slow.run(
                 "meshes", folder, {"description": values}, asker=_asker(request)
             )
             problems = found["problems"]
@@ -238,7 +238,7 @@ class Define:
         return JSONResponse({"name": name, "folder": str(own / name), "revision": written.revision})
 
     async def zip(self, request: Request) -> Response:
-        """A draft as a zip archive, finished or not."""
+        """Return a draft as a zip archive, finished or not."""
         asked = await self._json(request, description=dict)
         folder = await self._laid_out(asked)
         files = {path: folder / path for path in asked["files"]}
@@ -251,11 +251,11 @@ class Define:
         )
 
     async def start(self, request: Request) -> Response:
-        """Start a robot as a simulated one of the site, once all of it could be read."""
+        """Start a robot as a simulated robot of the site, if all of it can be read."""
         name = (await self._json(request, name=str))["name"]
         values, files = await self._opened(name)
         folder = await self._laid_out({"files": files})
-        found = await self.workshop.slow.do("meshes", folder, {"description": values}, asker=_asker(request))
+        found = await self.workshop.slow.run("meshes", folder, {"description": values}, asker=_asker(request))
         if found["problems"]:
             raise RefusedRequest(422, found["problems"][0]["text"])
         async with self._writing:
@@ -263,19 +263,19 @@ class Define:
         return JSONResponse({"site": self.settings.site.site, "robot": name})
 
     async def stop(self, request: Request) -> Response:
-        """End a robot that was started from the page."""
+        """Stop a robot that was started from the page."""
         name = (await self._json(request, name=str))["name"]
         async with self._writing:
             await asyncio.to_thread(stop, self.settings.site, name)
         return JSONResponse({"site": self.settings.site.site, "robot": name})
 
-    # --------------------------------------------------------------------------- parts
+    # --------------------------------------------------------------------------- helpers
 
     async def _json(self, request: Request, **needed: type) -> Json:
-        """A request's JSON object.
+        """Return a request's JSON object.
 
         Raises:
-            RefusedRequest: If it is too large, or is not one that holds what is needed.
+            RefusedRequest: If it is too large, or lacks a required value.
         """
         body, most = bytearray(), self.settings.most_json_bytes
         async for chunk in request.stream():
@@ -309,24 +309,24 @@ class Define:
 
 
 def _asker(request: Request) -> str:
-    """Whose turn a job takes: the account's, else the address's."""
-    who = request.scope.get("signed_in")
-    if isinstance(who, SignedIn):
-        return f"account {who.account.name}"
+    """Return the name for taking turns: the account's, otherwise the address."""
+    user = request.scope.get("signed_in")
+    if isinstance(user, SignedIn):
+        return f"account {user.account.name}"
     return request.client.host if request.client else ""
 
 
-class _Of(TypedDict):
+class _JobOptions(TypedDict):
     asker: str
     wanted: Callable[[], Awaitable[bool]]
 
 
-def _of(request: Request) -> _Of:
-    return {"asker": _asker(request), "wanted": _waits(request)}
+def _job_options(request: Request) -> _JobOptions:
+    return {"asker": _asker(request), "wanted": _client_waits(request)}
 
 
-def _waits(request: Request) -> Callable[[], Awaitable[bool]]:
-    """Whether whoever asked is still there: a job that nobody waits for takes no other's time."""
+def _client_waits(request: Request) -> Callable[[], Awaitable[bool]]:
+    """Return a function that tells if the client still waits; abandoned jobs are skipped."""
 
     async def waits() -> bool:
         return not await request.is_disconnected()
@@ -347,7 +347,7 @@ def _remember(kept: OrderedDict[Key, Value], key: Key, value: Value) -> None:
 
 
 def _answered(handler: Handler) -> Handler:
-    return answered(handler, _refused)
+    return with_error_responses(handler, _refused)
 
 
 def _refused(error: Exception) -> Response:
@@ -357,12 +357,12 @@ def _refused(error: Exception) -> Response:
         case RobotError():
             return PlainTextResponse(str(error), status_code=422)
         case UnicodeError():
-            return PlainTextResponse("the request holds half a character", status_code=422)
+            return PlainTextResponse("the request contains an unpaired surrogate", status_code=422)
         case RecursionError():
             return PlainTextResponse("the request is nested too deeply", status_code=422)
         case OSError():
             log.error("define: %s", error)
             return PlainTextResponse(f"the console's disk: {error.strerror}", status_code=507)
         case _:
-            log.error("define: a fault of robomesh itself", exc_info=error)
-            return PlainTextResponse(f"a fault of robomesh itself: {error!r}"[:300], status_code=500)
+            log.error("define: an internal error", exc_info=error)
+            return PlainTextResponse(f"an internal error of robomesh: {error!r}"[:300], status_code=500)

@@ -1,7 +1,8 @@
-"""What the worker may open while it reads somebody's files: its draft, the store, and program code.
+"""Confinement of the worker: it may open its draft, the store and program code only.
 
-A mesh file may name others (Inline, materials, textures), and a description names its meshes; none of
-these names may lead the server to a file of its own. Readers check names too; this holds for all of them.
+A mesh file may refer to others (Inline, materials, textures), and a description to its meshes; no reference
+may
+open one of the server's own files. Readers check these paths as well; this module covers all of them.
 """
 
 import os
@@ -15,11 +16,11 @@ _NEVER = ("socket.connect", "socket.bind", "os.system", "os.exec", "os.posix_spa
 
 
 def confine(folder: Path) -> None:
-    """From now on this process opens files below the folder, and reads code; it reaches nobody.
+    """Confine this process to files below the folder and program code, without network.
 
-    It starts nothing but this same Python, in which STEP files are read.
+    It may start only this Python, which reads STEP files.
 
-    Everything else raises PermissionError. There is no way back.
+    Everything else raises PermissionError. This cannot be undone.
     """
     own = (os.path.realpath(folder),)
     packages = Path(__file__).parents[3]
@@ -30,9 +31,9 @@ def confine(folder: Path) -> None:
         if event == "open":
             path, _, flags = arguments
             if not isinstance(path, int) and not _allowed(os.fsdecode(path), flags or 0, own, code):
-                raise PermissionError(1, "is outside of the robot's own files", os.fsdecode(path))
+                raise PermissionError(1, "is outside of the robot's folder", os.fsdecode(path))
         elif event in _NEVER or (event == "subprocess.Popen" and arguments[0] != sys.executable):
-            raise PermissionError(1, f"{event} is not for this process")
+            raise PermissionError(1, f"{event} is not allowed in this process")
 
     sys.addaudithook(hook)
 

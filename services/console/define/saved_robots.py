@@ -1,4 +1,4 @@
-"""The robots that can be opened: the library's, and those that were saved at this site."""
+"""The robots that the page can open: library robots, and robots saved at this site."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,18 +12,18 @@ Json = dict[str, Any]
 
 
 def robot_folder(site: Site, name: str) -> Path | None:
-    """The folder of a robot, a saved one before the library's; None: there is none."""
+    """Return a robot's folder, a saved robot before one of the library; None if there is none."""
     for folder in (site.define.folder, LIBRARY):
-        # A name is one of a listing, so it cannot lead elsewhere.
+        # A name from the listing cannot be a path to another folder.
         if name in _names(folder):
             return folder / name
     return None
 
 
 def listing(site: Site, running: frozenset[str]) -> Iterator[Json]:
-    """Every robot that can be opened: name, title, origin, number of joints, whether it runs here.
+    """Yield every robot that can be opened: name, title, origin, number of joints, whether it runs here.
 
-    The number is None where it is in another file, which is not for the console itself to read.
+    The number is None if the joints are in another file, which the console must not read itself.
     """
     saved = _names(site.define.folder)
     for name in saved:
@@ -41,7 +41,7 @@ def _row(folder: Path, name: str, origin: str, *, running: bool) -> Json:
     try:
         values = read_toml(folder / DESCRIPTION_FILE)
     except (OSError, ValueError):
-        values = {}  # what is wrong with it is told when it is opened
+        values = {}  # the page shows the error when the robot is opened
     return {
         "name": name,
         "title": str(values.get("title") or name),

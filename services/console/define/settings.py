@@ -1,4 +1,4 @@
-"""What Define's server is told."""
+"""Settings of Define's server."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,14 +14,14 @@ def _store_folder() -> Path:
 
 @dataclass(frozen=True, kw_only=True)
 class DefineSettings:
-    """Where robots are saved, and what drafts may take.
+    """Folder of saved robots, and limits of drafts.
 
     Attributes:
-        site: Its saved robots are in `site.define.folder`.
-        can_start: A supervisor follows the robots that are started (`robomesh up`).
+        site: The site; `site.define.folder` has its saved robots.
+        can_start: A supervisor starts robots (`robomesh up`).
         store: Folder for the files of drafts.
-        most_file_bytes: Of one file.
-        most_json_bytes: Of a request.
+        most_file_bytes: Largest file.
+        most_json_bytes: Largest request.
     """
 
     site: Site

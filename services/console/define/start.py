@@ -1,4 +1,4 @@
-"""Starting a robot that was defined, as a simulated one of the site, and ending it."""
+"""Starting and stopping a defined robot as a simulated robot of the site."""
 
 from services.console.define.errors import RefusedRequest
 from services.errors import SiteFileError
@@ -7,7 +7,7 @@ from services.site_file.started_robots import read_started, robot_to_start, writ
 
 
 def started_names(site: Site) -> tuple[str, ...]:
-    """Names of the robots that were started here; none where the file that says so cannot be read."""
+    """Return the names of the started robots; none if their file cannot be read."""
     try:
         return tuple(robot.name for robot in read_started(site))
     except SiteFileError:
@@ -15,10 +15,10 @@ def started_names(site: Site) -> tuple[str, ...]:
 
 
 def start(site: Site, name: str, *, can_start: bool) -> None:
-    """Have the supervisor start a robot.
+    """Make the supervisor start a robot.
 
     Raises:
-        RefusedRequest: If nobody would, or the site has one of that name.
+        RefusedRequest: If there is no supervisor, or the site has a robot with that name.
     """
     if name in {robot.name for robot in site.robot}:
         raise RefusedRequest(
@@ -29,26 +29,26 @@ def start(site: Site, name: str, *, can_start: bool) -> None:
         model = (site.define.folder / robot.model).absolute() if "/" in robot.model else robot.model
         raise RefusedRequest(
             409,
-            "nothing here can start a robot (robomesh up does). Put this into the site file and start its "
-            f'services anew:\n\n[[robot]]\nname = "{name}"\nmodel = "{model}"\ncontroller = "simulated"',
+            "no supervisor runs here (robomesh up). Add this to the site file and restart the site's "
+            f'services:\n\n[[robot]]\nname = "{name}"\nmodel = "{model}"\ncontroller = "simulated"',
         )
     robots = _read(site)
     if name in {each.name for each in robots}:
-        raise RefusedRequest(409, f"{name} runs already; what is saved anew starts anew by itself")
+        raise RefusedRequest(409, f"{name} runs already; it restarts whenever it is saved")
     write_started(site, (*robots, robot))
 
 
 def stop(site: Site, name: str) -> None:
-    """Have the supervisor end a robot that was started so.
+    """Make the supervisor stop a started robot.
 
     Raises:
-        RefusedRequest: If none was.
+        RefusedRequest: If it was not started from the page.
     """
     robots = _read(site)
     if name not in {robot.name for robot in robots}:
         if name in {robot.name for robot in site.robot}:
-            raise RefusedRequest(409, f"{name} is in the site file: take it out there")
-        raise RefusedRequest(409, f"{name} was not started from here")
+            raise RefusedRequest(409, f"{name} is in the site file: remove it there")
+        raise RefusedRequest(409, f"{name} was not started from the page")
     write_started(site, tuple(robot for robot in robots if robot.name != name))
 
 
@@ -56,4 +56,4 @@ def _read(site: Site) -> tuple[Robot, ...]:
     try:
         return read_started(site)
     except SiteFileError as error:
-        raise RefusedRequest(409, f"{error}: mend or remove it") from None
+        raise RefusedRequest(409, f"{error}: repair or remove it") from None

@@ -1,6 +1,6 @@
-"""Files of drafts, kept by their SHA-256, and drafts laid out as folders of them.
+"""Files of drafts, stored by their SHA-256, and drafts as folders of links to them.
 
-All of it may be deleted at any time: the page sends again what is missing.
+All of it may be deleted at any time: the page sends missing files again.
 """
 
 import contextlib
@@ -32,8 +32,8 @@ class Store:
     """A folder of files by content, and of drafts made of links to them.
 
     Attributes:
-        folder: Its owner's alone.
-        most_bytes: Of all files; the least recently used go first.
+        folder: Readable by its owner only.
+        most_bytes: Limit of all files; the least recently used are removed.
     """
 
     folder: Path
@@ -41,17 +41,17 @@ class Store:
 
     @property
     def files(self) -> Path:
-        """Where the files are, each named by its SHA-256."""
+        """Folder of the files, each named by its SHA-256."""
         return self.folder / "files"
 
     @property
     def drafts(self) -> Path:
-        """Where drafts are laid out."""
+        """Folder of the drafts."""
         return self.folder / "drafts"
 
 
 def open_store(folder: Path, *, most_bytes: int = MOST_BYTES) -> Store:
-    """The store in a folder, made if need be; in a temporary one where it cannot be, or is another's."""
+    """Open the store in a folder, or in a temporary one if the folder is not usable or not the user's own."""
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         usable = (
@@ -64,25 +64,25 @@ def open_store(folder: Path, *, most_bytes: int = MOST_BYTES) -> Store:
     store.files.mkdir(exist_ok=True)
     store.drafts.mkdir(exist_ok=True)
     for left in store.folder.glob("tmp*"):
-        # Of a console that was killed; a young one may be of another that runs.
+        # Left by a killed console; a recent one may be another console's.
         if time.time() - left.stat().st_mtime > _LEFT_BEHIND_S:
             shutil.rmtree(left) if left.is_dir() else left.unlink()
     return store
 
 
 def put(store: Store, content: bytes) -> str:
-    """Keep a file; its SHA-256."""
+    """Store a file; return its SHA-256."""
     sha = hashlib.sha256(content).hexdigest()
     if not _touch(store.files / sha):
         with _new_file(store) as path:
             path.write_bytes(content)
             path.replace(store.files / sha)
-        _make_room(store)
+        _evict_files(store)
     return sha
 
 
 async def put_stream(store: Store, chunks: AsyncIterable[bytes], *, most_bytes: int) -> tuple[str, int]:
-    """Keep a file that comes in pieces; its SHA-256 and size.
+    """Store a file from chunks; return its SHA-256 and size.
 
     Raises:
         RefusedRequest: If it is too large.
@@ -97,23 +97,23 @@ async def put_stream(store: Store, chunks: AsyncIterable[bytes], *, most_bytes: 
                 digest.update(chunk)
                 file.write(chunk)
         path.replace(store.files / digest.hexdigest())
-    _make_room(store)
+    _evict_files(store)
     return digest.hexdigest(), size
 
 
 def stored(store: Store, sha: str) -> Path | None:
-    """The file with that SHA-256; None where it is not (or no longer) there."""
+    """Return the path of the file with that SHA-256, or None."""
     path = store.files / sha
     return path if _SHA.fullmatch(sha) and _touch(path) else None
 
 
 def lay_out(store: Store, files: Mapping[str, str]) -> Path:
-    """A folder that holds a draft's files under their names, each linked to the stored one.
+    """Return a folder with a draft's files under their names, each linked to the stored one.
 
-    The same files give the same folder, so that typing in a form costs no disk.
+    The same files give the same folder, so that edits in a form write nothing to disk.
 
     Raises:
-        RefusedRequest: If a name leads out of the folder, or a file is not in the store.
+        RefusedRequest: If a path is not below the folder, or a file is not in the store.
     """
     if len(files) > MOST_FILES:
         raise RefusedRequest(413, f"{len(files)} files: {MOST_FILES} at most")
@@ -127,9 +127,9 @@ def lay_out(store: Store, files: Mapping[str, str]) -> Path:
     sources = {path: stored(store, sha) for path, sha in files.items()}
     if missing := [path for path, source in sources.items() if source is None]:
         raise RefusedRequest(
-            410, f"{', '.join(missing[:5])}: not here (any more); drop the file on the page again"
+            410, f"{', '.join(missing[:5])}: no longer stored; drop the file on the page again"
         )
-    # One file under a thousand names is one here, and a thousand where it is saved.
+    # A file under a thousand names is stored once, but saved a thousand times.
     size = sum(source.stat().st_size for source in sources.values() if source is not None)
     if size > MOST_DRAFT_BYTES:
         most = MOST_DRAFT_BYTES / 1e6
@@ -140,23 +140,23 @@ def lay_out(store: Store, files: Mapping[str, str]) -> Path:
             assert source is not None
             place = fresh.joinpath(*PurePosixPath(path).parts)
             place.parent.mkdir(parents=True, exist_ok=True)
-            # A hard link, not a symbolic one: nothing in a draft leads out of it.
+            # A hard link: a symbolic one could lead out of the draft.
             os.link(source, place)
         fresh.rename(folder)
     except FileExistsError:
         raise RefusedRequest(422, "a file's name is another file's folder") from None
     except OSError as error:
-        if not folder.is_dir():  # else somebody else laid the same draft out meanwhile
-            raise RefusedRequest(507, f"the files cannot be laid out: {error.strerror}") from None
+        if not folder.is_dir():  # otherwise a concurrent request made the same draft
+            raise RefusedRequest(507, f"the draft's files cannot be linked: {error.strerror}") from None
     finally:
         shutil.rmtree(fresh, ignore_errors=True)
-    _oldest_out(store, MOST_DRAFTS)
+    _evict_drafts(store, MOST_DRAFTS)
     return folder
 
 
 @contextlib.contextmanager
 def _new_file(store: Store) -> Iterator[Path]:
-    """A file of its own in the store, gone unless it was moved away."""
+    """Yield a new temporary file in the store; remove it if it was not renamed."""
     descriptor, name = tempfile.mkstemp(dir=store.folder)
     os.close(descriptor)
     try:
@@ -166,7 +166,7 @@ def _new_file(store: Store) -> Iterator[Path]:
 
 
 def _touch(path: Path) -> bool:
-    """Mark it as used now; False: it is not there."""
+    """Mark a file as used now; return whether it exists."""
     try:
         os.utime(path)
     except FileNotFoundError:
@@ -174,7 +174,7 @@ def _touch(path: Path) -> bool:
     return True
 
 
-def _make_room(store: Store) -> None:
+def _evict_files(store: Store) -> None:
     found = []
     for path in store.files.iterdir():
         with contextlib.suppress(FileNotFoundError):
@@ -182,8 +182,8 @@ def _make_room(store: Store) -> None:
             found.append((stat.st_mtime_ns, stat.st_size, path))
     total = sum(size for _, size, _ in found)
     if total > store.most_bytes:
-        # Their links would keep what goes.
-        _oldest_out(store, _DRAFTS_KEPT)
+        # Links in drafts would keep removed files on the disk.
+        _evict_drafts(store, _DRAFTS_KEPT)
     for _, size, path in sorted(found)[:-1]:
         if total <= store.most_bytes:
             return
@@ -191,13 +191,13 @@ def _make_room(store: Store) -> None:
         total -= size
 
 
-def _oldest_out(store: Store, most: int) -> None:
+def _evict_drafts(store: Store, most: int) -> None:
     drafts = []
     for path in store.drafts.iterdir():
         with contextlib.suppress(FileNotFoundError):
             drafts.append((path.stat().st_mtime_ns, path))
     for _, path in sorted(drafts)[: max(len(drafts) - most, 0)]:
-        # Gone in one step: nobody takes what is half removed for a draft.
+        # Renamed first, so that a half-removed draft is never used.
         going = store.folder / f"tmp-{secrets.token_hex(8)}"
         with contextlib.suppress(FileNotFoundError):
             path.rename(going)

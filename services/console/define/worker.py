@@ -1,9 +1,9 @@
-"""The process that reads other people's files for the console: a request a line in, an answer a line out.
+"""The process that reads untrusted files for the console: one line per request, one line per answer.
 
-It may hang, grow or die over any of them: `services.console.define.worker_pool` ends it and starts another.
+It may hang, exhaust memory or crash: `services.console.define.worker_pool` stops it and starts another.
 
     {"job": "mesh", "folder": ..., "request": {...}}
-    {"done": {...}}   or   {"refused": "words"}
+    {"done": {...}}   or   {"refused": "sentence"}
 """
 
 import contextlib
@@ -20,13 +20,13 @@ _PR_SET_PDEATHSIG = 1
 
 
 def main() -> None:
-    """The program: parent's process id, the store's folder, most bytes of memory."""
+    """Run the worker; arguments: parent's process id, the store's folder, memory limit [bytes]."""
     parent, folder, most_bytes = int(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         return
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C is for the console
-    # The libraries talk on standard output; answers have a line of their own.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C stops the console
+    # Libraries print to standard output, so answers use another descriptor.
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     resource.setrlimit(resource.RLIMIT_DATA, (most_bytes, most_bytes))
@@ -38,9 +38,9 @@ def main() -> None:
 
     store = Store(folder)
     confine(folder)
-    _say(answers, {"done": {}})
+    _send(answers, {"done": {}})
     for line in sys.stdin:
-        _say(answers, _answer(jobs.JOBS, store, json.loads(line), most_bytes))
+        _send(answers, _answer(jobs.JOBS, store, json.loads(line), most_bytes))
 
 
 def _answer(all_jobs: Any, store: Any, asked: dict[str, Any], most_bytes: int) -> dict[str, Any]:
@@ -51,28 +51,28 @@ def _answer(all_jobs: Any, store: Any, asked: dict[str, Any], most_bytes: int) -
     try:
         return {"done": all_jobs[asked["job"]](store, folder, asked["request"])}
     except DescriptionError as error:
-        return {"refused": _own_words("\n".join(error.problems), folder)}
+        return {"refused": _relative_paths("\n".join(error.problems), folder)}
     except (RobotError, RefusedRequest) as error:
-        return {"refused": _own_words(str(error), folder)}
+        return {"refused": _relative_paths(str(error), folder)}
     except PermissionError as error:
-        return {"refused": _own_words(f"{error.filename}: {error.strerror}", folder)}
+        return {"refused": _relative_paths(f"{error.filename}: {error.strerror}", folder)}
     except MemoryError:
-        return {"refused": f"it takes more than {most_bytes / 1024**3:g} GB of memory to read"}
+        return {"refused": f"reading it takes more than {most_bytes / 1024**3:g} GB of memory"}
     except RecursionError:
         return {"refused": "it is nested too deeply to read"}
     except Exception as error:
         import traceback
 
         traceback.print_exc()
-        return {"refused": f"a fault of robomesh itself, the console's log has more: {error!r}"[:300]}
+        return {"refused": f"an internal error of robomesh; see the console's log: {error!r}"[:300]}
 
 
-def _own_words(text: str, folder: Path) -> str:
-    """As the page knows the files: below the robot's folder, not where they lie on the server."""
+def _relative_paths(text: str, folder: Path) -> str:
+    """Return a text with paths relative to the robot's folder, as the page knows them."""
     return text.replace(f"{folder}{os.sep}", "").replace(str(folder), "robot.toml")
 
 
-def _say(answers: Any, answer: dict[str, Any]) -> None:
+def _send(answers: Any, answer: dict[str, Any]) -> None:
     with contextlib.suppress(BrokenPipeError):
         answers.write(json.dumps(answer) + "\n")
         answers.flush()

@@ -1,7 +1,8 @@
-"""The console's end of its workers: one for what must answer as one types, two for what may take long.
+"""The console's worker processes: one for checks while the user types, two for long jobs.
 
-Started when first needed and kept, for their imports cost over a second; one that hangs or dies
-is ended and the next request starts another.
+They start when first needed and keep running, because their imports take over a second. A worker that hangs
+or
+crashes is stopped, and the next request starts another.
 """
 
 import asyncio
@@ -29,13 +30,13 @@ _LONGEST_LINE = 64 * 1024**2
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """What a job may take.
+    """Limits of a job.
 
     Attributes:
-        quick_s: A check as one types.
-        slow_s: Reading and converting files, studying links that touch at home.
-        brief_s: The same, in the worker that no slow file may hold up.
-        memory_bytes: Of a worker.
+        quick_s: Time limit of a check while the user types.
+        slow_s: Time limit for reading and converting files, and for studying links that touch at home.
+        brief_s: The same in the brief worker, which must not wait for a slow file.
+        memory_bytes: Memory limit of a worker.
     """
 
     quick_s: float = 10.0
@@ -56,10 +57,10 @@ class Worker:
 
     @property
     def pid(self) -> int | None:
-        """Of its process, while it has one."""
+        """Process id; None if it does not run."""
         return None if self._process is None else self._process.pid
 
-    async def do(
+    async def run(
         self,
         job: str,
         folder: Path,
@@ -67,17 +68,17 @@ class Worker:
         *,
         wanted: Callable[[], Awaitable[bool]] | None = None,
     ) -> dict[str, Any]:
-        """What a job comes to; no other may be under way.
+        """Run a job and return its result; only one at a time.
 
         Args:
-            wanted: Whether somebody still waits for it.
+            wanted: Returns whether the client still waits.
 
         Raises:
-            TooSlowError: If it took too long.
-            RefusedRequest: If it says no, ended the process, or nobody waits for it any more.
+            TooSlowError: If it exceeds its time limit.
+            RefusedRequest: If the worker refuses it or crashes, or the client has disconnected.
         """
         if wanted is not None and not await wanted():
-            raise RefusedRequest(499, "nobody waits for this any more")
+            raise RefusedRequest(499, "the client has disconnected")
         line = json.dumps({"job": job, "folder": str(folder), "request": request}) + "\n"
         answer = await self._answer(job, line)
         if "refused" in answer:
@@ -86,28 +87,30 @@ class Worker:
         return done
 
     async def _answer(self, job: str, line: str) -> dict[str, Any]:
-        # A process may have died before, or of something else: one death is no proof against this file.
+        # A crash may have another cause than this file, so it gets a second try.
         for _ in range(2):
             try:
-                return await self._once(line)
+                return await self._run_once(line)
             except (EOFError, ConnectionError):
-                log.warning("the worker ended over %s (status %s)", job, await self._end())
+                log.warning("the worker crashed while handling %s (status %s)", job, await self._end())
             except TimeoutError:
                 await self._end()
-                raise TooSlowError(422, f"this took more than {self._longest_s:g} s and was ended") from None
+                raise TooSlowError(
+                    422, f"this took more than {self._longest_s:g} s and was stopped"
+                ) from None
             except BaseException:
-                # Whoever asked is gone; the answer must not be taken for the next one's.
+                # Cancelled: the next request must not read this one's answer.
                 await self._end()
                 raise
         raise RefusedRequest(
-            422, "this ended the process that reads, twice: it may be damaged, or need too much memory"
+            422, "this crashed the worker process twice: it may be damaged, or need too much memory"
         )
 
     async def close(self) -> None:
-        """End the process."""
+        """Stop the process."""
         await self._end()
 
-    async def _once(self, line: str) -> dict[str, Any]:
+    async def _run_once(self, line: str) -> dict[str, Any]:
         process = self._process or await self._start()
         async with asyncio.timeout(self._longest_s):
             return await _ask(process, line)
@@ -124,8 +127,8 @@ class Worker:
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
             limit=_LONGEST_LINE,
-            start_new_session=True,  # it is ended together with what it started
-            # What it writes beside the store goes with it.
+            start_new_session=True,  # so that its children are killed with it
+            # Removed with the worker.
             env={**os.environ, "TMPDIR": str(self._temporary), "XDG_CACHE_HOME": str(self._temporary)},
         )
         async with asyncio.timeout(_START_S):
@@ -138,7 +141,7 @@ class Worker:
             return None
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
-        # Kept until it has ended: the wait may be cancelled, and then another caller of `close` waits.
+        # Cleared only after it has ended: if this wait is cancelled, another call of `close` waits.
         status = await process.wait()
         if self._process is process:
             self._process = None
@@ -160,10 +163,10 @@ async def _ask(process: asyncio.subprocess.Process, line: str) -> dict[str, Any]
 
 
 class Workers:
-    """Workers whose askers take turns, and where no slow job holds up the others.
+    """Workers that serve askers in turn, and in which slow jobs do not delay others.
 
-    A job that the brief worker does not finish in its time is begun again by the main one: slow jobs
-    wait for each other, and small ones for the brief worker alone.
+    If the brief worker does not finish a job in time, the main worker runs it again. Slow jobs wait for each
+    other; short jobs wait for the brief worker only.
     """
 
     def __init__(self, main: Worker, brief: Worker | None = None) -> None:
@@ -175,10 +178,10 @@ class Workers:
 
     @property
     def pids(self) -> list[int]:
-        """Of their processes, those that run."""
+        """Process ids of the running workers."""
         return [worker.pid for worker in self._all if worker.pid is not None]
 
-    async def do(
+    async def run(
         self,
         job: str,
         folder: Path,
@@ -187,42 +190,43 @@ class Workers:
         asker: str = "",
         wanted: Callable[[], Awaitable[bool]] | None = None,
     ) -> dict[str, Any]:
-        """What a job comes to.
+        """Run a job and return its result.
 
         Args:
-            asker: Whose turn it takes.
-            wanted: Whether somebody still waits for it, asked when its turn has come.
+            asker: Name for taking turns.
+            wanted: Returns whether the client still waits; called when the job's turn has come.
 
         Raises:
-            RefusedRequest: If it says no, took too long, ended the process, or nobody waits for it any more.
+            RefusedRequest: If the worker refuses the job, exceeds its time or crashes, or the client has
+                disconnected.
         """
         async with self._turn(self._fresh, asker) as worker:
             try:
-                return await worker.do(job, folder, request, wanted=wanted)
+                return await worker.run(job, folder, request, wanted=wanted)
             except TooSlowError:
                 if worker is self._main:
                     raise
         async with self._turn(self._slow, asker) as worker:
-            return await worker.do(job, folder, request, wanted=wanted)
+            return await worker.run(job, folder, request, wanted=wanted)
 
     async def close(self) -> None:
-        """End their processes."""
+        """Stop the processes."""
         await asyncio.gather(*(worker.close() for worker in self._all))
 
     @contextlib.asynccontextmanager
     async def _turn(self, queue: AskerQueue[asyncio.Future[Worker]], asker: str) -> AsyncIterator[Worker]:
         turn: asyncio.Future[Worker] = asyncio.get_running_loop().create_future()
         queue.add(asker, turn)
-        self._hand_out()
+        self._assign_workers()
         try:
             yield await turn
         finally:
-            # An asker who went while waiting holds no worker, unless one was handed out in that instant.
+            # A cancelled asker holds no worker, unless it got one at the same moment.
             if turn.done() and not turn.cancelled():
                 self._idle.append(turn.result())
-                self._hand_out()
+                self._assign_workers()
 
-    def _hand_out(self) -> None:
+    def _assign_workers(self) -> None:
         for worker in sorted(self._idle, key=self._all.index):
             turn = self._next(self._slow) if worker is self._main else None
             turn = turn or self._next(self._fresh)
@@ -234,12 +238,12 @@ class Workers:
     def _next(queue: AskerQueue[asyncio.Future[Worker]]) -> asyncio.Future[Worker] | None:
         while (turn := queue.take()) is not None:
             if not turn.done():
-                return turn  # the others' askers have gone
+                return turn  # skips cancelled askers
         return None
 
 
 class Workshop:
-    """The workers: quick ones for what is asked as one types, slow ones for files."""
+    """The workers: quick ones for checks while the user types, slow ones for files."""
 
     def __init__(self, folder: Path, limits: Limits) -> None:
         def worker(longest_s: float) -> Worker:
@@ -249,5 +253,5 @@ class Workshop:
         self.slow = Workers(worker(limits.slow_s), brief=worker(min(limits.brief_s, limits.slow_s)))
 
     async def close(self) -> None:
-        """End them all."""
+        """Stop all workers."""
         await asyncio.gather(self.quick.close(), self.slow.close())

@@ -1,1 +1,1 @@
-"""What the console serves over HTTP."""
+"""The console's HTTP routes and connections."""

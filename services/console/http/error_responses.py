@@ -1,4 +1,4 @@
-"""A route's handler whose refusals are answered in words, and whose answers no cache keeps."""
+"""Route handlers with errors as responses and without caching."""
 
 from collections.abc import Awaitable, Callable
 from functools import wraps
@@ -9,11 +9,11 @@ from starlette.responses import Response
 Handler = Callable[[Request], Awaitable[Response]]
 
 
-def answered(handler: Handler, refused: Callable[[Exception], Response | None]) -> Handler:
-    """The handler, with its errors as answers.
+def with_error_responses(handler: Handler, refused: Callable[[Exception], Response | None]) -> Handler:
+    """Return the handler with its errors turned into responses.
 
     Args:
-        refused: What is answered to an error; None: it is none of those that are answered, and is raised.
+        refused: Returns the response to an error; None if the error is to be raised.
     """
 
     @wraps(handler)
@@ -21,12 +21,12 @@ def answered(handler: Handler, refused: Callable[[Exception], Response | None]) 
         try:
             response = await handler(request)
         except ClientDisconnect:
-            response = Response(status_code=499)  # nobody reads it
+            response = Response(status_code=499)  # the client has disconnected
         except Exception as error:
-            told = refused(error)
-            if told is None:
+            error_response = refused(error)
+            if error_response is None:
                 raise
-            response = told
+            response = error_response
         response.headers.setdefault("Cache-Control", "no-store")
         return response
 

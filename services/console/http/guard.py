@@ -1,8 +1,9 @@
-"""Who may talk to the console, and what a browser may do with its page.
+"""Request checks of the console, and the security headers of its responses.
 
-A page elsewhere must not reach a robot through an operator's browser: the Host must be a name
-of ours (else a foreign name could be pointed at us: DNS rebinding), and the Origin of a WebSocket
-and of whatever changes something must be the page's own.
+A page of another site must not reach a robot through an operator's browser. So the Host header must be one of
+the console's names (otherwise another domain could be resolved to the console: DNS rebinding), and the Origin
+of
+a WebSocket and of every changing request must be the page's own.
 """
 
 import contextlib
@@ -18,7 +19,7 @@ _OWN_NAMES = frozenset({"localhost"})
 
 _READING = ("GET", "HEAD", "OPTIONS")
 
-# Bytes, by the beginning of the path; the same are counted where a body is read.
+# Largest body [bytes], by the beginning of the path; the body's reader enforces it for chunked bodies.
 _MOST_BODY = (("/account/", 16 * 1024), ("/define/", 200 * 1000**2))
 _HSTS = "max-age=31536000"
 
@@ -37,16 +38,16 @@ SECURITY_HEADERS = {
 
 
 def refused_host(host: str, names: Collection[str]) -> str | None:
-    """Why a Host header is refused; None: it is ours.
+    """Return why a Host header is rejected; None if it is one of the console's.
 
-    An address of numbers is always ours: only a name can be pointed at somebody else.
+    IP addresses are always accepted, because DNS rebinding needs a name.
 
     Args:
-        names: Further names that the console is known by.
+        names: Additional host names of the console.
     """
     try:
         name = urlsplit(f"//{host}").hostname or ""
-    except ValueError:  # brackets around what is no address
+    except ValueError:  # brackets around something else than an address
         name = ""
     if name in _OWN_NAMES or name in {each.lower() for each in names}:
         return None
@@ -58,12 +59,12 @@ def refused_host(host: str, names: Collection[str]) -> str | None:
 
 
 def refused_origin(origin: str, host: str, *, secure: bool = False) -> str | None:
-    """Why an Origin is refused; None: it is the page's own.
+    """Return why an Origin is rejected; None if it is the page's own.
 
     Args:
-        secure: The page is served over TLS: one of this name without is somebody else's.
+        secure: The page is served over TLS, so an origin of the same name without TLS is another page.
     """
-    with contextlib.suppress(ValueError):  # brackets around what is no address
+    with contextlib.suppress(ValueError):  # brackets around something else than an address
         parts = urlsplit(origin)
         if origin and parts.netloc.lower() == host.lower() and (parts.scheme == "https" or not secure):
             return None
@@ -71,13 +72,13 @@ def refused_origin(origin: str, host: str, *, secure: bool = False) -> str | Non
 
 
 def refused_body(scope: Scope, headers: Headers) -> tuple[int, str] | None:
-    """HTTP's status and why, where a body is too large by its own account, or there should be none.
+    """Return status and reason if a body is declared too large, or is not allowed; otherwise None.
 
-    What comes in pieces of unknown number is counted by those who read it.
+    The body's reader counts a chunked body, which declares no size.
     """
     lengths, pieces = headers.getlist("content-length"), headers.getlist("transfer-encoding")
     if lengths and pieces:
-        # Who stands before us may have ended the request elsewhere (RFC 9112, 6.1).
+        # A proxy before the console may have seen the end of the request elsewhere (RFC 9112, 6.1).
         return 400, "a request has a content-length or a transfer-encoding, not both"
     if scope["method"] in _READING:
         return (400, f"a {scope['method']} has no body") if pieces or lengths not in ([], ["0"]) else None
@@ -88,10 +89,10 @@ def refused_body(scope: Scope, headers: Headers) -> tuple[int, str] | None:
 
 
 class Guard:
-    """ASGI middleware: Host and Origin checked, bodies bounded, security headers on every answer.
+    """ASGI middleware that checks Host and Origin, limits bodies, and adds security headers to responses.
 
     Args:
-        secure: Served over TLS.
+        secure: The console is served over TLS.
     """
 
     def __init__(self, app: ASGIApp, names: Collection[str] = (), *, secure: bool = False) -> None:
@@ -101,7 +102,7 @@ class Guard:
         self._headers = SECURITY_HEADERS | ({"Strict-Transport-Security": _HSTS} if secure else {})
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes on what is allowed."""
+        """Forward a request that passes the checks; reject others."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
@@ -115,7 +116,7 @@ class Guard:
         if refused is None:
             await self._app(scope, receive, send_guarded)
         elif scope["type"] == "http":
-            # What else comes over this connection may be the rest of what was refused.
+            # Further bytes of this connection may be the rest of the rejected request.
             answer = PlainTextResponse(refused[1], status_code=refused[0], headers={"Connection": "close"})
             await answer(scope, receive, send_guarded)
         else:
@@ -127,10 +128,10 @@ class Guard:
             return 421, problem
         changing = scope["type"] == "websocket" or scope["method"] not in _READING
         if changing:
-            # A browser says so itself (of WebSockets not all say the same); whoever is none need not.
+            # Browsers send this header (not all for WebSockets); other clients need not.
             site = headers.get("sec-fetch-site", "same-origin")
             if scope["type"] == "http" and site != "same-origin":
-                return 403, "asked from another page than this one's"
+                return 403, "the request comes from another page"
             if problem := refused_origin(headers.get("origin", ""), host, secure=self._secure):
                 return 403, problem
         return refused_body(scope, headers) if scope["type"] == "http" else None

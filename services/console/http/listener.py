@@ -1,4 +1,4 @@
-"""Where the console listens: nobody has more connections than his share, and none holds much back."""
+"""The console's listening socket: limits connections per address, and keeps send buffers small."""
 
 import contextlib
 import errno
@@ -9,20 +9,20 @@ from typing import Any
 
 from services.errors import ListenError
 
-# What the system may hold back for a slow browser: a second of state, not a minute of it.
+# Send buffer of a connection: a second of state for a slow browser, not a minute.
 _SEND_BUFFER = 128 * 1024
-# And of that what has not even left: what waits here cannot be replaced by something newer.
+# The unsent part of it: newer samples cannot replace what is in this buffer.
 _UNSENT = 16 * 1024
-# Who takes nothing of what was sent for so long is gone, whatever it had asked for.
+# A browser that acknowledges nothing for this long is disconnected.
 _TAKES_WITHIN_MS = 60_000
 
 
 class Listener(socket.socket):
-    """A listening socket that drops what is beyond an address's share, before a byte is read.
+    """A listening socket that drops connections above an address's limit, before a byte is read.
 
     Attributes:
-        most: Connections in all.
-        most_of_one: Of one address.
+        most: Maximum number of connections.
+        most_of_one: Maximum number of connections from one address.
     """
 
     most = 768
@@ -33,7 +33,7 @@ class Listener(socket.socket):
         self._open: Counter[str] = Counter()
 
     def accept(self) -> tuple[socket.socket, Any]:
-        """The next connection that may be; as `socket.accept` where there is none.
+        """Return the next connection within the limits, like `socket.accept`.
 
         Raises:
             BlockingIOError: If there is none.
@@ -71,10 +71,10 @@ class _Counted(socket.socket):
 
 @contextlib.contextmanager
 def listening(host: str, port: int) -> Iterator[socket.socket]:
-    """A listening socket whose connections hold little back.
+    """Yield a listening socket with small send buffers.
 
     Raises:
-        ListenError: If the address is taken, or not ours.
+        ListenError: If the address is in use, or is not this machine's.
     """
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(

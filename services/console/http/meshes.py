@@ -1,4 +1,4 @@
-"""Link meshes for the page: asked of the mesh, kept by what they are."""
+"""Link meshes for the page: requested from their gateways, cached by their hash."""
 
 import contextlib
 import hashlib
@@ -13,26 +13,26 @@ from robomesh.errors import BusyError, KeyNameError, NoAnswerError, QuotaError, 
 from robomesh.session import Session
 
 _MOST_BYTES = 256 * 1024 * 1024
-# On a busy machine an answer can be lost: asking again costs less than an arm without a link.
+# A busy machine may lose a reply; a retry is better than an arm without a link.
 _TIMEOUTS_S = (3.0, 5.0, 10.0)
 _BUSY_AGAIN_S = 1.0
 
 
 class MeshCache:
-    """GLB bytes by their SHA-256, the least used forgotten first."""
+    """GLB bytes by their SHA-256; evicts the least recently used."""
 
     def __init__(self) -> None:
         self._meshes: OrderedDict[str, bytes] = OrderedDict()
         self._bytes = 0
 
     def get(self, sha256: str) -> bytes | None:
-        """The bytes with that hash, where they are kept."""
+        """Return the bytes with that hash, or None."""
         if sha256 in self._meshes:
             self._meshes.move_to_end(sha256)
         return self._meshes.get(sha256)
 
     def put(self, sha256: str, data: bytes) -> None:
-        """Keeps bytes."""
+        """Store bytes, and evict others if there are too many."""
         if sha256 not in self._meshes:
             self._meshes[sha256] = data
             self._bytes += len(data)
@@ -48,9 +48,9 @@ async def _ask(session: Session, key: str) -> bytes:
 
 
 async def mesh_response(request: Request, session: Session, cache: MeshCache) -> Response:
-    """Answers `GET /mesh/<site>/<robot>/<name>?sha=<SHA-256>`.
+    """Handle `GET /mesh/<site>/<robot>/<name>?sha=<SHA-256>`.
 
-    A mesh that is not what its hash says is an error, so an answer never has to be asked again.
+    A mesh with another hash is an error, so a browser may cache the response for good.
     """
     wanted = request.query_params.get("sha", "")
     data = cache.get(wanted)

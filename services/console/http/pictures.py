@@ -1,12 +1,13 @@
-"""Pictures for anything that reads HTTP: a view as MJPEG, as MP4 while it happens, or as a still.
+"""Pictures over HTTP: a view as MJPEG, as live MP4, or as a still.
 
     /video/<site>/<robot>/<view>.mjpeg    an <img>, a player
-    /video/<site>/<robot>/<view>.mp4      fragmented, of the packets that everybody watches
+    /video/<site>/<robot>/<view>.mp4      fragmented, from the shared video packets
     /image/<site>/<robot>/<view>.jpg      or .png
 
-As it is, a view is what everybody watches; `?width=&height=&fps=` asks the renderer for one of one's own.
-Who reads slowly is given the newest picture (of MP4: goes on at a key frame); who is gone, or reads no
-more, is watched for no more.
+Without a query it is the shared view; `?width=&height=&fps=` requests a view of that size and rate.
+A slow reader gets the newest picture (for MP4: continues at a key frame). The subscription ends when its
+reader
+disconnects or stops reading.
 """
 
 import asyncio
@@ -40,25 +41,25 @@ from services.console.errors import PictureError
 from services.console.http.png import png
 from services.console.http.streaming import Streamed
 from services.console.requested_views import Views, robot_key
-from services.console.websocket.framing import Moment
-from services.console.websocket.send_queues import Lane, NewestLane, VideoLane
-from services.console.websocket.shared_subscriptions import Feeds
+from services.console.websocket.framing import SampleBatch
+from services.console.websocket.send_queues import NewestQueue, SendQueue, VideoQueue
+from services.console.websocket.shared_subscriptions import SharedSubscriptions
 
 log = logging.getLogger(__name__)
 
 MJPEG = "multipart/x-mixed-replace"
 _BOUNDARY = "picture"
-_MOST_STREAMS, _MOST_OF_ONE = 64, 32  # of all readers, of one address
+_MOST_STREAMS, _MOST_OF_ONE = 64, 32  # in total, per address
 _MOST_STILLS = 32
 _STILL_WITHIN_S = 5.0
-# A stream's first picture; after it a picture comes at least twice a second while the renderer lives.
+# A stream's first picture; afterwards one comes at least twice a second while the renderer runs.
 _FIRST_WITHIN_S = 10.0
 _STALE_AFTER_S, _SILENT_S = 1.0, 10.0
-_STALE_AFTER = 2.0  # and in pictures that did not come
+_STALE_AFTER = 2.0  # in missed pictures
 _READS_WITHIN_S = 10.0
 _NO_STORE = {"Cache-Control": "no-store"}
 _BUSY_AGAIN_S = 1.0
-# An <img> would show the last picture for ever: this one says that it is old.
+# Shown when no picture comes, because an <img> would show the last one for ever.
 _STALE = (Path(__file__).parent / "stale.jpg").read_bytes()
 
 
@@ -71,7 +72,7 @@ class _View(NamedTuple):
 
 
 class _Size(NamedTuple):
-    """What is asked of a view; zeros: as the renderer has it."""
+    """Requested size and rate of a view; zero: the renderer's default."""
 
     width: int = 0
     height: int = 0
@@ -80,20 +81,20 @@ class _Size(NamedTuple):
 
 @dataclass
 class Pictures:
-    """The routes, and how many use them now.
+    """The routes, and the numbers of streams and stills.
 
     Attributes:
-        asker: In whose name something is asked for over HTTP.
+        asker: Returns the name for a request over HTTP.
     """
 
-    feeds: Feeds
+    subscriptions: SharedSubscriptions
     views: Views
     asker: Callable[[Scope], str]
     streams: Counter[str] = field(default_factory=Counter)  # by address
     stills: int = 0
 
     def routes(self) -> list[Route]:
-        """Of video and stills."""
+        """Return the routes of videos and stills."""
         return [
             Route("/video/{site}/{robot}/{view}.mjpeg", self.mjpeg, methods=["GET"]),
             Route("/video/{site}/{robot}/{view}.mp4", self.mp4, methods=["GET"]),
@@ -102,32 +103,32 @@ class Pictures:
         ]
 
     async def mjpeg(self, request: Request) -> Response:
-        """One JPEG after another, in the place of the one before."""
+        """Send one JPEG after another; each replaces the one before."""
         try:
             view = await self._view(request)
             stale_after_s = max(_STALE_AFTER_S, _STALE_AFTER / view.fps)
-            pieces = _parts(self.feeds, view.image, stale_after_s)
+            pieces = _mjpeg_parts(self.subscriptions, view.image, stale_after_s)
             return await self._stream(request, pieces, f"{MJPEG}; boundary={_BOUNDARY}")
         except PictureError as error:
             return _refused(error)
 
     async def mp4(self, request: Request) -> Response:
-        """Fragmented MP4, from the newest key frame on."""
+        """Send fragmented MP4, from the newest key frame on."""
         try:
             view = await self._view(request)
-            return await self._stream(request, _fragments(self.feeds, view.video), "video/mp4")
+            return await self._stream(request, _fragments(self.subscriptions, view.video), "video/mp4")
         except PictureError as error:
             return _refused(error)
 
     async def still(self, request: Request) -> Response:
-        """The newest picture as JPEG."""
+        """Send the newest picture as JPEG."""
         try:
             return Response(await self._still(request), media_type="image/jpeg", headers=_NO_STORE)
         except PictureError as error:
             return _refused(error)
 
     async def still_png(self, request: Request) -> Response:
-        """The newest picture as PNG."""
+        """Send the newest picture as PNG."""
         try:
             data = await asyncio.to_thread(png, await self._still(request))
         except PictureError as error:
@@ -140,7 +141,7 @@ class Pictures:
         self.stills += 1
         try:
             key = (await self._view(request)).image
-            with contextlib.closing(_Watch(self.feeds, key, NewestLane())) as watch:
+            with contextlib.closing(_Watch(self.subscriptions, key, NewestQueue())) as watch:
                 sample = await watch.next(_STILL_WITHIN_S)
             if sample is None:
                 raise PictureError(504, f"no picture of {key} came within {_STILL_WITHIN_S:g} s")
@@ -149,7 +150,7 @@ class Pictures:
             self.stills -= 1
 
     async def _view(self, request: Request) -> _View:
-        """The keys of the view that a request names."""
+        """Return the keys of the view that a request names."""
         path, size = request.path_params, _size(request.query_params)
         try:
             robot, view = robot_key(path["site"], path["robot"]), keys.check_chunk(path["view"], "view")
@@ -161,7 +162,7 @@ class Pictures:
         except NoAnswerError as error:
             raise PictureError(
                 503,
-                f"no renderer draws {path['site']}/{path['robot']}: is there such a robot, and does its "
+                f"no renderer answers for {path['site']}/{path['robot']}: is its name right, and does its "
                 f"renderer run? ({error})",
             ) from None
         except QuotaError as error:
@@ -169,10 +170,10 @@ class Pictures:
         except BusyError as error:
             raise PictureError(503, str(error), again_s=_BUSY_AGAIN_S) from None
         except RefusedError as error:
-            # An earlier renderer has no code.
+            # An earlier version of the renderer sends no code.
             if error.reason.code == codes.VIEW_NO_ROOM.name or str(error).startswith("no room: "):
                 raise PictureError(503, str(error)) from None
-            # Whether it was the view or the size.
+            # Find out whether the view or the size was rejected.
             status = 404
             if any(size):
                 with contextlib.suppress(BusError):
@@ -195,7 +196,7 @@ class Pictures:
         self.streams[address] += 1
         begun = False
         try:
-            # A status can be told only before the first byte.
+            # A status can be sent only before the first byte.
             try:
                 async with asyncio.timeout(_FIRST_WITHIN_S):
                     first = await anext(pieces)
@@ -206,7 +207,7 @@ class Pictures:
             if not begun:
                 await self._end(address, pieces)
         return Streamed(
-            _all(first, pieces),
+            _prepend(first, pieces),
             _NO_STORE,
             media_type=media_type,
             within_s=_READS_WITHIN_S,
@@ -215,48 +216,50 @@ class Pictures:
 
     async def _end(self, address: str, pieces: AsyncGenerator[bytes]) -> None:
         self.streams[address] -= 1
-        self.streams += Counter()  # forgets who has none
+        self.streams += Counter()  # removes zeros
         await pieces.aclose()
 
 
 class _Watch:
-    """One reader's watch of a key: what it reads next is the newest."""
+    """One reader's subscription to a key; reads the newest sample."""
 
-    def __init__(self, feeds: Feeds, key: str, lane: Lane) -> None:
-        self._feeds, self._key, self._lane = feeds, key, lane
+    def __init__(self, subscriptions: SharedSubscriptions, key: str, queue: SendQueue) -> None:
+        self._subscriptions, self._key, self._queue = subscriptions, key, queue
         self._ready = asyncio.Event()
-        feeds.join(key, self._push)
+        subscriptions.join(key, self._push)
 
     def close(self) -> None:
-        """Watches no more."""
-        self._feeds.leave(self._key, self._push)
+        """Unsubscribe."""
+        self._subscriptions.leave(self._key, self._push)
 
     async def next(self, within_s: float) -> Sample | None:
-        """What is to be read next; None: nothing came."""
+        """Return the next sample; None if none arrives in time."""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(within_s):
                 while True:
                     self._ready.clear()
-                    sample = self._lane.pop()
+                    sample = self._queue.pop()
                     if sample is not None:
                         return sample
                     await self._ready.wait()
         return None
 
-    def _push(self, moment: Moment) -> None:
-        for sample in moment.samples:
-            self._lane.push(sample)
+    def _push(self, batch: SampleBatch) -> None:
+        for sample in batch.samples:
+            self._queue.push(sample)
         self._ready.set()
 
 
-async def _all(first: bytes, pieces: AsyncGenerator[bytes]) -> AsyncGenerator[bytes]:
+async def _prepend(first: bytes, pieces: AsyncGenerator[bytes]) -> AsyncGenerator[bytes]:
     yield first
     async for piece in pieces:
         yield piece
 
 
-async def _parts(feeds: Feeds, key: str, stale_after_s: float) -> AsyncGenerator[bytes]:
-    with contextlib.closing(_Watch(feeds, key, NewestLane())) as watch:
+async def _mjpeg_parts(
+    subscriptions: SharedSubscriptions, key: str, stale_after_s: float
+) -> AsyncGenerator[bytes]:
+    with contextlib.closing(_Watch(subscriptions, key, NewestQueue())) as watch:
         sample = await watch.next(_FIRST_WITHIN_S)
         if sample is None:
             return
@@ -269,10 +272,10 @@ async def _parts(feeds: Feeds, key: str, stale_after_s: float) -> AsyncGenerator
             silent_s = silent_s + stale_after_s if sample is None else 0.0
 
 
-async def _fragments(feeds: Feeds, key: str) -> AsyncGenerator[bytes]:
-    """What came before now is shown at once, as its beginning: times are when a picture came."""
+async def _fragments(subscriptions: SharedSubscriptions, key: str) -> AsyncGenerator[bytes]:
+    """Yield MP4 fragments. Earlier frames are shown at the start: the times are those of arrival."""
     mp4 = FragmentedMp4()
-    with contextlib.closing(_Watch(feeds, key, VideoLane())) as watch:
+    with contextlib.closing(_Watch(subscriptions, key, VideoQueue())) as watch:
         while (sample := await watch.next(_SILENT_S)) is not None:
             try:
                 piece = b"".join(mp4.add(data, at) for data, at in _packets(sample))
@@ -299,31 +302,31 @@ def _jpeg(sample: Sample) -> bytes:
 
 
 def _size(query: QueryParams) -> _Size:
-    """What a query asks of a view; what is possible, the renderer knows.
+    """Return what a query requests of a view; the renderer checks the values.
 
     Raises:
-        PictureError: If it is not readable.
+        PictureError: If it cannot be parsed.
     """
     unknown = set(query) - set(_Size._fields)
     if unknown:
-        raise PictureError(400, f"?{sorted(unknown)[0][:20]}= is not known: width, height and fps are")
+        raise PictureError(400, f"?{sorted(unknown)[0][:20]}= is unknown: width, height and fps are right")
     text = query.get("fps", "0")
     try:
         fps = float(text)
     except ValueError:
-        raise PictureError(400, f"fps={text[:20]!r} is no number") from None
+        raise PictureError(400, f"fps={text[:20]!r} is not a number") from None
     return _Size(_pixels(query, "width"), _pixels(query, "height"), fps)
 
 
 def _pixels(query: QueryParams, name: str) -> int:
     text = query.get(name, "0")
     if not (text.isascii() and text.isdecimal() and len(text) < 6):
-        raise PictureError(400, f"{name}={text[:20]!r} is no number of pixels")
+        raise PictureError(400, f"{name}={text[:20]!r} is not a number of pixels")
     return int(text)
 
 
 def _endless(media_type: str) -> Response:
-    """What tells a stream's headers: it has no length."""
+    """Return the headers of a stream, which has no length."""
     response = Response(media_type=media_type, headers=_NO_STORE)
     del response.headers["content-length"]
     return response

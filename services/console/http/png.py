@@ -1,4 +1,4 @@
-"""A JPEG as PNG: what the renderer published, in a form that loses no more."""
+"""Conversion of the renderer's JPEG pictures to PNG."""
 
 import contextlib
 import io
@@ -9,21 +9,21 @@ from services.console.errors import PictureError
 
 
 def prepare() -> None:
-    """Reads what PNG is made with, so that the first picture does not wait for it."""
+    """Import PyAV in advance, so that the first picture is not delayed."""
     with contextlib.suppress(ImportError):
         import_module("av")
 
 
 def png(jpeg: bytes) -> bytes:
-    """The same picture as PNG.
+    """Convert a JPEG to PNG.
 
     Raises:
-        PictureError: If this console cannot, or it is no picture.
+        PictureError: If PyAV is missing, or the picture cannot be read.
     """
     try:
         import av
     except ImportError:
-        raise PictureError(503, "this console has no PyAV to make PNG with: ask for .jpg") from None
+        raise PictureError(503, "this console has no PyAV to make PNG: request .jpg instead") from None
     try:
         with av.open(io.BytesIO(jpeg), "r", format="mjpeg") as container:
             frame = next(container.decode(video=0))

@@ -1,10 +1,10 @@
 """Recordings over HTTP, fetched from their site's recorder piece by piece.
 
-    /recordings/<site>/<file>                  the file; Range, If-Range and HEAD as for any file
+    /recordings/<site>/<file>                  the file; Range, If-Range and HEAD are supported
     /recordings/<site>/<file>/thumbnail.jpg
-    /recordings/<site>/<file>/values.csv       joints and tool, a row a state
+    /recordings/<site>/<file>/values.csv       joints and tool, one row for each state
 
-What is sent is never more in memory than one piece, however large the file.
+Only one piece is in memory at a time, however large the file.
 """
 
 import contextlib
@@ -46,14 +46,14 @@ _RANGE = re.compile(r"bytes=(\d{0,19})-(\d{0,19})")
 
 
 class _Where(NamedTuple):
-    """Whose recorder is asked, and in whose name."""
+    """The recorder's site, and the asker's name for quotas."""
 
     site: str
     asker: str
 
 
 class _Recorded(NamedTuple):
-    """As `mcap_files.publisher_time.Recorded`."""
+    """The fields of a message that `mcap_files.publisher_time` needs."""
 
     topic: str
     received_ns: int
@@ -62,10 +62,10 @@ class _Recorded(NamedTuple):
 
 
 class Recordings:
-    """The routes, and how many use them now.
+    """The routes, and the number of downloads.
 
     Args:
-        asker: In whose name something is asked for over HTTP.
+        asker: Returns the name for a request over HTTP.
     """
 
     def __init__(self, session: Session, asker: Callable[[Scope], str]) -> None:
@@ -73,7 +73,7 @@ class Recordings:
         self._downloads = 0
 
     def routes(self) -> list[Route]:
-        """Of files, their thumbnails, and their values."""
+        """Return the routes of files, thumbnails and values."""
         return [
             Route("/recordings/{site}/{file}", self.file, methods=["GET"]),
             Route("/recordings/{site}/{file}/thumbnail.jpg", self.thumbnail, methods=["GET"]),
@@ -81,7 +81,7 @@ class Recordings:
         ]
 
     async def file(self, request: Request) -> Response:
-        """The file, or a range of it."""
+        """Send the file, or a range of it."""
         where, name = self._where(request), request.path_params["file"]
         try:
             first = await self._piece(where, schema.PieceRequest(file=name, length=1))
@@ -99,7 +99,7 @@ class Recordings:
             return Response(status_code=304, headers=headers)
         asked = request.headers.get("range", "")
         if asked and request.headers.get("if-range", tag) != tag:
-            asked = ""  # another file by now: all of it
+            asked = ""  # the file has changed: send all of it
         begin, end, status = 0, total, 200
         if (wanted := _RANGE.fullmatch(asked)) and (wanted[1] or wanted[2]):
             begin, end = _within(wanted[1], wanted[2], total)
@@ -116,21 +116,21 @@ class Recordings:
         return self._streamed(self._bytes(where, name, first.version, begin, end), headers, status)
 
     async def thumbnail(self, request: Request) -> Response:
-        """A picture of what was recorded."""
+        """Send a picture from the recording."""
         where, name = self._where(request), request.path_params["file"]
         asked = schema.PieceRequest(file=name, attachment="thumbnail.jpg", length=4 << 20)
         try:
             piece = await self._piece(where, asked)
         except BusError as error:
             return _refused(error)
-        # A part of an open file's name may be written again, so it is asked for again, and seldom sent.
+        # A recording's open part may be replaced, so browsers must revalidate; the body is seldom sent.
         headers = {"ETag": f'"{piece.version}"', "Cache-Control": "no-cache"}
         if request.headers.get("if-none-match") == headers["ETag"]:
             return Response(status_code=304, headers=headers)
         return Response(piece.data, media_type="image/jpeg", headers=headers)
 
     async def values(self, request: Request) -> Response:
-        """Joints and tool, a row a state."""
+        """Send joints and tool as CSV, one row for each state."""
         where, name = self._where(request), request.path_params["file"]
         try:
             info = await self._ask(where, "info", schema.RecordingQuery(file=name))
@@ -166,7 +166,7 @@ class Recordings:
             asked = schema.PieceRequest(file=name, offset=begin, length=min(_PIECE, end - begin))
             piece = await self._piece(where, asked)
             if piece.version != version or not piece.data:
-                # The answer has begun: only breaking it off tells.
+                # The status has been sent already, so breaking off is the only way to report it.
                 raise RecordingChangedError(f"{name} was written again while it was sent")
             begin += len(piece.data)
             yield piece.data
@@ -202,7 +202,7 @@ class Recordings:
         yield text.getvalue().encode()
 
     async def _messages(self, where: _Where, name: str, topic: str) -> AsyncIterator[tuple[_Recorded, bytes]]:
-        """All of a topic; as many as there may be of one time."""
+        """Yield all messages of a topic; any number may have the same time."""
         asked = schema.RangeRequest(file=name, topic=topic, most=_ROWS)
         while True:
             answer = await self._ask(where, f"range/{where.asker}", asked)
@@ -235,7 +235,7 @@ class Recordings:
 
 
 def _within(first: str, last: str, total: int) -> tuple[int, int]:
-    """The bytes of a range, the end not included; RFC 9110, 14.1.2."""
+    """Return the bytes of a range, without its end; RFC 9110, 14.1.2."""
     if not first:
         return max(total - int(last), 0), total
     end = total if not last else min(int(last) + 1, total)
@@ -243,7 +243,7 @@ def _within(first: str, last: str, total: int) -> tuple[int, int]:
 
 
 def _decoded(kind: type[AnyMessage], data: bytes) -> AnyMessage | None:
-    """None: whoever published it wrote something else; the rest of the recording is no worse."""
+    """Parse a message; None if it is invalid, so that the rest of the recording is still used."""
     try:
         return kind.FromString(data)
     except DecodeError:

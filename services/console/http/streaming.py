@@ -1,4 +1,4 @@
-"""An answer that comes piece by piece, and ends with its reader."""
+"""A streaming response with a time limit for its reader."""
 
 import asyncio
 import logging
@@ -11,7 +11,7 @@ log = logging.getLogger(__name__)
 
 
 class Streamed(StreamingResponse):
-    """Pieces, each sent once the one before has left."""
+    """A response that sends each piece after the one before has left."""
 
     def __init__(
         self,
@@ -23,17 +23,17 @@ class Streamed(StreamingResponse):
         status: int = 200,
         media_type: str | None = None,
     ) -> None:
-        """What is sent, and to whom it is told.
+        """Prepare the response.
 
         Args:
-            on_end: Called once, however it ends: a generator that was not begun tells nobody.
-            within_s: Who takes nothing for so long is sent no more [s].
+            on_end: Called once, also if the generator never starts.
+            within_s: The stream ends if its reader takes nothing for this long [s].
         """
         super().__init__(pieces, status_code=status, headers=headers, media_type=media_type)
         self._on_end, self._within_s = on_end, within_s
 
     async def stream_response(self, send: Send) -> None:
-        """Sends what comes; breaks off where nothing leaves."""
+        """Send the pieces; stop if the reader takes none in time."""
 
         async def timely(message: Message) -> None:
             async with asyncio.timeout(self._within_s):
@@ -42,6 +42,6 @@ class Streamed(StreamingResponse):
         try:
             await super().stream_response(timely)
         except TimeoutError:
-            log.info("a reader took nothing for %g s: it is sent no more", self._within_s)
+            log.info("a stream ended: its reader took nothing for %g s", self._within_s)
         finally:
             await self._on_end()

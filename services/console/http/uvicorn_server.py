@@ -1,4 +1,4 @@
-"""uvicorn as the console runs it: on a listener of ours, over TLS or not, until it is cancelled."""
+"""uvicorn as the console runs it: on a given socket, with or without TLS, until cancelled."""
 
 import asyncio
 import contextlib
@@ -12,25 +12,25 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from services.console.http.request_timeout import Connection
-from services.console.websocket.websocket_transport import Line
+from services.console.websocket.websocket_transport import WebSocketTransport
 from services.errors import ListenError
 
 log = logging.getLogger(__name__)
 
 _HANDSHAKE_WITHIN_S = 10.0
-# So a browser whose cable was pulled is gone after 20 s; a slow line's last answer may wait behind video.
+# A browser with a pulled cable is dropped after 20 s; on a slow line a pong may queue behind video.
 _PING_EACH_S = 5.0
 _PONG_WITHIN_S = 15.0
 _MOST_MESSAGE = 1 << 20
-_RENEWED_LOOK_EACH_S = 10.0
+_CERTIFICATE_CHECK_EVERY_S = 10.0
 
 
 def server_of(app: ASGIApp, tls: ssl.SSLContext | None) -> "Server":
-    """A server of an application."""
+    """Return a server for an application."""
     return Server(
         uvicorn.Config(
             app,
-            ws=Line,
+            ws=WebSocketTransport,
             ws_per_message_deflate=False,
             ws_max_size=_MOST_MESSAGE,
             ws_ping_interval=_PING_EACH_S,
@@ -40,7 +40,7 @@ def server_of(app: ASGIApp, tls: ssl.SSLContext | None) -> "Server":
             log_level="warning",
             access_log=False,
             server_header=False,
-            # Else who comes over loopback names any address, and tries passwords as another each time.
+            # Otherwise a client on loopback could name any address, and evade the limit on sign-in attempts.
             proxy_headers=False,
             timeout_graceful_shutdown=1,
             ssl_context_factory=None if tls is None else lambda *_: tls,
@@ -49,15 +49,15 @@ def server_of(app: ASGIApp, tls: ssl.SSLContext | None) -> "Server":
 
 
 class Server(uvicorn.Server):
-    """uvicorn without its own signal handling: the service is cancelled instead."""
+    """uvicorn without its signal handling: cancelling the service ends it."""
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Leaves the signals to `robomesh.service.run`."""
+        """Leave signals to `robomesh.service.run`."""
         yield
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Listens; a TLS handshake is given as little time as a request."""
+        """Listen, with a time limit for TLS handshakes."""
         context: ssl.SSLContext | None = self.config.ssl
         self.servers = [
             await asyncio.get_running_loop().create_server(
@@ -75,30 +75,30 @@ class Server(uvicorn.Server):
 async def serve_until_cancelled(
     server: Server, listener: socket.socket, address: str, on_ready: Callable[[str], None] | None
 ) -> None:
-    """Serves until the running task is cancelled; `on_ready` is told the address once it can be opened."""
+    """Serve until the task is cancelled; call `on_ready` with the address once the page can be opened."""
     serving = asyncio.create_task(server.serve(sockets=[listener]))
     try:
         while not server.started and not serving.done():
-            await asyncio.sleep(0.005)  # uvicorn tells in no other way
+            await asyncio.sleep(0.005)  # uvicorn has no event for this
         log.info("console %s", address)
         if on_ready is not None:
             on_ready(address)
         await asyncio.shield(serving)
     finally:
         server.should_exit = True
-        server.force_exit = True  # browsers come back by themselves
+        server.force_exit = True  # browsers reconnect
         await asyncio.gather(serving, return_exceptions=True)
 
 
 def _no_password() -> str:
-    raise ValueError("nobody is there to type it")
+    raise ValueError("a key with a password cannot be used: no terminal to ask for it")
 
 
 def tls_context(certificate: Path, key: Path) -> ssl.SSLContext:
-    """TLS of a server: 1.2 at least.
+    """Return a server's TLS context, TLS 1.2 or later.
 
     Raises:
-        ListenError: If the files cannot be read, or do not belong together.
+        ListenError: If the files cannot be read, or the key does not belong to the certificate.
     """
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
@@ -118,19 +118,19 @@ def tls_context(certificate: Path, key: Path) -> ssl.SSLContext:
 
 
 async def follow_certificate(tls: ssl.SSLContext, certificate: Path, key: Path) -> None:
-    """Takes up a certificate that was renewed, until it is cancelled; open connections keep theirs."""
+    """Load renewed certificates until cancelled; open connections keep the old one."""
     seen = _versions(certificate, key)
     while True:
-        await asyncio.sleep(_RENEWED_LOOK_EACH_S)
+        await asyncio.sleep(_CERTIFICATE_CHECK_EVERY_S)
         if (now := _versions(certificate, key)) == seen:
             continue
         seen = now
         try:
-            tls_context(certificate, key)  # apart: half a change would leave none
+            tls_context(certificate, key)  # validate first: a half-written pair would leave none
             tls.load_cert_chain(certificate, key, password=_no_password)
             log.info("the console's certificate was renewed")
         except (ListenError, OSError) as error:
-            log.error("%s; the certificate before stays", error)
+            log.error("%s; the old certificate remains in use", error)
 
 
 def _versions(*paths: Path) -> list[tuple[int, int]]:

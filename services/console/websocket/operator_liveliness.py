@@ -1,7 +1,7 @@
-"""Whoever has control through a page is present on the mesh for as long as the page's connection lasts.
+"""Presence of operators: a liveliness token for as long as a page's connection lasts.
 
-The gateway ends a lease whose session is gone: a browser that was killed loses control at once, and
-not only when its lease's time is over. So does a player with a replay that a page has opened.
+The gateway ends a lease without its session: if a browser is killed, it loses control immediately, not
+when its lease expires. A player ends a replay that a page has opened in the same way.
 """
 
 import secrets
@@ -22,19 +22,19 @@ from robomesh.session import Session
 _ACTION = LeaseRequest.Action
 _GIVES_CONTROL = frozenset({_ACTION.ACQUIRE, _ACTION.ACCEPT, _ACTION.TAKE})
 _KEEPS_CONTROL = _GIVES_CONTROL | {_ACTION.RENEW}
-_HELD_S = 6.0  # no lease is given for longer
+_HELD_S = 6.0  # the longest lease
 _REQUEST = "lease/request/"
 _OPENS = "player/open"
 
 
 class OperatorPresence:
-    """The presence of one page's operator: a token for each robot under control, one for replays.
+    """The presence of one page's operator: a token for each robot under control, and for replays.
 
     Args:
-        own_name: The one operator that the page asks as; empty: any, without certificates.
+        own_name: The operator that the page acts as; empty if it may use any name, without certificates.
 
     Attributes:
-        id: Of the page's connection; the page puts it into its lease requests as `session`.
+        id: Identity of the page's connection; the page sends it as `session` in its lease requests.
     """
 
     def __init__(self, session: Session, own_name: str = "") -> None:
@@ -45,15 +45,15 @@ class OperatorPresence:
 
     @property
     def in_control(self) -> bool:
-        """Whether control of a robot was given or renewed just now."""
+        """True if control of a robot was granted or renewed within the longest lease."""
         return time.monotonic() - self._held_at < _HELD_S
 
     @contextmanager
-    def asking(self, key: keys.Key, payload: bytes) -> Iterator[None]:
-        """Around a request: present before control can be had, and no longer once it is not.
+    def during_request(self, key: keys.Key, payload: bytes) -> Iterator[None]:
+        """Keep the operator present during a request, and after it while it has control.
 
         Raises:
-            RefusedError: If it is asked for a lease with something else.
+            RefusedError: If the payload of a lease request is invalid.
         """
         site, robot, topic = key
         action: LeaseRequest.Action | None = None
@@ -68,7 +68,7 @@ class OperatorPresence:
         try:
             yield
         except BusError:
-            # Refused, or not answered: if it was done all the same, nobody knows of it.
+            # Refused or not answered; if it was granted without an answer, no client will use it.
             if new:
                 self._end(site, robot)
             raise
@@ -79,7 +79,7 @@ class OperatorPresence:
             self._held_at = time.monotonic()
 
     def close(self) -> None:
-        """The page is gone, or may have control no longer."""
+        """Withdraw all presence: the page is gone, or may no longer have control."""
         self._held_at = -_HELD_S
         for site, robot in tuple(self._tokens):
             self._end(site, robot)

@@ -1,6 +1,6 @@
-"""One browser on the page's WebSocket: what it watches goes down, what it asks goes up.
+"""One browser's WebSocket: sends watched samples, and forwards the page's requests.
 
-A slow browser slows nobody: its lanes keep the newest, and it is sent what fits its line.
+A slow browser delays no other: its send queues keep the newest samples, and it gets what its line can carry.
 """
 
 import asyncio
@@ -27,19 +27,19 @@ from services.console.accounts.rights import check_own_name, check_right, in_own
 from services.console.accounts.sessions import SignedIn
 from services.console.errors import WatchError
 from services.console.requested_views import Views
-from services.console.websocket.adaptive_video import SteppedVideo
+from services.console.websocket.adaptive_video import AdaptiveVideo
 from services.console.websocket.framing import (
     MOST_BEHIND,
     MOST_TOGETHER,
-    Moment,
+    SampleBatch,
     frame,
     state_frame,
     video_frame,
 )
 from services.console.websocket.operator_liveliness import OperatorPresence
-from services.console.websocket.send_queues import Lane, lane_for
-from services.console.websocket.shared_subscriptions import Feeds, check_expression
-from services.console.websocket.websocket_transport import Line, line_of
+from services.console.websocket.send_queues import SendQueue, queue_for
+from services.console.websocket.shared_subscriptions import SharedSubscriptions, check_expression
+from services.console.websocket.websocket_transport import WebSocketTransport, transport_of
 
 log = logging.getLogger(__name__)
 
@@ -47,84 +47,85 @@ _MOST_WATCHES = 1024
 _MOST_ASKS = 64
 _MOST_STOPS = 1024
 _LONGEST_KEY = 200
-# What waits for a page that does not read [bytes]: a large mesh's presence, and some large answers.
+# Limit of unread messages to a page [bytes]: a large mesh's presence, and some large answers.
 _MOST_UNREAD = 4 << 20
 _CLOSED_WITHIN_S = 1.0
-_LONGEST_ASK_S = 30.0  # a check of a program's motion
+_LONGEST_ASK_S = 30.0  # a collision check of a program
 _KEY_FRAME_EACH_S = 1.0
 _POLICY_VIOLATION, _LONGEST_REASON = 1008, 120
 
 
 class Browser:
-    """A browser's watches, lanes and questions.
+    """One browser's watches, send queues and pending requests.
 
     Args:
-        greet: What it is told at first, and whenever that has changed.
-        site: The console's own.
-        who: Is signed in there; None: the console has no accounts.
-        own_name: The one operator it asks as; empty: any, on a mesh that trusts its machine.
+        greet: Returns the greeting, which is sent again when it changes.
+        site: The console's own site.
+        who: The signed-in session; None: the console has no accounts.
+        own_name: The operator that the page acts as; empty if it may use any name, without certificates.
 
     Attributes:
-        operator: Who has control through it.
+        operator: Presence of the operator who has control through this page.
     """
 
     def __init__(
         self,
         session: Session,
-        feeds: Feeds,
+        subscriptions: SharedSubscriptions,
         views: Views,
         *,
         greet: Callable[["Browser"], ToPage],
         site: str,
-        who: SignedIn | None = None,
+        user: SignedIn | None = None,
         own_name: str = "",
     ) -> None:
         self.operator = OperatorPresence(session, own_name)
-        self.who, self.own_name = who, own_name
-        # Who is nobody asks as this connection, as its page does.
+        self.user, self.own_name = user, own_name
+        # Anonymous pages use the connection's id.
         self._asker = own_name or self.operator.id
         self._greet, self._site = greet, site
         self._session = session
-        self._feeds = feeds
+        self._subscriptions = subscriptions
         self._views = views
         self._watches: set[str] = set()
-        # State: what keeps step is sent as it came; once the line takes no more, it waits in lanes, until
-        # they are empty.
-        self._moments: deque[Moment] = deque()
+        # Samples of state are sent as they arrive. When the connection accepts no more, they wait in send
+        # queues,
+        # until these are empty.
+        self._batches: deque[SampleBatch] = deque()
         self._behind = False
-        self._lanes: dict[str, Lane] = {}
-        self._video: dict[str, SteppedVideo] = {}
-        # The lanes and views that have something to send; each in turn sends one sample.
-        self._waiting: dict[str, Lane | SteppedVideo] = {}
+        self._queues: dict[str, SendQueue] = {}
+        self._video: dict[str, AdaptiveVideo] = {}
+        # Send queues and views with samples; each in turn sends one.
+        self._waiting: dict[str, SendQueue | AdaptiveVideo] = {}
         self._key_frame_asked: dict[str, float] = {}
         self._messages: deque[bytes] = deque()
         self._unread = 0
         self._cut_off = False
         self._asks: set[asyncio.Task[None]] = set()
         self._websocket: WebSocket | None = None
-        self._line: Line | None = None
+        self._line: WebSocketTransport | None = None
         self._soon: asyncio.Handle | None = None
-        # Samples that came for it, and that were sent; the others were overtaken by newer ones.
+        # Number of samples for this browser, and of those sent; newer ones replaced the rest.
         self.offered = self.sent = 0
         self.greet()
 
     @property
     def in_control(self) -> bool:
-        """Whether control was had through it, and not given back."""
+        """True if the page got control and has not released it."""
         return self.operator.in_control
 
     def greet(self) -> None:
-        """Tells it what it is told at first."""
-        self.tell(self._greet(self))
+        """Send the greeting."""
+        self.send_message(self._greet(self))
 
     def rights_changed(self) -> None:
-        """The account may do more, or less: control that it may not have ends at once."""
-        if self.who is not None and not self.who.account.may_command:
+        """Apply changed rights: control without the right to it ends immediately."""
+        if self.user is not None and not self.user.account.may_command:
             self.operator.close()
         self.greet()
 
-    def tell(self, message: ToPage) -> None:
-        """Sends a message before any sample: greetings, answers, presence; a page has to read them."""
+    def send_message(self, message: ToPage) -> None:
+        """Queue a message ahead of samples (greeting, answer, presence); the page must read all of them."""
         self._cut_off = self._cut_off or self._unread > _MOST_UNREAD
         if not self._cut_off:
             self._messages.append(message.SerializeToString())
@@ -132,8 +133,8 @@ class Browser:
             self._serve_soon()
 
     async def run(self, websocket: WebSocket) -> None:
-        """Serves it until it goes."""
-        line = line_of(websocket)
+        """Serve the browser until it disconnects."""
+        line = transport_of(websocket)
         self._websocket, self._line = websocket, line
         line.on_ready = self._serve_soon
         self._serve_soon()
@@ -143,7 +144,7 @@ class Browser:
             pass
         except (WatchError, DecodeError) as error:
             log.warning("a browser was cut off: %s", error)
-            with contextlib.suppress(TimeoutError):  # who reads nothing is not told either
+            with contextlib.suppress(TimeoutError):  # a page that reads nothing does not get the reason
                 async with asyncio.timeout(_CLOSED_WITHIN_S):
                     await websocket.close(_POLICY_VIOLATION, _reason(error))
         finally:
@@ -176,76 +177,76 @@ class Browser:
         if len(self._watches) >= _MOST_WATCHES:
             raise WatchError(f"more than {_MOST_WATCHES} keys watched by one page")
         if check_expression(expression).history is History.KEY_FRAME:
-            self._video[expression] = SteppedVideo(
+            self._video[expression] = AdaptiveVideo(
                 expression,
-                self._feeds,
+                self._subscriptions,
                 self._views,
                 asker=self._asker,
-                on_frame=partial(self._frame_came, expression),
+                on_frame=partial(self._queue_frame, expression),
                 on_starved=self._want_key_frame,
             )
-            self._frame_came(expression)
+            self._queue_frame(expression)
         else:
-            self._feeds.join(expression, self._offer)
+            self._subscriptions.join(expression, self._offer)
         self._watches.add(expression)
 
     def _unwatch(self, expression: str) -> None:
         if expression not in self._watches:
             return
         self._watches.discard(expression)
-        # A later watch of the same video must begin with a key frame again.
+        # A new watch of the same video must begin with a key frame.
         video = self._video.pop(expression, None)
         if video is not None:
             video.close()
         else:
-            self._feeds.leave(expression, self._offer)
-            self._lanes.pop(expression, None)
+            self._subscriptions.leave(expression, self._offer)
+            self._queues.pop(expression, None)
         self._waiting.pop(expression, None)
 
-    def _offer(self, moment: Moment) -> None:
-        self.offered += len(moment.samples) + moment.overtaken
+    def _offer(self, batch: SampleBatch) -> None:
+        self.offered += len(batch.samples) + batch.overtaken
         if self._behind:
-            self._wait(moment)
+            self._wait(batch)
         else:
-            self._moments.append(moment)
-        self._feeds.turns.due(self._serve)
+            self._batches.append(batch)
+        self._subscriptions.scheduler.schedule(self._serve)
 
-    def _frame_came(self, expression: str) -> None:
+    def _queue_frame(self, expression: str) -> None:
         video = self._video.get(expression)
-        if video is not None:  # it is given what is held before it is kept here
+        if video is not None:  # None while the watch is being set up
             self._waiting[expression] = video
-            self._feeds.turns.due(self._serve)
+            self._subscriptions.scheduler.schedule(self._serve)
 
-    def _wait(self, moment: Moment) -> None:
-        """What the line does not take waits in lanes, where newer replaces older."""
+    def _wait(self, batch: SampleBatch) -> None:
+        """Put samples into send queues, where newer samples replace older ones."""
         self._behind = True
-        for sample in moment.samples:
-            lane = self._lanes.get(sample.key)
-            if lane is None:
-                lane = self._lanes[sample.key] = lane_for(topics.topic(sample.parsed.topic))
-            lane.push(sample)
-            self._waiting[sample.key] = lane
+        for sample in batch.samples:
+            queue = self._queues.get(sample.key)
+            if queue is None:
+                queue = self._queues[sample.key] = queue_for(topics.topic(sample.parsed.topic))
+            queue.push(sample)
+            self._waiting[sample.key] = queue
 
     def _serve_soon(self) -> None:
         if self._soon is None:
             self._soon = asyncio.get_running_loop().call_soon(self._serve)
 
     def _serve(self) -> None:
-        """Sends as much as the line takes."""
+        """Write as much as the connection accepts."""
         self._soon = None
         line = self._line
         if line is None:
             return
         while line.ready and (frames := self._frames()):
             line.write(frames)
-        while self._moments:
-            self._wait(self._moments.popleft())
-        if self._cut_off and not self._messages and self._websocket is not None:  # it has missed something
+        while self._batches:
+            self._wait(self._batches.popleft())
+        if self._cut_off and not self._messages and self._websocket is not None:  # messages were dropped
             self._keep(self._websocket.close(_POLICY_VIOLATION, "read too slowly"))
             self._websocket = None
 
     def _frames(self) -> bytes:
-        """What is given to the line at once; nothing: nothing waits."""
+        """Return the next write; empty if nothing is queued."""
         frames: list[bytes] = []
         size = 0
         most = MOST_BEHIND if self._behind else MOST_TOGETHER
@@ -255,24 +256,24 @@ class Browser:
         return b"".join(frames)
 
     def _next(self) -> bytes:
-        """The next to send: messages before any sample, state that keeps step before what waits."""
+        """Return the next frame: messages first, then current state, then send queues."""
         if self._messages:
             message = self._messages.popleft()
             self._unread -= len(message)
             return frame(message)
-        if self._moments:
-            moment = self._moments.popleft()
-            self.sent += len(moment.samples)
-            return moment.frames()
+        if self._batches:
+            batch = self._batches.popleft()
+            self.sent += len(batch.samples)
+            return batch.frames()
         while self._waiting:
             key = next(iter(self._waiting))
-            lane = self._waiting.pop(key)
-            sample = lane.pop()
+            queue = self._waiting.pop(key)
+            sample = queue.pop()
             if sample is None:
                 continue
-            self._waiting[key] = lane  # behind all others
-            if isinstance(lane, SteppedVideo):
-                return video_frame(sample, key=key, step=lane.step)
+            self._waiting[key] = queue  # after the others
+            if isinstance(queue, AdaptiveVideo):
+                return video_frame(sample, key=key, step=queue.step)
             self.sent += 1
             return state_frame(sample)
         self._behind = False
@@ -281,7 +282,7 @@ class Browser:
     def _want_key_frame(self, key: str) -> None:
         now = time.monotonic()
         if self._line is None or not self._line.ready:
-            return  # it would be made for all who watch, and this one takes nothing
+            return  # all viewers would get the key frame, but this one accepts no data
         if now - self._key_frame_asked.get(key, -_KEY_FRAME_EACH_S) < _KEY_FRAME_EACH_S:
             return
         self._key_frame_asked[key] = now
@@ -298,10 +299,10 @@ class Browser:
         most = _MOST_STOPS if ask.key.endswith("/stop") else _MOST_ASKS
         if len(ask.key) > _LONGEST_KEY:
             reason = codes.KEY_TOO_LONG(count=len(ask.key), most=_LONGEST_KEY)
-            self.tell(refusal(ask.id, reason.text, reason))
+            self.send_message(refusal(ask.id, reason.text, reason))
         elif len(self._asks) >= most:
             reason = codes.PAGE_TOO_MANY(count=most)
-            self.tell(refusal(ask.id, reason.text, reason))
+            self.send_message(refusal(ask.id, reason.text, reason))
         else:
             self._keep(self._answer(ask))
 
@@ -309,34 +310,34 @@ class Browser:
         try:
             key, row = parse_request(ask.key)
             asked = self._allowed(ask, key, row)
-            with self.operator.asking(key, asked):
+            with self.operator.during_request(key, asked):
                 payload = await self._session.ask_bytes(
                     key, asked, timeout_s=min(ask.timeout_s or 2.0, _LONGEST_ASK_S)
                 )
         except (RefusedError, NoAnswerError) as error:
-            # To the page a busy owner is a silent one: it asks again while its lease lasts.
+            # The page treats a busy service like a timeout: it retries while its lease lasts.
             no_answer = isinstance(error, NoAnswerError | BusyError)
             reason = error.reason if isinstance(error, RefusedError) else None
-            self.tell(refusal(ask.id, str(error), reason, no_answer=no_answer))
+            self.send_message(refusal(ask.id, str(error), reason, no_answer=no_answer))
         else:
             if row.request is ViewRequest:
                 self._learn_view(ask, key, payload)
-            self.tell(ToPage(answer=ToPage.Answer(id=ask.id, ok=True, payload=payload)))
+            self.send_message(ToPage(answer=ToPage.Answer(id=ask.id, ok=True, payload=payload)))
 
     def _allowed(self, ask: FromPage.Ask, key: keys.Key, row: topics.Request) -> bytes:
-        """What is asked, in the page's own name.
+        """Return the request's payload with the page's own operator name.
 
         Raises:
-            RefusedError: If this account may not.
+            RefusedError: If this account may not send it.
         """
-        if self.who is not None:
-            check_right(row, key, self.who, self._site)
+        if self.user is not None:
+            check_right(row, key, self.user, self._site)
         elif self.own_name:
             check_own_name(row, key, self.own_name)
         return in_own_name(row, ask.payload, self.own_name) if self.own_name else ask.payload
 
     def _learn_view(self, ask: FromPage.Ask, key: keys.Key, payload: bytes) -> None:
-        """What a page was given as a view of its own can be reduced like any other."""
+        """Remember a view that the page requested, so that it can be reduced like any other."""
         request, answer = ViewRequest.FromString(ask.payload), ViewAnswer.FromString(payload)
         self._views.learn(f"{keys.ROOT}/{key.site}/{key.robot}", request, answer)
 
@@ -357,7 +358,7 @@ async def _bytes(websocket: WebSocket) -> bytes:
 
 
 def _reason(error: Exception) -> str:
-    """In words, as many of them as a closing frame holds: it counts bytes."""
+    """Return the error's text, cut to the bytes that a close frame can hold."""
     return str(error).encode()[:_LONGEST_REASON].decode(errors="ignore")
 
 

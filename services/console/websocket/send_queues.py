@@ -1,7 +1,7 @@
-"""What waits for one browser, or is held for those still to come: per key, and never a queue.
+"""Send queues of a browser, and held samples for later browsers: bounded, one for each key.
 
-State: the newest value, and what came just before it. Lists (events, audit): the last few, in order.
-Video: the frames since a key frame; who falls behind goes on at the next key frame.
+State: the newest value, and those just before it. Lists (events, audit): the last entries, in order.
+Video: the frames since a key frame; a slow browser continues at the next key frame.
 """
 
 import functools
@@ -18,106 +18,106 @@ from robomesh.subscription import Sample
 from robomesh.topics import History, Topic
 
 LIST_LENGTH = 200
-# About two seconds of video: longer than the interval of key frames is late for ever.
+# About two seconds of video; longer than the interval of key frames would never catch up.
 _MOST_FRAMES = 75
-# A key frame lets a browser that is this far behind skip what it has not been sent.
+# With this many queued frames, a key frame replaces them.
 _SKIP_FROM = 6
 
-# A stall of the machine, not a slow line: at 100 Hz five states.
+# Covers a stall of the machine, at 100 Hz five states; a slow line gets the newest only.
 _RECENT_S, _MOST_RECENT = 0.05, 8
-# How far behind a page may draw.
+# Largest delay of a displayed state.
 _SHOWN_S = 0.1
 
 
-class Lane(Protocol):
-    """Samples of one key, on their way."""
+class SendQueue(Protocol):
+    """A queue of one key's samples."""
 
     def push(self, sample: Sample) -> None:
-        """Takes a sample; may drop older ones."""
+        """Add a sample; may drop older ones."""
 
     def pop(self) -> Sample | None:
-        """The next to send; None: nothing waits."""
+        """Return the next sample to send, or None."""
 
     def held(self) -> tuple[Sample, ...]:
-        """What is there now, in order."""
+        """Return the held samples, in order."""
 
 
-class NewestLane:
-    """State: a new value replaces one that was not sent."""
+class NewestQueue:
+    """A queue of state: a new value replaces an unsent one."""
 
     def __init__(self) -> None:
         self._sample: Sample | None = None
 
     def push(self, sample: Sample) -> None:
-        """Takes the newest."""
+        """Replace the sample."""
         self._sample = sample
 
     def pop(self) -> Sample | None:
-        """The newest, once."""
+        """Return the newest sample, once."""
         sample, self._sample = self._sample, None
         return sample
 
     def held(self) -> tuple[Sample, ...]:
-        """The newest."""
+        """Return the newest sample."""
         return () if self._sample is None else (self._sample,)
 
 
-class RecentLane:
-    """State, on its way: all of the last moment, so that a burst passes whole; of older ones the newest."""
+class RecentQueue:
+    """A queue of state that passes a short burst whole, and otherwise keeps the newest."""
 
     def __init__(self) -> None:
         self._samples: deque[Sample] = deque(maxlen=_MOST_RECENT)
 
     def push(self, sample: Sample) -> None:
-        """Takes the newest."""
+        """Add the newest sample."""
         self._samples.append(sample)
 
     def pop(self) -> Sample | None:
-        """The oldest of the last moment, or the newest."""
+        """Return the oldest recent sample, or the newest."""
         since = time.monotonic() - _RECENT_S
         while len(self._samples) > 1 and self._samples[0].received < since:
             self._samples.popleft()
         return self._samples.popleft() if self._samples else None
 
     def held(self) -> tuple[Sample, ...]:
-        """What waits."""
+        """Return the queued samples."""
         return tuple(self._samples)
 
 
-class ListLane:
-    """Entries in order. The list that a publisher answers with replaces all entries before it.
+class ListQueue:
+    """A queue of entries in order; a publisher's full list replaces all entries before it.
 
-    After an outage `Subscription` cuts the list of the same publisher to its new entries: these are appended.
+    After an outage `Subscription` cuts the list to its new entries; these are appended.
     """
 
     def __init__(self) -> None:
         self._samples: deque[Sample] = deque(maxlen=LIST_LENGTH)
 
     def push(self, sample: Sample) -> None:
-        """Takes an entry, or a list."""
-        if not sample.live and not (self._samples and _goes_on(self._samples[-1].header, sample.header)):
+        """Add an entry or a list."""
+        if not sample.live and not (self._samples and _continues(self._samples[-1].header, sample.header)):
             self._samples.clear()
         self._samples.append(sample)
 
     def pop(self) -> Sample | None:
-        """The oldest."""
+        """Return the oldest sample."""
         return self._samples.popleft() if self._samples else None
 
     def held(self) -> tuple[Sample, ...]:
-        """All."""
+        """Return all samples."""
         return tuple(self._samples)
 
 
-def _goes_on(before: Header, header: Header) -> bool:
-    """Whether a list holds only entries that are newer than the last sample."""
+def _continues(before: Header, header: Header) -> bool:
+    """Return whether a list continues after the last sample."""
     return header.publisher == before.publisher and header.sequence > before.sequence
 
 
-class VideoLane:
-    """Frames that can be decoded: from a key frame on, without a gap.
+class VideoQueue:
+    """A queue of decodable frames: from a key frame on, without a gap.
 
     Attributes:
-        starved: Frames come, but none can be sent before the next key frame.
+        starved: Frames arrive, but none can be sent before the next key frame.
     """
 
     def __init__(self) -> None:
@@ -126,7 +126,7 @@ class VideoLane:
         self.starved = False
 
     def push(self, sample: Sample) -> None:
-        """Takes a frame, or the frames since the last key frame."""
+        """Add a frame, or all frames since the last key frame."""
         if begins_video(sample):
             if self._gap or not sample.live or len(self._samples) >= _SKIP_FROM:
                 self._samples.clear()
@@ -140,50 +140,50 @@ class VideoLane:
             self.starved = True
 
     def pop(self) -> Sample | None:
-        """The oldest frame."""
+        """Return the oldest frame."""
         return self._samples.popleft()[1] if self._samples else None
 
     def held(self) -> tuple[Sample, ...]:
-        """Frames since the last key frame."""
+        """Return the frames since the last key frame."""
         return tuple(sample for _, sample in self._samples)
 
     def waited_s(self) -> float:
-        """How long the oldest frame has been waiting here [s]."""
+        """Return how long the oldest frame has waited here [s]."""
         return time.monotonic() - self._samples[0][0] if self._samples else 0.0
 
     def skip(self) -> None:
-        """Throws away what waits: it goes on at the next key frame."""
+        """Drop the queued frames; the video continues at the next key frame."""
         self._samples.clear()
         self._gap = True
 
 
-class HeldVideo(VideoLane):
-    """The frames that somebody who joins now needs: since the last key frame, sent or not."""
+class HeldVideoQueue(VideoQueue):
+    """The frames since the last key frame, for browsers that join."""
 
     def push(self, sample: Sample) -> None:
-        """As a lane, but a key frame makes all before it useless."""
+        """Add a frame; a key frame replaces all before it."""
         if begins_video(sample):
             self._samples.clear()
         super().push(sample)
 
 
-def lane_for(topic: Topic, *, hold: bool = False) -> Lane:
-    """The lane that a topic's samples take.
+def queue_for(topic: Topic, *, hold: bool = False) -> SendQueue:
+    """Return the queue for a topic's samples.
 
     Args:
-        hold: To keep them for browsers still to come.
+        hold: Hold them for browsers that join later.
     """
     match topic.history:
         case History.LAST_100:
-            return ListLane()
+            return ListQueue()
         case History.KEY_FRAME:
-            return HeldVideo() if hold else VideoLane()
+            return HeldVideoQueue() if hold else VideoQueue()
         case _:
-            return NewestLane() if hold else RecentLane()
+            return NewestQueue() if hold else RecentQueue()
 
 
-def thinned(topic: Topic, samples: Sequence[Sample]) -> Sequence[Sample]:
-    """What came together, without the state that is old for a display and has a newer."""
+def drop_outdated(topic: Topic, samples: Sequence[Sample]) -> Sequence[Sample]:
+    """Return samples without the states that are too old to display and have a newer one."""
     since = time.monotonic() - _SHOWN_S
     if topic.history is not History.LAST or not samples or samples[0].received > since:
         return samples
@@ -191,7 +191,7 @@ def thinned(topic: Topic, samples: Sequence[Sample]) -> Sequence[Sample]:
     return [each for each in samples if each.received > since or newest[each.key] is each]
 
 
-@functools.lru_cache(64)  # every page that watches a picture asks
+@functools.lru_cache(64)  # called for every viewer of a frame
 def begins_video(sample: Sample) -> bool:
-    """Whether a decoder can begin with this sample: a key frame, or the frames since one."""
+    """Return whether a decoder can begin with this sample: a key frame, or all frames since one."""
     return not sample.live or is_key_frame(CompressedVideo.FromString(sample.payload).data)

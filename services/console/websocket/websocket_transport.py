@@ -1,4 +1,4 @@
-"""A browser's connection that holds little back: what waits is in the lanes, where newer replaces older."""
+"""A browser's WebSocket with a small write buffer: samples wait in send queues, where newer replace older."""
 
 import asyncio
 from collections.abc import Callable
@@ -8,71 +8,69 @@ from starlette.websockets import WebSocket
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 _MOST_WAITING = 16 * 1024
-# Answers to pings that nobody reads [bytes], and parts of a message without end: more, and it is cut off.
-_MOST_HELD, _MOST_PARTS = 16 << 20, 1024
-# Among the extensions of a WebSocket's ASGI scope.
+# Limits: unread answers to pings [bytes], and parts of an unfinished message.
+_MAX_BUFFERED, _MOST_PARTS = 16 << 20, 1024
+# Key among the extensions of the ASGI scope.
 _LINE = "robomesh.line"
 
 
-class Line(WebSocketsSansIOProtocol):
-    """uvicorn's WebSocket, told to wait earlier: its own 64 KiB are seconds of a slow line.
+class WebSocketTransport(WebSocketsSansIOProtocol):
+    """uvicorn's WebSocket with a small write buffer; uvicorn's own 64 KiB are seconds on a slow line.
 
-    And with a way past ASGI for frames that are the same for many: each message on its own through it
-    costs ten times what it costs to write it.
+    It writes shared frames directly: passing each message through ASGI costs ten times as much as the write.
+
 
     Attributes:
-        on_ready: Called when it takes more again.
+        on_ready: Called when the connection accepts data again.
     """
 
     on_ready: Callable[[], None] | None = None
 
     @property
     def ready(self) -> bool:
-        """Whether it takes more now."""
+        """True if it accepts data now."""
         return self.writable.is_set() and self.open
 
     @property
     def open(self) -> bool:
-        """Whether anything can still be sent."""
+        """True while data can still be sent."""
         return not (self.disconnected or self.close_sent or self.transport.is_closing())
 
     def write(self, frames: bytes) -> None:
-        """Sends whole WebSocket frames of whole messages; on a line that is no longer open, nothing."""
+        """Write whole WebSocket frames of whole messages; does nothing on a closed connection."""
         if self.open:
             self.transport.write(frames)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """As uvicorn does, with less of a buffer."""
+        """Set a smaller write buffer than uvicorn's."""
         super().connection_made(transport)
         cast(asyncio.Transport, transport).set_write_buffer_limits(high=_MOST_WAITING)
 
     def resume_writing(self) -> None:
-        """As uvicorn does; and tells who serves the page."""
+        """Notify the connection's writer, too."""
         super().resume_writing()
         if self.on_ready is not None:
             self.on_ready()
 
     def keepalive_timeout(self) -> None:
-        """As uvicorn does, which would wait until all that is unread has been read."""
+        """Abort the connection; uvicorn would wait until all unread data is read."""
         super().keepalive_timeout()
         self.transport.abort()
 
     async def run_asgi(self) -> None:
-        """As uvicorn does; the application finds this line with `line_of`."""
+        """Put this connection into the scope, for `transport_of`."""
         self.scope["extensions"][_LINE] = {"line": self}
         await super().run_asgi()
 
     def data_received(self, data: bytes) -> None:
-        """As uvicorn does, which forgets an upgrade that cannot be read (it would stay open for ever), and
-        bounds neither the answers to pings nor the parts of a message.
-        """
+        """Close a failed upgrade, which uvicorn leaves open; limit pings' answers and parts of a message."""
         super().data_received(data)
         if self.conn.handshake_exc is not None and not self.handshake_initiated:
             self.transport.close()
-        elif self.transport.get_write_buffer_size() > _MOST_HELD or len(self.frames) > _MOST_PARTS:
+        elif self.transport.get_write_buffer_size() > _MAX_BUFFERED or len(self.frames) > _MOST_PARTS:
             self.transport.abort()
 
 
-def line_of(websocket: WebSocket) -> Line:
-    """The connection under a WebSocket."""
-    return cast(Line, websocket.scope["extensions"][_LINE]["line"])
+def transport_of(websocket: WebSocket) -> WebSocketTransport:
+    """Return the transport of a WebSocket."""
+    return cast(WebSocketTransport, websocket.scope["extensions"][_LINE]["line"])

@@ -1,8 +1,9 @@
-"""Turns at serving the pages: what comes between two of them goes out together.
+"""Scheduling of writes to pages: samples that arrive between two rounds are written together.
 
-A write to a page costs much the same with one state in it as with ten (TLS, the system's call, the page's
-own work). So with one page every state goes out as it comes, and the more pages there are, the more goes
-out at once: a quarter of a processor is spent on it, until a display would show that pages wait.
+A write costs about the same for one state as for ten (TLS, system call, the page's own work). With one page
+every
+state is written as it arrives; with more pages, more states share a write. The rounds use a quarter of a
+processor, as long as no page waits longer than a display's frame.
 """
 
 import asyncio
@@ -12,27 +13,27 @@ from collections.abc import Callable
 
 log = logging.getLogger(__name__)
 
-# Of a processor's time, for turns; but none is longer than a display shows a picture.
+# Share of a processor for the rounds; the pause between rounds is at most one frame of a display.
 _SHARE, _LONGEST_S = 0.25, 0.016
-# A stop that a page asks for waits no longer for the other pages.
+# Yield to the event loop this often, so that other pages do not delay a page's stop request.
 _LONGEST_AT_ONCE_S = 0.002
 
 
-class Turns:
-    """Who is to be served, and when."""
+class WriteScheduler:
+    """Pages that wait to be served, and the task that serves them."""
 
     def __init__(self) -> None:
         self._due: dict[Callable[[], None], None] = {}
         self._turn: asyncio.Task[None] | None = None
 
-    def due(self, serve: Callable[[], None]) -> None:
-        """Has a page served with the next turn; `serve` must return at once."""
+    def schedule(self, serve: Callable[[], None]) -> None:
+        """Serve a page in the next round; `serve` must not block."""
         self._due[serve] = None
         if self._turn is None:
             self._turn = asyncio.create_task(self._serve())
 
-    async def over(self) -> None:
-        """Waits until what is due has been served, and for the rest after it."""
+    async def wait_for_round(self) -> None:
+        """Wait until this round and its pause are over."""
         if self._turn is not None:
             await asyncio.shield(self._turn)
 
@@ -43,14 +44,14 @@ class Turns:
         for serve in due:
             try:
                 serve()
-            except Exception:  # of one page: it must not take the others' turn
+            except Exception:  # an error of one page must not affect the others
                 log.exception("a page could not be served")
             if time.monotonic() - at_once > _LONGEST_AT_ONCE_S:
                 spent_s += time.thread_time() - used_s
                 await asyncio.sleep(0)
                 used_s, at_once = time.thread_time(), time.monotonic()
         spent_s += time.thread_time() - used_s
-        # On a busy machine the turn itself was rest enough.
+        # On a busy machine the round itself was pause enough.
         rest_s = min(spent_s / _SHARE, _LONGEST_S) - (time.monotonic() - began)
         await asyncio.sleep(max(rest_s, 0.0))
         self._turn = asyncio.create_task(self._serve()) if self._due else None
