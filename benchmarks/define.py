@@ -44,7 +44,7 @@ async def measure(robot: str, checks: int) -> dict[str, float]:
             for _ in range(checks + 1):
                 begun = time.perf_counter()
                 request: dict[str, Any] = {"description": values, "joints": None}
-                await workshop.quick.do("check", lay_out(store, files), request)
+                await workshop.quick.run("check", lay_out(store, files), request)
                 times.append((time.perf_counter() - begun) * 1e3)
         finally:
             await workshop.close()

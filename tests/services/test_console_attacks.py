@@ -382,7 +382,7 @@ async def endlessly(writer, data):
 def test_a_page_whose_frames_never_end_is_cut_off_before_it_takes_memory(
     mesh, page, monkeypatch, begin, again
 ):
-    monkeypatch.setattr(websocket_transport, "_MOST_HELD", 1 << 20)
+    monkeypatch.setattr(websocket_transport, "_MAX_BUFFERED", 1 << 20)
     monkeypatch.setattr(uvicorn_server, "_PING_EACH_S", 300.0)  # it is not that it answers none
 
     async def main():

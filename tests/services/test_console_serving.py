@@ -54,7 +54,7 @@ class SharedSubscriptions:
         for moment in batches(samples):
             for sink in self.sinks:
                 sink(moment)
-        await self.scheduler.over()
+        await self.scheduler.wait_for_round()
 
 
 class WebSocketTransport:
@@ -184,11 +184,11 @@ def test_what_is_given_to_a_line_at_once_is_little_and_in_order():
 def test_a_page_that_cannot_be_served_takes_nobody_elses_turn(caplog):
     async def main():
         scheduler, served = WriteScheduler(), []
-        scheduler.due(lambda: 1 / 0)
-        scheduler.due(lambda: served.append(1))
-        await scheduler.over()
+        scheduler.schedule(lambda: 1 / 0)
+        scheduler.schedule(lambda: served.append(1))
+        await scheduler.wait_for_round()
         assert served == [1]
-        await scheduler.over()
+        await scheduler.wait_for_round()
 
     run(main())
     assert "could not be served" in caplog.text

@@ -76,7 +76,7 @@ def test_beyond_loopback_it_starts_with_accounts_and_tls_or_says_what_is_missing
 def test_a_renewed_certificate_is_taken_up_without_a_restart_and_half_a_one_is_not(
     mesh, page, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(uvicorn_server, "_RENEWED_LOOK_EACH_S", 0.02)
+    monkeypatch.setattr(uvicorn_server, "_CERTIFICATE_CHECK_EVERY_S", 0.02)
     certificate, key = self_signed(tmp_path)
     (tmp_path / "next").mkdir()
     renewed, renewed_key = self_signed(tmp_path / "next")

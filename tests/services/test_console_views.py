@@ -193,7 +193,7 @@ def test_who_cannot_be_given_less_is_not_asked_about_with_every_picture(monkeypa
 
 def test_who_takes_all_again_is_given_more_later_and_less_soon_after_too_much(monkeypatch):
     async def main():
-        monkeypatch.setattr(adaptive_video, "_MIND_EACH_S", 0.0)
+        monkeypatch.setattr(adaptive_video, "_ADAPT_EVERY_S", 0.0)
         clock, feeds = Clock(monkeypatch), SharedSubscriptions()
         video = watch(feeds)
 
