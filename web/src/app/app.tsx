@@ -1,4 +1,4 @@
-// What is on every screen: where one is, what is wrong, and STOP, always in the same place.
+// Frame of every page: links, alarms, banners, and STOP in a fixed place.
 
 import { signal } from "@preact/signals";
 import type { ComponentType } from "preact";
@@ -21,7 +21,7 @@ import { Missing } from "../ui/robot-not-found";
 import { type Route, robotLink, robotOf, route } from "../ui/route";
 import { switchTheme, theme } from "../ui/theme";
 
-/** A page that is loaded when it is first shown. */
+/** Return a component that loads its page when it is first shown. */
 function onDemand<Props>(load: () => Promise<ComponentType<Props>>) {
   const loaded = signal<ComponentType<Props> | null>(null);
   const failed = signal(false);
@@ -39,7 +39,7 @@ function onDemand<Props>(load: () => Promise<ComponentType<Props>>) {
   };
 }
 
-/** A console that was renewed has other files. */
+/** The message for a page whose files a newer console no longer has. */
 function NotLoaded() {
   return (
     <div class="empty" role="alert">
@@ -51,7 +51,7 @@ function NotLoaded() {
   );
 }
 
-// The robot's page brings three.js: the fleet's words do not wait for it.
+// The robot's page needs three.js; the fleet's text must not wait for it.
 const Robot = onDemand(async () => (await import("../features/robot/robot")).Robot);
 const ReplayRobot = onDemand(async () => (await import("../features/recordings/replay-robot")).ReplayRobot);
 const Program = onDemand(async () => (await import("../features/program/program")).Program);
@@ -68,13 +68,13 @@ export function App() {
   const notFound = robot !== null && !canBe(robot);
   const key = robot && !notFound ? `robomesh/${robot.site}/${robot.robot}` : null;
   const replay = robot !== null && isReplay(robot.robot);
-  // Control does not outlive the robot's pages; between them it stays.
+  // Keep control between a robot's pages, release it when leaving them.
   useEffect(() => () => void release(), [key]);
   const page = shown.page === "fleet" || shown.page === "robot" ? "" : t(shown.page);
   const title = [notFound ? "" : robot?.robot, page, "robomesh"].filter(Boolean).join(" · ");
   useEffect(() => void (document.title = title), [title]);
   useStopKey();
-  // Nothing of a replay is live: STOP stays that of the robots that are.
+  // A replay has nothing to stop: STOP stays with the live robots.
   const robots = key && !replay ? [key] : fleetRobots.value;
   return (
     <>
@@ -165,7 +165,7 @@ function Crumbs({ page, site, robot }: { page: Route["page"]; site: string; robo
   );
 }
 
-/** The pages, in a row; where that has no place, in a menu that names the one that is shown. */
+/** Links to the pages in a row; on a narrow screen, in a menu with the name of the current page. */
 function PageLinks({ current }: { current: Route["page"] }) {
   const menu = useRef<HTMLDetailsElement>(null);
   const close = () => menu.current?.removeAttribute("open");
@@ -219,7 +219,7 @@ function StopButton({ robots }: { robots: readonly string[] }) {
   );
 }
 
-/** Space asks for a stop while this tab is in control, wherever the focus is, typing excepted. */
+/** Request a stop on Space while this tab is in control, except while the operator types. */
 function useStopKey(): void {
   useEffect(() => {
     const isTyping = (target: EventTarget | null) =>
@@ -228,7 +228,7 @@ function useStopKey(): void {
     const onKey = (event: KeyboardEvent) => {
       const mine = held.value;
       if (event.code !== "Space" || !mine || isTyping(event.target)) return;
-      event.preventDefault(); // nor does it press the button that has the focus
+      event.preventDefault(); // nor press the focused button
       event.stopPropagation();
       if (event.type === "keydown" && !event.repeat) void stop([mine.robotKey]);
     };
@@ -243,7 +243,7 @@ function useStopKey(): void {
 
 function Banners() {
   const lost = lostAt.value;
-  if (mustSignIn.value) return null; // what there is to say stands there
+  if (mustSignIn.value) return null; // the sign-in page says it
   return (
     <div class="banners">
       {lost === 0 && <div class="banner connecting">{t("connecting")}</div>}

@@ -1,25 +1,25 @@
-// Who is signed in on this page, and the console's word on it.
+// The signed-in account of this page, and requests to the console about it.
 
 import { computed, signal } from "@preact/signals";
 import { hello } from "./connection";
 
 export interface Me {
-  /** Whether this console has accounts at all. */
+  /** Whether this console has accounts. */
   accounts: boolean;
   site: string;
   secure: boolean;
   insecure: boolean;
-  /** Empty: nobody is signed in. */
+  /** Empty: not signed in. */
   account: string;
   role: "" | "monitor" | "operator" | "admin";
   operator: string;
   may_command: boolean;
-  /** The right to command rests until the password is given again. */
+  /** The right to command is suspended until the password is given again. */
   resting: boolean;
   session: string;
 }
 
-/** A request that was refused; `word` is the server's, for the page. */
+/** A refused request; `word` is the server's code for the page. */
 export class AccountError extends Error {
   constructor(
     readonly word: string,
@@ -31,26 +31,26 @@ export class AccountError extends Error {
 }
 
 const ACTIVE_EACH_MS = 60_000;
-const ANSWERED_WITHIN_MS = 10_000; // else a page on a dead line would wait for it, and try no other
+const ANSWERED_WITHIN_MS = 10_000; // without it a page on a dead connection would wait and not reconnect
 
 /** Null: not known yet. */
 export const me = signal<Me | null>(null);
-/** Why the last session of this page ended, in the server's word; empty: there was none. */
+/** Why this page's last session ended, as the server's code; empty: it had none. */
 export const endedBy = signal("");
 export const mustSignIn = computed(() => !!me.value?.accounts && !me.value.account);
-/** Whether this account may ask for control, were it not for what rests. */
+/** Whether the account's role never permits control. */
 export const onlyWatches = computed(() => me.value?.role === "monitor");
 export const rests = computed(() => !!hello.value?.account && !hello.value.mayCommand && !onlyWatches.value);
 
 let connects: () => void = () => undefined;
 
-/** Asks the console who one is; null: it does not answer. */
+/** Ask the console which account is signed in; null: no answer. */
 export async function whoAmI(): Promise<Me | null> {
   try {
     const answer = await fetch("/account/me", { cache: "no-store", signal: AbortSignal.timeout(ANSWERED_WITHIN_MS) });
     if (!answer.ok) return null;
     const told = (await answer.json()) as Me;
-    // A console that was started anew knows no sessions.
+    // A restarted console knows no sessions.
     if (me.value?.account && !told.account) endedBy.value ||= "restart";
     me.value = told;
     return told;
@@ -59,16 +59,16 @@ export async function whoAmI(): Promise<Me | null> {
   }
 }
 
-/** The page's connection was ended with its session. */
+/** Handle the end of the page's connection with its session. */
 export function signedOut(word: string): void {
   endedBy.value = word || "signed_out";
   if (me.value) me.value = { ...me.value, account: "", role: "", operator: "", may_command: false, session: "" };
   void whoAmI();
 }
 
-/** Posts to `/account/...`.
+/** Post to `/account/...`.
  *
- * @throws AccountError with the server's word and text. */
+ * @throws AccountError with the server's code and text. */
 export async function post<Answer>(path: string, body: object = {}): Promise<Answer> {
   let answer: Response;
   try {
@@ -100,7 +100,7 @@ export async function signOut(everywhere: boolean): Promise<void> {
   signedOut("signed_out");
 }
 
-/** Tells the console that a person is here, once a minute at most: otherwise the right to command rests. */
+/** Report activity to the console, at most once a minute: without it the right to command is suspended. */
 export function followPerson(connect: () => void): void {
   connects = connect;
   let told = 0;

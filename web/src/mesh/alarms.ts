@@ -1,4 +1,4 @@
-// The alarms of every site, after ISA-18.2, as each site's watch tells them; what a person does about them.
+// Alarms of every site, after ISA-18.2, from each site's watch, and the operator's actions on them.
 
 import { fromBinary } from "@bufbuild/protobuf";
 import { timestampMs } from "@bufbuild/protobuf/wkt";
@@ -23,7 +23,7 @@ export const PRIORITIES = [Priority.CRITICAL, Priority.HIGH, Priority.MEDIUM, Pr
 
 const lists = signal<ReadonlyMap<string, Latest<AlarmList>>>(new Map());
 
-/** Follows them for as long as the page is there: the header counts them everywhere. */
+/** Follow the alarms while the page is open; the header counts them on every page. */
 export function followAlarms(): () => void {
   return watch("robomesh/*/-/alarms", (sample) => {
     const site = sample.key.split("/")[1] ?? "";
@@ -32,10 +32,10 @@ export function followAlarms(): () => void {
   });
 }
 
-// What nobody knows yet asks first.
+// Unacknowledged alarms come first.
 const STATES = [State.UNACKNOWLEDGED, State.RETURNED, State.ACKNOWLEDGED, State.SHELVED];
 
-/** Every alarm, the most urgent first. */
+/** Every alarm, most urgent first. */
 export const alarms = computed<readonly Alarm[]>(() =>
   [...lists.value]
     .flatMap(([site, { message }]) => message.alarms.map((alarm) => ({ ...alarm, site: alarm.site || site })))
@@ -44,7 +44,7 @@ export const alarms = computed<readonly Alarm[]>(() =>
     ),
 );
 
-/** Those that are not put aside and not over, by `robomesh/<site>/<robot>`. */
+/** Active alarms that are not shelved, by `robomesh/<site>/<robot>`. */
 export const alarmsOf = computed(() =>
   Map.groupBy(
     alarms.value.filter(({ state }) => state === State.UNACKNOWLEDGED || state === State.ACKNOWLEDGED),
@@ -57,7 +57,7 @@ export const isUnacknowledged = ({ state }: Alarm): boolean =>
 
 export const unacknowledged = computed(() => alarms.value.filter(isUnacknowledged));
 
-/** How many alarms nobody has acknowledged, by priority, the most urgent first. */
+/** Number of unacknowledged alarms by priority, most urgent first. */
 export const counts = computed(() =>
   PRIORITIES.map((priority) => ({
     priority,
@@ -65,12 +65,12 @@ export const counts = computed(() =>
   })).filter(({ count }) => count > 0),
 );
 
-/** Sites whose alarms were known and are so no longer. */
+/** Sites whose alarms were known and no longer are. */
 export function silentSites(): string[] {
   return [...lists.value].filter(([, list]) => isStale("alarms", ageOf(list))).map(([site]) => site);
 }
 
-/** Whether any site tells its alarms. */
+/** Whether any site reports its alarms. */
 export const anyWatch = computed(() => lists.value.size > 0);
 
 export function lastMs({ last, since }: Alarm): number {
@@ -78,18 +78,18 @@ export function lastMs({ last, since }: Alarm): number {
   return stamp ? timestampMs(stamp) : 0;
 }
 
-/** One alarm among all sites'. */
+/** Identify an alarm among those of all sites. */
 export const nameOf = ({ site, id }: Alarm): string => `${site}/${id}`;
 
-/** The name that this page asks in; empty: nobody has given one. */
+/** The operator's name in this page's requests; empty: not given. */
 export const asker = computed(() => hello.value?.operator || operator.value.trim());
 
-/** Whether whoever is signed in may acknowledge at all; a console without accounts leaves it to the mesh. */
+/** Whether the signed-in account may acknowledge; without accounts the mesh decides. */
 export const mayAct = computed(() => !hello.value?.account || hello.value.mayCommand);
 
-/** Asks each site's watch for the same of its own alarms.
+/** Send a request to each site's watch for its own alarms.
  *
- * @throws AskError with the reason in words, of the first site that refused. */
+ * @throws AskError with the reason in words, from the first site that refused. */
 export async function act(
   chosen: readonly Alarm[],
   action: Action,

@@ -1,4 +1,4 @@
-// How near a robot is to what stands around it, and to itself: level and words.
+// Distance between a robot, its surroundings and its own links: level and words.
 
 import type { Clearance, Description } from "../gen/robomesh_pb";
 import { DescriptionSchema } from "../gen/robomesh_pb";
@@ -7,16 +7,16 @@ import { t } from "../i18n/texts";
 import type { Level } from "./robot-state";
 import { useTopic } from "./topics";
 
-/** The floor in a pair of two that are near each other; the contract's word. */
+/** The floor's name in a pair of near parts, as in the contract. */
 const FLOOR = "the floor";
 
-/** Height of the floor of a robot's cell, in the site's frame [m]; null: there is none. */
+/** Return the height of the floor of a robot's cell in the site's frame [m]; null: no floor. */
 export function floorOf({ floor, baseToSite }: Description): number | null {
-  // An older sender tells of none: the robot stands on it.
+  // Older gateways publish no floor: the robot stands on it.
   return floor ? (floor.height ?? null) : (baseToSite[11] ?? 0);
 }
 
-/** How much a robot's distance to fixtures and other robots asks to be looked at: of two robots, the larger counts. */
+/** Return the level of a robot's distance to fixtures and robots; of two robots' limits, the larger counts. */
 export function useClearanceLevel(robotKey: string, clearance: Clearance | undefined): Level {
   const [site, robot, link] = clearance?.second.split("/") ?? [];
   const ownKey = `${robotKey}/description`;
@@ -29,12 +29,12 @@ export function useClearanceLevel(robotKey: string, clearance: Clearance | undef
   return within("warningDistance") ? "warning" : "normal";
 }
 
-/** Two links of one arm: only touching counts. */
+/** Return the level of two links of one arm: only contact counts. */
 export function ownLevel(clearance: Clearance): Level {
   return clearance.distance <= 0 ? "alarm" : "normal";
 }
 
-/** "flange – table", "forearm – pt600-2 wrist": frame ids `<site>/<robot>/<link>`, `<site>/<fixture>` in words. */
+/** Return "flange – table", "forearm – pt600-2 wrist" for frame ids `<site>/<robot>/<link>`, `<site>/<fixture>`. */
 export function pairText({ first, second }: Clearance, robotKey: string): string {
   const [, site = "", robot = ""] = robotKey.split("/");
   const name = (frame: string) => {
@@ -45,7 +45,7 @@ export function pairText({ first, second }: Clearance, robotKey: string): string
   return `${name(first)} – ${name(second)}`;
 }
 
-/** "12.3 mm", or that they touch. */
+/** Return "12.3 mm", or that the parts touch. */
 export function distanceText({ distance }: Clearance): string {
   return distance <= 0 ? t("touching") : `${fixed(distance * 1000, 1)}\u202fmm`;
 }

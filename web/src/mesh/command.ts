@@ -1,4 +1,4 @@
-// Commands to the robot that this tab is in control of.
+// Commands to the robot that this tab controls.
 
 import { timestampFromMs } from "@bufbuild/protobuf/wkt";
 import { signal } from "@preact/signals";
@@ -20,18 +20,18 @@ export interface CommandValues {
 
 const VALID_MS = 1000;
 const ANSWERED_S = 2;
-// A program is checked before it is answered, and does not begin once nobody waits for the answer.
+// The gateway checks a program before it answers, and does not start it after this timeout.
 const CHECKED_S = 30;
 const MOTIONS: readonly Command[] = [Command.HOME, Command.MOVE_ABSOLUTE, Command.MOVE_RELATIVE, Command.RUN_PROGRAM];
 
-// It counts up under each lease, and so it may under all of them.
+// Sequence numbers rise within a lease, so one counter serves all leases.
 let lastId = 0n;
-/** The newest motion that was accepted; those before it go nowhere any more. */
+/** Number of the newest accepted motion; it supersedes all earlier ones. */
 export const newestMotion = signal(0n);
 
-/** Sends a command under the lease; what became of it, in words. Never sends without control.
+/** Send a command under the lease; return the outcome in words. Never sends without control.
  *
- * `positions`: where it leads the joints [rad] or [m], if anywhere. */
+ * `positions`: the motion's target joints [rad] or [m], if it has one. */
 export async function command(
   robotKey: string,
   name: Command,
@@ -59,7 +59,7 @@ export async function command(
     const answer = await ask(key, CommandRequestSchema, request, CommandAnswerSchema, withinS);
     const target = positions && { what, positions, id: request.id };
     if (answer.accepted && MOTIONS.includes(name)) newestMotion.value = request.id;
-    // An earlier gateway has the warning in its sentence alone.
+    // Older gateways put the warning only into their sentence.
     const mind = reasonText(answer.warning, answer.text.split("; mind: ")[1]);
     if (answer.accepted)
       tell({ kind: "done", text: t("sent", { what }), ...(mind && { mind }), ...(target && { target }) });
@@ -71,7 +71,7 @@ export async function command(
   }
 }
 
-/** A sentence with its full stop. */
+/** Return a sentence with its full stop. */
 const ended = (text: string): string => (/[.。]$/.test(text) ? text : t("sentence", { text }));
 
 export { Command };

@@ -1,4 +1,4 @@
-// The page's one WebSocket to the console's server: keys watched, requests asked.
+// The page's one WebSocket to the console: subscriptions and requests.
 
 import type { DescMessage, MessageInitShape, MessageShape } from "@bufbuild/protobuf";
 import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
@@ -9,7 +9,7 @@ import { t } from "../i18n/texts";
 import { ageClock } from "./age-clock";
 import { lateness } from "./delay";
 
-/** A publication as it came. Times are on this page's monotonic clock, in ms; ages on that of `ageClock`. */
+/** A received publication. Times are on this page's monotonic clock [ms]; ages on `ageClock`. */
 export interface Sample {
   key: string;
   payload: Uint8Array;
@@ -19,17 +19,17 @@ export interface Sample {
   sourceTime: number;
   live: boolean;
   arrived: number;
-  /** When it was new, on the clock of ages; null: its age is not known. */
+  /** When the data was new, on the clock for ages; null: its age is not known. */
   newAt: number | null;
-  /** Of video: how much less than was asked for, because this browser's line takes no more; 0: as asked for. */
+  /** Video: how much the console reduced it because this browser's connection is slow; 0: not reduced. */
   step: number;
 }
 
-/** A request that was refused or not answered; the text is for people. */
+/** A request that was refused or not answered; the text is for the operator. */
 export class AskError extends Error {
-  /** Nobody answered: it was not refused, and may even have been done. */
+  /** No answer arrived: the request was not refused, and may have been carried out. */
   readonly noAnswer: boolean;
-  /** Why it was refused, where its owner says it by a code. */
+  /** The refusal's reason, if its owner gave a code. */
   readonly reason: Reason | undefined;
 
   constructor(text: string, noAnswer: boolean, reason?: Reason) {
@@ -41,36 +41,36 @@ export class AskError extends Error {
 
 type Listener = (sample: Sample) => void;
 
-// As long as the console waits for this page. A line that is cut, or a machine that slept, tells nobody.
+// The console waits as long for this page. A cut connection or a sleeping machine sends no notice.
 const QUIET_MS = 5000;
 const ANSWERED_WITHIN_MS = 15_000;
 const LOOK_EACH_MS = 1000;
 const PRESENCE_EACH_MS = 20;
-/** The console ended the session that this page belongs to; the reason says why. */
+/** The console ended this page's session; the reason says why. */
 const SIGNED_OUT = 4401;
 
 export const hello = signal<ToPage_Hello | null>(null);
-/** Keys of the liveliness tokens that are alive. */
+/** Keys of the live liveliness tokens. */
 export const presence = signal<ReadonlySet<string>>(new Set());
-/** When the connection was lost (ms since the Unix epoch); null while there is one; 0 before the first. */
+/** When the connection was lost (ms since the Unix epoch); null: connected; 0: not yet connected. */
 export const lostAt = signal<number | null>(0);
 
 const listeners = new Map<string, Set<Listener>>();
 const newest = new Map<string, Sample>();
-/** Of presence, not told yet. */
+/** Presence changes that subscribers have not received yet. */
 const changes = new Map<string, boolean>();
 const asked = new Map<bigint, { resolve: (payload: Uint8Array) => void; reject: (error: AskError) => void }>();
 let socket: WebSocket | null = null;
 let lastAsk = 0n;
 let retryMs = 250;
-/** When anything came [ms], and what ends a connection through which nothing does. */
+/** When the last message arrived [ms], and a function that closes an idle connection. */
 let heardAt = 0;
 let giveUp: () => void = () => undefined;
 
-/** Connects, and keeps connecting.
+/** Connect, and reconnect for ever.
  *
- * @param ready Whether whoever is here may connect now; null: the console does not answer.
- * @param ended Told that the session is over, and why. */
+ * @param ready Whether the page may connect now; null: the console does not answer.
+ * @param ended Called with the reason when the session has ended. */
 export function keepConnected(ready: () => Promise<boolean | null>, ended: (why: string) => void): () => void {
   const again = () => {
     setTimeout(begin, retryMs);
@@ -89,7 +89,7 @@ function connect(again: () => void, ended: (why: string) => void): void {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
   const opened = new WebSocket(`${scheme}://${location.host}/mesh`);
   opened.binaryType = "arraybuffer";
-  let askedAt = performance.now(); // to open is to answer
+  let askedAt = performance.now(); // opening counts as an answer
   heardAt = 0;
   const heard = () => (heardAt = performance.now());
   const end = (code: number, reason: string) => {
@@ -112,12 +112,12 @@ function connect(again: () => void, ended: (why: string) => void): void {
       giveUp();
     } else if (at - heardAt > QUIET_MS) {
       askedAt = at;
-      send({ case: "ask", value: { id: ++lastAsk, key: "" } }); // no such request: it is answered at once
+      send({ case: "ask", value: { id: ++lastAsk, key: "" } }); // an invalid request is answered immediately
     }
   };
   const looking = setInterval(look, LOOK_EACH_MS);
   giveUp = () => {
-    opened.close(); // which would wait for the other end to say so too
+    opened.close(); // close() waits for the peer's close frame
     end(0, "");
   };
   opened.onopen = () => {
@@ -135,12 +135,12 @@ function connect(again: () => void, ended: (why: string) => void): void {
   opened.onclose = ({ code, reason }) => end(code, reason);
 }
 
-/** Opens the connection anew where nothing has come through it since a time of `performance.now`. */
+/** Reconnect if nothing was received since a time of `performance.now`. */
 export function reopenIfSilent(since: number): void {
   if (socket && heardAt < since) giveUp();
 }
 
-/** Hears every publication on a key expression until the returned function is called. */
+/** Receive every publication on a key expression until the returned function is called. */
 export function watch(expression: string, listener: Listener): () => void {
   const present = listeners.get(expression);
   if (present) {
@@ -160,12 +160,12 @@ export function watch(expression: string, listener: Listener): () => void {
   };
 }
 
-/** A request's key in this page's name: its account's or console's, else its connection's own. */
+/** Return a request's key in the name of the account or console, or else of this connection. */
 export function inOwnName(key: string): string {
   return `${key}/${hello.value?.operator || hello.value?.session || "page"}`;
 }
 
-/** Asks a request of the mesh.
+/** Send a request to the mesh.
  *
  * @throws AskError with the reason in words. */
 export async function ask<Q extends DescMessage, A extends DescMessage>(
@@ -182,7 +182,7 @@ export async function ask<Q extends DescMessage, A extends DescMessage>(
       reject(new AskError(t("not_connected"), true));
       return;
     }
-    // The server tells a time-out itself; this is for a server that says nothing any more.
+    // The server reports a timeout itself; this one is for a server that no longer answers.
     const timer = setTimeout(
       () => settle(id)?.reject(new AskError(t("timed_out", { seconds: timeoutS }), true)),
       timeoutS * 1000 + 1000,
@@ -233,10 +233,10 @@ function receive(bytes: Uint8Array): void {
       const before = newest.get(key);
       const repeated = before?.publisher === header.publisher && before.sequence === header.sequence;
       let newAt = null;
-      // A repeat (after a new connection, say) is as old as it was.
+      // A repeated sample, for example after reconnecting, keeps its age.
       if (repeated && before.newAt !== null) newAt = before.newAt;
       else if (live) {
-        // What the console's server knows of its age, or what it was late on the whole way to here.
+        // The age that the console's server knows, or the delay on the whole path to here.
         newAt = ageClock() - Math.max((ageS ?? 0) * 1000, lateness(key, header.publisher, header.sourceTime, arrived));
       }
       const sample = { key, payload, ...header, live, arrived, newAt, step };
@@ -249,7 +249,7 @@ function receive(bytes: Uint8Array): void {
   }
 }
 
-/** A new page is told of every process of the mesh: one by one, thousands would be copied thousands of times. */
+/** Add presence changes in batches: a new page receives every process of the mesh. */
 function settlePresence(): void {
   const keys = new Set(presence.value);
   for (const [key, alive] of changes) {
@@ -270,7 +270,7 @@ function readHeader(attachment: Uint8Array) {
   };
 }
 
-/** Whether a key expression (`*` stands for one chunk) covers a key. */
+/** Return whether a key expression (`*` matches one chunk) covers a key. */
 export function matches(expression: string, key: string): boolean {
   if (expression === key) return true;
   if (!expression.includes("*")) return false;

@@ -1,8 +1,8 @@
-// Control of one robot from this tab: asked for, taken, offered, accepted, renewed, given back, lost.
+// Control of one robot from this tab: request, take, offer, accept, renew, release, lose.
 //
-// Only a tab that is seen renews a lease: a hidden, frozen or closed one loses control by itself,
-// and the robot stops if its motion runs. A tab whose connection is gone has lost control at once.
-// A browser that was seen to be slow asks for longer leases, and is told when it was too slow all the same.
+// Only a visible tab renews a lease. A hidden, frozen or closed tab therefore loses control, and the robot
+// stops if it is moving. A tab that loses its connection has lost control immediately.
+// A browser that proved slow asks for longer leases, and shows a message if it was still too slow.
 
 import type { Timestamp } from "@bufbuild/protobuf/wkt";
 import { timestampMs } from "@bufbuild/protobuf/wkt";
@@ -14,13 +14,13 @@ import type { TextName } from "../i18n/texts";
 import { t } from "../i18n/texts";
 import { AskError, ask, hello, lostAt } from "./connection";
 
-/** What became of an action, in words, shown where the action was. */
+/** The outcome of an action, in words, shown beside the action. */
 export interface Notice {
   kind: "busy" | "done" | "refused" | "lost";
   text: string;
-  /** What the gateway's check warns of in what it did all the same. */
+  /** A warning of the gateway's check about an action that it carried out. */
   mind?: string;
-  /** Where what was sent leads the joints: the message ends with that motion. */
+  /** Target joints of the motion; the message disappears when they are reached. */
   target?: { what: string; positions: readonly number[]; id: bigint };
 }
 
@@ -29,26 +29,26 @@ export interface Held {
   robotKey: string;
   operator: string;
   lease: string;
-  /** The gateway's clock minus this page's monotonic clock [ms]; never ahead of the truth. */
+  /** The gateway's clock minus this page's monotonic clock [ms]; a lower bound. */
   clockMs: number;
-  /** When it ends unless renewed, on this page's clock [ms]. */
+  /** When the lease ends unless renewed, on this page's clock [ms]. */
   endsAt: number;
-  /** When it was asked for, on this page's clock [ms]. */
+  /** When this tab requested it, on this page's clock [ms]. */
   askedAt: number;
-  /** When it began, and when that was said, on the gateway's clock [ms]. */
+  /** When it began, and when the gateway reported that, on the gateway's clock [ms]. */
   since: number;
   saidAt: number;
 }
 
 const TTL_S = 2;
-const SLOW_TTL_S = 5; // the gateway gives no more
+const SLOW_TTL_S = 5; // the gateway's maximum
 const RENEW_EACH_MS = 650;
 const SLOW_GAP_MS = 500;
-const SLOW_FOR_MS = 60_000; // after such a gap
+const SLOW_FOR_MS = 60_000; // after a long gap
 const OPERATOR = "robomesh.operator";
 const OPERATOR_NAME = /^[A-Za-z0-9][A-Za-z0-9_.-]*$/;
 
-/** Where there are accounts, the account's; otherwise what one says. */
+/** The account's name, or without accounts the name that the operator gave. */
 export const operator = signal(localStorage.getItem(OPERATOR) ?? "");
 /** The lease that this tab holds; one robot at a time. */
 export const held = signal<Held | null>(null);
@@ -61,9 +61,9 @@ let beatAt = performance.now();
 let gaps: { ms: number; endedAt: number }[] = [];
 let beginning = false;
 let offeredTo = "";
-/** A lease that ended, until the gateway has said why. */
+/** An ended lease, until the gateway has given the reason. */
 let ended: Held | null = null;
-/** The lease that was lost last, and which one is there instead. */
+/** The lease that was lost last, and the lease that replaced it. */
 let lost: { mine: Held; to: string } | null = null;
 
 export function setOperator(name: string): void {
@@ -77,7 +77,7 @@ export function holds(robotKey: string): boolean {
 
 export function reasonOf(error: unknown): string {
   if (!(error instanceof Error)) return String(error);
-  // Where only the gateway's sentence is there, it says so too.
+  // Older gateways give only a sentence.
   const text = error.message.replace(/^Not (sent|run): /, "");
   return error instanceof AskError ? reasonText(error.reason, text) : text;
 }
@@ -86,7 +86,7 @@ export function ms(stamp: Timestamp | undefined): number {
   return stamp ? timestampMs(stamp) : 0;
 }
 
-/** The operator's name, where it can be one; says so where it cannot. */
+/** Return the operator's name if it is valid; otherwise show why it is not. */
 export function ownName(): string | null {
   const who = operator.value.trim();
   if (OPERATOR_NAME.test(who)) {
@@ -112,11 +112,11 @@ function ttlS(): number {
   return performance.now() < slowUntil ? SLOW_TTL_S : TTL_S;
 }
 
-/** Takes control of a robot that nobody is in control of. */
+/** Take control of a robot that no operator controls. */
 export const take = (robotKey: string) => begin(robotKey, Action.ACQUIRE);
-/** Takes control away from whoever has it, who is told the reason; a motion that runs is stopped. */
+/** Take control from another operator, who receives the reason; a running motion is stopped. */
 export const takeOver = (robotKey: string, reason: string) => begin(robotKey, Action.TAKE, reason);
-/** Accepts control that is offered. */
+/** Accept offered control. */
 export const accept = (robotKey: string) => begin(robotKey, Action.ACCEPT);
 
 async function begin(robotKey: string, action: Action, reason = ""): Promise<void> {
@@ -139,13 +139,13 @@ async function begin(robotKey: string, action: Action, reason = ""): Promise<voi
   beginning = false;
 }
 
-/** Asks whoever is in control for it; everybody sees it for half a minute. */
+/** Ask the operator in control for it; every page shows the request for half a minute. */
 export async function askFor(robotKey: string, holder: string, reason: string): Promise<void> {
   const who = ownName();
   if (who) await say(robotKey, who, Action.ASK, { reason }, t("asked", { name: holder }), "not_asked");
 }
 
-/** Offers control to another operator, or to nobody any more. */
+/** Offer control to another operator, or withdraw the offer. */
 export async function offer(to: string | null): Promise<void> {
   const mine = held.value;
   if (!mine) return;
@@ -210,7 +210,7 @@ async function renew(): Promise<void> {
   }
 }
 
-/** `known`: the reason is known here, and the gateway's would be no news. */
+/** `known`: this page knows the reason and does not need the gateway's. */
 function lose(reason: string, known = false): void {
   clearTimeout(renewing);
   ended = known ? null : held.value;
@@ -219,10 +219,10 @@ function lose(reason: string, known = false): void {
   controlNotice.value = { kind: "lost", text: t("control_lost", { text: reason }) };
 }
 
-// For everybody, beside the gateway's own words; a tab that is closed is hidden first.
+// Published with the release; a tab that is closed is hidden first.
 const putAway = () => release(t("released_hidden"), "window hidden or closed");
 
-/** Gives control back, where this tab has it; `reason` is for everybody. */
+/** Release control if this tab has it; every page shows `reason`. */
 export async function release(text: string = t("released"), reason = ""): Promise<void> {
   const mine = held.value;
   if (!mine) return;
@@ -232,11 +232,11 @@ export async function release(text: string = t("released"), reason = ""): Promis
   try {
     await askLease(mine.robotKey, mine.operator, Action.RELEASE, { lease: mine.lease, reason });
   } catch {
-    // It ends by itself in at most its time to live.
+    // The lease expires by itself within its time to live.
   }
 }
 
-/** Tells this tab what the mesh says of a robot's lease: another than ours means that ours has ended. */
+/** Compare the published lease with this tab's: a different one means that this tab's has ended. */
 export function seeLease(robotKey: string, lease: Lease): void {
   seeLoss(robotKey, lease);
   endLoss(robotKey, lease);
@@ -244,7 +244,7 @@ export function seeLease(robotKey: string, lease: Lease): void {
 
 function seeLoss(robotKey: string, lease: Lease): void {
   const mine = held.value ?? ended;
-  // What was said before ours began knows nothing of it.
+  // Messages from before this lease began do not know it.
   if (mine?.robotKey !== robotKey || ms(lease.timestamp) <= mine.saidAt) return;
   if (isOf(mine, lease)) return;
   if (held.value) {
@@ -263,7 +263,7 @@ function seeLoss(robotKey: string, lease: Lease): void {
         };
 }
 
-/** A loss is told of until somebody else is in control than was right after it. */
+/** Clear the message about a lost lease once another operator takes control. */
 function endLoss(robotKey: string, lease: Lease): void {
   if (lost?.mine.robotKey !== robotKey || ms(lease.timestamp) <= lost.mine.saidAt || isOf(lost.mine, lease)) return;
   const now = `${lease.holder} ${ms(lease.since)}`;
@@ -277,9 +277,9 @@ function isOf(mine: Held, lease: Lease): boolean {
   return lease.holder === mine.operator && ms(lease.since) === mine.since;
 }
 
-/** Gives control back when this tab is hidden, and knows it lost when the connection is.
+/** Release control when this tab is hidden; treat it as lost when the connection is.
  *
- * One that is closed says nothing: its connection ends, and its control with it, as everybody is told. */
+ * A closed tab sends nothing: its connection ends, its control with it, and every page is notified. */
 export function followThisTab(): void {
   hello.subscribe((greeting) => {
     if (greeting?.operator) operator.value = greeting.operator;
@@ -300,7 +300,7 @@ export function followThisTab(): void {
   }, 100);
 }
 
-/** Whether this page did nothing for most of a lease's time just now: then nobody else was late. */
+/** Return whether this page was inactive for most of a lease's time just now, so that it caused the delay itself. */
 function stoodStill(leaseMs: number): boolean {
   const now = performance.now();
   const recent = gaps.filter((each) => now - each.endedAt < leaseMs);

@@ -1,4 +1,4 @@
-// How late a sample comes to this page: the same rule as in `robomesh/delay.py`, for the page's own line.
+// Delay of a sample on its way to this page: the rule of `robomesh/delay.py`, for the page's own connection.
 
 interface Least {
   publisher: bigint;
@@ -9,15 +9,15 @@ interface Least {
 }
 const least = new Map<string, Least>();
 
-// The least lag may grow as fast as clocks part while one is being set, but not over a silence.
+// The smallest lag may grow as fast as a clock is slewed, but not during a silence.
 const DRIFT = 1e-3;
 const MOST_GROWN_MS = 1000;
-// Nothing waits longer on its way: a second sample that is later tells that the first was dated ahead.
+// No sample waits longer: a second, later one shows that the first was dated ahead.
 const MOST_WAITED_MS = 10_000;
 
-/** How much longer [ms] a sample was on its way than its publisher's quickest; `arrived` on any monotonic clock. */
+/** Return a sample's delay [ms] beyond its publisher's fastest; `arrived` is on any monotonic clock. */
 export function lateness(key: string, publisher: bigint, sourceTime: number, arrived: number): number {
-  // A recording played back has the times of then; and some publishers tell none.
+  // Replays carry the recording's times, and some publishers give none.
   if (sourceTime === 0 || key.includes("/replay-")) return 0;
   const lag = arrived - sourceTime;
   const before = least.get(key);
@@ -27,7 +27,7 @@ export function lateness(key: string, publisher: bigint, sourceTime: number, arr
   }
   const grown = Math.min(Math.max(arrived - before.at, 0), MOST_GROWN_MS) * DRIFT;
   const leastOfAll = before.lag + grown;
-  // A single sample dated ahead makes no other late.
+  // A single sample dated ahead must not make the others late.
   const ofTwo = Math.max(lag, before.last);
   const datedAhead = before.alone && lag - leastOfAll > MOST_WAITED_MS;
   const now = {

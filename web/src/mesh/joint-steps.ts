@@ -1,7 +1,7 @@
-// Steps of single joints by the ± buttons: one a press, in order, none lost, none twice.
+// Steps of single joints by the ± buttons: one for each press, in order, none lost or repeated.
 //
-// The controller adds a step to where the arm is when it reads it. So the next one is sent when the arm
-// rests where the last one leads: two quick presses of 1° are 2°, not something less.
+// The controller adds a step to the position at which it reads it. The next step is therefore sent when the
+// arm rests at the last target: two quick presses of 1° make 2°, not less.
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { Description_Joint } from "../gen/robomesh_pb";
@@ -23,16 +23,16 @@ interface Going extends Step {
   target: number;
   what: string;
   accepted: boolean;
-  /** What the gateway's check warned of. */
+  /** The warning of the gateway's check. */
   mind?: string;
 }
 
 export interface Steps {
   press: (index: number, offset: number) => void;
   waiting: number;
-  /** A step is under way: that the arm moves is no reason to refuse the next. */
+  /** A step is being carried out: its motion does not block the next. */
   going: boolean;
-  /** The step that was refused last, until the next press. */
+  /** The last refused step, until the next press. */
   refused: Step | null;
 }
 
@@ -41,7 +41,7 @@ export function useSteps(props: {
   joints: readonly Description_Joint[];
   current: readonly (number | undefined)[];
   enabled: boolean;
-  /** The controller does not say that it moves. */
+  /** The controller does not report whether it moves. */
   resting: boolean;
   tell: (notice: Notice) => void;
 }): Steps {
@@ -52,7 +52,7 @@ export function useSteps(props: {
 
   const count = useRef(0);
   count.current = waiting.length;
-  /** After a step that failed: what waits was meant to begin where it would have led. */
+  /** Drop the waiting steps after a failed one: they assumed that it reached its target. */
   const drop = (text: string) => {
     const dropped = count.current ? ` ${t("steps_dropped", { count: count.current })}` : "";
     tell({ kind: "refused", text: text + dropped });
@@ -90,7 +90,7 @@ export function useSteps(props: {
     void start(next);
   }, [going, waiting]);
 
-  // Each move on, by a twentieth of the step, begins the wait anew.
+  // Each advance by a twentieth of the step restarts the timeout.
   useEffect(() => {
     if (!going?.accepted) return;
     const joint = joints[going.index]?.name ?? "";

@@ -1,10 +1,10 @@
-// Which robots there are, by presence or by what they published; no replays.
+// Robots known by presence or by their publications; without replays.
 
 import { computed, signal } from "@preact/signals";
 import { presence } from "./connection";
 import { isReplay } from "./robot-name";
 
-/** In the service's place: presence of whoever is in control. */
+/** In the place of a service's name: presence of the operator in control. */
 export const OPERATOR = "operator";
 
 const seen = signal<ReadonlySet<string>>(new Set());
@@ -19,7 +19,7 @@ export const fleetRobots = computed<readonly string[]>(() => {
   return [...keys].filter((key) => !isReplay(key.split("/")[2] ?? "")).sort();
 });
 
-/** Takes note of the robots that keys of topics are of. */
+/** Remember the robots in the keys of topics. */
 export function seeRobots(topicKeys: Iterable<string>): void {
   const robots = [...topicKeys].map((key) => key.split("/").slice(0, 3).join("/"));
   if (robots.some((key) => !seen.value.has(key))) seen.value = new Set([...seen.value, ...robots]);

@@ -1,21 +1,21 @@
-// A message ends with what it is about: a motion's when the motion does, the others' after a while.
+// End of a message: with its motion if it is about one, otherwise after a time.
 
 import { useEffect, useRef } from "preact/hooks";
 import { t } from "../i18n/texts";
 import { newestMotion } from "./command";
 import type { Notice } from "./control";
 
-const REACHED = 0.002; // rad or m: half of what a person reads off
+const REACHED = 0.002; // rad or m: half of what the page displays
 const BEGINS_WITHIN_MS = 1500;
 const TOLD_MS = { done: 8_000, refused: 30_000 };
 
-/** What is known of the holder's motion. */
+/** The known state of the operator's motion. */
 export interface Motion {
-  /** It is under way, or on hold. */
+  /** A motion is running or on hold. */
   running: boolean;
-  /** A stop or a fault has ended it, and says so itself. */
+  /** A stop or a fault ended it, and is shown itself. */
   stopped: boolean;
-  /** Where the joints are [rad] or [m]. */
+  /** Joint positions [rad] or [m]. */
   positions: readonly (number | undefined)[];
 }
 
@@ -35,7 +35,7 @@ export function useNoticeEnd(notice: Notice | null, tell: (notice: Notice | null
     }
     if (stopped) return tell(null);
     const isThere = () => target.positions.every((each, i) => Math.abs(each - (positions.current[i] ?? NaN)) < REACHED);
-    // Another motion goes on from here: if this one was not done yet, it never will be, as was wanted.
+    // A later motion has begun: this one will not reach its target.
     if (overtaken)
       return tell(isThere() ? { kind: "done", text: t("motion_done", { what: target.what }), ...warned } : null);
     if (running) {
@@ -47,7 +47,7 @@ export function useNoticeEnd(notice: Notice | null, tell: (notice: Notice | null
       const text = t(there ? "motion_done" : "motion_ended", { what: target.what });
       tell({ kind: there ? "done" : "refused", text, ...warned });
     };
-    // The state that says so may still be on its way.
+    // The state that reports it may still be on its way.
     const timer = setTimeout(end, ran.current === notice ? 0 : BEGINS_WITHIN_MS);
     return () => clearTimeout(timer);
   }, [notice, running, stopped, overtaken]);

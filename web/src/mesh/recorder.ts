@@ -1,14 +1,14 @@
-// What is asked of a robot's recorder: begin, end, keep the last minutes.
+// Requests to a robot's recorder: start, stop, keep the last minutes.
 
 import type { Recording } from "../gen/robomesh_pb";
 import { RecorderRequest_Action as Action, RecorderRequestSchema, RecordingSchema } from "../gen/robomesh_pb";
 import { r } from "../i18n/recordings";
 import { AskError, ask } from "./connection";
 
-// Closing writes the file again.
+// Closing rewrites the file.
 const WITHIN_S = 20;
 
-/** Asks a robot's recorder.
+/** Send a request to a robot's recorder.
  *
  * @throws Error with the reason in words. */
 export async function askRecorder(

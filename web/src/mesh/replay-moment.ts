@@ -1,18 +1,18 @@
-// Whether what came last of a topic is of the moment at which a replay is: nothing of another is shown as of this one.
+// Whether a topic's last message belongs to the replay's current moment; others are not shown.
 
 import { useEffect, useState } from "preact/hooks";
 import { watch } from "./connection";
 import type { Replay } from "./replay";
 
-/** `coming`: the replay has just gone elsewhere, and what was recorded there may be on its way. */
+/** `coming`: the replay has just jumped, and data recorded there may be on its way. */
 export type OfMoment = "here" | "coming" | "absent";
 
 const COMES_WITHIN_MS = 2000;
 const LOOK_EACH_MS = 50;
-/** Passing to here takes time, in which a quick replay goes far [s]. */
+/** Time for messages to arrive, during which a fast replay advances far [s]. */
 const ON_ITS_WAY_S = 0.5;
 
-/** Follows a topic of a replay whose messages hold for so long [s]; an empty one is absent. */
+/** Follow a replay's topic whose messages are valid for a time [s]; an empty topic is absent. */
 export function useOfMoment(replay: Replay | null, topic: string, holdsS: number): OfMoment {
   const [state, setState] = useState<OfMoment>("coming");
   useEffect(() => {
@@ -20,7 +20,7 @@ export function useOfMoment(replay: Replay | null, topic: string, holdsS: number
     if (!replay || !topic) return;
     const opened = performance.now();
     let source: number | null = null;
-    let offset = 0; // of the recorder's clock to the publisher's [ms]
+    let offset = 0; // recorder's clock to the publisher's [ms]
     const away = (from: number) => replay.recordedMs() - from;
     const look = () => {
       const { playing, speed } = replay.state.peek();
@@ -32,7 +32,7 @@ export function useOfMoment(replay: Replay | null, topic: string, holdsS: number
     const stop = watch(`${replay.robotKey}/${topic}`, (sample) => {
       if (!sample.sourceTime) return;
       source = sample.sourceTime;
-      if (replay.steadyFor() > COMES_WITHIN_MS) offset = away(source); // in play each comes at its moment
+      if (replay.steadyFor() > COMES_WITHIN_MS) offset = away(source); // during playback each arrives at its moment
       look();
     });
     const timer = setInterval(look, LOOK_EACH_MS);

@@ -1,4 +1,4 @@
-// A replay: where it is, and what is asked of it.
+// A replay: its position, and requests to its player.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { fromBinary } from "@bufbuild/protobuf";
@@ -12,18 +12,18 @@ import { isStale, now } from "./topics";
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 20, 50, 100] as const;
 const WITHIN_S = 5;
 const FIRST_WITHIN_S = 0.5;
-const JUMP_S = 0.5; // farther from where it should be, and it has gone elsewhere
+const JUMP_S = 0.5; // a larger difference from the expected position is a jump
 
-/** Follows a replay until it is let go; times are in s from the recording's start. */
+/** Follow a replay until it is closed; times are in s from the recording's start. */
 export class Replay {
   readonly state;
-  /** Why the last request was not done, in words. */
+  /** Why the last request failed, in words. */
   readonly problem = signal("");
   private arrived = performance.now();
   private wanted: number | null = null; // a seek that is on its way
-  /** When it went elsewhere last, on the page's clock [ms]. */
+  /** When it last jumped, on the page's clock [ms]. */
   movedAt = performance.now();
-  private changedAt = performance.now(); // how it goes
+  private changedAt = performance.now(); // play, pause or speed
   private firstS = 0;
   seeking = false;
   private readonly stop: () => void;
@@ -40,7 +40,7 @@ export class Replay {
 
   private take(state: ReplayState, arrived: number): void {
     const [before, after] = [this.state.peek().timestamp, state.timestamp];
-    // What was told before the answer to a request is not what came of it.
+    // A report from before the answer does not include the request's effect.
     if (before && after && timestampMs(after) < timestampMs(before)) return;
     const was = this.state.peek();
     const jumped = Math.abs(state.positionS - this.position(arrived)) > JUMP_S * Math.max(1, state.speed);
@@ -50,28 +50,28 @@ export class Replay {
     this.state.value = state;
   }
 
-  /** Where it is now, between what it tells. */
+  /** Return the current position, extrapolated between reports. */
   position(at = performance.now()): number {
     if (this.wanted !== null) return this.wanted;
     const { positionS, playing, speed, durationS } = this.state.peek();
     return Math.min(durationS, positionS + (playing ? (Math.max(0, at - this.arrived) / 1000) * speed : 0));
   }
 
-  /** The recorded time at which it is [ms since the Unix epoch]. */
+  /** The recorded time of the current position [ms since the Unix epoch]. */
   recordedMs(): number {
     const { start } = this.state.peek();
     return (start ? timestampMs(start) : 0) + this.position() * 1000;
   }
 
-  /** For how long it has passed as time does [ms]; 0: it does not. */
+  /** How long it has played without a jump [ms]; 0: it is not playing. */
   steadyFor(): number {
     const { playing, speed } = this.state.peek();
     return playing && speed === 1 && !this.seeking ? performance.now() - this.changedAt : 0;
   }
 
-  /** Whether its player says nothing any more. */
+  /** Whether its player no longer reports. */
   get gone(): boolean {
-    void now.value; // it is what draws this again
+    void now.value; // triggers drawing
     return isStale("replay", (performance.now() - this.arrived) / 1000);
   }
 
@@ -84,13 +84,13 @@ export class Replay {
   readonly setSpeed = (speed: number): void => void this.request({ action: Action.SPEED, speed });
   readonly setLoop = (loop: boolean): void => void this.request({ action: Action.LOOP, loop });
 
-  /** Tells when its first joints came [s]: a little after its start, where nothing would be seen yet. */
+  /** Report when its first joints were recorded [s]: a little after its start, where nothing is visible yet. */
   beginAt(firstS: number): void {
     this.firstS = firstS < FIRST_WITHIN_S ? firstS : 0;
     if (!this.state.peek().playing && this.position() < this.firstS) this.seek(this.firstS);
   }
 
-  /** Goes to a time: one request is on its way at most, and after it the newest wish. */
+  /** Seek to a time: at most one request is on its way, followed by the newest wish. */
   readonly seek = (to: number): void => {
     this.wanted = Math.min(this.state.peek().durationS, Math.max(this.firstS, to));
     if (!this.seeking) void this.goThere();
@@ -120,12 +120,12 @@ export class Replay {
     }
   }
 
-  /** Follows it no more; it goes on for whoever else does. */
+  /** Stop following it; it continues for other pages. */
   letGo(): void {
     this.stop();
   }
 
-  /** Ends it. */
+  /** Stop the replay. */
   close(): void {
     this.stop();
     void this.request({ action: Action.CLOSE });

@@ -1,4 +1,4 @@
-// The name of a robot on the mesh: its site's, and its own at the site.
+// The name of a robot on the mesh: its site's name and its own.
 
 export interface RobotName {
   site: string;
@@ -7,12 +7,13 @@ export interface RobotName {
 
 const NAME = /^[a-z0-9][a-z0-9_-]{0,62}$/;
 
-/** Return whether a robot can have this name; the console closes the connection of a page that watches an impossible key. */
+/** Return whether a robot can have this name. The console closes the connection of a page that subscribes to an
+ * invalid key. */
 export function canBe({ site, robot }: RobotName): boolean {
   return NAME.test(site) && NAME.test(robot);
 }
 
-/** Return whether the robot is a replay of a recording, so that nothing of it is live. */
+/** Return whether the robot is a replay of a recording, and therefore not live. */
 export function isReplay(robot: string): boolean {
   return robot.startsWith("replay-");
 }

@@ -1,4 +1,4 @@
-// What the fleet knows of each robot, kept apart by robot: one that changes has one tile drawn, not two hundred.
+// What the fleet knows of each robot, kept by robot: a change draws one tile, not two hundred.
 
 import type { DescMessage, MessageShape } from "@bufbuild/protobuf";
 import { fromBinary } from "@bufbuild/protobuf";
@@ -17,13 +17,13 @@ const TAKEN_EACH_MS = 250;
 export interface RobotNow {
   controller: Signal<Latest<ControllerState> | undefined>;
   lease: Signal<Latest<Lease> | undefined>;
-  /** As it was when the tile was last on the screen. */
+  /** Its state when the tile was last visible. */
   description: Description | undefined;
 }
 
 const robots = new Map<string, RobotNow>();
 
-/** What is known of a robot; the same object each time. */
+/** Return the snapshot of a robot; always the same object. */
 export function robotNow(robotKey: string): RobotNow {
   const present = robots.get(robotKey);
   if (present) return present;
@@ -32,7 +32,7 @@ export function robotNow(robotKey: string): RobotNow {
   return made;
 }
 
-/** Follows the states and leases of every robot while it is mounted. */
+/** Follow the states and leases of every robot while the component is mounted. */
 export function useFleetNow(): void {
   useEffect(() => {
     const ends = [
@@ -45,7 +45,7 @@ export function useFleetNow(): void {
   }, []);
 }
 
-/** Of each key only the newest is decoded, a few times a second. */
+/** Decode only the newest message of each key, a few times a second. */
 function follow<S extends DescMessage>(
   expression: string,
   schema: S,

@@ -1,4 +1,4 @@
-// How a robot is, in one word with its colour and shape; whether it heeds a stop; why it takes no motion.
+// State of a robot in one word with colour and shape; whether it obeys a stop; why it accepts no motion.
 
 import type { Timestamp } from "@bufbuild/protobuf/wkt";
 import { timestampMs } from "@bufbuild/protobuf/wkt";
@@ -16,7 +16,7 @@ import { t } from "../i18n/texts";
 import type { Latest } from "./topics";
 import { ageOf, isStale } from "./topics";
 
-/** How much a state asks to be looked at; each has a colour and a shape of its own. */
+/** Level of attention; each has its own colour and shape. */
 export type Level = "normal" | "warning" | "alarm";
 
 export interface StateWord {
@@ -38,26 +38,26 @@ const ACTIVITIES: Record<Activity, StateWord> = {
 const MOVES = new Set([Activity.MOVING, Activity.HOMING]);
 const RESTS = new Set([Activity.IDLE, Activity.HOLDING, Activity.STOPPED, Activity.FAULT]);
 
-// The gateway waits as long before it says so, and then says it again each 2 s.
+// The gateway waits as long before it reports this, then repeats it every 2 s.
 const HEEDED_WITHIN_MS = 2000;
 const TOLD_AGAIN_MS = 3000;
 export const DISOBEYED = "stop.disobeyed";
 
-/** How long before a controller's report something was [ms], by the gateway's clock. */
+/** Return how long before a controller's report an event was [ms], by the gateway's clock. */
 export function before(state: ControllerState, stamp: Timestamp | undefined): number {
   return state.timestamp && stamp ? timestampMs(state.timestamp) - timestampMs(stamp) : 0;
 }
 
-/** Whether the arm moves on although its stop was sent: by the controller's word, or by the gateway's event. */
+/** Return whether the arm moves although its stop was sent, by the controller's report or the gateway's event. */
 export function disobeys(state: ControllerState | undefined, events: readonly Event[] = []): boolean {
   const stop = state?.stop;
   if (!state || !stop?.sent) return false;
   if (MOVES.has(state.activity) && before(state, stop.since) > HEEDED_WITHIN_MS) return true;
-  // Whichever stop it was: who asks again does not hide it.
+  // Any stop counts: a repeated request must not hide the event.
   return events.some(({ code, timestamp }) => code === DISOBEYED && before(state, timestamp) < TOLD_AGAIN_MS);
 }
 
-/** A latched stop in words, by whom, since when. Asked for is not stopped: they say what is known of the arm. */
+/** Describe a latched stop: by whom, since when, and what is known of the arm. A requested stop is not a stopped arm. */
 export function stopText({ stop, activity }: ControllerState, disobeyed = false): string {
   if (!stop) return "";
   const text = !stop.sent
@@ -70,7 +70,7 @@ export function stopText({ stop, activity }: ControllerState, disobeyed = false)
   return t(text, { by: stop.by || "–", time: stampTime(stop.since) });
 }
 
-/** The state word of a robot, the most urgent first. */
+/** Return the state word of a robot, the most urgent first. */
 export function stateWord(controller: Latest<ControllerState> | undefined, events?: readonly Event[]): StateWord {
   if (!controller) return { word: "state_unknown", level: "warning" };
   if (isStale("controller", ageOf(controller))) return { word: "state_stale", level: "warning" };
@@ -85,12 +85,12 @@ export function stateWord(controller: Latest<ControllerState> | undefined, event
   return ACTIVITIES[activity] ?? { word: "state_unknown", level: "warning" };
 }
 
-/** Whether the controller stopped by itself, or has a fault: it moves no more until it is reset. */
+/** Return whether the controller stopped by itself or has a fault; it moves again only after a reset. */
 export function stoppedByItself(state: ControllerState | undefined): boolean {
   return state !== undefined && !state.stop && [Activity.STOPPED, Activity.FAULT].includes(state.activity);
 }
 
-/** Why the robot can be moved by nobody now, and what to do; empty: as far as is known, it can. */
+/** Explain why the robot cannot be moved now, and what to do; empty: it can, as far as is known. */
 export function whyNoMotion(state: ControllerState | undefined): string {
   if (!state) return "";
   if (state.readOnly) return t("read_only_text");
@@ -101,17 +101,17 @@ export function whyNoMotion(state: ControllerState | undefined): string {
   return "";
 }
 
-/** Why no joint can be moved; a robot that is not homed can be homed all the same. */
+/** Explain why no joint can be moved; a robot that is not homed can still be homed. */
 export function whyNoMove(state: ControllerState | undefined): string {
   return whyNoMotion(state) || (state?.homed === Known.NO ? t("no_motion_unhomed") : "");
 }
 
-/** Whether the controller says that the arm moves. */
+/** Return whether the controller reports motion. */
 export function moves(state: ControllerState | undefined): boolean {
   return state !== undefined && MOVES.has(state.activity);
 }
 
-/** What is wrong, in words. */
+/** Describe what is wrong. */
 export function problemOf(state: ControllerState | undefined): string {
   if (disobeys(state)) return t("disobeys");
   if (state?.fault) return state.fault;

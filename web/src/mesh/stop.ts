@@ -1,4 +1,4 @@
-// The stop request: needs no control, waits for nothing.
+// The stop request: it needs no control and waits for nothing.
 
 import { signal } from "@preact/signals";
 import { StopAnswerSchema, StopRequestSchema } from "../gen/robomesh_pb";
@@ -8,11 +8,11 @@ import { AskError, ask, reopenIfSilent } from "./connection";
 import type { Notice } from "./control";
 import { operator, reasonOf } from "./control";
 
-const TOLD_MS = 15_000; // how long a stop that went well is told of
+const TOLD_MS = 15_000; // how long the notice of a successful stop is shown
 
 export const stopNotice = signal<Notice | null>(null);
 
-/** Asks robots to stop, each by itself: one that does not answer delays no other. */
+/** Request a stop of each robot separately, so that a robot without an answer delays no other. */
 export async function stop(robotKeys: readonly string[]): Promise<void> {
   const name = (key: string) => key.split("/").slice(1).join("/");
   stopNotice.value = { kind: "busy", text: t("stop_sending", { robot: robotKeys.map(name).join(", ") }) };
@@ -27,7 +27,7 @@ export async function stop(robotKeys: readonly string[]): Promise<void> {
           ? { kind: "done", text: t("stop_done", { robot, id: String(answer.stopId) }) }
           : { kind: "refused", text: t("stop_latched", { robot, text: reasonText(answer.reason, answer.text) }) };
       } catch (error) {
-        // The next one must not go the same way.
+        // The next request must not use the same dead connection.
         if (error instanceof AskError && error.noAnswer) reopenIfSilent(askedAt);
         return { kind: "refused", text: t("stop_failed", { robot, text: reasonOf(error) }) };
       }

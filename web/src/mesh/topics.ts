@@ -1,4 +1,4 @@
-// What the page knows of the mesh: the newest message per key, and how old it is.
+// What the page knows of the mesh: the newest message by key, and its age.
 
 import type { DescMessage, MessageShape } from "@bufbuild/protobuf";
 import { fromBinary } from "@bufbuild/protobuf";
@@ -19,14 +19,14 @@ export interface Latest<M> {
   sample: Sample;
 }
 
-/** The clock of ages in ms, four times a second: what ages are drawn by. */
+/** The clock for ages [ms], four times a second, for drawing. */
 export const now = signal(ageClock());
 const tick = () => (now.value = ageClock());
 setInterval(tick, 250);
-// A page that is hidden has few ticks: what it showed is old before anybody sees it again.
+// A hidden page ticks rarely: mark its data stale before it is visible again.
 document.addEventListener("visibilitychange", tick);
 
-const REDRAW_MS = 50; // a person reads no faster; 3-D and plots take samples as they come
+const REDRAW_MS = 50; // people read no faster; 3-D and plots take each sample
 const LIST_LENGTH = 200;
 
 interface Watched<M> {
@@ -65,14 +65,14 @@ function start<S extends DescMessage>(schema: S, expression: string, topic: Watc
   };
 }
 
-/** The newest message of every key that a key expression covers. */
+/** Follow the newest message of every key that a key expression covers. */
 export function useTopics<S extends DescMessage>(
   schema: S,
   expression: string,
 ): ReadonlyMap<string, Latest<MessageShape<S>>> {
   const topic = useMemo(() => follow<MessageShape<S>>(expression), [expression]);
   useEffect(() => {
-    // Another component may have let it go between this one's drawing and now.
+    // Another component may have released it since this one was drawn.
     watched.set(expression, topic as Watched<unknown>);
     if (topic.users++ === 0) start(schema, expression, topic);
     return () => {
@@ -85,19 +85,19 @@ export function useTopics<S extends DescMessage>(
   return topic.entries.value;
 }
 
-/** The newest message of one key. */
+/** Follow the newest message of one key. */
 export function useTopic<S extends DescMessage>(schema: S, key: string): Latest<MessageShape<S>> | undefined {
   return useTopics(schema, key).get(key);
 }
 
-/** The last events of a robot, newest first: the gateway's, and those of every other service. */
+/** Follow the last events of a robot, newest first: the gateway's and all other services'. */
 export function useEvents(robotKey: string): readonly Event[] {
   return useList([`${robotKey}/events`, `${robotKey}/events/*`], (sample) =>
     sample.live ? [fromBinary(EventSchema, sample.payload)] : fromBinary(EventListSchema, sample.payload).events,
   );
 }
 
-/** The last audit entries of a robot, newest first. */
+/** Follow the last audit entries of a robot, newest first. */
 export function useAudit(robotKey: string): readonly AuditEntry[] {
   return useList([`${robotKey}/audit`], (sample) =>
     sample.live ? [fromBinary(AuditEntrySchema, sample.payload)] : fromBinary(AuditListSchema, sample.payload).entries,
@@ -125,12 +125,12 @@ function useList<M extends Dated>(
         last: sample,
       };
       const id = `${sample.publisher}:${sample.sequence}`;
-      if (told.seen.has(id)) return; // sent again after a new connection
+      if (told.seen.has(id)) return; // repeated after a reconnect
       if (sample.live) told.seen.add(id);
       told.last = sample;
       told.entries = [...[...entries].reverse(), ...told.entries].slice(0, LIST_LENGTH);
       lists.set(sample.key, told);
-      // The sort is stable: what one publisher told keeps its order.
+      // The sort is stable: entries of one publisher keep their order.
       const merged = [...lists.values()].flatMap(({ entries }) => entries);
       if (lists.size > 1) merged.sort((first, second) => timeOf(second) - timeOf(first));
       list.value = merged.slice(0, LIST_LENGTH);
@@ -143,20 +143,20 @@ function useList<M extends Dated>(
   return list.value;
 }
 
-/** Whether a sample's entries follow the last sample's. A list after an outage holds only new entries; a list over a
- * new connection holds all of them again. */
+/** Return whether a sample's entries follow the last sample's. After an outage a list holds only new entries;
+ * after a reconnect it holds all of them again. */
 function goesOn(last: Sample, sample: Sample, count: number): boolean {
   const more = sample.sequence - last.sequence;
   return sample.live || (sample.publisher === last.publisher && more >= BigInt(count) && more > 0n);
 }
 
-/** Age [s] of a sample now; null: not known. */
+/** Return the age [s] of a sample now; null: not known. */
 export function ageOf(latest: Latest<unknown> | undefined, at = now.value): number | null {
   if (!latest || latest.sample.newAt === null) return null;
   return Math.max(0, (at - latest.sample.newAt) / 1000);
 }
 
-/** Age [s] of joint states, with what the gateway itself says of the last unit's age; null: not known. */
+/** Return the age [s] of joint states, including the gateway's report of its last unit's age; null: not known. */
 export function jointsAge(
   joints: Latest<unknown> | undefined,
   controller: Latest<ControllerState> | undefined,
@@ -169,11 +169,11 @@ export function jointsAge(
   if (reportAge === null || lastUnit === undefined || controller === undefined) return own;
   const reported = reportAge + lastUnit;
   if (own === null) return reported;
-  // A report made before the newest states came says nothing of them.
+  // A report from before the newest states does not describe them.
   return controller.sample.arrived >= joints.sample.arrived ? Math.max(own, reported) : own;
 }
 
-/** Age [s] from which a topic is stale; infinite where it does not age. */
+/** Return the age [s] at which a topic is stale; infinite if it does not expire. */
 export function staleAfter(topic: string): number {
   const rows = hello.value?.stale ?? [];
   const row = rows.find((r) => r.topic === topic) ?? rows.find((r) => r.topic === topic.replace(/\/.*/, "/*"));

@@ -1,4 +1,4 @@
-// A short tone when an alarm comes that nobody has acknowledged; off unless this browser was told otherwise.
+// A short tone for a new unacknowledged alarm; off unless enabled in this browser.
 
 import { effect, signal } from "@preact/signals";
 import { anyWatch, nameOf, unacknowledged } from "../mesh/alarms";
@@ -12,16 +12,16 @@ export const sound = signal(localStorage.getItem(KEPT) === "on");
 export function setSound(on: boolean): void {
   sound.value = on;
   localStorage.setItem(KEPT, on ? "on" : "off");
-  if (on) play(); // so that one hears what will be heard, and the browser lets it be heard
+  if (on) play(); // demonstrates the tone; browsers need a click before they play it
 }
 
-/** Plays it for each alarm that is new, from now on. */
+/** Play the tone for each alarm that is new from now on. */
 export function followSound(): () => void {
   let known: ReadonlySet<string> | null = null;
   return effect(() => {
     const names = new Set(unacknowledged.value.map(nameOf));
     if (known && sound.peek() && [...names].some((name) => !known?.has(name))) play();
-    if (anyWatch.value) known = names; // what is there at first is no news
+    if (anyWatch.value) known = names; // the first list holds no new alarms
   });
 }
 

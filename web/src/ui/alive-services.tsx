@@ -1,4 +1,4 @@
-// Services alive for a robot or a site, by presence.
+// Live services of a robot or a site, by presence.
 
 import { t } from "../i18n/texts";
 import { presence } from "../mesh/connection";

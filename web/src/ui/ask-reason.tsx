@@ -1,4 +1,4 @@
-// Asks for a reason before something is done. It is no modal dialog: STOP stays within reach.
+// A form for the reason of an action. Not a modal dialog: STOP stays within reach.
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
@@ -9,7 +9,7 @@ export function Reason(props: {
   text: string;
   does: string;
   required?: boolean;
-  /** What else is chosen, between the text and the reason. */
+  /** Other choices, between the text and the reason. */
   children?: ComponentChildren;
   close: () => void;
   done: (reason: string) => void;

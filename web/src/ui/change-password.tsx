@@ -1,4 +1,4 @@
-// A new password of one's own.
+// A form for the account's new password.
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { a, refusedText } from "../i18n/account";
@@ -12,7 +12,7 @@ export function ChangePassword({ close }: { close: () => void }) {
   const [again, setAgain] = useState("");
   const [told, setTold] = useState<{ done: boolean; text: string } | null>(null);
   const form = useRef<HTMLFormElement>(null);
-  // Escape must reach the sheet, and typing the first field.
+  // Pass Escape to the sheet, and focus the first field.
   useEffect(() => form.current?.querySelector<HTMLInputElement>("input:not([hidden])")?.focus(), []);
   const send = async () => {
     if (fresh !== again) {
@@ -35,7 +35,7 @@ export function ChangePassword({ close }: { close: () => void }) {
         void send();
       }}
     >
-      {/* For password managers: whose it is. */}
+      {/* For password managers: the account's name. */}
       <input type="text" name="username" autocomplete="username" value={me.value?.account} readOnly hidden />
       <PasswordField label={a("old_password")} kind="current-password" value={old} set={setOld} />
       <PasswordField label={a("new_password")} kind="new-password" value={fresh} set={setFresh} hint={a("new_hint")} />
@@ -57,7 +57,7 @@ export function ChangePassword({ close }: { close: () => void }) {
   );
 }
 
-/** A refusal in the page's language where it has words for it, in the server's where not. */
+/** Return a refusal in the page's language if it has one, otherwise the server's text. */
 export function refusalText(error: unknown): string {
   if (!(error instanceof AccountError)) return String(error);
   const { word, seconds } = error;

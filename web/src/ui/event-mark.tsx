@@ -1,4 +1,4 @@
-// The mark of an event's severity and of an audit entry's outcome: a word, with a shape where a person must look.
+// Mark of an event's severity or an audit entry's outcome: a word, with a shape if it needs attention.
 
 import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "../gen/robomesh_pb";
 import type { TextName } from "../i18n/texts";
@@ -17,7 +17,7 @@ export const OUTCOMES: Partial<Record<Outcome, [TextName, string]>> = {
   [Outcome.FAILED]: ["outcome_failed", "alarm"],
 };
 
-/** A word that asks to be looked at; what is as it should be has no shape. */
+/** A word that needs attention has a shape; a normal one has none. */
 export function Mark({ word, level }: { word: TextName; level: string }) {
   return (
     <span class={`mark state ${level}`}>

@@ -1,4 +1,4 @@
-// How far the arm is from what it must not come to, as bars: grey while there is room, amber where it is short.
+// The arm's distances to limits, singularity and collision as bars: grey, or amber when short.
 
 import type { ComponentChildren } from "preact";
 import type { Description, KinematicState } from "../gen/robomesh_pb";
@@ -9,10 +9,10 @@ import { distanceText, ownLevel, pairText, useClearanceLevel } from "../mesh/cle
 import type { Level } from "../mesh/robot-state";
 import { Unit } from "./parts";
 
-// A bar is full from here on; what lies beyond is room enough.
+// Values at which a bar is full.
 const FULL_CLEARANCE_M = 0.3;
 const FULL_SINGULARITY = 0.25;
-// Below these a bar is amber, and kinematics has an event.
+// Below these values a bar is amber, and the kinematics service publishes an event.
 const LOW_LIMIT = 0.02; // of the range
 const LOW_SINGULARITY = 0.02;
 
@@ -81,7 +81,7 @@ export function Margins(props: {
   );
 }
 
-/** A label, what it is measured to, a bar, and the number or words; without them a dash. */
+/** A label, the part that is measured, a bar, and the number or words; a dash without a value. */
 function Margin(props: {
   name: string;
   label: string;
@@ -111,7 +111,7 @@ function Margin(props: {
   );
 }
 
-/** The joint or constraint nearest to one of its limits, by its share of the range. */
+/** Return the joint or constraint that is nearest to one of its limits, by its share of the range. */
 function nearestLimit(state: KinematicState | undefined, description: Description | undefined) {
   let nearest: { name: string; value: number; unit: string; share: number } | undefined;
   for (const { name, lower, upper } of state?.limitMargins ?? []) {

@@ -1,7 +1,7 @@
-// A joint between its limits: where it is, and a handle for where it shall go.
+// A joint's range with its position, and a handle for its target.
 //
-// Only dragging the handle itself sets a target, and only letting go of it sends one; a tap on the
-// track does nothing. By keys: arrows set, Enter sends, Escape takes back.
+// Only dragging the handle sets a target, and only releasing it sends the target; a tap on the track does
+// nothing. Keys: arrows set, Enter sends, Escape resets.
 
 import { useRef, useState } from "preact/hooks";
 import { t } from "../i18n/texts";
@@ -15,10 +15,10 @@ export interface TrackProps {
   target: number | undefined;
   stale: boolean;
   enabled: boolean;
-  /** Steps of the arrow keys, fine with Shift, coarse with Page up and down; in the joint's unit. */
+  /** Steps of the arrow keys in the joint's unit: fine with Shift, coarse with Page Up and Page Down. */
   step: number;
   text: (value: number) => string;
-  /** While it is being set; undefined: taken back. */
+  /** Called while the target is being set; undefined: reset. */
   preview: (value: number | undefined) => void;
   send: (value: number) => void;
 }

@@ -1,4 +1,4 @@
-// A joint's value; pressed, it becomes a field for an exact target: Enter sends, Escape takes back.
+// A joint's value; a press turns it into a field for an exact target: Enter sends, Escape cancels.
 
 import { useState } from "preact/hooks";
 import type { Description_Joint } from "../gen/robomesh_pb";
@@ -11,7 +11,7 @@ export function JointValue(props: {
   position: number | undefined;
   stale: boolean;
   enabled: boolean;
-  /** While it is being typed, where it is a number within the limits; undefined: taken back. */
+  /** Called while a number within the limits is typed; undefined: cancelled. */
   preview: (value: number | undefined) => void;
   send: (value: number) => void;
   wrong: (text: string) => void;
@@ -75,7 +75,7 @@ export function JointValue(props: {
 
 const focus = (field: HTMLInputElement | null) => field?.focus();
 
-/** A number as people type it: a comma for the point, a true minus sign. Not a number where it is none. */
+/** Parse a number with a comma or a true minus sign; NaN if it is invalid. */
 function numberOf(text: string): number {
   const plain = text.trim().replace("−", "-").replace(",", ".");
   return plain ? Number(plain) : NaN;

@@ -1,4 +1,4 @@
-// Small parts that every screen uses.
+// Small components that every page uses.
 
 import type { ComponentChildren } from "preact";
 import { staleText } from "../i18n/format";
@@ -6,7 +6,7 @@ import { t } from "../i18n/texts";
 import type { Notice } from "../mesh/control";
 import type { StateWord } from "../mesh/robot-state";
 
-/** A panel with a heading; `end` stands right of the heading. */
+/** A panel with a heading; `end` is right of the heading. */
 export function Panel(props: { title: string; name: string; end?: ComponentChildren; children: ComponentChildren }) {
   return (
     <section class={`panel ${props.name}`} aria-label={props.title}>
@@ -19,7 +19,7 @@ export function Panel(props: { title: string; name: string; end?: ComponentChild
   );
 }
 
-/** What became of an action, where the action was; it keeps its place when empty. */
+/** The outcome of an action, beside the action; it keeps its height when empty. */
 export function NoticeLine({ notice, idle }: { notice: Notice | null; idle?: string }) {
   const bad = notice?.kind === "refused" || notice?.kind === "lost";
   return (
@@ -36,12 +36,12 @@ export function NoticeLine({ notice, idle }: { notice: Notice | null; idle?: str
   );
 }
 
-/** A unit after its number: the degree sign close to it and as large, words smaller and apart. */
+/** A unit after its number: the degree sign close and as large, words smaller and apart. */
 export function Unit({ of: unit }: { of: string }) {
   return <span class={unit === "°" ? "unit degree" : "unit"}>{unit}</span>;
 }
 
-/** A state word with the shape and colour of its level; of several, how many. */
+/** A state word with the shape and colour of its level; of several, their number. */
 export function State({ state, count }: { state: StateWord; count?: number }) {
   return (
     <span class={`state ${state.level}`}>
@@ -52,7 +52,7 @@ export function State({ state, count }: { state: StateWord; count?: number }) {
   );
 }
 
-/** Nothing while fresh; how old, in words, when not. */
+/** Nothing while fresh, the age in words when stale. */
 export function Age({ stale, age }: { stale: boolean; age: number | null }) {
   return stale ? <span class="age">{staleText(age)}</span> : null;
 }
@@ -61,7 +61,7 @@ export function Tag({ kind, children }: { kind: string; children: ComponentChild
   return <span class={`tag ${kind}`}>{children}</span>;
 }
 
-/** Buttons of which one is chosen. */
+/** Buttons, one of which is chosen. */
 export function Choice<Value extends string>(props: {
   label: string;
   values: readonly Value[];
@@ -88,7 +88,7 @@ export function Toggle(props: { on: boolean; set: (on: boolean) => void; childre
   );
 }
 
-/** Stands in where there is no picture. */
+/** A drawing in the place of a missing picture. */
 export function Silhouette({ label }: { label: string }) {
   return (
     <svg viewBox="0 0 160 90" class="silhouette" role="img" aria-label={label}>

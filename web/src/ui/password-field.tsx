@@ -1,4 +1,4 @@
-// A password that can be looked at, with a word when Caps Lock is on.
+// A password field that can show its text and warns of Caps Lock.
 
 import { useId, useState } from "preact/hooks";
 import { a } from "../i18n/account";

@@ -1,7 +1,7 @@
-// How the axes of every plot look, in the colours of the theme.
+// Axes of every plot, in the colours of the theme.
 
 export interface PlotLook {
-  /** The value of one of the theme's colours, by its name. */
+  /** Return a colour of the theme by its name. */
   colour: (name: string) => string;
   axis: { stroke: string; grid: { stroke: string; width: number }; ticks: { show: boolean }; font: string };
 }

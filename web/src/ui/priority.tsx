@@ -17,7 +17,7 @@ export function priorityWord(priority: Priority): string {
   return e((WORDS[priority] ?? WORDS[Priority.LOW])[0]);
 }
 
-/** `children` stand in the word's place. */
+/** `children` replace the word. */
 export function PriorityMark({ of: priority, children }: { of: Priority; children?: string | number }) {
   const [word, name] = WORDS[priority] ?? WORDS[Priority.LOW];
   return (

@@ -1,11 +1,11 @@
-// What marks everything that is played back, in magenta and in words.
+// The mark of everything that is played back, in magenta and in words.
 
 import { fullTime } from "../i18n/format";
 import { dateText } from "../i18n/recording-format";
 import { r } from "../i18n/recordings";
 import { Tag } from "./parts";
 
-/** Of which robot, and when it was. */
+/** The recorded robot, and the time of the recording. */
 export function ReplayTag({ robot, start }: { robot: string; start: number }) {
   return (
     <Tag kind="replay">

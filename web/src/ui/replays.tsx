@@ -1,4 +1,4 @@
-// The recordings that are being played back now, apart from the robots that are live.
+// Running replays, separate from the live robots.
 
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { ReplayState } from "../gen/robomesh_pb";

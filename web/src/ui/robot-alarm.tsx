@@ -1,4 +1,4 @@
-// What must be seen at once, over the robot's page: an arm that does not heed its stop, a critical event.
+// The most urgent alarm, above the robot's page: an arm that does not obey its stop, or a critical event.
 
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import { useState } from "preact/hooks";

@@ -1,4 +1,4 @@
-// A robot that is not there: said, with those that are.
+// The page of a robot that does not exist, with links to those that do.
 
 import { useEffect, useState } from "preact/hooks";
 import { t } from "../i18n/texts";
@@ -9,7 +9,7 @@ import { robotLink } from "./route";
 
 const SHOWS_WITHIN_MS = 4000;
 
-/** Whether nothing was heard of a robot for some seconds of a connection that stands; `known`: something was. */
+/** Return whether a live connection received nothing of a robot for some seconds; `known`: something was received. */
 export function useMissing(robotKey: string, known: boolean): boolean {
   const [waited, setWaited] = useState(false);
   const there = known || fleetRobots.value.includes(robotKey);

@@ -1,4 +1,4 @@
-// One of several, where there is no place for buttons.
+// A choice of one, where there is no space for buttons.
 
 export function Select<Value extends string>(props: {
   label: string;

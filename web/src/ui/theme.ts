@@ -1,4 +1,4 @@
-// Dark unless the person or the system says light.
+// The theme: dark unless the person or the system chooses light.
 
 import { signal } from "@preact/signals";
 

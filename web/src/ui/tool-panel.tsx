@@ -1,4 +1,4 @@
-// Where the tool is, how fast, and how far the arm is from what it must not come to.
+// The tool's position and speed, and the arm's distances to its limits.
 
 import type { Description, KinematicState } from "../gen/robomesh_pb";
 import { fixed, rollPitchYaw, toDegrees } from "../i18n/format";

@@ -1,4 +1,4 @@
-// Who controls the robot, and the commands of whoever does.
+// The operator in control of the robot, and that operator's commands.
 
 import type { ControllerState, Description, Lease } from "../../gen/robomesh_pb";
 import { ControllerState_Activity as Activity, ControllerState_Known as Known } from "../../gen/robomesh_pb";
@@ -20,7 +20,7 @@ import { Holder, WhoControls } from "./who-controls";
 export function ControlPanel(props: {
   robotKey: string;
   controller: Latest<ControllerState> | undefined;
-  /** Who is in control, empty: nobody, null: not known. */
+  /** The operator in control; empty: none; null: not known. */
   holder: string | null;
   lease: Lease | undefined;
   description: Description | undefined;

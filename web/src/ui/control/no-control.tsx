@@ -1,4 +1,4 @@
-// In the place of taking control: why this account cannot, and what it can do about it.
+// Why this account cannot take control, and what it can do about it.
 
 import { useState } from "preact/hooks";
 import { a } from "../../i18n/account";
@@ -8,7 +8,7 @@ import { refusalText } from "../change-password";
 import { PasswordField } from "../password-field";
 import "../account.css";
 
-/** Whether whoever is signed in may not ask for control now. */
+/** Return whether the signed-in account may not request control now. */
 export function mayNotCommand(): boolean {
   return onlyWatches.value || rests.value || (!!hello.value?.account && !hello.value.mayCommand);
 }

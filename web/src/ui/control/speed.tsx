@@ -1,15 +1,15 @@
-// The speed that was last set through the gateway, by whomever; and the one to ask for.
+// The last speed that any operator set through the gateway, and the speed to request.
 
 import { useRef, useState } from "preact/hooks";
 import { fixed } from "../../i18n/format";
 import { t } from "../../i18n/texts";
 
 const LOW_PERCENT = 10;
-const SHOWS_WITHIN_MS = 500; // that it was set is published just after it is answered
+const SHOWS_WITHIN_MS = 500; // the new speed is published just after the answer
 
-/** A range sends on release, by pointer or by Enter; until then what it shows is marked as not sent. */
+/** A slider that sends on release or Enter; until then its value is marked as not sent. */
 export function Speed(props: {
-  /** Undefined: nobody has set it since the link came up. */
+  /** Undefined: not set since the link was established. */
   percent: number | undefined;
   enabled: boolean;
   send: (percent: number) => Promise<boolean>;

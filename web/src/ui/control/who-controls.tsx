@@ -1,4 +1,4 @@
-// Who is in control, who asks for it, to whom it is offered; and how one gets it, from nobody or from somebody.
+// The operator in control, requests and offers of control; and how to take, request or accept it.
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useState } from "preact/hooks";
@@ -24,7 +24,7 @@ import { mayNotCommand, NoControl } from "./no-control";
 
 const MOST_ASKERS_SHOWN = 3;
 
-/** In the panel's head: who is in control, since when. */
+/** In the panel's head: the operator in control, and since when. */
 export function Holder(props: { robotKey: string; holder: string | null; lease: Lease | undefined }) {
   const { holder } = props;
   const mine = holds(props.robotKey);
@@ -53,17 +53,17 @@ export function Holder(props: { robotKey: string; holder: string | null; lease: 
 
 export function WhoControls(props: {
   robotKey: string;
-  /** Who is in control, empty: nobody, null: not known. */
+  /** The operator in control; empty: none; null: not known. */
   holder: string | null;
   lease: Lease | undefined;
   readOnly: boolean;
 }) {
   const { robotKey, lease } = props;
   const mine = holds(robotKey);
-  // While it is not known who is in control, the buttons stay as they were: none changes under the pointer.
+  // While the operator in control is not known, keep the buttons: none must change under the pointer.
   const other = (!mine && (props.holder ?? lease?.holder)) || "";
   const [sheet, setSheet] = useState<"ask" | "take" | null>(null);
-  // What it says of somebody is not asked of somebody else.
+  // A reason typed for one operator must not go to another.
   useEffect(() => setSheet(null), [other, ms(lease?.since)]);
   const open = (which: "ask" | "take") => ownName() && setSheet(which);
   if (mayNotCommand() && !mine) return <NoControl />;
@@ -131,18 +131,18 @@ export function WhoControls(props: {
   );
 }
 
-/** Who would like to have control, and to whom it is offered: for everybody to see, for some to answer. */
+/** Requests and offers of control: every page shows them, the operators concerned can answer. */
 function Wishes({ mine, robotKey, lease }: { mine: boolean; robotKey: string; lease: Lease }) {
   const me = operator.value.trim();
   const { holder, offeredTo } = lease;
   const [declined, setDeclined] = useState<readonly string[]>([]);
   const idOf = (asker: Lease_Asker) => `${asker.operator} ${ms(asker.since)}`;
   const age = (asker: Lease_Asker) => ageText(Math.max(0, ms(lease.timestamp) - ms(asker.since)) / 1000);
-  // An offer that was withdrawn and made again is a new one.
+  // An offer that was withdrawn and repeated is a new one.
   useEffect(() => setDeclined((old) => old.filter((each) => each !== "offer")), [offeredTo]);
   const decline = (what: string) => setDeclined([...declined, what]);
   const handOver = (asker: Lease_Asker) => {
-    decline(idOf(asker)); // answered: an offer that is withdrawn does not bring it back
+    decline(idOf(asker)); // declined: withdrawing the offer must not show it again
     void offer(asker.operator);
   };
   const toMe = !mine && offeredTo !== "" && offeredTo === me;
