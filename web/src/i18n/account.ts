@@ -1,4 +1,4 @@
-// Every word of signing in, in English and Chinese. `{name}` is filled in.
+// Texts of sign-in and accounts, in English and Chinese, with `{name}` placeholders.
 
 import { inLanguage } from "./texts";
 
@@ -116,12 +116,12 @@ export function a(name: AccountText, values: Record<string, string | number> = {
   return inLanguage(TEXTS[name], values);
 }
 
-/** Why a session ended, by the server's word for it. */
+/** Explain the end of a session by the server's code. */
 export function endText(word: string): string {
   return `out_${word}` in TEXTS ? a(`out_${word}` as AccountText) : a("out_signed_out");
 }
 
-/** Why something was refused, by the server's word for it; empty: there are no words for it here. */
+/** Explain a refusal by the server's code; empty: no text for it. */
 export function refusedText(word: string): string {
   return `refused_${word}` in TEXTS ? a(`refused_${word}` as AccountText) : "";
 }

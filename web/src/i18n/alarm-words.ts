@@ -1,4 +1,4 @@
-// Alarms in Chinese, by their code: what it is and what to do. The watch's own words are English, and stand beside.
+// Alarms in Chinese by code: what happened and what to do. In English the watch's own text is shown.
 
 import { language } from "./texts";
 
@@ -66,7 +66,7 @@ const CHINESE: Record<string, readonly [title: string, advice: string]> = {
   "alarm.flood": ["报警过多", "从最紧急者中最早的开始处理，其余可能由它引起。"],
 };
 
-/** In Chinese what the alarm is, where its code is known; null: the watch's own words do. */
+/** Return the Chinese text of an alarm with a known code; null: show the watch's text. */
 export function alarmTitle(code: string): string | null {
   return language.value === "zh" ? (CHINESE[code]?.[0] ?? null) : null;
 }

@@ -1,4 +1,4 @@
-// Every word of Define, in English and Chinese. `{name}` is filled in.
+// Texts of Define, in English and Chinese, with `{name}` placeholders.
 
 import { inLanguage } from "./texts";
 
@@ -288,7 +288,7 @@ const TEXTS = {
 
 export type DefineText = keyof typeof TEXTS;
 
-/** A text of Define in the page's language. */
+/** Return a text of Define in the page's language. */
 export function d(name: DefineText, values: Record<string, string | number> = {}): string {
   return inLanguage(TEXTS[name], values);
 }

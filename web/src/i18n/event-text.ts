@@ -1,5 +1,5 @@
-// Events in Chinese, by their code: a sentence with what their values tell, or the alarm that is over. In English
-// they are in their own words.
+// Events in Chinese by code: a sentence with their values, or the alarm that ended. In English the event's own
+// text is shown.
 
 import type { Event } from "../gen/robomesh_pb";
 import { Event_Severity as Severity } from "../gen/robomesh_pb";
@@ -7,7 +7,7 @@ import { alarmTitle } from "./alarm-words";
 import { isolated } from "./foreign-text";
 import { language, t } from "./texts";
 
-// What nobody has to act on; a code that may be an alarm's too stands here as it is when it is none.
+// Events that need no action. A code that can also be an alarm is listed for its normal severity.
 const CHINESE: Record<string, string> = {
   "mesh.key_ignored": "已忽略不符合网络命名规则的键：{key}。",
   "link.up": "与控制器的连接正常。",
@@ -59,10 +59,10 @@ const VALUES: Record<string, string> = {
   "action:remove": "删除",
 };
 
-// Of what an alarm is, where there may be several.
+// Alarm texts that need a value, because there may be several.
 const OF_WHAT = ["joint", "second", "robot", "service", "site"] as const;
 
-/** An event that asks nobody to act, in the page's language; null: its own words do. */
+/** Return the text of an event that needs no action, in the page's language; null: show its own text. */
 function eventInChinese({ code, severity, values }: Event): string | null {
   if (language.value !== "zh" || severity > Severity.INFO) return null;
   const sentence = CHINESE[code];
@@ -73,7 +73,7 @@ function eventInChinese({ code, severity, values }: Event): string | null {
   return `已解除：${title}${of ? `（${of}）` : ""}`;
 }
 
-/** Null: an older program told it without a value that the sentence needs. */
+/** Null: an older program sent it without a value that the sentence needs. */
 function filled(sentence: string, values: Record<string, string>): string | null {
   let all = true;
   const text = sentence.replace(/\{(\w+)\}/g, (_, name: string) => {
@@ -84,7 +84,7 @@ function filled(sentence: string, values: Record<string, string>): string | null
   return all ? text : null;
 }
 
-/** The page's own words for what people meet most; the event's for the rest. */
+/** Return the page's text of the most common events, otherwise the event's own. */
 export function eventText(event: Event): string {
   const { code, values } = event;
   const by = values.by ?? "";

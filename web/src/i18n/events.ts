@@ -1,4 +1,4 @@
-// Every word of Events, in English and Chinese. `{name}` is filled in.
+// Texts of Events, in English and Chinese, with `{name}` placeholders.
 
 import { inLanguage } from "./texts";
 
@@ -130,7 +130,7 @@ export const EVENTS_TEXTS = {
 
 export type EventsTextName = keyof typeof EVENTS_TEXTS;
 
-/** A text in the page's language. */
+/** Return a text in the page's language. */
 export function e(name: EventsTextName, values: Record<string, string | number> = {}): string {
   return inLanguage(EVENTS_TEXTS[name], values);
 }

@@ -1,4 +1,4 @@
-// Every word of Fleet, in English and Chinese. `{name}` is filled in.
+// Texts of Fleet, in English and Chinese, with `{name}` placeholders.
 
 import { inLanguage } from "./texts";
 
@@ -38,7 +38,7 @@ export const FLEET_TEXTS = {
 
 export type FleetTextName = keyof typeof FLEET_TEXTS;
 
-/** A text in the page's language. */
+/** Return a text in the page's language. */
 export function f(name: FleetTextName, values: Record<string, string | number> = {}): string {
   return inLanguage(FLEET_TEXTS[name], values);
 }

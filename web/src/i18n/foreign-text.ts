@@ -1,35 +1,35 @@
-// Texts of others on the page: operators' names and reasons, controllers' faults, events, names of files. None of them
-// can change the order in which what is around it is read (CVE-2021-42574). It is done once, for every text that is
-// drawn: at each place by itself it would be forgotten at some.
+// Isolation of texts from outside the page: operators' names and reasons, faults, events, file names. None of them
+// can change the order in which the text around it is read (CVE-2021-42574). It applies to every rendered text,
+// because some call sites would forget it.
 
 import type { ComponentChildren, VNode } from "preact";
 import { h, options } from "preact";
 
-/** Control characters of direction; a text between FSI and PDI without others in it is isolated already, and stays. */
+/** Bidirectional control characters; a text between FSI and PDI without others in it is already isolated. */
 const CONTROLS =
   /(\u2068[^\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]*\u2069)|[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]/g;
 const ANY_CONTROL = /[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]/;
-/** Letters that are read from right to left: Hebrew, Arabic, Syriac, Thaana, NKo, Adlam and the others of their blocks. */
+/** Right-to-left letters: Hebrew, Arabic, Syriac, Thaana, NKo, Adlam and others of their blocks. */
 const FROM_THE_RIGHT = /[\u0590-\u08ff\ufb1d-\ufdff\ufe70-\ufefe\u{10800}-\u{10fff}\u{1e800}-\u{1efff}]/u;
 const FSI = "\u2068";
 const PDI = "\u2069";
-/** Elements that hold nothing but text. */
+/** Elements that hold only text. */
 const PLAIN = new Set(["bdi", "option", "textarea", "title", "style", "script", "text", "tspan"]);
 const SPOKEN = ["title", "aria-label", "alt", "placeholder"] as const;
 
-/** A text whose control characters of direction are shown by their numbers. */
+/** Return a text with its bidirectional control characters shown as numbers. */
 export function shown(text: string): string {
   if (!ANY_CONTROL.test(text)) return text;
   return text.replace(CONTROLS, (found: string, isolated: string | undefined) => isolated ?? numbered(found));
 }
 
-/** A text of somebody's for the middle of a sentence of ours. */
+/** Isolate a foreign text for use within a sentence. */
 export function isolated(text: string): string {
   const plain = text.replace(/[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]/g, numbered);
   return FROM_THE_RIGHT.test(plain) ? FSI + plain + PDI : plain;
 }
 
-/** Draws every text so from now on. */
+/** Isolate every text that is rendered from now on. */
 export function isolateForeignTexts(): void {
   const before = options.vnode;
   options.vnode = (vnode) => {

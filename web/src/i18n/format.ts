@@ -1,4 +1,4 @@
-// Numbers, times and ages for people: degrees and millimetres, fixed decimals, a true minus sign.
+// Format of numbers, times and ages: degrees and millimetres, fixed decimals, a true minus sign.
 
 import type { Timestamp } from "@bufbuild/protobuf/wkt";
 import { timestampMs } from "@bufbuild/protobuf/wkt";
@@ -7,17 +7,17 @@ import { Description_Joint_Type } from "../gen/robomesh_pb";
 import { t } from "./texts";
 
 const DEGREES = 180 / Math.PI;
-const UPRIGHT = 1e-6; // the cosine of a pitch so near to 90 degrees is noise
+const UPRIGHT = 1e-6; // the cosine of a pitch so close to 90 degrees is noise
 export const DASH = "–";
 
-/** A number with fixed decimals; a figure-wide minus. */
+/** Format a number with fixed decimals and a figure-wide minus. */
 export function fixed(value: number | undefined, decimals: number): string {
   if (value === undefined || !Number.isFinite(value)) return DASH;
   const text = value.toFixed(decimals);
   return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
 }
 
-/** A whole number with its thousands apart: 4,312. */
+/** Format a whole number with thousands separators: 4,312. */
 export function count(value: number | bigint): string {
   return value.toLocaleString("en-GB");
 }
@@ -25,7 +25,7 @@ export function count(value: number | bigint): string {
 export const toDegrees = (radians: number): number => radians * DEGREES;
 export const toRadians = (degrees: number): number => degrees / DEGREES;
 
-/** How a joint's values are shown: unit, decimals, and the factor from SI. */
+/** Return how a joint's values are shown: unit, decimals, and the factor from SI. */
 export interface JointUnit {
   unit: string;
   decimals: number;
@@ -44,7 +44,7 @@ export function jointText(joint: Description_Joint, value: number | undefined): 
   return `${fixed(value === undefined ? undefined : value * factor, decimals)}${space}${unit}`;
 }
 
-/** An age in s as people say it: 3 s, 4 min, 2 h. */
+/** Format an age in s: 3 s, 4 min, 2 h. */
 export function ageText(seconds: number): string {
   if (seconds < 100) return `${Math.floor(seconds)}\u202fs`;
   if (seconds < 6000) return `${Math.floor(seconds / 60)}\u202fmin`;
@@ -55,18 +55,18 @@ export function staleText(age: number | null): string {
   return age === null ? t("stale_unknown") : t("stale_for", { age: ageText(age) });
 }
 
-/** A duration as a clock shows it: 00:12, 61:03. */
+/** Format a duration like a clock: 00:12, 61:03. */
 export function clock(seconds: number): string {
   const whole = Math.floor(seconds);
   return [Math.floor(whole / 60), whole % 60].map((part) => String(part).padStart(2, "0")).join(":");
 }
 
-/** Local time of day, to the second. */
+/** Return the local time of day, to the second. */
 export function timeOfDay(ms: number): string {
   return new Date(ms).toLocaleTimeString("en-GB", { hour12: false });
 }
 
-/** Local date, time and zone: what is shown on hover. */
+/** Return local date, time and zone, for tooltips. */
 export function fullTime(ms: number): string {
   return new Date(ms).toLocaleString("en-GB", { timeZoneName: "short" });
 }
@@ -79,9 +79,9 @@ export function stampFull(stamp: Timestamp | undefined): string {
   return stamp ? fullTime(timestampMs(stamp)) : "";
 }
 
-/** Roll, pitch, yaw [rad] (about fixed x, y, z) of a 4x4 placement, by rows.
+/** Return roll, pitch, yaw [rad] (about fixed x, y, z) of a 4x4 placement, by rows.
  *
- * Straight up or down only roll and yaw together are known: then yaw is 0. */
+ * At a pitch of ±90 degrees only the sum of roll and yaw is defined: yaw is 0. */
 export function rollPitchYaw(m: readonly number[]): [number, number, number] {
   const [r11 = 1, , , , r21 = 0, r22 = 1, r23 = 0, , r31 = 0, r32 = 0, r33 = 1] = m;
   const level = Math.hypot(r11, r21);

@@ -1,4 +1,4 @@
-// Every word of Program, in English and Chinese. `{name}` is filled in.
+// Texts of Program, in English and Chinese, with `{name}` placeholders.
 
 import { inLanguage } from "./texts";
 
@@ -162,11 +162,11 @@ const TEXTS = {
 
 export type ProgramText = keyof typeof TEXTS;
 
-/** A text that follows the page's language as long as it stands. */
+/** A text that follows the page's language while it is shown. */
 export type Words = () => string;
 export const noWords: Words = () => "";
 
-/** A text of Program in the page's language. */
+/** Return a text of Program in the page's language. */
 export function p(name: ProgramText, values: Record<string, string | number> = {}): string {
   return inLanguage(TEXTS[name], values);
 }

@@ -1,4 +1,4 @@
-// What is told of a recording, in words and numbers for people.
+// Format of a recording's facts: size, times, losses, reason.
 
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { Recording } from "../gen/robomesh_pb";
@@ -7,7 +7,7 @@ import { r } from "./recordings";
 
 const UNITS = ["B", "kB", "MB", "GB", "TB"];
 
-/** A size: 912 B, 4.3 MB. */
+/** Format a size: 912 B, 4.3 MB. */
 export function sizeText(bytes: number | bigint): string {
   let value = Number(bytes);
   let unit = 0;
@@ -23,7 +23,7 @@ export function durationS({ duration }: Recording): number {
   return duration ? Number(duration.seconds) + duration.nanos / 1e9 : 0;
 }
 
-/** Local date and time of day: 2026-11-21 14:03:09. */
+/** Format a local date and time: 2026-11-21 14:03:09. */
 export function dateText(ms: number): string {
   if (!ms) return "–";
   const date = new Date(ms);
@@ -32,7 +32,7 @@ export function dateText(ms: number): string {
   return `${day} ${date.toLocaleTimeString("en-GB", { hour12: false })}`;
 }
 
-/** A time within a recording: 00:03.25, 1:02:03.00. */
+/** Format a time within a recording: 00:03.25, 1:02:03.00. */
 export function momentText(seconds: number, decimals = 2): string {
   const hundredths = Math.round(Math.max(0, seconds) * 10 ** decimals);
   const whole = Math.floor(hundredths / 10 ** decimals);
@@ -42,7 +42,7 @@ export function momentText(seconds: number, decimals = 2): string {
   return decimals ? `${text}.${String(hundredths % 10 ** decimals).padStart(decimals, "0")}` : text;
 }
 
-/** A channel of a recording by its topic: robomesh/hall/arm/events/renderer is events/renderer. */
+/** Return a channel's short name: robomesh/site/arm/events/renderer is events/renderer. */
 export function topicOf(channel: string): string {
   const chunks = channel.split("/");
   return chunks[0] === "robomesh" && chunks.length > 3 ? chunks.slice(3).join("/") : channel;
@@ -52,12 +52,12 @@ export function messagesOf({ topics }: Recording): bigint {
   return topics.reduce((sum, { messages }) => sum + messages, 0n);
 }
 
-/** Whether there is nothing in it to be played. */
+/** Return whether the recording holds nothing to play. */
 export function isEmpty(recording: Recording): boolean {
   return !recording.open && messagesOf(recording) === 0n;
 }
 
-/** What was lost, in words; empty: nothing. */
+/** Describe the losses; empty: none. */
 export function lostText({ topics }: Recording): string {
   const lost = topics.filter((each) => each.lost > 0n);
   if (lost.length === 0) return "";
@@ -66,14 +66,14 @@ export function lostText({ topics }: Recording): string {
   });
 }
 
-/** Who or what had it begun. */
+/** Return the operator or the rule that started it. */
 export function startedText({ startedBy }: Recording): string {
   if (startedBy === "trace") return r("by_trace");
   if (startedBy === "flight" || startedBy === "flight recorder") return r("by_flight");
   return startedBy === "request" ? r("by_request") : startedBy;
 }
 
-/** Views whose video is in it. */
+/** Return the views whose video it holds. */
 export function recordedViews({ topics }: Recording): readonly string[] {
   return topics
     .map((each) => topicOf(each.topic))
@@ -81,7 +81,7 @@ export function recordedViews({ topics }: Recording): readonly string[] {
     .map((topic) => topic.slice("video/".length));
 }
 
-/** Where the console gives a recording's file, or what belongs to it. */
+/** Return the console's address of a recording's file, or of a part of it. */
 export function fileUrl(site: string, file: string, rest = ""): string {
   return `/recordings/${encodeURIComponent(site)}/${encodeURIComponent(file)}${rest}`;
 }

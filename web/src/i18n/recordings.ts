@@ -1,4 +1,4 @@
-// Every word of Recordings, in English and Chinese. `{name}` is filled in.
+// Texts of Recordings, in English and Chinese, with `{name}` placeholders.
 
 import { inLanguage, viewText } from "./texts";
 
@@ -192,19 +192,19 @@ const TEXTS = {
 
 export type RecordingsText = keyof typeof TEXTS;
 
-/** A text of Recordings in the page's language. */
+/** Return a text of Recordings in the page's language. */
 export function r(name: RecordingsText, values: Record<string, string | number> = {}): string {
   return inLanguage(TEXTS[name], values);
 }
 
 const RECORDED = "recorded-";
 
-/** The name under which a replay tells a recorded view. */
+/** Return the name under which a replay publishes a recorded view. */
 export function recordedView(view: string): string {
   return RECORDED + view;
 }
 
-/** A replay's view as people read it. */
+/** Return a replay's view in words. */
 export function viewName(view: string): string {
   return view.startsWith(RECORDED)
     ? r("recorded_view", { view: viewText(view.slice(RECORDED.length)) })

@@ -1,4 +1,4 @@
-// Every word of Settings, in English and Chinese. `{name}` is filled in.
+// Texts of Settings, in English and Chinese, with `{name}` placeholders.
 
 import { inLanguage } from "./texts";
 
@@ -129,7 +129,7 @@ export const SETTINGS_TEXTS = {
 
 export type SettingsTextName = keyof typeof SETTINGS_TEXTS;
 
-/** A text in the page's language. */
+/** Return a text in the page's language. */
 export function s(name: SettingsTextName, values: Record<string, string | number> = {}): string {
   return inLanguage(SETTINGS_TEXTS[name], values);
 }

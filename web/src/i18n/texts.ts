@@ -1,4 +1,4 @@
-// Every word of the page, in English and Chinese. `{name}` is filled in.
+// Texts that several pages share, in English and Chinese, with `{name}` placeholders.
 
 import { signal } from "@preact/signals";
 import { isolated } from "./foreign-text";
@@ -422,12 +422,12 @@ export function switchLanguage(): void {
   document.documentElement.lang = language.value === "zh" ? "zh-Hans" : "en";
 }
 
-/** A text in the page's language. */
+/** Return a text in the page's language. */
 export function t(name: TextName, values: Record<string, string | number> = {}): string {
   return inLanguage(TEXTS[name], values);
 }
 
-/** One of a pair of texts, English and Chinese, filled in. */
+/** Return one of a pair of texts, English and Chinese, with its placeholders replaced. */
 export function inLanguage(pair: readonly [string, string], values: Record<string, string | number>): string {
   return pair[language.value === "zh" ? 1 : 0].replace(/\{(\w+)\}/g, (whole, key: string) => {
     const value = values[key];
@@ -435,12 +435,12 @@ export function inLanguage(pair: readonly [string, string], values: Record<strin
   });
 }
 
-/** A text by a name made at run time, or what stands in for it. */
+/** Return a text by a computed name, or a substitute. */
 export function textOr(name: string, otherwise: string): string {
   return name in TEXTS ? t(name as TextName) : otherwise;
 }
 
-/** A view's name as people read it. */
+/** Return a view's name in words. */
 export function viewText(name: string): string {
   return textOr(`view_${name}`, name);
 }

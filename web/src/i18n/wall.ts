@@ -1,4 +1,4 @@
-// Every word of the Wall, in English and Chinese. `{name}` is filled in.
+// Texts of the wall, in English and Chinese, with `{name}` placeholders.
 
 import { inLanguage } from "./texts";
 
@@ -26,7 +26,7 @@ const TEXTS = {
   replay: ["replay", "回放"],
 } as const;
 
-/** A text of the Wall in the page's language. */
+/** Return a text of the wall in the page's language. */
 export function w(name: keyof typeof TEXTS, values: Record<string, string | number> = {}): string {
   return inLanguage(TEXTS[name], values);
 }

@@ -57,7 +57,7 @@ export function disobeys(state: ControllerState | undefined, events: readonly Ev
   return events.some(({ code, timestamp }) => code === DISOBEYED && before(state, timestamp) < TOLD_AGAIN_MS);
 }
 
-/** Describe a latched stop: by whom, since when, and what is known of the arm. A requested stop is not a stopped arm. */
+/** Describe a latched stop: by whom, since when, and the arm's known state. A requested stop is not a stopped arm. */
 export function stopText({ stop, activity }: ControllerState, disobeyed = false): string {
   if (!stop) return "";
   const text = !stop.sent

@@ -1,4 +1,4 @@
-// An arm in the 3-D view: its links where its frames say, grey when those are old, and its ghost.
+// An arm in the 3-D view: links at their frames, grey when those are stale, and its ghost.
 
 import { fromBinary } from "@bufbuild/protobuf";
 import * as THREE from "three";
@@ -9,9 +9,9 @@ import type { Kind } from "./models";
 import { colourGhost, dressed, ghostOf, loadModel, paint } from "./models";
 import { palette } from "./surroundings";
 
-const SAME_PLACE = 2e-3; // m, or of a rotation's matrix
+const SAME_PLACE = 2e-3; // m, or an element of a rotation matrix
 
-/** Hears why a link or a fixture cannot be drawn yet, and "" when it could. */
+/** Called with the reason why a link or fixture cannot be drawn yet, and with "" when it can. */
 export type Failed = (name: string, why: string) => void;
 
 export class Arm {
@@ -31,7 +31,7 @@ export class Arm {
     private readonly changed: () => void,
   ) {}
 
-  /** Loads the links' meshes; `made` sees each ghost before it is needed. */
+  /** Load the links' meshes; `made` receives each ghost before it is needed. */
   async load(description: Description, failed: Failed, made?: (ghost: THREE.Group) => void): Promise<void> {
     if (description.baseToSite.length === 16) this.base.fromArray(description.baseToSite).transpose();
     await Promise.all(
@@ -50,7 +50,7 @@ export class Arm {
 
   private addLink(frame: string, model: THREE.Group, colour: string, made?: (ghost: THREE.Group) => void): void {
     const group = dressed(model, colour);
-    group.visible = false; // until its frame has come
+    group.visible = false; // until its frame arrives
     this.links.set(frame, group);
     this.scene.add(group);
     if (made) {
@@ -63,12 +63,12 @@ export class Arm {
     this.player.touch();
   }
 
-  /** Takes a FrameTransforms payload. */
+  /** Add a FrameTransforms payload. */
   placeFrames(payload: Uint8Array, sourceTimeMs: number, arrivedMs: number): void {
     this.player.add(fromBinary(FrameTransformsSchema, payload), sourceTimeMs, arrivedMs);
   }
 
-  /** Places the links as they are at a time of the page's clock [ms]; null: as before. */
+  /** Place the links at a time of the page's clock [ms]; null: unchanged. */
   placeAt(time: number): ReadonlyMap<string, THREE.Matrix4> | null {
     const placements = this.player.at(time);
     for (const [frame, placement] of placements ?? []) {
@@ -86,7 +86,7 @@ export class Arm {
     this.paint();
   }
 
-  /** Paints links red, named `<robot>/<link>`: their ghosts, or themselves where there is no ghost of them. */
+  /** Paint links red, named `<robot>/<link>`: their visible ghosts, otherwise themselves. */
   setRed(names: ReadonlySet<string>): void {
     this.red = names;
     this.paint();
@@ -103,9 +103,9 @@ export class Arm {
     this.changed();
   }
 
-  /** Shows where the links would be, as placements in the base frame by link; null: not at all.
+  /** Show the ghost at placements in the base frame by link; null: hide it.
    *
-   * @returns How many links are elsewhere: one that stays where it is needs no ghost over it. */
+   * @returns Number of visible ghosts: a link that does not move needs none. */
   showGhost(placements: ReadonlyMap<string, THREE.Matrix4> | null): number {
     let turned = false;
     for (const [frame, group] of this.links) {
@@ -122,7 +122,7 @@ export class Arm {
     return [...this.ghosts.values()].filter((copy) => copy.visible).length;
   }
 
-  /** Takes the arm out of the scene. */
+  /** Remove the arm from the scene. */
   remove(): void {
     this.removed = true;
     for (const group of this.links.values()) {
@@ -138,12 +138,12 @@ export class Arm {
   }
 }
 
-/** Where the console gives a mesh of a robot, `<site>/<robot>`. */
+/** Return the console's address of a mesh of a robot, `<site>/<robot>`. */
 export function meshUrl(prefix: string, mesh: string, sha256: string): string {
   return `/mesh/${prefix}/${encodeURIComponent(mesh)}?sha=${sha256}`;
 }
 
-/** A model, or null and why there is none. */
+/** Load a model; on failure report why and return null. */
 export async function loadOrSay(
   url: string,
   wanted: () => boolean,

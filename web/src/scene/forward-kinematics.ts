@@ -3,9 +3,9 @@
 
 import * as THREE from "three";
 
-/** Placements of every link in the base frame at joint positions [rad] or [m], in the robot's order.
+/** Function from joint positions [rad] or [m], in the robot's order, to placements of every link in the base frame.
  *
- * The matrices are filled in again by the next call. */
+ * The next call overwrites the matrices. */
 export type Forward = (positions: readonly number[]) => ReadonlyMap<string, THREE.Matrix4>;
 
 interface Joint {
@@ -18,7 +18,7 @@ interface Joint {
   mimic: { leader: string; multiplier: number; offset: number } | null;
 }
 
-/** How a robot's links move with its joints; a text that is no URDF places nothing. */
+/** Return the forward kinematics of a robot; an invalid URDF has no placements. */
 export function forwardOf(urdf: string, jointNames: readonly string[]): Forward {
   const joints = fromRoot(readJoints(urdf));
   const children = new Set(joints.map((joint) => joint.child));
@@ -66,12 +66,12 @@ function readJoints(urdf: string): Joint[] {
   });
 }
 
-/** Joints in an order in which each link is placed before what hangs on it. */
+/** Sort joints so that each link is placed before its children. */
 function fromRoot(joints: readonly Joint[]): Joint[] {
   const byParent = Map.groupBy(joints, (joint) => joint.parent);
   const children = new Set(joints.map((joint) => joint.child));
   const ordered = joints.filter((joint) => !children.has(joint.parent));
-  for (const joint of ordered) ordered.push(...(byParent.get(joint.child) ?? [])); // grows as it goes
+  for (const joint of ordered) ordered.push(...(byParent.get(joint.child) ?? [])); // grows during the loop
   return ordered;
 }
 

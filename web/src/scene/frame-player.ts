@@ -1,4 +1,4 @@
-// Plays frames at the display's rate: between the two newest by source time, at most 100 ms behind.
+// Playback of frames at the display's rate: interpolated between the two newest, at most 100 ms late.
 
 import * as THREE from "three";
 import type { FrameTransforms } from "../gen/foxglove/FrameTransforms_pb";
@@ -14,34 +14,34 @@ interface Keyed {
 
 const BEHIND_MS = 60;
 const KEPT = 12;
-const GAP_MS = 1000; // of source time as it passes here
+const GAP_MS = 1000; // of source time at this page's rate
 
-/** Frames as they come, placements as they are drawn. */
+/** Frames on arrival, placements when drawn. */
 export class FramePlayer {
   private readonly frames: Keyed[] = [];
-  private skew = Number.POSITIVE_INFINITY; // page's clock minus source clock as it passes here, of the least delayed frame, ms
+  private skew = Number.POSITIVE_INFINITY; // page clock minus source clock of the least delayed frame, ms
   private rate = 1;
   private readonly placements = new Map<string, THREE.Matrix4>();
   private settled = false;
-  private shownTime = Number.NEGATIVE_INFINITY; // source time of what was told last, ms
+  private shownTime = Number.NEGATIVE_INFINITY; // source time of the last result, ms
   private passedTime = Number.NEGATIVE_INFINITY;
 
   add(message: FrameTransforms, sourceTime: number, arrived: number): void {
     const newest = this.frames.at(-1);
     const early = arrived - sourceTime / this.rate;
     if (newest && (sourceTime <= newest.time || sourceTime - newest.time > GAP_MS * Math.max(1, this.rate))) {
-      this.begin(); // a new publisher, a replay that goes elsewhere, or a long gap: no motion is made up between
+      this.begin(); // a new publisher, a replay's jump, or a long gap: do not interpolate across it
     }
-    // A replay that stood still: from now on, its frames are as much later.
+    // A replay was paused: its frames are later from now on.
     if (early - this.skew > GAP_MS) this.skew = early;
     this.frames.push({ time: sourceTime, poses: inSite(message) });
     if (this.frames.length > KEPT) this.frames.shift();
-    // Forgets slowly, so that clocks that drift apart do not matter.
+    // Forget slowly, which compensates for drifting clocks.
     this.skew = Math.min(this.skew + 0.05, early);
     this.settled = false;
   }
 
-  /** How much faster than here time passes at the source: other than 1 in replays only. */
+  /** Set how fast source time passes; not 1 in replays only. */
   setRate(rate: number): void {
     if (rate === this.rate) return;
     this.rate = rate;
@@ -56,17 +56,17 @@ export class FramePlayer {
     this.passedTime = Number.NEGATIVE_INFINITY;
   }
 
-  /** Source time [ms] of what was told last. */
+  /** Source time [ms] of the last result. */
   get shown(): number {
     return this.shownTime;
   }
 
-  /** Has the placements told again although nothing moved. */
+  /** Return the placements again at the next call although nothing moved. */
   touch(): void {
     this.settled = false;
   }
 
-  /** Where a frame was on its way to where it is shown, each place once, however seldom it is drawn. */
+  /** Return the positions of a frame up to the drawn time, each once, at any frame rate. */
   passed(name: string): readonly THREE.Vector3[] {
     const from = this.passedTime;
     this.passedTime = this.shownTime;
@@ -75,7 +75,7 @@ export class FramePlayer {
       .flatMap((frame) => frame.poses.get(name)?.position ?? []);
   }
 
-  /** Placements at a time of the page's clock [ms]; null: as before. */
+  /** Return placements at a time of the page's clock [ms]; null: unchanged. */
   at(time: number): ReadonlyMap<string, THREE.Matrix4> | null {
     const newest = this.frames.at(-1);
     if (!newest || this.settled) return null;
@@ -99,7 +99,7 @@ export class FramePlayer {
 
 const ONE = new THREE.Vector3(1, 1, 1);
 
-/** Poses in the site's frame, whatever frame each was given in. */
+/** Return poses in the site's frame, whatever frame each was given in. */
 function inSite(message: FrameTransforms): Map<string, Pose> {
   const given = new Map(message.transforms.map((transform) => [transform.childFrameId, transform]));
   const poses = new Map<string, Pose>();

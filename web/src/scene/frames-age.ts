@@ -1,13 +1,13 @@
-// How old the 3-D view's frames are, told without decoding them.
+// Age of the 3-D view's frames, measured without decoding them.
 
 import { useEffect, useState } from "preact/hooks";
 import { watch } from "../mesh/connection";
 import { now } from "../mesh/topics";
 
-/** Age [s] of the newest frames; null: not known, or none yet. */
+/** Return the age [s] of the newest frames; null: not known, or none yet. */
 export function useFramesAge(robotKey: string, topic: string): number | null {
   const [last] = useState<{ newAt: number | null }>({ newAt: null });
   useEffect(() => watch(`${robotKey}/${topic}`, (sample) => (last.newAt = sample.newAt)), [robotKey, topic]);
-  const at = now.value; // read in any case: it is what draws the view again
+  const at = now.value; // triggers drawing
   return last.newAt === null ? null : Math.max(0, (at - last.newAt) / 1000);
 }

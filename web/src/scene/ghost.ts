@@ -1,6 +1,6 @@
-// What the 3-D view shows beside what is: where the arm would stand, the way of its tool, what would touch.
+// Overlays of the 3-D view: a ghost of the arm, a path of its tool, colliding parts in red.
 //
-// Whoever sets one of these takes it away again when its page or panel goes.
+// The page or panel that sets one of these clears it when it unmounts.
 
 import { signal } from "@preact/signals";
 
@@ -10,16 +10,16 @@ export interface Ghost {
   positions: readonly number[];
 }
 
-/** Where an arm would stand; null: nowhere. The view that shows that robot draws it. */
+/** The ghost, drawn by the view that shows its robot; null: none. */
 export const ghost = signal<Ghost | null>(null);
-/** What is drawn red, as pairs of a check name it: `<robot>/<link>`, or a fixture of the cell.
+/** Red parts, named as in a check's pairs: `<robot>/<link>`, or a fixture of the cell.
  *
- * A link is red at its ghost; at the robot itself where both stand in the same place. */
+ * A link's ghost is red, or the link itself if its ghost is not visible. */
 export const redLinks = signal<ReadonlySet<string>>(new Set());
-/** Points x, y, z of the tool's way in the robot's base frame [m]; null: none is shown. */
+/** Points x, y, z of the tool's path in the robot's base frame [m]; null: none. */
 export const toolPath = signal<readonly (readonly [number, number, number])[] | null>(null);
 
-/** Shows the arm's ghost at joint positions; null takes it away. */
+/** Show the ghost at joint positions; null hides it. */
 export function ghostAt(robotKey: string, positions: readonly number[] | null): void {
   ghost.value = positions && { robotKey, positions };
 }

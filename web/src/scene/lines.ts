@@ -1,4 +1,4 @@
-// Lines in the 3-D view: the tool's trail, a path that it would take, the nearest two points.
+// Lines in the 3-D view: the tool's trail, a path that it would take, the shortest distance.
 
 import * as THREE from "three";
 import type { Level } from "../mesh/robot-state";
@@ -6,10 +6,10 @@ import type { Palette } from "./surroundings";
 
 const TRAIL_POINTS = 900;
 const END_RADIUS = 0.006; // m
-const MOST_WAITING = 20; // a second of what is told
-const NEAR_MS = 25; // half of the time between two
+const MOST_WAITING = 20; // a second of data
+const NEAR_MS = 25; // half of the interval between two
 
-/** A line over everything that is there: a way behind a link is still a way. */
+/** A line drawn over everything: a path behind a link stays visible. */
 function line(points: number): THREE.Line<THREE.BufferGeometry, THREE.LineBasicMaterial> {
   const made = new THREE.Line(
     new THREE.BufferGeometry().setAttribute("position", new THREE.BufferAttribute(new Float32Array(points * 3), 3)),
@@ -20,7 +20,7 @@ function line(points: number): THREE.Line<THREE.BufferGeometry, THREE.LineBasicM
   return made;
 }
 
-/** The last places of the tool, in the site's frame. */
+/** The last positions of the tool, in the site's frame. */
 export class Trail {
   readonly line = line(TRAIL_POINTS);
   private length = 0;
@@ -63,14 +63,14 @@ export class Path {
   }
 }
 
-/** The nearest two points, in the site's frame [m], how much they ask to be looked at, and their distance in words. */
+/** The two nearest points in the site's frame [m], their level, and their distance in words. */
 export interface Nearest {
   points: readonly [THREE.Vector3, THREE.Vector3];
   level: Level;
   text: string;
 }
 
-/** A line between the nearest two points with a ball at each end and its words, played beside the arm's frames. */
+/** A line between the two nearest points with a ball at each end and a label, in time with the arm's frames. */
 export class Gap {
   readonly group = new THREE.Group();
   private readonly line = line(2);
@@ -86,7 +86,7 @@ export class Gap {
     this.group.visible = false;
   }
 
-  /** Takes what is nearest at a source time [ms]. */
+  /** Add the nearest points at a source time [ms]. */
   add(nearest: Nearest, time: number): void {
     if (time < (this.waiting.at(-1)?.time ?? time)) this.waiting = []; // a new publisher
     this.waiting.push({ time, nearest });
@@ -98,7 +98,7 @@ export class Gap {
     this.group.visible = false;
   }
 
-  /** Shows what was nearest when the arm was where it is drawn [ms of source time]. */
+  /** Show the nearest points of the arm's drawn source time [ms]. */
   showAt(time: number, { dim, warning, alarm }: Palette): void {
     const next = this.waiting.findIndex((each) => each.time > time + NEAR_MS);
     const shown = this.waiting.at(next < 0 ? -1 : next - 1);
@@ -117,7 +117,7 @@ export class Gap {
     this.words = { text, level };
   }
 
-  /** Puts the words beside the line's middle in the picture that was drawn now, of a size [px]. */
+  /** Place the label beside the line's middle in the drawn picture of a size [px]. */
   placeLabel(camera: THREE.Camera, width: number, height: number): void {
     const [first, second] = this.ends.map((end) => end.position);
     this.label.hidden = !this.group.visible;

@@ -1,11 +1,11 @@
-// Models of the 3-D view: asked of the mesh, given the page's materials, painted, copied as ghosts.
+// Models of the 3-D view: loaded from the mesh, given the page's materials, painted, copied as ghosts.
 
 import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { toCreasedNormals } from "three/addons/utils/BufferGeometryUtils.js";
 import { t } from "../i18n/texts";
 
-const NOT_YET: readonly number[] = [503, 504]; // the mesh's service is busy, or did not answer
+const NOT_YET: readonly number[] = [503, 504]; // the mesh service is busy, or did not answer
 const ASK_AGAIN_MS = 2000;
 const CREASE_ANGLE = 0.6; // rad: sharper edges stay sharp
 const STALE_COLOUR = new THREE.Color("#7d8387");
@@ -13,29 +13,29 @@ const MUTED = 0.6;
 const STALE_OPACITY = 0.38;
 const FIXTURE_OPACITY = 0.7;
 const FIXTURE_COLOUR = "#6f7c88";
-const NO_COLOUR = 0xcccccc; // a model says so where it has none of its own: see robots/meshes/mesh.py
+const NO_COLOUR = 0xcccccc; // placeholder of models without colour: see robots/meshes/mesh.py
 const EDGE_ANGLE = 30; // degrees: sharper ones are drawn
-const MOST_CORNERS = 100_000; // more of them, and their edges take too long to find
+const MOST_CORNERS = 100_000; // finding the edges of more takes too long
 
-/** How a model is drawn. */
+/** Appearance of a model. */
 export interface Paint {
   stale: boolean;
   red: boolean;
-  /** What is not looked at for itself: a neighbour is muted, a fixture lets the arm be seen through it. */
+  /** Other parts than the arm: a neighbour is muted, a fixture translucent. */
   kind: Kind;
 }
 export type Kind = "arm" | "neighbour" | "fixture";
 
-/** Asks for a GLB until there is one; null: nobody wants it any more.
+/** Load a GLB, with retries; null: no longer wanted.
  *
- * `failed` hears why it cannot be yet. @throws Error with the reason why it cannot be at all. */
+ * `failed` receives the reason for each retry. @throws Error with the reason if it can never be loaded. */
 export async function loadModel(
   url: string,
   wanted: () => boolean,
   failed: (why: string) => void,
 ): Promise<THREE.Group | null> {
   let glb: ArrayBuffer | null = null;
-  // Its service, or the console, may be starting or busy: said at once, and asked until it is there.
+  // The mesh service or the console may be starting or busy: report it immediately, and retry.
   while (wanted() && !(glb = await fetched(url, failed))) {
     await new Promise((resolve) => setTimeout(resolve, ASK_AGAIN_MS));
   }
@@ -44,7 +44,7 @@ export async function loadModel(
   return wanted() ? scene : null;
 }
 
-/** A GLB; null, and why, where it cannot be had yet. */
+/** Fetch a GLB; on a temporary failure report why and return null. */
 async function fetched(url: string, failed: (why: string) => void): Promise<ArrayBuffer | null> {
   let answer: Response;
   try {
@@ -60,7 +60,7 @@ async function fetched(url: string, failed: (why: string) => void): Promise<Arra
   return null;
 }
 
-/** A group that holds a model with materials of the page's own; its matrix is set by hand. */
+/** Return a group with a model in the page's materials; the caller sets its matrix. */
 export function dressed(model: THREE.Group, colour: string): THREE.Group {
   model.traverse((part) => {
     if (!(part instanceof THREE.Mesh)) return;
@@ -85,7 +85,7 @@ export function dressed(model: THREE.Group, colour: string): THREE.Group {
   return group;
 }
 
-/** A dressed fixture: of a colour that stands out from the floor where it has none, with its edges drawn. */
+/** Return a fixture's model with edges; without a colour it gets one that contrasts with the floor. */
 export function dressedFixture(model: THREE.Group, colour: string): THREE.Group {
   const group = dressed(model, colour);
   const parts: THREE.Mesh[] = [];
@@ -102,14 +102,14 @@ export function dressedFixture(model: THREE.Group, colour: string): THREE.Group 
   return group;
 }
 
-/** Gives the edges of a fixture a colour. */
+/** Set the colour of a fixture's edges. */
 export function colourEdges(group: THREE.Group, colour: string): void {
   group.traverse((part) => {
     if (part instanceof THREE.LineSegments) (part.material as THREE.LineBasicMaterial).color.set(colour);
   });
 }
 
-/** Paints a dressed model: grey and translucent when what is known of it is old. */
+/** Paint a model; stale ones are grey and translucent. */
 export function paint(group: THREE.Group, { stale, red, kind }: Paint, alarm: string): void {
   const opacity = stale ? STALE_OPACITY : kind === "fixture" ? FIXTURE_OPACITY : 1;
   group.traverse((part) => {
@@ -122,14 +122,14 @@ export function paint(group: THREE.Group, { stale, red, kind }: Paint, alarm: st
     material.vertexColors = !stale && !red && part.geometry.hasAttribute("color");
     material.transparent = opacity < 1;
     material.opacity = opacity;
-    // Of what is seen through, the inside would only confuse.
+    // The inside of a translucent part would only confuse.
     material.side = kind === "fixture" ? THREE.FrontSide : THREE.DoubleSide;
     material.needsUpdate = true;
     part.castShadow = opacity === 1;
   });
 }
 
-/** A translucent copy, hidden yet; `colourGhost` gives it its colour. */
+/** Return a hidden translucent copy; `colourGhost` sets its colour. */
 export function ghostOf(group: THREE.Group): THREE.Group {
   const copy = group.clone();
   copy.visible = false;
@@ -143,7 +143,7 @@ export function ghostOf(group: THREE.Group): THREE.Group {
   return copy;
 }
 
-/** Gives a ghost another colour. */
+/** Set a ghost's colour. */
 export function colourGhost(copy: THREE.Group, colour: string, opacity: number): void {
   copy.traverse((part) => {
     if (!(part instanceof THREE.Mesh)) return;

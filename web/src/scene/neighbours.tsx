@@ -1,4 +1,4 @@
-// The other robots of the cell in the 3-D view of one of them.
+// Other robots of the cell in a robot's 3-D view.
 
 import { useEffect, useRef } from "preact/hooks";
 import type { Description } from "../gen/robomesh_pb";
@@ -26,7 +26,7 @@ export function Neighbours(props: { robotKey: string; cell: string; scene: Robot
   );
 }
 
-/** One of them: dimmed; grey when what is known of it is old. */
+/** One other robot: dimmed; grey when stale. */
 function Neighbour(props: { robotKey: string; description: Description; scene: RobotScene }) {
   const { robotKey, description, scene } = props;
   const stale = isStale("frames", useFramesAge(robotKey, "frames"));

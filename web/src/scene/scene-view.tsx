@@ -1,4 +1,4 @@
-// The live 3-D panel: views of the description, trail and frames, and a word when it is stale.
+// The live 3-D panel: views of the description, trail, frames, and a message when stale.
 
 import { create } from "@bufbuild/protobuf";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
@@ -23,18 +23,18 @@ import type { Stage } from "./scene";
 import { RobotScene } from "./scene";
 import { framesOf, framesTopic } from "./topic-selection";
 
-// Where the free camera stands, from the target, in lengths of the arm's reach.
+// Eye of the free camera relative to its target, in multiples of the arm's reach.
 const FREE_EYE = { x: 1.2, y: -1.69, z: 0.72 };
-const NOMINAL_REACH = 1.1; // m, until the description is there
+const NOMINAL_REACH = 1.1; // m, until the description arrives
 
-/** Views of a description, the free one first. */
+/** Return the views of a description, the free one first. */
 export function viewsOf(description: Description | undefined): readonly View[] {
   const named = description?.views ?? [];
   const free = named.find((view) => view.name === "free") ?? freeView(named);
   return [free, ...named.filter((view) => view.name !== "free")];
 }
 
-/** A free view as far away as the others, which stand three reaches from their target. */
+/** Return a free view at the distance of the others, which is three times the reach. */
 function freeView(others: readonly View[]): View {
   const front = others.find((view) => view.name === "front");
   const { eye, target } = front ?? {};
@@ -56,9 +56,9 @@ export function SceneView(props: {
   stale: boolean;
   age: number | null | undefined;
   lostAt: number | null;
-  /** Of a replay: whether its joints are of the moment at which it is. */
+  /** Replay only: whether its joints belong to the replay's current moment. */
   arm?: OfMoment;
-  /** Told of each scene that is made, and of its end: somebody else's parts may stand in it. */
+  /** Called with each new scene, and with null at its end, so that other components can add parts. */
   staged?: (stage: Stage | null) => void;
 }) {
   const canvas = useRef<HTMLCanvasElement>(null);
@@ -74,13 +74,13 @@ export function SceneView(props: {
   const topic = framesTopic(robotKey);
   const framesAge = useFramesAge(robotKey, topic);
   const replayed = description?.replay !== undefined;
-  // A replay that is paused sends no frames, and they are not old; whether it is there its page says.
+  // A paused replay sends no frames, and they are not stale; its page shows whether it is available.
   const absent = props.arm === "absent" || props.arm === "coming";
   const stale = props.stale || absent || (!replayed && isStale(topic, framesAge));
   const age = props.stale ? props.age : framesAge;
   const rate = useTopic(ReplayStateSchema, `${robotKey}/replay`)?.message.speed || 1;
 
-  // One scene for one description: a changed one begins anew.
+  // A changed description gets a new scene.
   const identity = useMemo(
     () => description && JSON.stringify([description.links, description.fixtures, description.baseToSite]),
     [description],
@@ -211,7 +211,7 @@ export function SceneView(props: {
   );
 }
 
-/** The nearest two points of the arm and what stands around it, while that is known. */
+/** Return the two nearest points of the arm and its surroundings; null: not known. */
 function useNearest(robotKey: string): { nearest: Nearest; sourceTime: number } | null {
   const latest = useTopic(KinematicStateSchema, `${robotKey}/kinematics`);
   const clearance = latest?.message.clearance;

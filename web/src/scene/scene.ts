@@ -1,4 +1,4 @@
-// The live 3-D picture of one robot: three.js behind five functions, drawn only when something changed.
+// The live 3-D picture of one robot, drawn only after a change.
 
 import { create } from "@bufbuild/protobuf";
 import * as THREE from "three";
@@ -30,21 +30,21 @@ const MANY_SLOW_FRAMES = 3;
 const PAUSE_FACTOR = 3; // pause after a slow frame, in its durations
 const LONGEST_PAUSE_MS = 2000;
 
-/** What somebody else's parts in the picture need: see Program's gizmo. */
+/** Interface for parts that other components add: see Program's gizmo. */
 export interface Stage {
   scene: THREE.Scene;
   canvas: HTMLCanvasElement;
   /** The robot's base in the site's frame. */
   base: () => THREE.Matrix4;
-  /** As they are now: a view takes others. */
+  /** Current camera and controls: each view replaces them. */
   camera: () => THREE.Camera;
   controls: () => OrbitControls;
-  /** What is seen, for somebody else to draw. */
+  /** The current camera as a view for the renderer. */
   view: () => View;
   changed: () => void;
 }
 
-/** A scene on a canvas. Placements come by `placeFrames`; `dispose` frees the GPU. */
+/** A scene on a canvas. `placeFrames` supplies placements; `dispose` frees the GPU. */
 export class RobotScene {
   private readonly renderer: THREE.WebGLRenderer;
   private readonly scene = new THREE.Scene();
@@ -69,7 +69,7 @@ export class RobotScene {
   private disposed = false;
   private readonly observer: ResizeObserver;
 
-  /** @throws Error where the browser has no WebGL. */
+  /** @throws Error if the browser has no WebGL. */
   constructor(
     private readonly canvas: HTMLCanvasElement,
     private readonly prefix: string,
@@ -95,7 +95,7 @@ export class RobotScene {
     this.request = requestAnimationFrame(this.frame);
   }
 
-  /** Background, floor and lines after the page's theme. */
+  /** Set background, floor and lines to the page's theme. */
   setColours(): void {
     const colours = (this.colours = palette());
     // Level in the site's frame, whatever the robot's base is tilted by.
@@ -124,7 +124,7 @@ export class RobotScene {
     };
   }
 
-  /** Loads the models of the arm and of what stands around it. */
+  /** Load the models of the arm and the fixtures. */
   async load(description: Description, failed: Failed): Promise<void> {
     if (description.baseToSite.length === 16) this.base.fromArray(description.baseToSite).transpose();
     this.floorAt = floorOf(description);
@@ -136,7 +136,7 @@ export class RobotScene {
       this.axes.set(`${this.prefix}/${frame.name}`, axes);
       this.scene.add(axes);
     }
-    // Made when a target is first dragged, a ghost's shader would hold up the page, and with it the lease.
+    // Compile the ghosts' shaders now: during the first drag they would block the page, and its lease would expire.
     const compiled = (ghost: THREE.Group) => this.renderer.compile(ghost, this.viewpoint.camera, this.scene);
     await Promise.all([this.arm.load(description, failed, compiled), this.loadFixtures(description, failed)]);
   }
@@ -161,28 +161,28 @@ export class RobotScene {
     );
   }
 
-  /** Takes a FrameTransforms payload. */
+  /** Add a FrameTransforms payload. */
   placeFrames(payload: Uint8Array, sourceTimeMs: number, arrivedMs: number): void {
     this.arm.placeFrames(payload, sourceTimeMs, arrivedMs);
   }
 
-  /** How fast a replay passes; see `FramePlayer`. */
+  /** Set a replay's rate; see `FramePlayer`. */
   setRate(rate: number): void {
     this.arm.player.setRate(rate);
   }
 
-  /** Grey and translucent when what is known of the robot is old. */
+  /** Draw the robot grey and translucent when its data is stale. */
   setStale(stale: boolean): void {
     this.arm.setStale(stale);
   }
 
-  /** Another robot of the cell, drawn dimmed until it is removed; its placements are its own to take. */
+  /** Add another robot of the cell, dimmed; it receives its own placements. */
   addNeighbour(prefix: string, description: Description): Arm {
     const neighbour = new Arm(this.scene, prefix, "neighbour", this.changed);
     this.neighbours.add(neighbour);
     this.canvas.dataset.neighbours = String(this.neighbours.size);
     neighbour.setRed(this.red);
-    // A neighbour without its model is no trouble of this robot's: its own page says why.
+    // A neighbour's missing model is shown on its own page.
     void neighbour.load(description, () => undefined);
     return neighbour;
   }
@@ -192,7 +192,7 @@ export class RobotScene {
     neighbour.remove();
   }
 
-  /** Draws links (`<robot>/<link>`) and fixtures red. */
+  /** Draw links (`<robot>/<link>`) and fixtures red. */
   setRed(names: ReadonlySet<string>): void {
     this.red = names;
     for (const arm of [this.arm, ...this.neighbours]) arm.setRed(names);
@@ -205,19 +205,19 @@ export class RobotScene {
     this.dirty = true;
   }
 
-  /** Shows where the links would be, as placements in the base frame; null: not at all. */
+  /** Show the ghost at placements in the base frame; null hides it. */
   showGhost(placements: ReadonlyMap<string, THREE.Matrix4> | null): void {
     this.canvas.dataset.ghost = String(this.arm.showGhost(placements));
   }
 
-  /** Shows a path of the tool, in the base frame [m]; null: none. */
+  /** Show a path of the tool in the base frame [m]; null: none. */
   showPath(points: readonly (readonly [number, number, number])[] | null): void {
     this.path.show(points);
     this.canvas.dataset.path = String(points?.length ?? 0);
     this.dirty = true;
   }
 
-  /** Shows the nearest two points when the arm is drawn where it was at their source time [ms]; null: none. */
+  /** Show the two nearest points together with the arm at their source time [ms]; null: none. */
   showGap(nearest: Nearest | null, sourceTimeMs = 0): void {
     if (nearest) this.gap.add(nearest, sourceTimeMs);
     else this.gap.hide();
@@ -235,7 +235,7 @@ export class RobotScene {
     this.dirty = true;
   }
 
-  /** Looks from a view of the description; its points are in the robot's base frame. */
+  /** Set the camera to a view of the description; its points are in the robot's base frame. */
   look(view: View): void {
     const point = (v: { x: number; y: number; z: number } | undefined) =>
       new THREE.Vector3(v?.x ?? 0, v?.y ?? 0, v?.z ?? 0);
@@ -248,7 +248,7 @@ export class RobotScene {
     });
   }
 
-  /** The camera as it is now, as a view in the base's frame, for somebody else to draw. */
+  /** Return the current camera as a view in the base frame, for the renderer. */
   view(): View {
     const { camera, controls, isFlat, fieldOfView, flatHeight } = this.viewpoint;
     const toBase = this.base.clone().invert();

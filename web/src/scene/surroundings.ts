@@ -1,4 +1,4 @@
-// What stands around a robot in the 3-D view: light, floor, grid, in the page's colours.
+// Surroundings of a robot in the 3-D view: light, floor, grid, in the page's colours.
 
 import * as THREE from "three";
 
@@ -16,7 +16,7 @@ export interface Palette {
   alarm: string;
 }
 
-/** The page's colours for the scene, from the style sheet. */
+/** Return the scene's colours from the style sheet. */
 export function palette(): Palette {
   const style = getComputedStyle(document.documentElement);
   const read = (name: string) => style.getPropertyValue(name).trim();
@@ -32,7 +32,7 @@ export function palette(): Palette {
   };
 }
 
-/** Sky, key light with a shadow, and a fill from behind. */
+/** Return sky, key light with a shadow, and a fill light. */
 export function lights(): THREE.Object3D[] {
   const sky = new THREE.HemisphereLight("#f4f7fa", "#5b5f63", 1.5);
   sky.position.set(0, 0, 1);
@@ -62,7 +62,7 @@ export function surround(scene: THREE.Scene, colours: Palette, hasFloor = true):
   return made;
 }
 
-/** A round floor with a grid of 100 mm, stronger each 500 mm, ending at its edge. */
+/** Return a round floor with a grid of 100 mm, stronger each 500 mm. */
 function floor(colours: Palette): THREE.Group {
   const group = new THREE.Group();
   const disc = new THREE.Mesh(

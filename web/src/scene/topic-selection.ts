@@ -1,4 +1,4 @@
-// How much of a robot is taken: of one at another site what fits a slow link, unless a person asks for all.
+// Choice of a robot's topics: for one at another site those that fit a slow link, unless the operator wants all.
 
 import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
 import { signal } from "@preact/signals";
@@ -15,7 +15,7 @@ export type Reach = (typeof REACHES)[number];
 
 const asked = signal<ReadonlyMap<string, Reach>>(new Map());
 
-/** Whether it is at another site than this console. */
+/** Return whether the robot is at another site than this console. */
 export function isFar(robotKey: string): boolean {
   const [, site, robot = ""] = robotKey.split("/");
   return hello.value !== null && hello.value.site !== site && !isReplay(robot);
@@ -29,17 +29,17 @@ export function askReach(robotKey: string, reach: Reach): void {
   asked.value = new Map(asked.value).set(robotKey, reach);
 }
 
-/** The topic of the robot's joint states, whole or thinned. */
+/** Return the topic of the robot's joint states, whole or thinned. */
 export function jointsTopic(robotKey: string): "joints" | "joints/slow" {
   return reachOf(robotKey) === "slow" ? "joints/slow" : "joints";
 }
 
-/** Where the 3-D view's placements come from. */
+/** Return the topic that supplies the 3-D view's placements. */
 export function framesTopic(robotKey: string): "frames" | "joints/slow" {
   return reachOf(robotKey) === "slow" ? "joints/slow" : "frames";
 }
 
-/** Makes a FrameTransforms payload of a JointStates payload: over a slow link placements are computed here. */
+/** Convert JointStates to FrameTransforms payloads: over a slow link the page computes placements. */
 export function framesOf(
   prefix: string,
   description: Description,
@@ -68,7 +68,7 @@ export function framesOf(
   };
 }
 
-/** Of 16 doubles by rows; anything else stands still. */
+/** Read 16 doubles by rows; anything else is the identity. */
 function matrixOf(rows: readonly number[]): THREE.Matrix4 {
   const matrix = new THREE.Matrix4();
   return rows.length === 16 ? matrix.fromArray(rows).transpose() : matrix;

@@ -1,4 +1,4 @@
-// What of H.264 a decoder must be told: key frames, and the codec's name in its parameter set.
+// Properties of an H.264 stream that a decoder needs: key frames, and the codec's name.
 
 const SLICE = 1;
 const KEY_SLICE = 5;
@@ -9,18 +9,18 @@ function* units(data: Uint8Array): Generator<{ kind: number; at: number }> {
     if (data[i] !== 0 || data[i + 1] !== 0 || data[i + 2] !== 1) continue;
     const kind = (data[i + 3] ?? 0) & 0x1f;
     yield { kind, at: i + 3 };
-    if (kind === SLICE || kind === KEY_SLICE) return; // the rest is the picture
+    if (kind === SLICE || kind === KEY_SLICE) return; // slice data follows
     i += 3;
   }
 }
 
-/** Whether a picture (Annex B) can be decoded by itself. */
+/** Return whether a picture (Annex B) can be decoded by itself. */
 export function isKeyFrame(data: Uint8Array): boolean {
   for (const { kind } of units(data)) if (kind === KEY_SLICE) return true;
   return false;
 }
 
-/** The codec's name from the sequence parameter set, as "avc1.42c01f"; null where there is none. */
+/** Return the codec's name from the sequence parameter set, as "avc1.42c01f"; null without one. */
 export function codecName(data: Uint8Array): string | null {
   for (const { kind, at } of units(data)) {
     if (kind !== PARAMETERS || at + 3 >= data.length) continue;

@@ -1,4 +1,4 @@
-// A live picture of a robot: video where this browser decodes it, one still after another where not.
+// A live picture of a robot: video if this browser decodes it, otherwise a sequence of stills.
 
 import { fromBinary } from "@bufbuild/protobuf";
 import type { JSX, RefObject } from "preact";
@@ -17,22 +17,22 @@ const REDUCED_STILL = { width: 640, height: 360 };
 
 export interface Live {
   picture: JSX.Element | null;
-  /** Its canvas or image, to be saved. */
+  /** Its canvas or image, for saving. */
   place: RefObject<HTMLCanvasElement | null> | RefObject<HTMLImageElement | null>;
-  /** Whether there is a picture at all. */
+  /** Whether there is a picture. */
   any: boolean;
-  /** Of the picture [s]; null: not known. */
+  /** Age of the picture [s]; null: not known. */
   age: number | null;
   stale: boolean;
-  /** How far it is reduced for this browser's line; 0: not at all. */
+  /** Reduction for this browser's connection; 0: none. */
   step: number;
   /** Whether it is video. */
   video: boolean;
-  /** Why there is none, or no video; empty: nothing is wrong. */
+  /** Why there is no picture or no video; empty: no problem. */
   problem: string;
 }
 
-/** The live picture of what is wanted; null: nothing for now. */
+/** Show the live picture of a view; null: none for now. */
 export function useLive(robotKey: string, wanted: Wanted | null, label: string): Live {
   const canvas = useRef<HTMLCanvasElement>(null);
   const image = useRef<HTMLImageElement>(null);
@@ -41,7 +41,7 @@ export function useLive(robotKey: string, wanted: Wanted | null, label: string):
   const [still, setStill] = useState<string | null>(null);
   const [any, setAny] = useState(false);
   const [step, setStep] = useState(0);
-  // Read when it is drawn, not a reason to draw.
+  // Read while drawing; its changes need no drawing.
   const [drawn] = useState<{ newAt: number | null; at: number }>({ newAt: null, at: 0 });
   const identity = wanted && JSON.stringify(wanted);
 
@@ -58,7 +58,7 @@ export function useLive(robotKey: string, wanted: Wanted | null, label: string):
       setProblem("");
       setStep(reduced);
     };
-    // Stills are many times the bytes of video: never larger and more often than needed.
+    // Stills need many times the bytes of video: limit their size and rate.
     const asked = video || !isStanding(wanted) ? wanted : { ...wanted, ...REDUCED_STILL, fps: STILL_FPS };
     return withView(
       robotKey,
@@ -84,10 +84,10 @@ export function useLive(robotKey: string, wanted: Wanted | null, label: string):
       setProblem,
     );
   }, [robotKey, identity, video]);
-  // What another robot's or view's picture was is none of this one's.
+  // The state of another robot's or view's picture does not apply.
   useEffect(() => () => setAny(false), [robotKey, wanted?.of]);
 
-  const at = now.value; // read in any case: it is what draws this again
+  const at = now.value; // triggers drawing
   const age = drawn.newAt === null ? null : Math.max(0, (at - drawn.newAt) / 1000);
   const picture = video ? (
     <canvas ref={canvas} data-drawn={any} role="img" aria-label={label} />

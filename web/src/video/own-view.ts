@@ -1,10 +1,10 @@
-// A view of one's own: asked of the renderer, and asked for again when its pictures end.
+// A view requested from the renderer for this page, and requested again when its pictures stop.
 
 import type { View } from "../gen/robomesh_pb";
 import { ViewAnswerSchema, ViewRequestSchema } from "../gen/robomesh_pb";
 import { ask, inOwnName } from "../mesh/connection";
 
-/** What is wanted to be seen; a width of 0: as the renderer has it for everybody. */
+/** The wanted picture; a width of 0: the renderer's standard size. */
 export interface Wanted {
   /** The camera of the view of this name, or `view`. */
   of: string;
@@ -14,7 +14,7 @@ export interface Wanted {
   fps: number;
 }
 
-/** Keys on which the pictures come. */
+/** Keys of the pictures. */
 export interface PictureKeys {
   video: string;
   image: string;
@@ -23,21 +23,21 @@ export interface PictureKeys {
 const ASK_S = 4;
 const LOOK_EACH_MS = 3000;
 
-/** The renderer's own view, for everybody. */
+/** Keys of the renderer's standard view. */
 export function standing(of: string): Wanted {
   return { of, width: 0, height: 0, fps: 0 };
 }
 
-/** Whether it is what everybody gets. */
+/** Return whether it is the standard view. */
 export function isStanding(wanted: Wanted): boolean {
   return wanted.width === 0 && wanted.fps === 0 && !wanted.view;
 }
 
-/** Has pictures of what is wanted, until the returned function is called.
+/** Receive pictures of a view until the returned function is called.
  *
- * @param attach Told where they come, again when that changes; returns how to end it.
- * @param quiet Whether none has come for long: the renderer may have begun anew, and know of nothing.
- * @param refused Told why there are none, in words. */
+ * @param attach Called with the keys, again when they change; returns a function that detaches.
+ * @param quiet Returns whether no picture has arrived for long: the renderer may have restarted.
+ * @param refused Called with the reason why there are none. */
 export function withView(
   robotKey: string,
   wanted: Wanted,
@@ -65,7 +65,7 @@ export function withView(
     } catch (error) {
       if (ended) return;
       refused(error instanceof Error ? error.message : String(error));
-      if (!view && !attached) takeStanding(); // larger than wanted is better than none
+      if (!view && !attached) takeStanding(); // a larger picture than wanted is better than none
     }
   };
   let timer: ReturnType<typeof setInterval> | undefined;

@@ -1,4 +1,4 @@
-// Rendered video on a canvas, by WebCodecs: decoded as it comes, drawn newest first.
+// Video on a canvas by WebCodecs: decoded on arrival, newest frame drawn.
 
 import { fromBinary } from "@bufbuild/protobuf";
 import { CompressedVideoSchema } from "../gen/foxglove/CompressedVideo_pb";
@@ -7,17 +7,17 @@ import type { Sample } from "../mesh/connection";
 import { watch } from "../mesh/connection";
 import { codecName, isKeyFrame } from "./h264";
 
-/** Whether this browser decodes video here (it does so only over https, or on localhost). */
+/** Return whether this browser decodes video here (only over https, or on localhost). */
 export const decodesVideo = "VideoDecoder" in window;
 
 export interface VideoListener {
-  /** A picture was drawn; `newAt` is when it was new on this page's clock [ms], null: not known; `step`: how
-   * far the video is reduced for this browser's line. */
+  /** Called for each drawn picture; `newAt` is when it was new on this page's clock [ms], null: not known; `step`: how
+   * much the video is reduced for this browser's connection. */
   drawn: (newAt: number | null, step: number) => void;
   failed: (text: string) => void;
 }
 
-/** Plays a video key on a canvas until the returned function is called. */
+/** Play a video key on a canvas until the returned function is called. */
 export function playVideo(key: string, canvas: HTMLCanvasElement, listener: VideoListener): () => void {
   const context = canvas.getContext("2d", { alpha: false, desynchronized: true });
   let decoder: VideoDecoder | null = null;
@@ -50,7 +50,7 @@ export function playVideo(key: string, canvas: HTMLCanvasElement, listener: Vide
         drawing ||= requestAnimationFrame(draw);
       },
       error: (error) => {
-        codec = ""; // the next key frame begins anew
+        codec = ""; // restart at the next key frame
         listener.failed(error.message);
       },
     });
@@ -68,7 +68,7 @@ export function playVideo(key: string, canvas: HTMLCanvasElement, listener: Vide
     try {
       if (sample.step !== step) {
         step = sample.step;
-        codec = ""; // another stream: it begins with a key frame
+        codec = ""; // a new stream begins with a key frame
       }
       if (sample.live) {
         decode(fromBinary(CompressedVideoSchema, sample.payload).data, sample.newAt);

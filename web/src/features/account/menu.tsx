@@ -1,4 +1,4 @@
-// In the bar: who is signed in, as what; signing out; a new password.
+// The account menu in the bar: name and role, sign-out, new password.
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { a, roleText } from "../../i18n/account";

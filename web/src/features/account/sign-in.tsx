@@ -1,4 +1,4 @@
-// The page before one is signed in: what console this is, how it is reached, and who one is.
+// The sign-in page: the console's name, how the page reaches it, name and password.
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { a, endText } from "../../i18n/account";
@@ -78,7 +78,7 @@ export function SignIn() {
           {how && a(how.insecure && !how.secure ? "insecure" : how.secure ? "secure" : "this_machine")}
         </p>
         <p class="dim">{a("no_stop")}</p>
-        {/* Where the bar has no place for them. */}
+        {/* For narrow screens, where the bar has no space for them. */}
         <p class="sign-in-look">
           <button class="quiet" onClick={switchLanguage} title={t("language_hint")}>
             {t("language")}
@@ -92,7 +92,7 @@ export function SignIn() {
   );
 }
 
-/** Whole seconds until a time, counted down. */
+/** Return the whole seconds until a time, counted down. */
 function useSecondsUntil(time: number): number {
   const secondsLeft = () => Math.max(0, Math.ceil((time - Date.now()) / 1000));
   const [left, setLeft] = useState(secondsLeft);

@@ -1,4 +1,4 @@
-// The chain as a list: the base, each joint with its link, the tool.
+// The kinematic chain as a list: the base, each joint with its link, the tool.
 
 import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
@@ -196,7 +196,7 @@ function ToolMark() {
   );
 }
 
-/** A ring for a joint that turns, an arrow for one that slides. */
+/** A ring for a rotary joint, an arrow for a prismatic one. */
 function JointSign({ joint }: { joint: Joint }) {
   const word = d(joint.type);
   return (

@@ -1,4 +1,4 @@
-// What the server finds wrong with the draft as one types, and where it says the tool is.
+// The server's problems with the draft while the user types, and the tool's position.
 
 import { computed, effect, signal } from "@preact/signals";
 import { d } from "../../i18n/define";
@@ -12,32 +12,32 @@ import { positions } from "./workbench";
 
 const AFTER_MS = 200;
 const AGAIN_MS = 1500;
-// Beyond these a link's shape is hardly in the unit that was meant [m].
+// A link's shape beyond these sizes probably has the wrong unit [m].
 const LARGEST_M = 10;
 const SMALLEST_M = 0.001;
 
 export const checked = signal<Checked | null>(null);
-/** Whether an answer for the draft as it stands is still to come. */
+/** Whether the current draft's answer is pending. */
 export const checking = signal(false);
 /** Why it could not be checked; "" when it could. */
 export const checkFailed = signal("");
 
-/** What stands in number fields and is no number, by path; the draft keeps the last one that was. */
+/** Invalid texts of number fields, by path; the draft keeps the last valid number. */
 export const unread = signal<ReadonlyMap<string, string>>(new Map());
 
-/** A field's path in the form of a problem's. */
+/** Return a field's path in the format of a problem's. */
 export function placeOf(path: string): (string | number)[] {
   return path.split("/").map((step) => (/^\d+$/.test(step) ? Number(step) : step));
 }
 
-/** Notes what was typed where a number belongs; null: it is one. */
+/** Record an invalid number; null: it is valid. */
 export function noNumber(path: string, text: string | null): void {
   if (text === (unread.peek().get(path) ?? null)) return;
   const others = [...unread.peek()].filter(([other]) => other !== path);
   unread.value = new Map(text === null ? others : [...others, [path, text]]);
 }
 
-// In another draft, or after links came, went or moved, a path is another field's.
+// In another draft, or after links change, a path names another field.
 const fields = computed(
   () => `${identity.value.id} ${draft.value?.description.joint.map(({ name }) => name).join(" ") ?? ""}`,
 );
@@ -45,7 +45,7 @@ effect(() => {
   if (fields.value) unread.value = new Map();
 });
 
-/** What is wrong: as the server checks it, the shapes that it could not read, and what is no number. */
+/** Problems: from the server's check, unreadable shapes, and invalid numbers. */
 export const problems = computed<readonly Problem[]>(() => {
   const typed = [...unread.value].map(([path, text]) => ({
     path: placeOf(path),
@@ -75,7 +75,7 @@ function oddShapes(): Problem[] {
   });
 }
 
-/** Whether shapes are still being read, which may be found unreadable. */
+/** Whether shapes are still being read, which may add problems. */
 export const readingShapes = computed(() => {
   const now = draft.value;
   return now !== null && bodies(now.description).some(({ mesh }) => mesh && shapeOf(mesh, now.files) === "reading");
@@ -84,14 +84,14 @@ export const readingShapes = computed(() => {
 let timer = 0;
 let asking: AbortController | null = null;
 
-/** Checks each change of the draft and of the joints until the returned function is called. */
+/** Check each change of the draft and of the joints until the returned function is called. */
 export function keepChecking(): () => void {
   const end = effect(() => {
     const now = draft.value;
     const joints = positions.value;
     clearTimeout(timer);
     if (!now) {
-      asking?.abort(); // its answer is of a draft that was left
+      asking?.abort(); // its answer is of a closed draft
       checked.value = null;
       return;
     }
@@ -118,7 +118,7 @@ async function ask(of: Draft, joints: readonly number[]): Promise<void> {
     if (own.signal.aborted) return;
     checked.value = null;
     checkFailed.value = error instanceof Error ? error.message : String(error);
-    // A console that was gone comes back, and nobody types meanwhile.
+    // Retry: the console may come back without any typing.
     if (error instanceof Refused && (error.status === 0 || error.status >= 500)) {
       clearTimeout(timer);
       timer = setTimeout(() => void ask(of, joints), AGAIN_MS);
@@ -127,7 +127,7 @@ async function ask(of: Draft, joints: readonly number[]): Promise<void> {
   checking.value = false;
 }
 
-/** Problems of a field: at its path, beneath it, or at the list of numbers that it is one of. */
+/** Return a field's problems: at its path, below it, or of the list that contains it. */
 export function problemsAt(path: string): readonly Problem[] {
   return problems.value.filter((problem) => {
     const at = problem.path.join("/");

@@ -1,4 +1,4 @@
-// How each pair of the draft's links is checked: the server works it out as `robomesh robot check` does.
+// How each pair of the draft's links is checked, computed by the server as by `robomesh robot check`.
 
 import { computed, effect, signal } from "@preact/signals";
 import { concise, linkNames } from "./description";
@@ -12,12 +12,12 @@ type Links = readonly [string, string];
 export interface PairRow extends Omit<Pair, "links"> {
   links: Links;
   isIgnored: boolean;
-  /** Ignored by a rule: a tick of the user's would change nothing. */
+  /** Ignored by a rule: the user's choice would change nothing. */
   isAutomatic: boolean;
 }
 
 const AFTER_MS = 600;
-// What needs a look comes first.
+// Pairs that need attention come first.
 const ORDER: readonly PairKind[] = [
   "touching",
   "no_surface",
@@ -34,17 +34,17 @@ const ORDER: readonly PairKind[] = [
 const IGNORED: readonly PairKind[] = ["adjacent", "description", "always"];
 const TOUCHING: readonly PairKind[] = ["touching", "no_surface", "not_studied"];
 
-/** The last plan, what it is of, and of which draft. */
+/** The last plan, its inputs, and its draft. */
 const plan = signal<{ subject: string; id: string; pairs: readonly Pair[] } | null>(null);
 const failure = signal<{ subject: string; text: string } | null>(null);
-/** The draft whose plan is being worked out; "": none. */
+/** The draft whose plan is being computed; "": none. */
 const working = signal("");
 
-/** All that a plan depends on. */
+/** All inputs of a plan. */
 const subject = computed(() => (draft.value ? subjectOf(draft.value) : ""));
 
 export const planning = computed(() => working.value === identity.value.id);
-/** Whether the plan is of the draft as it stands. */
+/** Whether the plan is of the current draft. */
 export const isPlanned = computed(() => plan.value?.subject === subject.value);
 /** Why there is no plan; "" unless it failed. */
 export const planFailed = computed(() => (failure.value?.subject === subject.value ? failure.value.text : ""));
@@ -56,7 +56,7 @@ function subjectOf({ description, files }: Draft): string {
 
 export const isSame = (one: Links, other: Links) => one.every((link) => other.includes(link));
 
-/** Every two links with a shape, and further pairs that the user ignores. */
+/** Return all pairs of links with shapes, and other pairs that the user ignores. */
 export const pairRows = computed<readonly PairRow[]>(() => {
   const description = draft.value?.description;
   if (!description) return [];
@@ -70,7 +70,7 @@ export const pairRows = computed<readonly PairRow[]>(() => {
   ];
 });
 
-/** Whether the user's tick decides: links one joint apart are ignored with or without one. */
+/** Return whether the user's choice matters: links one joint apart are always ignored. */
 function isSaid({ links, kind }: Pair, ignore: readonly Links[]): boolean {
   return kind !== "adjacent" && ignore.some((each) => isSame(each, links));
 }
@@ -88,7 +88,7 @@ export function isTouching({ kind }: PairRow): boolean {
   return TOUCHING.includes(kind);
 }
 
-/** Works out the plan of each change of the draft until the returned function is called. */
+/** Compute the plan of each change of the draft until the returned function is called. */
 export function keepPlanning(): () => void {
   let timer = 0;
   const end = effect(() => {
@@ -108,7 +108,7 @@ async function work(): Promise<void> {
   const of = identity.peek();
   const own = subjectOf(now);
   const { ignore } = now.description.collision;
-  // In place while the user ticks: sorted once.
+  // Sort once, so that rows stay in place while the user changes them.
   const rank = (pair: Pair) => ORDER.indexOf(isSaid(pair, ignore) ? "description" : pair.kind);
   working.value = of.id;
   try {

@@ -78,7 +78,7 @@ export function CollisionsTab() {
   );
 }
 
-/** What the plan comes to, or why there is none yet. */
+/** A summary of the plan, or why there is none yet. */
 function PlanState({ rows }: { rows: readonly PairRow[] }) {
   if (planFailed.value) {
     return (

@@ -1,4 +1,4 @@
-// Define: a robot from nothing, from link files, from a URDF or from another robot, to a simulated one on the mesh.
+// Define: a robot from nothing, from link files, a URDF or another robot, up to a simulated one on the mesh.
 
 import { signal } from "@preact/signals";
 import { useEffect, useLayoutEffect } from "preact/hooks";
@@ -39,7 +39,7 @@ export function Define({ name }: { name: string }) {
       leave();
     };
   }, []);
-  // Before files can be dropped: they are of what is open then.
+  // Open the draft before files can be dropped: they belong to it.
   useLayoutEffect(() => void open(name), [name]);
   useKeys();
   useDrop();
@@ -97,7 +97,7 @@ function Workbench() {
   );
 }
 
-/** Files that others refer to: asked for by name, until they come or are done without. */
+/** Missing files that others refer to, until they are added or skipped. */
 function MissingFiles() {
   const waiting = waitingUrdf.value;
   const missing = waiting
@@ -131,7 +131,7 @@ function MissingFiles() {
   );
 }
 
-/** Undo, redo and save by keyboard, wherever the focus is. */
+/** Handle undo, redo and save keys, wherever the focus is. */
 function useKeys(): void {
   useEffect(() => {
     const onKey = (event: KeyboardEvent) => {
@@ -148,9 +148,9 @@ function useKeys(): void {
   }, []);
 }
 
-/** Files may be dropped anywhere on the page. */
+/** Accept dropped files anywhere on the page. */
 function useDrop(): void {
-  // At once: a file let go a moment too early would replace the page.
+  // Register first: a file dropped before would replace the page.
   useLayoutEffect(() => {
     const ending = new AbortController();
     const { signal: until } = ending;

@@ -1,4 +1,4 @@
-// A robot's description as Define holds it: robot.toml's values, complete, in the file's own units.
+// A robot's description in Define: all values of robot.toml, in the file's own units.
 
 export type Triple = [number, number, number];
 export type Range = [number, number];
@@ -9,10 +9,10 @@ export interface Pose {
   rpy: Triple;
 }
 
-/** How a link looks; an empty mesh or colour: none. */
+/** Appearance of a link; an empty mesh or colour: none. */
 export interface Body {
   mesh: string;
-  /** What collision checks use in place of the mesh; empty: the mesh. */
+  /** The shape for collision checks; empty: the mesh. */
   collision_mesh: string;
   mesh_scale: number;
   mesh_pose: Pose;
@@ -31,7 +31,7 @@ export interface Joint {
   max_acceleration: number;
   max_jerk: number;
   home: number;
-  /** Its name is the joint's where it is empty. */
+  /** Empty: the joint's name. */
   link: Body & { name: string };
 }
 
@@ -62,7 +62,7 @@ export interface Description {
   title: string;
   provenance: string;
   units: Units;
-  /** Its pose is of the frame in which the first row begins, in the base link's. */
+  /** Its pose is the first row's frame, in the base link's. */
   base: Body & { pose: Pose };
   joint: Joint[];
   tool: Pose;
@@ -72,7 +72,7 @@ export interface Description {
   collision: { ignore: [string, string][] };
 }
 
-/** What the server sends: every key may be left out, as in the file. */
+/** The server's form: every key is optional, as in the file. */
 export type Partly<T> = T extends readonly unknown[] ? T : T extends object ? { [K in keyof T]?: Partly<T[K]> } : T;
 export type GivenDescription = Omit<Partly<Description>, "joint" | "frame" | "view"> & {
   joint?: Partly<Joint>[];
@@ -97,7 +97,7 @@ function body(given: Partly<Body> | undefined): Body {
   };
 }
 
-/** A description with every key that its file left out. */
+/** Return a description with every key that its file omits. */
 export function complete(given: GivenDescription): Description {
   const units: Units = { length: "mm", angle: "deg", ...given.units };
   return {
@@ -124,7 +124,7 @@ export function complete(given: GivenDescription): Description {
   };
 }
 
-/** A description without what says nothing: what is checked and saved. */
+/** Return a description without defaults, to check and save. */
 export function concise(from: Description): object {
   const isZero = (at: Pose) => [...at.xyz, ...at.rpy].every((value) => value === 0);
   const shape = (of: Body) => ({
@@ -152,7 +152,7 @@ export function concise(from: Description): object {
   };
 }
 
-/** A description of nothing but a name, which one will want to change. */
+/** Return a description with only a provisional name. */
 export function empty(): Description {
   return complete({ name: "my-arm" });
 }
@@ -167,7 +167,7 @@ export function radians(units: Units): number {
   return units.angle === "deg" ? Math.PI / 180 : 1;
 }
 
-/** The sign of a joint's own unit: of an angle or a length. */
+/** Return the symbol of a joint's unit, an angle or a length. */
 export function jointUnit(type: JointType, units: Units): string {
   return type === "rotary" ? angleUnit(units) : units.length;
 }
@@ -180,23 +180,23 @@ export function linkName(joint: Joint): string {
   return joint.link.name || joint.name;
 }
 
-/** Names of the links, base first. */
+/** Return the names of the links, base first. */
 export function linkNames(of: Description): string[] {
   return [BASE, ...of.joint.map(linkName)];
 }
 
-/** How each link looks, base first. */
+/** Return the appearance of each link, base first. */
 export function bodies(of: Description): Body[] {
   return [of.base, ...of.joint.map((joint) => joint.link)];
 }
 
-// What a joint of this kind usually has, in degrees or millimetres, so that only what differs is typed.
+// Typical values of a joint in degrees or millimetres, so that only differences need typing.
 const USUAL = {
   rotary: { limits: [-180, 180], max_speed: 90, max_acceleration: 360, max_jerk: 3600 },
   prismatic: { limits: [0, 500], max_speed: 250, max_acceleration: 1000, max_jerk: 10000 },
 } as const;
 
-/** A joint with nothing moved or turned, and usual limits. */
+/** Return a joint with zero D-H parameters and typical limits. */
 export function newJoint(name: string, type: JointType, units: Units): Joint {
   return {
     name,
@@ -223,7 +223,7 @@ export function usualLimits(type: JointType, units: Units) {
   };
 }
 
-/** Without the last digits, which only binary fractions made. */
+/** Round off the last digits, which are artefacts of binary fractions. */
 export function tidy(value: number): number {
-  return Number(value.toPrecision(12)) || 0; // nor a minus zero
+  return Number(value.toPrecision(12)) || 0; // and no minus zero
 }

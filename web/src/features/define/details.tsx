@@ -1,4 +1,4 @@
-// The chosen part: a joint's motion, a link's looks, the tool's pose.
+// The chosen part: a joint's motion, a link's appearance, the tool's pose.
 
 import { d } from "../../i18n/define";
 import { Choice } from "../../ui/parts";
@@ -230,7 +230,7 @@ function MeshDetails({ path, body, set }: { path: string; body: Body; set: SetBo
   const now = draft.value;
   const shape = now ? shapeOf(body.mesh, now.files) : undefined;
   if (shape === undefined || shape === "reading") return <p class="dim small">{d("mesh_reading")}</p>;
-  if ("error" in shape) return null; // said with the link's problems
+  if ("error" in shape) return null; // shown with the link's problems
   const { info } = shape;
   const size = info.max.map((value, axis) => Math.round((value - (info.min[axis] ?? 0)) * body.mesh_scale * 1000));
   const named = Object.entries(SCALES).find(([, scale]) => Math.abs(scale - body.mesh_scale) < 1e-12)?.[0] ?? "";

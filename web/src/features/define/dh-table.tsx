@@ -1,4 +1,4 @@
-// All D-H rows at a glance, and in place to be typed over.
+// All D-H rows in an editable table.
 
 import { d } from "../../i18n/define";
 import { problemsAt } from "./checks";

@@ -1,26 +1,26 @@
-// The draft: what is being defined, its undo and redo, and how it outlives a reload.
+// The draft being defined, its undo and redo, and how it survives a reload.
 
 import { batch, computed, effect, signal } from "@preact/signals";
 import type { Description } from "./description";
 
-/** What a change changes, and an undo brings back. */
+/** The editable state, which undo restores. */
 export interface Draft {
   description: Description;
   /** SHA-256 of every file of the description's folder, by path. */
   files: Record<string, string>;
 }
 
-/** Which draft it is, and what the site has of it. */
+/** The draft's identity, and its saved state at the site. */
 export interface Identity {
-  /** Of the draft, or of the page before there is one: what was begun under another does not end here. */
+  /** Signal of the draft, or of the page before it: tasks that began under another draft must not end in this one. */
   id: string;
-  /** The robot that it is of; "": a new one. */
+  /** The robot that it belongs to; "": a new one. */
   owner: string;
-  /** The name under which the site has it; "": it has not. */
+  /** The name under which the site has saved it; "": not saved. */
   siteName: string;
-  /** The draft as it was last saved, as text; "": never. */
+  /** The draft as last saved, as text; "": never. */
   saved: string;
-  /** Of the site's robot as it was opened, or last saved from here; "": none. */
+  /** Revision of the site's robot when it was opened or last saved here; "": none. */
   revision: string;
 }
 
@@ -32,8 +32,8 @@ interface Kept {
 }
 
 const KEPT = "robomesh.define.draft/";
-const NEW = `${KEPT}new/`; // no robot's name holds a slash
-/** In the tab's own storage: the id of its new draft. */
+const NEW = `${KEPT}new/`; // no robot's name contains a slash
+/** Key in the tab's storage: the id of its new draft. */
 const OF_THIS_TAB = "robomesh.define.new";
 const MOST_STEPS = 500;
 
@@ -41,7 +41,7 @@ export const draft = signal<Draft | null>(null);
 export const identity = signal<Identity>(newIdentity());
 const past = signal<readonly Draft[]>([]);
 const future = signal<readonly Draft[]>([]);
-/** When the draft that a reload brought back was last changed; null: nothing was brought back. */
+/** When the draft that a reload restored was last changed; null: none was restored. */
 export const broughtBack = signal<number | null>(null);
 let together = "";
 
@@ -54,7 +54,7 @@ function newIdentity(): Identity {
   return { id, owner: "", siteName: "", saved: "", revision: "" };
 }
 
-/** Whether a draft, or the page before it, is still on the screen. */
+/** Return whether a draft, or the page before it, is still open. */
 export function isOpen({ id }: Identity): boolean {
   return identity.value.id === id;
 }
@@ -63,7 +63,7 @@ function textOf(of: Draft): string {
   return JSON.stringify([of.description, of.files]);
 }
 
-/** Changes the draft: one step of undo, or, with the same `as` as just before, part of that step. */
+/** Change the draft: one undo step, or part of the previous step if `as` is the same. */
 export function edit(change: (draft: Draft) => void, as = ""): void {
   const before = draft.value;
   if (!before) return;
@@ -76,7 +76,7 @@ export function edit(change: (draft: Draft) => void, as = ""): void {
   draft.value = after;
 }
 
-/** Ends a step: a field was left, a drag let go. */
+/** End an undo step: a field lost the focus, a drag ended. */
 export function seal(): void {
   together = "";
 }
@@ -99,15 +99,15 @@ function step(from: typeof past, to: typeof past): void {
   draft.value = after;
 }
 
-/** Begins with a draft.
+/** Open a draft.
  *
- * @param owner The robot that it is of; "": a new one.
+ * @param owner The robot that it belongs to; "": a new one.
  * @param origin Where that robot is saved; a new one's draft is unsaved from the start.
- * @param revision Of that robot, as the site told it. */
+ * @param revision The robot's revision, from the site. */
 export function begin(with_: Draft, owner = "", origin: "library" | "site" | null = null, revision = ""): void {
   const fresh = newIdentity();
   show(with_, {
-    // What was dropped on the page before there was a draft is the draft's.
+    // Files that were dropped before belong to this draft.
     id: draft.value ? fresh.id : identity.value.id,
     owner,
     saved: origin ? textOf(with_) : "",
@@ -127,7 +127,7 @@ function show(shown: Draft, of: Identity, at: number | null = null): void {
   });
 }
 
-/** A draft was saved under a name: it is that robot's from now on, where it is still open. */
+/** Mark a draft as saved under a name; if it is still open, it now belongs to that robot. */
 export function savedAs(as: Draft, of: Identity, name: string, revision: string): void {
   const key = keyOf(of);
   const kept = keptAt(key);
@@ -136,13 +136,13 @@ export function savedAs(as: Draft, of: Identity, name: string, revision: string)
   if (isOpen(of)) identity.value = { id: of.id, owner: name, siteName: name, saved: textOf(as), revision };
 }
 
-/** Ends the draft without keeping it. */
+/** Close the draft and delete it. */
 export function discard(): void {
   localStorage.removeItem(keyOf(identity.value));
   leave();
 }
 
-/** Leaves the draft, which stays kept. */
+/** Close the draft, which stays kept. */
 export function leave(): void {
   batch(() => {
     draft.value = null;
@@ -151,23 +151,23 @@ export function leave(): void {
   });
 }
 
-/** Leaves the draft for a new one: it is offered, but not brought back by itself. */
+/** Close the draft for a new one: it stays in the list, but a reload does not restore it. */
 export function putAside(): void {
   sessionStorage.removeItem(OF_THIS_TAB);
   leave();
 }
 
-/** Brings back an unsaved draft; false: there is none.
+/** Restore an unsaved draft; false: there is none.
  *
- * @param owner The robot that it is of; "": a new one.
- * @param id Which new one; this tab's, where it is left out. */
+ * @param owner The robot that it belongs to; "": a new one.
+ * @param id Which new one; by default this tab's. */
 export function bringBack(owner: string, id = sessionStorage.getItem(OF_THIS_TAB) ?? ""): boolean {
   const kept = keptAt(keyOf({ owner, id }));
   if (kept) show(kept.draft, kept.identity, kept.at);
   return kept !== null;
 }
 
-/** Whether a robot has an unsaved draft. */
+/** Return whether a robot has an unsaved draft. */
 export function hasKept(owner: string): boolean {
   return keptAt(keyOf({ owner, id: "" })) !== null;
 }
@@ -184,7 +184,7 @@ export function newDrafts(): { id: string; name: string; at: number }[] {
     .sort((one, other) => other.at - one.at);
 }
 
-/** SHA-256 of every file that some kept draft holds. */
+/** Return the SHA-256 of every file in any kept draft. */
 export function keptFiles(): Set<string> {
   return new Set(keys(KEPT).flatMap((key) => Object.values(keptAt(key)?.draft.files ?? {})));
 }
@@ -206,7 +206,7 @@ function keptAt(key: string): Kept | null {
   }
 }
 
-/** What could not be kept for a reload, in the browser's words; "" when all is well. */
+/** The browser's message if the draft could not be kept; "" if it was. */
 export const keepingFailed = signal("");
 
 effect(() => {
@@ -220,7 +220,7 @@ effect(() => {
   }
   const kept: Kept = { draft: now, identity: of, at: Date.now() };
   const before = keptAt(key);
-  if (before && JSON.stringify({ ...before, at: 0 }) === JSON.stringify({ ...kept, at: 0 })) return; // brought back
+  if (before && JSON.stringify({ ...before, at: 0 }) === JSON.stringify({ ...kept, at: 0 })) return; // restored
   try {
     localStorage.setItem(key, JSON.stringify(kept));
     keepingFailed.value = "";

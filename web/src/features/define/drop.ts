@@ -1,4 +1,4 @@
-// Files that are dropped or chosen: sent to the server, and made links, companions or a URDF's robot.
+// Dropped or chosen files: uploaded, and used as links, companion files or a URDF's robot.
 
 import { signal } from "@preact/signals";
 import { d } from "../../i18n/define";
@@ -13,7 +13,7 @@ import { importRobot, mesh, unzip, upload } from "./server";
 import { beside, missingFiles, readShape, setShape } from "./shapes";
 import { choose, resetWorkbench } from "./workbench";
 
-/** What looks like a mesh file; which of them are read, and why not, the server says. */
+/** File types that may be meshes; the server decides which it can read. */
 const SHAPE = /\.(wrl|wrz|vrml|3ds|stl|obj|ply|off|dae|glb|gltf|dxf|ste?p|ige?s)(\.gz)?$/i;
 const MESH_FOLDER = "meshes";
 
@@ -28,20 +28,20 @@ export interface Notice {
   text: string;
 }
 
-/** What is being read, in words; "": nothing. */
+/** What is being read; "": nothing. */
 export const reading = signal("");
-/** What became of the files that came last. */
+/** The outcome of the last files. */
 export const fileNotices = signal<readonly Notice[]>([]);
-/** Paths of missing files that are done without. */
+/** Paths of missing files that the user skipped. */
 export const doneWithout = signal<ReadonlySet<string>>(new Set());
-/** A URDF that waits for files which it refers to. */
+/** A URDF that waits for files. */
 export const waitingUrdf = signal<{ file: string; files: Record<string, string>; missing: string[] } | null>(null);
 
 let last: Promise<void> = Promise.resolve();
-/** What the files that are being read were dropped on. */
+/** The page or draft that the files were dropped on. */
 let place: Identity | null = null;
 
-/** Reads files after those that came before, unless what they were dropped on has been left. */
+/** Read files after earlier ones, unless their page or draft was closed. */
 function inTurn(read: () => Promise<void>): Promise<void> {
   const own = identity.value;
   last = last.then(async () => {
@@ -74,7 +74,7 @@ function refuse(name: string, error: unknown): void {
   notice("refused", d("file_refused", { name, text: words(error) }));
 }
 
-/** Every file of a drop, those in dropped folders too. */
+/** Return every file of a drop, including those in folders. */
 export async function droppedFiles(data: DataTransfer): Promise<Dropped[]> {
   const entries = [...data.items].map((item) => item.webkitGetAsEntry()).filter((entry) => entry !== null);
   if (entries.length === 0) return [...data.files].map((file) => ({ path: file.name, file }));
@@ -90,13 +90,13 @@ async function filesOf(entry: FileSystemEntry): Promise<Dropped[]> {
   const found: FileSystemEntry[] = [];
   for (;;) {
     const some = await new Promise<FileSystemEntry[]>((resolve, reject) => reader.readEntries(resolve, reject));
-    if (some.length === 0) break; // a reader tells a hundred at a time
+    if (some.length === 0) break; // a reader returns a hundred at a time
     found.push(...some);
   }
   return (await Promise.all(found.map(filesOf))).flat();
 }
 
-/** Sends files to the server and keeps them; SHA-256 by path. A zip archive counts as the files in it. */
+/** Upload and keep files; return SHA-256 by path. A zip archive counts as its files. */
 async function sendAll(dropped: readonly Dropped[]): Promise<Map<string, string>> {
   const sent = new Map<string, string>();
   for (const [index, { path, file }] of dropped.entries()) {
@@ -114,9 +114,9 @@ async function sendAll(dropped: readonly Dropped[]): Promise<Map<string, string>
   return sent;
 }
 
-/** Takes files: what was missing goes to its place, a URDF or a robot.toml begins a robot, each mesh file becomes a link.
+/** Process files: place missing ones, start a robot from a URDF or robot.toml, make each mesh file a link.
  *
- * @param asRobot A VRML file among them is a robot, as OpenHRP has it, not a link. */
+ * @param asRobot A VRML file is a robot, as in OpenHRP, not a link. */
 export function takeFiles(dropped: readonly Dropped[] | Promise<readonly Dropped[]>, asRobot = false): Promise<void> {
   return inTurn(async () => take(await dropped, asRobot));
 }
@@ -173,7 +173,7 @@ async function takeShapes(sent: Map<string, string>): Promise<void> {
   for (const path of fresh) if (!infos.has(path) && !parts.has(path)) delete added[path];
   const links = draft.value?.description.joint.length ?? 0;
   edit((now) => {
-    Object.assign(now.files, added); // it may have been changed while these were read
+    Object.assign(now.files, added); // it may have changed while these were read
     for (const [path, info] of infos) addLink(now.description, path, info);
   });
   if ((draft.value?.description.joint.length ?? 0) > links) choose(links);
@@ -184,7 +184,7 @@ async function takeShapes(sent: Map<string, string>): Promise<void> {
   if (fileNotices.value.length === 0) notice("done", whole);
 }
 
-/** Reads new mesh files; those that another refers to (Inline) are parts of it, not links. */
+/** Read new mesh files; those that another refers to (Inline) are its parts, not links. */
 async function readLinks(paths: readonly string[], files: Readonly<Record<string, string>>) {
   const infos = new Map<string, MeshInfo>();
   const parts = new Set<string>();
@@ -192,7 +192,7 @@ async function readLinks(paths: readonly string[], files: Readonly<Record<string
     if (isLeft()) break;
     reading.value = d("reading", { name: path, number: index + 1, count: paths.length });
     try {
-      // Alone first: what it then lacks of the others are its parts.
+      // Read it alone first: the other files that it then lacks are its parts.
       const alone = Object.fromEntries(
         Object.entries(files).filter(([name]) => name === path || !paths.includes(name)),
       );
@@ -210,7 +210,7 @@ async function readLinks(paths: readonly string[], files: Readonly<Record<string
   return { infos, parts };
 }
 
-/** The first link of an empty description is its base; each other comes with a joint at the end. */
+/** Add links: the first of an empty description is its base; each other comes with a joint at the end. */
 function addLink(into: Description, path: string, info: MeshInfo): void {
   if (into.joint.length === 0 && !into.base.mesh) {
     shapeBody(into, into.base, path, info);
@@ -223,7 +223,7 @@ function addLink(into: Description, path: string, info: MeshInfo): void {
   shapeBody(into, joint.link, path, info);
 }
 
-/** Gives a link a mesh file, with its guessed unit, and upright. */
+/** Give a link a mesh file, with its guessed unit, and upright. */
 function shapeBody(of: Description, body: Body, path: string, info: MeshInfo): void {
   body.mesh = path;
   body.collision_mesh = "";
@@ -232,7 +232,7 @@ function shapeBody(of: Description, body: Body, path: string, info: MeshInfo): v
   body.mesh_pose = { xyz: [0, 0, 0], rpy: [info.up === "y" ? quarter : 0, 0, 0] };
 }
 
-/** Gives one link the file that was chosen for it, with the files beside it. */
+/** Give a link the chosen file, with the files beside it. */
 export function takeShapeFor(dropped: readonly Dropped[], find: (of: Description) => Body | undefined): Promise<void> {
   return inTurn(async () => {
     const sent = [...(await sendAll(dropped))].map(([path, sha]): [string, string] => [`${MESH_FOLDER}/${path}`, sha]);
@@ -251,7 +251,7 @@ export function takeShapeFor(dropped: readonly Dropped[], find: (of: Description
   });
 }
 
-/** Begins with the URDF that waits for files, as it is. */
+/** Open the waiting URDF without its missing files. */
 export function goOnWithout(): Promise<void> {
   const waiting = waitingUrdf.value;
   return inTurn(async () => {
@@ -259,13 +259,13 @@ export function goOnWithout(): Promise<void> {
   });
 }
 
-/** Begins with a URDF's robot; where files are missing, waits for them. */
+/** Open a URDF's robot; if files are missing, wait for them. */
 async function readUrdf(file: string, files: Record<string, string>, without = false): Promise<void> {
   reading.value = d("reading", { name: file, number: 1, count: 1 });
   try {
     if (draft.value) throw new Error(d("urdf_twice"));
     let answer = await importRobot(file, files);
-    // Files that came without their folders are put where the URDF looks for them.
+    // Place files without folders where the URDF expects them.
     const placed = placedWhereMissing(file, files, answer.missing);
     if (placed) {
       files = placed;
@@ -277,7 +277,7 @@ async function readUrdf(file: string, files: Record<string, string>, without = f
       return;
     }
     waitingUrdf.value = null;
-    if (draft.value) throw new Error(d("urdf_twice")); // one was begun meanwhile
+    if (draft.value) throw new Error(d("urdf_twice")); // another draft was opened meanwhile
     const made: Draft = { description: complete(answer.description), files: answer.files };
     resetWorkbench();
     begin(made);

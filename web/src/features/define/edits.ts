@@ -1,20 +1,20 @@
-// Changes of a description that touch more than one value. Each changes the copy that it is given.
+// Edits of a description that change several values. Each changes the copy that it receives.
 
 import type { Description, Joint, JointType, Pose, Triple, Units } from "./description";
 import { linkName, linkNames, metres, newJoint, radians, tidy, usualLimits } from "./description";
 
-/** A name that is not taken: "joint3". */
+/** Return a free name: "joint3". */
 export function freshName(stem: string, taken: readonly string[]): string {
   for (let number = 1; ; number++) if (!taken.includes(`${stem}${number}`)) return `${stem}${number}`;
 }
 
-/** What may be a link's or a joint's name, from a file's. */
+/** Return a valid name of a link or joint from a file's name. */
 export function nameFromFile(path: string): string {
   const stem = path.replace(/^.*\//, "").replace(/\.[^.]*$/, "");
   return stem.replace(/[^A-Za-z0-9_.-]+/g, "_").replace(/^[^A-Za-z0-9]+/, "") || "link";
 }
 
-/** Puts a joint and its link in at a place of the chain, and tells it. */
+/** Insert a joint and its link into the chain; return the joint. */
 export function insertJoint(into: Description, at: number): Joint {
   const names = into.joint.map((joint) => joint.name);
   const joint = newJoint(freshName("joint", [...names, ...linkNames(into)]), "rotary", into.units);
@@ -22,7 +22,7 @@ export function insertJoint(into: Description, at: number): Joint {
   return joint;
 }
 
-/** Takes a joint and its link out, and all that names them. */
+/** Remove a joint and its link, and all references to them. */
 export function removeJoint(from: Description, at: number): void {
   const [gone] = from.joint.splice(at, 1);
   if (!gone) return;
@@ -38,13 +38,13 @@ export function moveJoint(of: Description, from: number, to: number): void {
   if (moved) of.joint.splice(to, 0, moved);
 }
 
-/** Another kind of joint has other units: its limits begin anew. */
+/** Change a joint's type; its limits are reset, because the unit differs. */
 export function setType(of: Description, at: number, type: JointType): void {
   const joint = of.joint[at];
   if (joint) Object.assign(joint, { type, ...usualLimits(type, of.units), home: 0 });
 }
 
-/** Names a joint; constraints follow, and all that names a link called after it. */
+/** Rename a joint; constraints and references to its link follow. */
 export function renameJoint(of: Description, at: number, name: string): void {
   const joint = of.joint[at];
   if (!joint) return;
@@ -73,7 +73,7 @@ function linkRenamed(of: Description, old: string, name: string): void {
   );
 }
 
-/** The same robot in other units. */
+/** Convert the robot to other units. */
 export function setUnits(of: Description, units: Units): void {
   const length = (value: number) => tidy((value * metres(of.units)) / metres(units));
   const angle = (value: number) => tidy((value * radians(of.units)) / radians(units));

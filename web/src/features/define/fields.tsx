@@ -1,4 +1,4 @@
-// Fields of the forms: numbers with units, texts, choices; each knows its place in the description.
+// Form fields: numbers with units, texts, choices; each has its path in the description.
 
 import type { ComponentChildren } from "preact";
 import { useId, useState } from "preact/hooks";
@@ -8,25 +8,25 @@ import type { Pose, Triple } from "./description";
 import { seal } from "./draft";
 
 interface Place {
-  /** Its place in the description, as the server's problems name it: "joint/2/limits/0". */
+  /** Its path in the description, as in the server's problems: "joint/2/limits/0". */
   path: string;
   label: string;
-  /** The label is read out, not shown: a column's head or the row says it. */
+  /** Show the label to screen readers only: a column's head or the row shows it. */
   quiet?: boolean;
 }
 
-/** A number as text: no more digits than it has, and the sign that people read. */
+/** Format a number with its own digits and a true minus sign. */
 export function numberText(value: number): string {
   return String(Math.round(value * 1e6) / 1e6).replace("-", "−");
 }
 
-/** The number that a person typed, all of it; null: none. A comma may mean two things, so it means nothing. */
+/** Parse a whole text as a number; null: invalid. A comma is ambiguous, so it is invalid. */
 export function readNumber(text: string): number | null {
   const plain = text.trim().replace("−", "-");
   return /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(plain) && Number.isFinite(Number(plain)) ? Number(plain) : null;
 }
 
-/** A number with its unit. Arrow keys step it; what is no number stays, marked, until it is mended or Escape. */
+/** A number with its unit. Arrow keys step it; invalid text stays, marked, until it is corrected or Escape. */
 export function NumberField(
   props: Place & { value: number; unit?: string; step?: number; set: (value: number) => void; onFocus?: () => void },
 ) {
@@ -38,7 +38,7 @@ export function NumberField(
     noNumber(props.path, text !== null && readNumber(text) === null ? text : null);
   };
   const read = typed === null ? props.value : readNumber(typed);
-  // What was typed stands as typed while it means the value; an undo shows the value again.
+  // Keep the typed text while it has the value; an undo shows the value again.
   const text = typed !== null && (read === null || read === props.value) ? typed : numberText(props.value);
   const problems = problemsAt(props.path);
   const wrong = problems[0]?.text ?? "";
@@ -192,7 +192,7 @@ export function Section(props: { title: string; end?: ComponentChildren; childre
   );
 }
 
-/** Problems of a place, in words. */
+/** Problems of a path, in words. */
 export function ProblemWords({ path }: { path: string }) {
   return (
     <>

@@ -1,4 +1,4 @@
-// A button that opens the browser's choice of files.
+// A button that opens the browser's file dialog.
 
 import { useRef } from "preact/hooks";
 import type { Dropped } from "./drop";
@@ -19,7 +19,7 @@ export function FileButton(props: { label: string; take: (files: Dropped[]) => v
         aria-label={props.label}
         onChange={(event) => {
           const files = [...(event.currentTarget.files ?? [])];
-          event.currentTarget.value = ""; // the same file may be chosen again
+          event.currentTarget.value = ""; // allows the same file again
           if (files.length > 0) props.take(files.map((file) => ({ path: file.name, file })));
         }}
       />

@@ -1,4 +1,4 @@
-// The bytes of dropped files, kept in the browser: sent again when the server has forgotten them.
+// Contents of dropped files, kept in the browser to upload again if the server has dropped them.
 
 const DATABASE = "robomesh.define";
 const STORE = "files";
@@ -25,7 +25,7 @@ async function within<T>(mode: IDBTransactionMode, work: (store: IDBObjectStore)
   }
 }
 
-/** Keeps a file; a browser without room, or in private mode, keeps none. */
+/** Keep a file, unless the browser has no space or is in private mode. */
 export async function keep(sha: string, bytes: Blob): Promise<void> {
   await within("readwrite", (store) => store.put(bytes, sha)).catch(() => undefined);
 }
@@ -34,7 +34,7 @@ export async function keptFile(sha: string): Promise<Blob | undefined> {
   return within("readonly", (store) => store.get(sha) as IDBRequest<Blob | undefined>).catch(() => undefined);
 }
 
-/** Drops every file that is not wanted any more. */
+/** Delete every file that is no longer needed. */
 export async function keepOnly(wanted: ReadonlySet<string>): Promise<void> {
   const keys = await within("readonly", (store) => store.getAllKeys()).catch(() => []);
   for (const key of keys) {

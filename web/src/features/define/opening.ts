@@ -1,4 +1,4 @@
-// Opening a robot to be defined: as it is saved, or its unsaved draft.
+// Opening of a robot to define: as saved, or its unsaved draft.
 
 import { signal } from "@preact/signals";
 import { d } from "../../i18n/define";
@@ -9,10 +9,10 @@ import { known, listRobots, outcome } from "./outcome";
 import { robot } from "./server";
 import { resetWorkbench } from "./workbench";
 
-/** What is being opened, in words; "": nothing. */
+/** What is being opened; "": nothing. */
 export const loading = signal("");
 
-/** Opens a robot, or its unsaved draft; "": a new one's. */
+/** Open a robot, or its unsaved draft; "": a new one's. */
 export async function open(name: string): Promise<void> {
   leave();
   resetWorkbench();
@@ -29,7 +29,7 @@ export async function open(name: string): Promise<void> {
     const { description, files, notes, revision } = await robot(name);
     if (!isOpen(place)) return;
     const read = complete(description);
-    // The library's names are the library's: what is made of one is another robot.
+    // Library robots are read-only: a draft of one is another robot.
     if (origin === "library") read.name = `${name}-copy`;
     begin({ description: read, files }, name, origin, revision);
     fileNotices.value = notes.map((text) => ({ kind: "done", text }));
@@ -42,7 +42,7 @@ export async function open(name: string): Promise<void> {
   }
 }
 
-/** Ends the draft: back to the robot as it was saved; a new one is gone. */
+/** Discard the draft: reload the saved robot; a new one is deleted. */
 export function discardDraft(): void {
   const { owner } = identity.value;
   discard();

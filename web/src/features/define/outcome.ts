@@ -1,4 +1,4 @@
-// Saving, downloading, starting: what the toolbar does, and what became of it.
+// Save, download and start, and their outcome.
 
 import { signal } from "@preact/signals";
 import { d } from "../../i18n/define";
@@ -13,9 +13,9 @@ export type Outcome =
   | { kind: "exists"; text: string; name: string; thenStart: boolean }
   | { kind: "started"; site: string; robot: string };
 
-/** What became of the last action; null: it was put away. */
+/** Outcome of the last action; null: dismissed. */
 export const outcome = signal<Outcome | null>(null);
-/** What is being done, in words; "": nothing. */
+/** The action in progress; "": none. */
 export const busy = signal("");
 export const known = signal<Robots | null>(null);
 
@@ -45,9 +45,9 @@ async function doing<T>(what: string, work: () => Promise<T>): Promise<T | undef
   }
 }
 
-/** Saves the draft at the site, and starts it where that is asked for.
+/** Save the draft at the site, and start it on request.
  *
- * @param over The robot that may be saved over, asked before; "": none.
+ * @param over The robot that the user agreed to overwrite; "": none.
  * @returns Whether it is saved. */
 export async function save(thenStart: boolean, over = ""): Promise<boolean> {
   const now = draft.value;
@@ -64,7 +64,7 @@ export async function save(thenStart: boolean, over = ""): Promise<boolean> {
     outcome.value = { kind: "exists", text: d("exists_running", { name }), name, thenStart };
     return false;
   }
-  // As long as the site has it as it was opened here, nobody needs to be asked.
+  // No question is needed while the site's copy is the one opened here.
   const revision = of.siteName === name ? of.revision : "";
   const done = await doing(d("saving"), async () => {
     try {

@@ -15,14 +15,14 @@ export function rowAt(joint: Joint, position: number, units: Units): DhRow {
   };
 }
 
-/** `Trans(xyz) Rot(z, yaw) Rot(y, pitch) Rot(x, roll)` in metres. */
+/** Return `Trans(xyz) Rot(z, yaw) Rot(y, pitch) Rot(x, roll)` in metres. */
 export function poseMatrix(pose: Pose, units: Units): Matrix4 {
   const [x, y, z] = pose.xyz.map((value) => value * metres(units)) as Triple;
   const [roll, pitch, yaw] = pose.rpy.map((value) => value * radians(units)) as Triple;
   return transformOf([x, y, z], [roll, pitch, yaw]);
 }
 
-/** The pose of a placement, as finely as one would type it: micrometres and thousandths of a degree. */
+/** Return a placement's pose, rounded to micrometres and thousandths of a degree. */
 export function poseOf(placement: Matrix4, units: Units): Pose {
   const at = new Vector3();
   const turn = new Quaternion();
@@ -37,7 +37,7 @@ export function poseOf(placement: Matrix4, units: Units): Pose {
   };
 }
 
-/** How far from the base's origin the tool can come [m]: an upper bound. */
+/** Return an upper bound of the tool's distance from the base's origin [m]. */
 export function reach(of: Description): number {
   const one = metres(of.units);
   let total = Math.hypot(...of.base.pose.xyz) + Math.hypot(...of.tool.xyz);

@@ -1,4 +1,4 @@
-// The joints' sliders, and where the server says that the tool is.
+// Sliders of the joints, and the server's position of the tool.
 
 import { Matrix4 } from "three";
 import { d } from "../../i18n/define";
@@ -87,7 +87,7 @@ function Slider({ joint, units }: { joint: Joint; units: Units }) {
   );
 }
 
-/** The server's answer: what is drawn here is only a picture. */
+/** The server's answer, which counts; the picture only illustrates it. */
 function ToolAt() {
   const tool = checked.value?.tool;
   const pose = tool && poseOf(new Matrix4().set(...(tool.flat() as Parameters<Matrix4["set"]>)), SI_TO_SHOWN);

@@ -1,4 +1,4 @@
-// What is wrong with the draft, in the server's words; a click goes to the field.
+// The draft's problems in the server's words; a click opens the field.
 
 import { d } from "../../i18n/define";
 import { checked, checkFailed, checking, problems, readingShapes } from "./checks";

@@ -1,4 +1,4 @@
-// What belongs to the whole robot: its name, where its dimensions come from, its units.
+// Values of the whole robot: name, source of its dimensions, units.
 
 import { d } from "../../i18n/define";
 import type { Units } from "./description";

@@ -20,9 +20,9 @@ import { readShape, shapeOf } from "./shapes";
 import { lookOf, sizeOf, USUAL_VIEWS } from "./views";
 import { choose, chosen, chosenBody, positions } from "./workbench";
 
-/** The scene's camera, for the views' tab; null: there is no scene. */
+/** The scene's camera, for the views tab; null: there is no scene. */
 export const cameraNow = signal<(() => Look) | null>(null);
-/** The view that the scene is asked to look from; a new object asks anew. */
+/** The requested view; a new object requests it again. */
 export const lookFrom = signal<{ name: string }>({ name: "free" });
 
 function pictureOf(now: Draft): Picture {
@@ -108,7 +108,7 @@ export function ScenePanel() {
   useEffect(() => {
     if (now && picture) scene.current?.view.look(lookOf(lookFrom.value.name, now.description, picture.size));
   }, [lookFrom.value]);
-  // Until somebody moves the camera it keeps the whole arm in the picture.
+  // Until the user moves the camera, it keeps the whole arm in the picture.
   useEffect(() => {
     const view = scene.current?.view;
     if (view && !view.touched && now && picture) view.look(lookOf(lookFrom.value.name, now.description, picture.size));
@@ -180,7 +180,7 @@ function canPlace({ chosen: part, shapes }: Picture): boolean {
   return part === "tool" || (part !== null && Boolean(shapes[part]));
 }
 
-/** The gizmo was dragged: one step of undo until it is let go. */
+/** Apply a drag of the gizmo: one undo step until it ends. */
 function placeChosen(pose: Pose): void {
   edit((now) => {
     if (chosen.value === "tool") now.description.tool = pose;
@@ -191,7 +191,7 @@ function placeChosen(pose: Pose): void {
   }, "gizmo");
 }
 
-/** The server no longer has a converted shape: it is converted again, and so shown again. */
+/** Convert a shape again that the server has dropped, so that it is shown again. */
 async function convertAgain(glb: string): Promise<void> {
   const now = draft.value;
   if (!now) return;

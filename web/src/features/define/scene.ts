@@ -1,4 +1,4 @@
-// The picture of a draft: its links where the D-H rows put them, the rows themselves, and a gizmo to place a shape.
+// The picture of a draft: links at their D-H frames, the rows themselves, and a gizmo to place a shape.
 
 import * as THREE from "three";
 import type { TransformControls } from "three/addons/controls/TransformControls.js";
@@ -21,14 +21,14 @@ import { glb } from "./server";
 import { Skeleton } from "./skeleton";
 
 const CREASE_ANGLE = 0.6; // rad: sharper edges stay sharp
-const PAINT = "paint"; // the material that a link's colour is for
+const PAINT = "paint"; // the material that takes a link's colour
 const BARE = "#8a8f94";
 const CHOSEN_TINT = 0.55;
 const CLICK_PX = 4;
 
 export type Dragging = "off" | "translate" | "rotate";
 
-/** A link's shape; `pose` is of the file's geometry, scaled to metres, in the link's frame. */
+/** A link's shape; `pose` places the file's geometry, scaled to metres, in the link's frame. */
 export interface Shown {
   glb: string;
   scale: number;
@@ -36,10 +36,10 @@ export interface Shown {
   color: string;
 }
 
-/** All that the picture shows, in metres. */
+/** Contents of the picture, in metres. */
 export interface Picture {
   placements: readonly THREE.Matrix4[];
-  /** The frame in which the rows begin. */
+  /** Frame of the first row. */
   start: THREE.Matrix4;
   rows: readonly DhRow[];
   shapes: readonly (Shown | null)[];
@@ -48,13 +48,13 @@ export interface Picture {
   /** Named frames, in the base frame. */
   frames: readonly { name: string; placement: THREE.Matrix4 }[];
   size: number;
-  /** The chosen link by its number, the base's is 0; the tool; or none. */
+  /** Index of the chosen link (0: the base); the tool; or none. */
   chosen: number | "tool" | null;
 }
 
 export interface Heard {
   pick: (link: number) => void;
-  /** The gizmo's object stands here now, in its link's frame. */
+  /** The gizmo's object was dragged to this pose in its link's frame. */
   drag: (pose: THREE.Matrix4) => void;
   dragged: () => void;
   failed: (glb: string, text: string) => void;
@@ -85,7 +85,7 @@ export class DefineScene {
   private request = 0;
   private floorScale = 1;
 
-  /** @throws Error where the browser has no WebGL. */
+  /** @throws Error if the browser has no WebGL. */
   constructor(
     private readonly canvas: HTMLCanvasElement,
     private readonly heard: Heard,
@@ -107,7 +107,7 @@ export class DefineScene {
     this.frame();
   }
 
-  /** Background, floor and lines after the page's theme. */
+  /** Set background, floor and lines to the page's theme. */
   setColours(): void {
     surround(this.scene, palette())?.scale.setScalar(this.floorScale);
     if (this.picture) this.paintAll();
@@ -117,7 +117,7 @@ export class DefineScene {
   show(picture: Picture): void {
     const before = this.picture;
     this.picture = picture;
-    // A floor of whole metres for an arm that a floor of 1.6 m would not hold.
+    // A larger floor, in whole metres, for an arm beyond the floor of 1.6 m.
     const scale = Math.max(1, Math.ceil(picture.size / 1.6));
     if (scale !== this.floorScale) {
       this.floorScale = scale;
@@ -147,7 +147,7 @@ export class DefineScene {
     this.touch();
   }
 
-  /** A model that could not be loaded is loaded anew when it is shown again. */
+  /** Load a failed model again when it is next shown. */
   forget(glb: string): void {
     this.models.delete(glb);
   }
@@ -177,7 +177,7 @@ export class DefineScene {
     return link;
   }
 
-  /** Gives a link its model; one that comes late is not put where another is wanted meanwhile. */
+  /** Load a link's model, unless another one is wanted meanwhile. */
   private async give(link: Link, shape: Shown | null): Promise<void> {
     const wanted = shape?.glb ?? "";
     if (link.glb !== wanted) {
@@ -195,7 +195,7 @@ export class DefineScene {
           link.holder.add(model);
           this.heard.failed(wanted, "");
         } catch (error) {
-          if (link.glb === wanted) link.glb = ""; // asked again when shown again
+          if (link.glb === wanted) link.glb = ""; // retried when shown again
           this.heard.failed(wanted, error instanceof Error ? error.message : String(error));
         }
         const now = this.picture?.shapes[this.links.indexOf(link)];
@@ -228,7 +228,7 @@ export class DefineScene {
             metalness: 0.1,
             side: THREE.DoubleSide,
           });
-          part.userData.colour = (own.color ?? new THREE.Color(BARE)).getHex(); // a copy keeps plain values
+          part.userData.colour = (own.color ?? new THREE.Color(BARE)).getHex(); // a clone keeps plain values
         });
         return scene;
       });

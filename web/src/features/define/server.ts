@@ -1,4 +1,4 @@
-// Define's requests to the console's server.
+// Requests of Define to the console's server.
 
 import { t } from "../../i18n/texts";
 import type { GivenDescription } from "./description";
@@ -32,9 +32,9 @@ export interface Loaded {
   notes: string[];
 }
 
-/** A robot as the site has it. */
+/** A robot at the site. */
 export interface Opened extends Loaded {
-  /** Of all that is in its folder: another one, once that is changed. */
+  /** Revision of its folder; each change creates a new one. */
   revision: string;
 }
 
@@ -46,21 +46,21 @@ export interface MeshInfo {
   materials: string[];
   warnings: string[];
   missing: string[];
-  /** Metres in the file's unit, guessed. */
+  /** Guessed metres in the file's unit. */
   scale: number;
   up: "y" | "z";
-  /** Why these are guessed, in words. */
+  /** Reasons for these guesses. */
   guess: string;
 }
 
 export interface Checked {
   problems: Problem[];
-  /** 4x4 by rows, metres; null where the description has problems. */
+  /** 4x4 by rows, metres; null if the description has problems. */
   tool: number[][] | null;
   links: Record<string, number[][]>;
 }
 
-/** Why a pair of links is ignored (the first three), or as what it is checked: robots/collision/verdicts.py. */
+/** Why a pair of links is ignored (the first three), or its shape for checks: robots/collision/verdicts.py. */
 export type PairKind =
   | "adjacent"
   | "description"
@@ -77,17 +77,17 @@ export type PairKind =
 export interface Pair {
   links: [string, string];
   kind: PairKind;
-  /** What the reason names: positions, percent, triangles, seconds, gigabytes. */
+  /** Numbers in the reason: positions, percent, triangles, seconds, gigabytes. */
   values: Readonly<Record<string, number>>;
 }
 
-/** A request that was refused, or not answered; the text is for people. */
+/** A request that was refused or not answered; the text is for the user. */
 export class Refused extends Error {
   constructor(
     readonly status: number,
     text: string,
     readonly problems: Problem[] = [],
-    /** What would be saved over was changed since it was opened. */
+    /** The robot to overwrite has changed since it was opened. */
     readonly isChanged = false,
   ) {
     super(text);
@@ -113,7 +113,7 @@ async function send(path: string, init?: RequestInit): Promise<Response> {
     changed = said.changed ?? false;
     words = said.text ?? problems.map((problem) => problem.text).join("; ");
   } catch {
-    // it is text already
+    // it is already text
   }
   throw new Refused(answer.status, words || `HTTP ${answer.status}`, problems, changed);
 }
@@ -131,16 +131,16 @@ async function json<T>(answer: Promise<Response>): Promise<T> {
   return (await (await answer).json()) as T;
 }
 
-// "Gone": the server's store has made room for other files.
+// "Gone": the server's store dropped the files for others.
 const FORGOTTEN = 410;
 
-/** Asks with a draft's files; where the server has forgotten some, sends again what is kept here, and asks again. */
+/** Send a request with a draft's files; if the server has dropped some, upload them and repeat it. */
 async function withFiles(files: Readonly<Record<string, string>>, asked: () => Promise<Response>): Promise<Response> {
   try {
     return await asked();
   } catch (error) {
     if (!(error instanceof Refused) || error.status !== FORGOTTEN) throw error;
-    // A saved robot's own files are put back by opening it.
+    // Opening a saved robot restores its own files.
     const { owner } = identity.value;
     let sent = owner
       ? await robot(owner).then(
@@ -181,12 +181,12 @@ export function check(of: Draft, joints: readonly number[] | null, signal: Abort
   return json(withFiles(of.files, () => post("/check", { ...body(of), joints }, signal)));
 }
 
-/** How each pair is checked; those that the draft ignores are judged like all others. */
+/** Return how each pair is checked; pairs that the draft ignores are included. */
 export function collisions(of: Draft): Promise<{ pairs: Pair[] }> {
   return json(withFiles(of.files, () => post("/collisions", body(of))));
 }
 
-/** A URDF, an OpenHRP VRML file or a robot.toml as a draft. */
+/** Return a URDF, an OpenHRP VRML file or a robot.toml as a draft. */
 export function importRobot(
   file: string,
   files: Readonly<Record<string, string>>,
@@ -194,13 +194,13 @@ export function importRobot(
   return json(post("/import", { file, files }));
 }
 
-/** The files of a zip archive, SHA-256 by path. */
+/** Return the files of a zip archive, SHA-256 by path. */
 export async function unzip(file: string, sha: string): Promise<Record<string, string>> {
   const answer = await json<{ files: Record<string, string> }>(post("/unzip", { file, files: { [file]: sha } }));
   return answer.files;
 }
 
-/** @param revision Of the robot that it is saved over without a question; "": of none. */
+/** @param revision Revision that may be overwritten without a question; "": none. */
 export function save(
   of: Draft,
   revision: string,

@@ -1,4 +1,4 @@
-// What is in each mesh file of the draft: read by the server, once for each content.
+// Contents of the draft's mesh files, read by the server once for each content.
 
 import { effect, signal } from "@preact/signals";
 import { bodies } from "./description";
@@ -24,7 +24,7 @@ export function setShape(path: string, files: Readonly<Record<string, string>>, 
   shapes.value = new Map([...shapes.value, [shapeKey(path, files), shape]]);
 }
 
-/** Has a mesh file read, whatever is known of it. */
+/** Request a mesh file's contents again. */
 export async function readShape(path: string, files: Readonly<Record<string, string>>): Promise<Shape> {
   let shape: Shape;
   try {
@@ -36,7 +36,7 @@ export async function readShape(path: string, files: Readonly<Record<string, str
   return shape;
 }
 
-/** Has every mesh file of the draft read until the returned function is called. */
+/** Request the contents of every mesh file of the draft until the returned function is called. */
 export function keepReading(): () => void {
   return effect(() => {
     const now = draft.value;
@@ -52,13 +52,13 @@ export function keepReading(): () => void {
 export interface Missing {
   /** The mesh file that refers to it. */
   of: string;
-  /** As that file names it. */
+  /** The name in that file. */
   name: string;
-  /** Where it belongs in the description's folder. */
+  /** Its path in the description's folder. */
   path: string;
 }
 
-/** Files that the draft's mesh files refer to and that are not there. */
+/** Missing files that the draft's mesh files refer to. */
 export function missingFiles(): Missing[] {
   const now = draft.value;
   if (!now) return [];
@@ -74,7 +74,7 @@ export function missingFiles(): Missing[] {
   return [...found.values()];
 }
 
-/** Where a name that stands in a file leads. */
+/** Resolve a name in a file to a path. */
 export function beside(file: string, name: string): string {
   const steps = file.split("/").slice(0, -1);
   for (const step of name.replaceAll("\\", "/").split("/")) {

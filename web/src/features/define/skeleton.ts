@@ -1,4 +1,4 @@
-// The D-H rows as lines: each joint's axis z, its offset d along it, its common normal a, each link's frame.
+// The D-H rows as lines: each joint's axis z, offset d along it, common normal a, and each link's frame.
 
 import * as THREE from "three";
 import { alongAxis, type DhRow } from "../../scene/forward-kinematics";
@@ -12,7 +12,7 @@ const FAINT = 0.45;
 const RADIUS = 0.0032; // of the arm's reach
 const AXIS_LENGTH = 0.2;
 const FRAME_LENGTH = 0.07;
-const LABEL_HEIGHT = 0.032; // of the picture's
+const LABEL_HEIGHT = 0.032; // of the picture's height
 const ON_TOP = { depthTest: false, depthWrite: false, transparent: true, toneMapped: false } as const;
 
 const rod = new THREE.CylinderGeometry(1, 1, 1, 10).translate(0, 0.5, 0);
@@ -22,7 +22,7 @@ const UP = new THREE.Vector3(0, 1, 0);
 interface Drawn {
   /** Of the links, base first. */
   placements: readonly THREE.Matrix4[];
-  /** The frame in which the rows begin. */
+  /** Frame of the first row. */
   start: THREE.Matrix4;
   rows: readonly DhRow[];
   frames: readonly { name: string; placement: THREE.Matrix4 }[];
@@ -30,13 +30,13 @@ interface Drawn {
   size: number;
 }
 
-/** Lines of all rows, made anew at each change: few and small, from shared shapes. */
+/** Lines of all rows, rebuilt at each change: few and small, from shared geometries. */
 export class Skeleton {
   readonly group = new THREE.Group();
   private readonly materials = new Map<string, THREE.MeshBasicMaterial>();
   private readonly labels = new Map<string, THREE.SpriteMaterial>();
 
-  /** @param chosen The row drawn bright; null: all are. */
+  /** @param chosen Index of the bright row; null: all. */
   update({ placements, start, rows, frames, size }: Drawn, tool: THREE.Matrix4, chosen: number | null): void {
     this.group.clear();
     rows.forEach((row, index) => {
@@ -66,7 +66,7 @@ export class Skeleton {
     }
   }
 
-  /** Letters are as large however far away they are. */
+  /** Scale letters to a constant size at any distance. */
   scaleLetters(scale: number): void {
     for (const sprite of this.group.children) {
       if (sprite instanceof THREE.Sprite) sprite.scale.set(LABEL_HEIGHT * 4 * scale, LABEL_HEIGHT * scale, 1);
@@ -96,7 +96,7 @@ export class Skeleton {
     mesh.position.copy(from);
     mesh.quaternion.setFromUnitVectors(UP, along.divideScalar(length));
     mesh.scale.set(RADIUS * size * width, length, RADIUS * size * width);
-    mesh.renderOrder = (bright ? 3 : 1) + (width > 1 ? 1 : 0); // the row's lengths over its axis
+    mesh.renderOrder = (bright ? 3 : 1) + (width > 1 ? 1 : 0); // lengths over the axis
     this.group.add(mesh);
   }
 
@@ -156,7 +156,7 @@ function subscript(number: number): string {
 
 function lettering(text: string, colour: string): THREE.CanvasTexture {
   const canvas = document.createElement("canvas");
-  [canvas.width, canvas.height] = [256, 64]; // longer names are drawn narrower
+  [canvas.width, canvas.height] = [256, 64]; // longer names are compressed
   const pen = canvas.getContext("2d");
   if (pen) {
     pen.font = "600 38px system-ui, sans-serif";

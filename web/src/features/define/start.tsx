@@ -1,4 +1,4 @@
-// Before there is a draft: the ways to begin one.
+// The ways to begin, while there is no draft.
 
 import { useEffect } from "preact/hooks";
 import { d } from "../../i18n/define";

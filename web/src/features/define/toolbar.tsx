@@ -1,4 +1,4 @@
-// Above the columns: what is being defined, undo and redo, save, download, start; and what became of it.
+// The toolbar: name, undo and redo, save, download, start; and the outcome of actions.
 
 import { useState } from "preact/hooks";
 import { d } from "../../i18n/define";
@@ -80,7 +80,7 @@ export function Toolbar() {
   );
 }
 
-/** What became of things, one line each, put away by hand. */
+/** Outcomes, one line each, which the user dismisses. */
 export function Outcomes() {
   const [sure, setSure] = useState(false);
   const done = outcome.value;

@@ -1,4 +1,4 @@
-// Named views: what the video and the 3-D panel look from, set from this page's own camera.
+// Named views for the video and the 3-D panel, set from this page's camera.
 
 import { useState } from "preact/hooks";
 import { d } from "../../i18n/define";

@@ -1,4 +1,4 @@
-// A description's cameras: its own, and top, front and left worked out from the arm's reach.
+// A description's cameras: its own, and top, front and left derived from the arm's reach.
 
 import { Vector3 } from "three";
 import type { Look } from "../../scene/viewpoint";
@@ -7,15 +7,15 @@ import { metres, tidy } from "./description";
 import { reach } from "./placements";
 
 export const USUAL_VIEWS = ["top", "front", "left"] as const;
-// An arm without lengths yet is looked at as if it had these.
+// Size for an arm without lengths.
 const LEAST_M = 0.4;
 
-/** The arm's size for drawing [m]. */
+/** Return the arm's size for drawing [m]. */
 export function sizeOf(description: Description, shapes = 0): number {
   return Math.max(reach(description), shapes, LEAST_M);
 }
 
-/** Where the named view looks from; the free one where the description has none of that name. */
+/** Return the camera of a named view; of the free one if the description does not have it. */
 export function lookOf(name: string, description: Description, size: number): Look {
   const one = metres(description.units);
   const given = description.view[name];
@@ -39,7 +39,7 @@ export function lookOf(name: string, description: Description, size: number): Lo
   return { eye, target, up: name === "top" ? new Vector3(0, 1, 0) : new Vector3(0, 0, 1), flat: true };
 }
 
-/** A look as a view of the description, rounded as one would type it. */
+/** Return a camera as a view of the description, rounded. */
 export function viewOf({ eye, target, up, flat }: Look, description: Description): View {
   const one = metres(description.units);
   const point = (at: Vector3) => at.toArray().map((value) => tidy(Math.round(value * 1e4) / 1e4 / one)) as Triple;

@@ -1,18 +1,18 @@
-// What is looked at while a draft is edited: the chosen part, the open tab, where the joints stand.
+// Selection while a draft is edited: the chosen part, the open tab, the joint positions.
 
 import { computed, signal } from "@preact/signals";
 import type { Body, Description, Joint } from "./description";
 import { linkName } from "./description";
 import { draft } from "./draft";
 
-/** The base, a joint with its link by its place in the chain, or the tool. */
+/** The base, a joint with its link by index, or the tool. */
 export type Part = "base" | "tool" | number;
 export const TABS = ["details", "robot", "frames", "constraints", "collisions", "views"] as const;
 export type Tab = (typeof TABS)[number];
 
 export const chosen = signal<Part>("base");
 export const tab = signal<Tab>("details");
-/** Slider positions by joint name, in the description's units; a joint without one is at home. */
+/** Slider positions by joint name, in the description's units; missing joints are at home. */
 export const slid = signal<ReadonlyMap<string, number>>(new Map());
 
 export function choose(part: Part): void {
@@ -20,19 +20,19 @@ export function choose(part: Part): void {
   tab.value = "details";
 }
 
-/** Begins anew with another robot. */
+/** Reset for another robot. */
 export function resetWorkbench(): void {
   chosen.value = "base";
   tab.value = "details";
   slid.value = new Map();
 }
 
-/** The joint that is chosen; undefined: none. */
+/** The chosen joint; undefined: none. */
 export function chosenJoint(of: Description): Joint | undefined {
   return typeof chosen.value === "number" ? of.joint[chosen.value] : undefined;
 }
 
-/** The chosen link's looks; undefined: the tool is chosen. */
+/** The chosen link's appearance; undefined: the tool is chosen. */
 export function chosenBody(of: Description): Body | undefined {
   return chosen.value === "base" ? of.base : chosenJoint(of)?.link;
 }
@@ -50,7 +50,7 @@ export function positionOf(joint: Joint): number {
 /** Positions of all joints, in the description's units. */
 export const positions = computed<readonly number[]>(() => draft.value?.description.joint.map(positionOf) ?? []);
 
-/** Goes to where a problem is: opens its part and tab, and puts the focus into the nearest field. */
+/** Open a problem's part and tab, and focus the nearest field. */
 export function goTo(path: readonly (string | number)[]): void {
   const [first, second] = path;
   const tabs: Record<string, Tab> = {

@@ -1,4 +1,4 @@
-// One alarm: how urgent, how it stands, since when, of what, what to do about it, who has seen to it.
+// One alarm: priority, state, since when, source, advice, acknowledgement.
 
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import { alarmAdvice, alarmTitle } from "../../i18n/alarm-words";

@@ -1,4 +1,4 @@
-// The alarm list after ISA-18.2: chosen, acknowledged and shelved, one or many at a time.
+// The alarm list after ISA-18.2: select, acknowledge and shelve alarms, one or many at a time.
 
 import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
@@ -31,7 +31,7 @@ import { Shelve } from "./shelve";
 const SHOWN = ["all", "unacknowledged", "shelved"] as const;
 type Shown = (typeof SHOWN)[number];
 const LEAST = { any_priority: Priority.LOW, from_medium: Priority.MEDIUM, from_high: Priority.HIGH } as const;
-const MOST_SHOWN = 200; // nobody acts on more; those are the most urgent
+const MOST_SHOWN = 200; // more are of no use to an operator; these are the most urgent
 
 const DONE = new Map<Action, EventsTextName>([
   [Action.ACKNOWLEDGE, "acknowledged"],
@@ -187,7 +187,7 @@ export function AlarmPanel() {
   );
 }
 
-/** What narrows a list; on a phone only when one asks for it, so that the list itself is in sight. */
+/** Filters of a list; on a phone they open on request, so that the list stays visible. */
 export function Filters({ children }: { children: ComponentChildren }) {
   const [open, setOpen] = useState(false);
   return (
@@ -200,7 +200,7 @@ export function Filters({ children }: { children: ComponentChildren }) {
   );
 }
 
-/** Where no account says who one is. */
+/** The name of the operator, for consoles without accounts. */
 function Name() {
   return (
     <label class="alarm-name">

@@ -1,4 +1,4 @@
-// What is in the gateways' audit logs beyond the last hundred of each: asked for, some gateways at a time.
+// Older entries of the gateways' audit logs, requested from some gateways at a time.
 
 import { timestampFromMs } from "@bufbuild/protobuf/wkt";
 import { AuditListSchema, AuditQuerySchema } from "../../gen/robomesh_pb";
@@ -17,7 +17,7 @@ export interface Found {
   failed: { robot: string; text: string }[];
 }
 
-/** Entries of the last `sinceS` seconds; infinite: of any time. */
+/** Request entries of the last `sinceS` seconds; infinite: all. */
 export async function findInLogs(robotKeys: readonly string[], sinceS: number): Promise<Found> {
   const found: Found = { entries: [], failed: [] };
   const left = [...robotKeys];

@@ -1,4 +1,4 @@
-// On every page: how many alarms nobody has acknowledged, by priority; calm while there is none.
+// The alarm badge of every page: unacknowledged alarms by priority; grey while there is none.
 
 import { useEffect } from "preact/hooks";
 import { e } from "../../i18n/events";

@@ -1,4 +1,4 @@
-// Events and audit entries of every robot and service, newest first, each once, as many as are kept.
+// Events and audit entries of every robot and service, newest first, without repeats, up to a maximum.
 
 import { fromBinary } from "@bufbuild/protobuf";
 import { timestampMs } from "@bufbuild/protobuf/wkt";
@@ -14,7 +14,7 @@ export const MOST_KEPT = 5000;
 const TAKEN_EACH_MS = 250;
 
 interface Of {
-  /** Told apart from every other. */
+  /** Unique among all entries. */
   id: string;
   ms: number;
   site: string;
@@ -23,13 +23,13 @@ interface Of {
 export type EventEntry = Of & { event: Event };
 export type AuditLine = Of & { audit: AuditEntry };
 
-/** A list that many publishers tell. */
+/** A list that many publishers add to. */
 export class Entries<E extends Of> {
   readonly newest: Signal<readonly E[]> = signal([]);
   private readonly known = new Set<string>();
   private waiting: E[] = [];
 
-  /** Takes what is not known yet; it is seen at the next `settle`. */
+  /** Add new entries; they become visible at the next `settle`. */
   take(entries: readonly E[]): void {
     for (const entry of entries) {
       if (this.known.has(entry.id)) continue;
@@ -40,7 +40,7 @@ export class Entries<E extends Of> {
 
   settle(): void {
     if (this.waiting.length === 0) return;
-    // Two runs in order or nearly so: the sort is quick, and stable.
+    // Two nearly sorted runs: the sort is quick, and stable.
     const merged = [...this.waiting.reverse(), ...this.newest.value].sort((a, b) => b.ms - a.ms);
     for (const { id } of merged.splice(MOST_KEPT)) this.known.delete(id);
     this.waiting = [];
@@ -51,7 +51,7 @@ export class Entries<E extends Of> {
 export const events = new Entries<EventEntry>();
 export const audits = new Entries<AuditLine>();
 
-/** Follows both while it is mounted; what was there before stays. */
+/** Follow both lists while the component is mounted; earlier entries are kept. */
 export function useEntries(): void {
   useEffect(() => {
     const ends = [
@@ -92,10 +92,10 @@ function takeAudit(sample: Sample): void {
   audits.take(auditLines(site, robot, told));
 }
 
-/** Entries of one robot's log. */
+/** Return the entries of one robot's log. */
 export function auditLines(site: string, robot: string, entries: readonly AuditEntry[]): AuditLine[] {
   return entries.map((audit) => ({
-    // An entry that is repeated comes again under its number.
+    // A repeated entry has the same number.
     id: `${site}/${robot} ${audit.number} ${audit.repeatedCount}`,
     ms: audit.timestamp ? timestampMs(audit.timestamp) : 0,
     site,

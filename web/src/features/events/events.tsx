@@ -1,4 +1,4 @@
-// What needs a person, what happened and who asked for what, of every robot and service of every site.
+// The page of alarms, events and audit entries of every robot and service of every site.
 
 import { AlarmPanel } from "./alarm-panel";
 import { Journal } from "./journal";

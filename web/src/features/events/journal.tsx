@@ -1,4 +1,4 @@
-// What happened and who asked for what, newest first: of all robots and services, narrowed by what one looks for.
+// Events and audit entries of all robots and services, newest first, with filters.
 
 import { useEffect, useState } from "preact/hooks";
 import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "../../gen/robomesh_pb";
@@ -172,7 +172,7 @@ function Line({ entry, open, choose }: { entry: Entry; open: boolean; choose: (e
 function EventWords({ entry: { event } }: { entry: EventEntry }) {
   const [word, level] = SEVERITIES[event.severity] ?? ["severity_info", "normal"];
   const [title, text] = [alarmTitle(event.code), eventText(event)];
-  // What the page says in its own language needs no title; what ends an alarm has that alarm's code.
+  // A translated text needs no title; the end of an alarm has that alarm's code.
   const titled = title && text === event.text && event.severity > Severity.INFO;
   return (
     <>
@@ -195,7 +195,7 @@ function AuditWords({ entry: { audit } }: { entry: AuditLine }) {
   );
 }
 
-/** All of one entry, below the list: a line is cut where it ends. */
+/** All of one entry, below the list, because a line is cut off. */
 function Details({ entry, close }: { entry: Entry; close: () => void }) {
   const event = "event" in entry ? entry.event : null;
   const audit = "audit" in entry ? entry.audit : null;
@@ -229,7 +229,7 @@ function Details({ entry, close }: { entry: Entry; close: () => void }) {
   );
 }
 
-/** Time of day; with its day where that is not today. */
+/** Return the time of day, with the date unless it is today's. */
 function dayTime(ms: number): string {
   const at = new Date(ms);
   const time = at.toLocaleTimeString("en-GB", { hour12: false });
@@ -239,7 +239,7 @@ function dayTime(ms: number): string {
 
 const NARROW = matchMedia("(max-width: 899px)");
 
-/** px: on a phone a line has its place below its time. */
+/** px: on a phone, a line's text is below its time. */
 function useLineHeight(): number {
   const [narrow, setNarrow] = useState(NARROW.matches);
   useEffect(() => {

@@ -1,4 +1,4 @@
-// Puts alarms aside for a while, with a reason.
+// A form that shelves alarms for a time, with a reason.
 
 import { useState } from "preact/hooks";
 import { e } from "../../i18n/events";

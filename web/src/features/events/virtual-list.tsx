@@ -1,9 +1,9 @@
-// A list of thousands of lines of one height, of which only those in sight are there.
+// A list of thousands of lines of equal height that renders only the visible ones.
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
 
-const OVER = 8; // lines beyond either edge
+const OVER = 8; // extra lines above and below
 
 export function VirtualList<Item>(props: {
   label: string;

@@ -1,15 +1,15 @@
-// An arm of few triangles: a tile shows it a hand's breadth high, and there are two hundred of them on a page.
+// Simplified meshes: a tile shows an arm a hand's breadth high, and a page has two hundred tiles.
 
 import * as THREE from "three";
 import { toCreasedNormals } from "three/addons/utils/BufferGeometryUtils.js";
 
 const MOST_TRIANGLES = 2000;
-const FINEST = 1 / 150; // of its size: finer than a tile shows
+const FINEST = 1 / 150; // of its size: finer than a tile can show
 const CREASE_ANGLE = 0.7; // rad: sharper edges stay sharp
 
-/** Makes the meshes below a group coarse, with normals; all of them together have at most `MOST_TRIANGLES`.
+/** Simplify the meshes below a group to at most `MOST_TRIANGLES` together, with normals.
  *
- * Corners in one cell of a grid become one; triangles that lose a corner go; the grid grows until that does. */
+ * Vertices in one cell of a grid merge; degenerate triangles are removed; the grid grows until few are left. */
 export function coarsen(group: THREE.Object3D): void {
   const meshes: THREE.Mesh[] = [];
   group.traverse((part) => part instanceof THREE.Mesh && meshes.push(part));
@@ -30,7 +30,7 @@ export function coarsen(group: THREE.Object3D): void {
 }
 
 interface Triangle {
-  /** Its first corner's number. */
+  /** Index of its first vertex. */
   from: number;
   corners: readonly Cluster[];
 }
@@ -40,7 +40,7 @@ interface Cluster {
   count: number;
 }
 
-/** The triangles of a geometry without index that are still ones on a grid; each only once. */
+/** Return the triangles of a non-indexed geometry that do not degenerate on a grid, without repeats. */
 function triangles(geometry: THREE.BufferGeometry, cell: number): Triangle[] {
   const position = geometry.getAttribute("position");
   const clusters = new Map<string, Cluster>();
@@ -63,7 +63,7 @@ function triangles(geometry: THREE.BufferGeometry, cell: number): Triangle[] {
   return [...found.values()];
 }
 
-/** The geometry of some triangles: corners where their clusters are, colours and places in pictures as before. */
+/** Return the geometry of some triangles: vertices at their clusters, colours and texture coordinates unchanged. */
 function picked(geometry: THREE.BufferGeometry, some: readonly Triangle[]): THREE.BufferGeometry {
   const made = new THREE.BufferGeometry();
   for (const [name, attribute] of Object.entries(geometry.attributes)) {

@@ -1,4 +1,4 @@
-// Every robot of every site as a tile: picture, state, who controls, how old, what is wrong.
+// The fleet: every robot of every site as a tile with picture, state, operator, age and problem.
 
 import { signal, useComputed } from "@preact/signals";
 import { useEffect, useState } from "preact/hooks";
@@ -22,7 +22,7 @@ import "./fleet.css";
 const STATES = ["any_state", "needs_look", "faulty", "with_alarm"] as const;
 const ORDERS = ["by_name", "by_urgency"] as const;
 const LEVELS: readonly Level[] = ["alarm", "warning", "normal"];
-const EMPTY_AFTER_MS = 1500; // robots tell of themselves within that, if there are any
+const EMPTY_AFTER_MS = 1500; // live robots have published by then
 
 const text = signal("");
 const site = signal("");
@@ -31,7 +31,7 @@ const order = signal<(typeof ORDERS)[number]>("by_name");
 
 export function Fleet() {
   useFleetNow();
-  // Once a second: two hundred tiles that change places more often could not be read.
+  // Once a second: tiles that move more often are unreadable.
   const second = useComputed(() => Math.floor(now.value / 1000));
   const robots = fleetRobots.value;
   void second.value;
@@ -158,7 +158,7 @@ function NoMatch({ all }: { all: number }) {
   );
 }
 
-/** Places of tiles until it is known what there is. */
+/** Placeholders until the first robots are known. */
 function Skeletons() {
   return (
     <div class="tiles some skeletons" aria-hidden="true">
@@ -172,7 +172,7 @@ function Skeletons() {
   );
 }
 
-/** Whether there was a connection for so long that robots would have told of themselves. */
+/** Return whether the connection has lasted long enough for live robots to have published. */
 function useSettled(): boolean {
   const [settled, setSettled] = useState(false);
   const connected = lostAt.value === null;
@@ -184,7 +184,7 @@ function useSettled(): boolean {
   return settled;
 }
 
-/** How many robots are how, the most urgent first: what a glance from across the room needs. */
+/** Number of robots in each state, most urgent first, readable from across the room. */
 function Summary({ states }: { states: readonly StateWord[] }) {
   const groups = Map.groupBy(states, ({ word }) => word);
   const sorted = [...groups.values()].sort(
@@ -204,7 +204,7 @@ function Summary({ states }: { states: readonly StateWord[] }) {
   );
 }
 
-/** A site's name and how it is: what is missing, off or different, by its watch; else what is there. */
+/** A site's name and health by its watch: what is missing, offset or different; otherwise its services. */
 function SiteHead({ site: name, robots }: { site: string; robots: number }) {
   const latest = useMesh().get(name);
   const problems = latest && !isMeshStale(latest) ? siteProblems(latest) : [];

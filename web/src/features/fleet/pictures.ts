@@ -1,4 +1,4 @@
-// Every tile's arm, drawn by one WebGL context: some tiles at a time, the longest not drawn first, within a budget.
+// Every tile's arm, drawn by one WebGL context: a few tiles a frame, the longest waiting first, within a budget.
 
 import { effect } from "@preact/signals";
 import * as THREE from "three";
@@ -13,7 +13,7 @@ const FIELD_OF_VIEW = 28; // degrees, upright
 const LOOK_FROM = new THREE.Vector3(1.1, -1.7, 0.8).normalize();
 const MOST_AT_ONCE = 6;
 const COLUMNS = 3;
-const FEW = 6; // tiles that are drawn as smoothly as the display goes
+const FEW = 6; // up to so many tiles are drawn at the display's rate
 const FEW_EACH_MS = 15;
 const MANY_EACH_MS = 90;
 const SLOW_BATCH_MS = 12; // a slower batch becomes smaller, and is followed by as long a pause
@@ -37,7 +37,7 @@ export class TilePicture {
     readonly floor: THREE.Matrix4 | null,
   ) {}
 
-  /** Takes joint positions [rad] or [m] that arrived at a time of the page's clock [ms]. */
+  /** Set the joint positions [rad] or [m] that arrived at a time of the page's clock [ms]. */
   take(positions: readonly number[], arrived: number): void {
     if (this.to.length && positions.every((value, i) => value === this.to[i])) return;
     this.span = Math.min(arrived - this.arrived, 250);
@@ -52,12 +52,12 @@ export class TilePicture {
     this.stale = stale;
   }
 
-  /** Whether there is anything to draw; a place that nobody knows is not drawn. */
+  /** Whether all meshes and a position are known. */
   get ready(): boolean {
     return this.rig.complete && this.to.length > 0;
   }
 
-  /** Joint positions at a time: between the last two states, as late as the newer one is after the older. */
+  /** Return joint positions interpolated between the last two states, delayed by their interval. */
   at(time: number): readonly number[] {
     const share = this.span > 0 ? Math.min(1, (time - this.arrived) / this.span) : 1;
     this.dirty = share < 1 && this.from !== this.to;
@@ -65,7 +65,7 @@ export class TilePicture {
   }
 }
 
-/** Places a level disc on the floor of a robot's cell, in its base frame; null: there is none. */
+/** Return the placement of a disc on the floor of a robot's cell, in its base frame; null: no floor. */
 function floorInBase(description: Description): THREE.Matrix4 | null {
   const height = floorOf(description);
   if (height === null) return null;
@@ -101,7 +101,7 @@ class Pictures {
     sky.position.set(0, 0, 1);
     this.scene.add(key, sky, this.floor);
     this.renderer.domElement.addEventListener("webglcontextrestored", () => this.drawAll());
-    // Where the main processor draws, it draws what is scrolled first.
+    // A software renderer shares the processor with scrolling: let scrolling go first.
     const scrolled = () => (this.nextAt = performance.now() + SCROLLED_MS);
     if (this.software) addEventListener("scroll", scrolled, { capture: true, passive: true });
     effect(() => {
@@ -173,7 +173,7 @@ class Pictures {
     this.nextAt = at + PAUSE_FACTOR * (performance.now() - at);
   }
 
-  /** Makes the canvases as large as their tiles, and the drawing as some of the largest. */
+  /** Size the canvases to their tiles, and the renderer to hold a batch of the largest. */
   private fit(tiles: readonly TilePicture[]): void {
     const ratio = this.software ? 1 : Math.min(devicePixelRatio, 1.5);
     for (const { canvas } of tiles) {
@@ -204,7 +204,7 @@ class Pictures {
 
 let pictures: Pictures | null | undefined;
 
-/** The one that draws all tiles; null: this browser has no WebGL. */
+/** Return the renderer of all tiles; null: this browser has no WebGL. */
 export function tilePictures(): Pictures | null {
   if (pictures === undefined) {
     try {

@@ -1,4 +1,4 @@
-// An arm as tiles draw it: coarse, one for all robots of a kind, posed by joint positions.
+// An arm for tiles: simplified, shared by all robots of a model, posed by joint positions.
 
 import * as THREE from "three";
 import type { Description } from "../../gen/robomesh_pb";
@@ -16,9 +16,9 @@ const rigs = new Map<string, Rig>();
 
 export class Rig {
   readonly group = new THREE.Group();
-  /** Every one of its links is there. */
+  /** All of its links are loaded. */
   complete = false;
-  /** Where the arm may be seen, in its base frame: more than it fills at home. */
+  /** A sphere around the arm's poses, in its base frame: larger than the arm at home. */
   readonly bounds = new THREE.Sphere(new THREE.Vector3(0, 0, 0.4), 0.8);
   private readonly forward: Forward;
   private readonly links = new Map<string, THREE.Group>();
@@ -59,10 +59,10 @@ export class Rig {
         loaded();
       },
       () => rigs.delete(rigName(description)),
-    ); // the next tile that wants it tries again
+    ); // the next tile that needs it tries again
   }
 
-  /** Places the links at joint positions [rad] or [m]. */
+  /** Place the links at joint positions [rad] or [m]. */
   pose(positions: readonly number[]): void {
     const placements = this.forward(positions);
     for (const [name, group] of this.links) {
@@ -72,7 +72,7 @@ export class Rig {
     }
   }
 
-  /** Grey and translucent, or in its own colours. */
+  /** Draw it grey and translucent, or in its own colours. */
   setStale(stale: boolean): void {
     if (stale === this.stale) return;
     this.stale = stale;
@@ -80,7 +80,7 @@ export class Rig {
   }
 }
 
-/** The rig of a description: one for all robots of a kind. */
+/** Return the rig of a description, shared by all robots of a model. */
 export function rigOf(prefix: string, description: Description, loaded: () => void): Rig {
   const name = rigName(description);
   const rig = rigs.get(name) ?? new Rig(prefix, description, loaded);
@@ -89,11 +89,11 @@ export function rigOf(prefix: string, description: Description, loaded: () => vo
 }
 
 function rigName({ urdf, links }: Description): string {
-  // The robot's own name is no matter.
+  // The robot's own name does not matter.
   return urdf.replace(/<robot name="[^"]*"/, "") + links.map((link) => link.meshSha256 + link.color).join();
 }
 
-/** With the cheapest lit material: a tile is small. */
+/** Apply the cheapest lit material: a tile is small. */
 function dressed(model: THREE.Group, colour: string): THREE.Group {
   model.traverse((part) => {
     if (!(part instanceof THREE.Mesh)) return;

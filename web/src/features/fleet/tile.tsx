@@ -1,4 +1,4 @@
-// One robot of the fleet. Off the screen it is its name and nothing else: it is neither watched nor drawn.
+// One robot of the fleet. An invisible tile shows only its name, without subscriptions or drawing.
 
 import { fromBinary } from "@bufbuild/protobuf";
 import { useEffect, useRef, useState } from "preact/hooks";
@@ -58,7 +58,7 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
   const stale = isStale("controller", unitAge);
   const leaseKnown = lease !== undefined && !isStale("lease", ageOf(lease));
   const holder = lease?.message.holder;
-  // What it said last of its link is no longer so.
+  // The last report about the link is outdated.
   const problem = state.word === "state_stale" ? f("nothing_comes") : problemOf(controller?.message);
   const alarms = alarmsOf.value.get(robotKey) ?? [];
   const worst = alarms.reduce((most, { priority }) => Math.max(most, priority), 0);
@@ -91,7 +91,7 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
                 : t("nobody")}
           </span>
         </div>
-        {/* One line for any of them, so that a tile never changes its height. */}
+        {/* One line for each case, so that a tile's height never changes. */}
         <div class="tile-line">
           {state.level !== "normal" && problem ? (
             <p class={`tile-problem ${state.level}`} title={problem}>
@@ -112,7 +112,7 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
   );
 }
 
-/** The arm where its slow joint states say: those are thinned for many watchers, and for far ones. */
+/** The arm at its slow joint states, which are thinned for many subscribers and for remote robots. */
 function Picture(props: { robotKey: string; description: Description | undefined; stale: boolean }) {
   const { robotKey, description } = props;
   const canvas = useRef<HTMLCanvasElement>(null);
@@ -149,7 +149,7 @@ function Picture(props: { robotKey: string; description: Description | undefined
       end?.();
     };
   }, [robotKey, kind]);
-  const at = now.value; // read in any case: it is what draws this again
+  const at = now.value; // triggers drawing
   const age = last.newAt === null ? null : Math.max(0, (at - last.newAt) / 1000);
   const stale = props.stale || age === null || age > (description?.staleAfterS ?? staleAfter("joints/slow"));
   useEffect(() => picture?.setStale(stale), [picture, stale]);

@@ -1,9 +1,9 @@
-// Whether a tile is on the screen, or about to be: only then it is watched and drawn.
+// Visibility of tiles: only tiles on the screen or close to it are subscribed and drawn.
 
 import type { RefObject } from "preact";
 import { useEffect, useState } from "preact/hooks";
 
-// Scrolled past is not looked at: nobody is asked for it.
+// A tile that is only scrolled past causes no subscription.
 const COMES_AFTER_MS = 120;
 const GOES_AFTER_MS = 400;
 

@@ -1,4 +1,4 @@
-// What is being taught: a pose of the ghost, set by sliders, by numbers or by the gizmo. It moves nothing.
+// The pose being taught: set on the ghost by sliders, by numbers or by the gizmo. It moves no robot.
 
 import { computed, signal } from "@preact/signals";
 import { InverseAnswerSchema, InverseRequestSchema, InverseRequest_Task as Task } from "../../gen/robomesh_pb";
@@ -8,38 +8,38 @@ import { reasonOf } from "../../mesh/control";
 import { robotKey, toolAt } from "./subject";
 
 const WITHIN_S = 5;
-const FULL_POSE = 6; // joints from which on all of a pose can be wanted
+const FULL_POSE = 6; // a full pose can be reached with so many joints
 
-/** Joint positions [rad] or [m]; null: nothing is being taught. */
+/** Joint positions [rad] or [m]; null: no pose is being taught. */
 export const aim = signal<readonly number[] | null>(null);
-/** Why the wanted pose cannot be, in words; "" when it can. */
+/** Why the wanted pose cannot be reached; "" when it can. */
 export const aimProblem = signal("");
 const wantedPose = signal<readonly number[] | null>(null);
-/** The tool in the base frame, 16 by rows, where it is wanted or where the joints put it; null: not known. */
+/** The tool in the base frame, 16 by rows: the wanted pose, or the joints' pose; null: not known. */
 export const aimPose = computed(() => wantedPose.value ?? (aim.value && toolAt.value(aim.value)));
 
 let solving = false;
 
-/** Aims at joint positions; null ends it. */
+/** Aim at joint positions; null ends it. */
 export function aimAt(positions: readonly number[] | null): void {
   aim.value = positions;
   wantedPose.value = null;
   aimProblem.value = "";
 }
 
-/** Aims at a pose of the tool, by the joint positions nearest to those aimed at now. */
+/** Aim at a pose of the tool, with the joint positions nearest to the current ones. */
 export function aimAtPose(pose: readonly number[]): void {
   wantedPose.value = pose;
   if (!solving) void solve();
 }
 
-/** Lets go of a wanted pose: the tool is where the joints put it. */
+/** Drop the wanted pose: the tool is at the joints' pose. */
 export function settle(): void {
   wantedPose.value = null;
   aimProblem.value = "";
 }
 
-/** One question at a time, the newest next. */
+/** Send one request at a time, the newest next. */
 async function solve(): Promise<void> {
   solving = true;
   let pose = wantedPose.value;
@@ -66,13 +66,13 @@ async function solve(): Promise<void> {
   solving = false;
 }
 
-/** X, Y, Z [mm], roll, pitch, yaw [degrees] of a placement, as people and programs write it. */
+/** Return X, Y, Z [mm], roll, pitch, yaw [degrees] of a placement, as programs write it. */
 export function poseNumbers(pose: readonly number[]): number[] {
   const at = [pose[3], pose[7], pose[11]].map((each) => (each ?? 0) * 1000);
   return [...at, ...rollPitchYaw(pose).map(toDegrees)];
 }
 
-/** The placement (16, by rows) of X, Y, Z [mm] and roll, pitch, yaw [degrees]. */
+/** Return the placement (16, by rows) of X, Y, Z [mm] and roll, pitch, yaw [degrees]. */
 export function poseOf(numbers: readonly number[]): number[] {
   const [x = 0, y = 0, z = 0] = numbers.map((each) => each / 1000);
   const [roll = 0, pitch = 0, yaw = 0] = numbers.slice(3).map(toRadians);

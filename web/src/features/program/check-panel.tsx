@@ -1,4 +1,4 @@
-// What the check found: the verdict in words, what it assumed, and a row a violation.
+// Result of the check: the verdict in words, its assumptions, and a row a violation.
 
 import type { CheckAnswer } from "../../gen/robomesh_pb";
 import { timeOfDay } from "../../i18n/format";

@@ -1,4 +1,4 @@
-// The check of the text as it stands: asked of the mesh when typing ends, the newest only.
+// The check of the current text: requested from the mesh when typing pauses, the newest text only.
 
 import { effect, signal } from "@preact/signals";
 import type { CheckAnswer, CheckAnswer_Violation } from "../../gen/robomesh_pb";
@@ -13,18 +13,18 @@ const WITHIN_S = 30;
 export interface Checked {
   text: string;
   answer: CheckAnswer;
-  /** When it was asked for, ms since the Unix epoch: it began where the robot was then. */
+  /** When it was requested, ms since the Unix epoch: it starts at the robot's position then. */
   at: number;
 }
 
 export const checked = signal<Checked | null>(null);
 export const checking = signal(false);
-/** Why there is no check, in words; "" when there is. */
+/** Why there is no check; "" when there is. */
 export const checkFailed = signal("");
 
 let wanted: { robotKey: string; text: string } | null = null;
 
-/** Checks whenever typing ends, until the returned function is called. */
+/** Check after each pause in typing, until the returned function is called. */
 export function keepChecking(): () => void {
   let timer: ReturnType<typeof setTimeout> | undefined;
   let last: string | undefined;
@@ -77,12 +77,12 @@ async function askNext(): Promise<void> {
   checking.value = false;
 }
 
-/** Whether what is shown is of the text as it stands. */
+/** Whether the displayed check is of the current text. */
 export function isCurrent(): boolean {
   return checked.value !== null && checked.value.text === draft.value?.text;
 }
 
-/** The text's own errors: such a program is not run. */
+/** The text's own errors: a program with errors is not run. */
 export function errorsOf(answer: CheckAnswer | undefined): readonly CheckAnswer_Violation[] {
   return answer?.violations.filter((each) => each.kind === "program") ?? [];
 }

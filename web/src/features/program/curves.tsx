@@ -1,4 +1,4 @@
-// The checked motion as curves: joints, and the clearance to what stands around.
+// Curves of the checked motion: joints, and the clearance to the surroundings.
 
 import { useEffect, useRef } from "preact/hooks";
 import uPlot from "uplot";

@@ -1,12 +1,12 @@
-// The draft: one a robot, kept in the browser as it is typed, with undo and redo of its own.
+// The draft: one a robot, kept in the browser while it is typed, with its own undo and redo.
 //
-// The text field's own undo would take seconds for a file of a thousand lines, and forgets what the page writes.
+// The text field's undo takes seconds for a thousand lines, and loses what the page writes.
 
 import { computed, effect, signal } from "@preact/signals";
 
 export interface Draft {
   robotKey: string;
-  /** Shown to everybody while it runs, and the file's name. */
+  /** The file's name, shown to all while the program runs. */
   name: string;
   text: string;
 }
@@ -20,11 +20,11 @@ const KEPT = "robomesh.program/";
 const FIRST_NAME = "program";
 export const FILE_ENDING = ".prog";
 const MOST_STEPS = 200;
-const TOGETHER_MS = 800; // what is typed without a longer pause is one step
+const TOGETHER_MS = 800; // text typed without a longer pause is one step
 export const LINE_PX = 20;
 
 export const draft = signal<Draft | null>(null);
-/** Why the browser could not keep it, in its words; "" when it did. */
+/** The browser's message if it could not keep the draft; "" if it did. */
 export const keepingFailed = signal("");
 const past = signal<readonly Step[]>([]);
 const future = signal<readonly Step[]>([]);
@@ -34,7 +34,7 @@ export const canRedo = computed(() => future.value.length > 0);
 let field: HTMLTextAreaElement | null = null;
 let typedAt = 0;
 
-/** Opens a robot's draft; false: there is none yet, and an empty one was begun. */
+/** Open a robot's draft; false: it had none, and gets an empty one. */
 export function open(robotKey: string): boolean {
   const kept = keptOf(robotKey);
   draft.value = kept ?? { robotKey, name: FIRST_NAME, text: "" };
@@ -47,13 +47,13 @@ function keptOf(robotKey: string): Draft | null {
     const { name, text } = JSON.parse(localStorage.getItem(KEPT + robotKey) ?? "null") as Partial<Draft>;
     return typeof name === "string" && typeof text === "string" ? { robotKey, name, text } : null;
   } catch {
-    return null; // none, or written by hand
+    return null; // none, or edited by hand
   }
 }
 
 effect(() => {
   const now = draft.value;
-  // An empty one is not kept: the example is for who has none.
+  // An empty draft is not kept: the example is for robots without a draft.
   if (!now?.text) return;
   try {
     localStorage.setItem(KEPT + now.robotKey, JSON.stringify({ name: now.name, text: now.text }));
@@ -63,12 +63,12 @@ effect(() => {
   }
 });
 
-/** The field that the text stands in; null: it is gone. */
+/** The text field; null: unmounted. */
 export function setField(element: HTMLTextAreaElement | null): void {
   field = element;
 }
 
-/** What a person typed into the field. */
+/** Record text that the operator typed into the field. */
 export function typed(): void {
   if (!field) return;
   const now = performance.now();
@@ -80,13 +80,13 @@ export function rename(name: string): void {
   if (draft.value) draft.value = { ...draft.value, name };
 }
 
-/** Begins with a text: nothing to undo, no cursor taken from where it is. */
+/** Start with a text: no undo, cursor unchanged. */
 export function begin(text: string): void {
   if (field) field.value = text;
   if (draft.value) draft.value = { ...draft.value, text };
 }
 
-/** Replaces the whole text as one step of undo, and puts the cursor at the end of a line. */
+/** Replace the whole text as one undo step, and move the cursor to the end of a line. */
 export function replace(text: string, line = 1): void {
   if (!field) return;
   change(text, false);
@@ -94,7 +94,7 @@ export function replace(text: string, line = 1): void {
   show({ text, cursor: text.split("\n").slice(0, line).join("\n").length });
 }
 
-/** Puts a text where the cursor is, instead of what is selected. */
+/** Insert a text at the cursor, replacing the selection. */
 export function insert(text: string): void {
   if (!field) return;
   const { value, selectionStart, selectionEnd } = field;
@@ -103,7 +103,7 @@ export function insert(text: string): void {
   show({ text: before + value.slice(selectionEnd), cursor: before.length });
 }
 
-/** `together`: part of the step before. */
+/** `together`: part of the previous step. */
 function change(text: string, together: boolean): void {
   const before = draft.value;
   if (!before || text === before.text) return;
@@ -140,7 +140,7 @@ function show({ text, cursor }: Step): void {
   requestAnimationFrame(() => scrollTo(cursorLine())); // once its lines are painted
 }
 
-/** Saves the draft as a file. */
+/** Save the draft as a file. */
 export function download(): void {
   const now = draft.value;
   if (!now?.text) return;
@@ -151,13 +151,13 @@ export function download(): void {
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
-/** The line of the cursor, from 1. */
+/** Return the line of the cursor, from 1. */
 export function cursorLine(): number {
   if (!field) return 1;
   return field.value.slice(0, field.selectionEnd).split("\n").length;
 }
 
-/** Puts the cursor on a line, and selects it. */
+/** Move the cursor to a line, and select it. */
 export function goToLine(line: number): void {
   if (!field) return;
   const lines = field.value.split("\n");

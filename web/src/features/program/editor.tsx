@@ -1,4 +1,4 @@
-// The text: a plain text field over its coloured lines, with line numbers and marks beside them.
+// The program's text: a plain text field over its coloured lines, with line numbers and marks.
 
 import { Component } from "preact";
 import { useLayoutEffect, useRef } from "preact/hooks";
@@ -20,7 +20,7 @@ export function Editor() {
   const field = useRef<HTMLTextAreaElement>(null);
   const key = draft.value?.robotKey;
   useLayoutEffect(() => {
-    // From here on the page writes its value only where it changes the text itself.
+    // After mounting, write the field's value only where the page changes the text itself.
     if (field.current) field.current.value = draft.value?.text ?? "";
     setField(field.current);
     return () => setField(null);
@@ -70,7 +70,7 @@ export function Editor() {
               if (action && !event.altKey) event.preventDefault(), action();
             }}
             onPaste={(event) => {
-              // By itself the field takes seconds for a thousand lines.
+              // The browser's own layout takes seconds for a thousand lines.
               event.preventDefault();
               insert((event.clipboardData?.getData("text/plain") ?? "").replace(/\r\n?/g, "\n"));
             }}
@@ -82,7 +82,7 @@ export function Editor() {
   );
 }
 
-/** Lines that are marked, with what for: the line that runs before all. */
+/** Marked lines with their marks; the running line has priority. */
 function marksOf(lines: readonly string[]): ReadonlyMap<number, Mark> {
   const marks = new Map<number, Mark>();
   const running = runningLine(lines);
@@ -94,7 +94,7 @@ function marksOf(lines: readonly string[]): ReadonlyMap<number, Mark> {
   return marks;
 }
 
-/** Painted anew only when it changes: a program may have thousands. */
+/** Rendered only on a change: a program may have thousands of lines. */
 class Line extends Component<{ text: string }> {
   override shouldComponentUpdate(next: { text: string }): boolean {
     return next.text !== this.props.text;

@@ -1,4 +1,4 @@
-// The gizmo on the ghost's tool: dragged, it says where the tool shall be.
+// The gizmo at the ghost's tool: dragging it sets the pose to teach.
 
 import { effect, signal } from "@preact/signals";
 import { Group, Matrix4, Object3D } from "three";
@@ -6,10 +6,10 @@ import { makeGizmo } from "../../scene/gizmo";
 import type { Stage } from "../../scene/scene";
 import { aimAtPose, aimPose } from "./aim";
 
-/** What dragging it does; off: it is not there. */
+/** What dragging does; off: hidden. */
 export const gizmoMode = signal<"off" | "translate" | "rotate">("off");
 
-/** Puts a gizmo on a scene; the returned function takes it away. */
+/** Add the gizmo to a scene; the returned function removes it. */
 export function addGizmo(stage: Stage): () => void {
   const ending = new AbortController();
   const controls = makeGizmo(stage.camera(), stage.canvas, ending.signal);
@@ -18,7 +18,7 @@ export function addGizmo(stage: Stage): () => void {
   const tool = new Object3D();
   inBase.matrixAutoUpdate = false;
   inBase.add(tool);
-  // A view has a camera of its own, which the gizmo must be as large as, and be dragged by.
+  // Each view has its own camera, which the gizmo must use for its size and its drags.
   const update = helper.updateMatrixWorld.bind(helper);
   helper.updateMatrixWorld = (force) => {
     controls.camera = stage.camera();
@@ -41,7 +41,7 @@ export function addGizmo(stage: Stage): () => void {
     else {
       inBase.matrix.copy(stage.base());
       inBase.matrixWorldNeedsUpdate = true;
-      // What is being dragged stays in the hand.
+      // During a drag, keep the dragged pose.
       if (!controls.dragging)
         new Matrix4().fromArray(pose).transpose().decompose(tool.position, tool.quaternion, tool.scale);
       controls.setMode(mode);

@@ -1,9 +1,9 @@
-// Violations that one cause has: of the same kind and pair, on neighbouring lines, they are one row.
+// Violations with a common cause: of one kind and pair on neighbouring lines, they share a row.
 
 import type { CheckAnswer_Violation } from "../../gen/robomesh_pb";
 
 export interface Group {
-  /** The nearest one: what the row says and leads to. */
+  /** The nearest violation, which the row describes and opens. */
   worst: CheckAnswer_Violation;
   first: number;
   last: number;
@@ -13,9 +13,9 @@ export interface Group {
 
 const MOVES = /^\s*(home|move_)/;
 
-/** In the order of their first ones. Lines are neighbours where none between them moves the robot.
+/** Group violations in the order of their first ones. Lines are neighbours if no line between them moves the robot.
  *
- * Errors of the text are one row only where their words are the same. */
+ * Errors of the text share a row only if their texts are equal. */
 export function grouped(violations: readonly CheckAnswer_Violation[], text: string): readonly Group[] {
   const lines = text.split("\n");
   const none = (from: number, to: number) =>

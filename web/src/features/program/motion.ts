@@ -1,10 +1,10 @@
-// The checked motion at a moment: where the ghost stands then, and which links a violation makes red.
+// The checked motion at a moment: the ghost's position, and the links that violate something.
 
 import { computed, signal } from "@preact/signals";
 import type { CheckAnswer_Path } from "../../gen/robomesh_pb";
 import { checked } from "./check";
 
-/** The moment shown [s from the program's start]; null: none. */
+/** The displayed moment [s from the program's start]; null: none. */
 export const moment = signal<number | null>(null);
 export const playing = signal(false);
 
@@ -14,7 +14,7 @@ export const path = computed<CheckAnswer_Path | null>(() => {
 });
 export const duration = computed(() => path.value?.timesS.at(-1) ?? 0);
 
-/** Joint positions [rad] or [m] at a moment; null: nothing was sampled. */
+/** Return joint positions [rad] or [m] at a moment; null: no samples. */
 export function positionsAt(of: CheckAnswer_Path, time: number): readonly number[] | null {
   const count = of.timesS.length;
   const width = of.jointPositions.length / count;
@@ -26,7 +26,7 @@ export function positionsAt(of: CheckAnswer_Path, time: number): readonly number
   return Array.from({ length: width }, (_, i) => at(before, i) + share * (at(after, i) - at(before, i)));
 }
 
-/** The first sample that is not before a moment; the last one after the end. */
+/** Return the index of the first sample at or after a moment, or of the last. */
 function indexAt(of: CheckAnswer_Path, time: number): number {
   let [low, high] = [0, of.timesS.length - 1];
   while (low < high) {
@@ -37,13 +37,13 @@ function indexAt(of: CheckAnswer_Path, time: number): number {
   return low;
 }
 
-/** The program's line that runs at a moment. */
+/** Return the program's line at a moment. */
 export const lineNow = computed(() => {
   const of = path.value;
   return of && moment.value !== null ? (of.lines[indexAt(of, moment.value)] ?? null) : null;
 });
 
-/** Clearance at the moment [m]; null: nothing is around, or no moment is shown. */
+/** Clearance at the moment [m]; null: no surroundings, or no moment. */
 export const clearanceNow = computed(() => {
   const of = path.value;
   if (!of || moment.value === null || of.clearances.length === 0) return null;
@@ -51,7 +51,7 @@ export const clearanceNow = computed(() => {
   return Number.isFinite(clearance) ? clearance : null;
 });
 
-/** Links and fixtures that a violation names at the moment. */
+/** Links and fixtures in violations at the moment. */
 export const redNow = computed<ReadonlySet<string>>(() => {
   const time = moment.value;
   const violations = checked.value?.answer.violations ?? [];

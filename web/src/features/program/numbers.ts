@@ -1,8 +1,8 @@
-// Times and distances as the program page writes them.
+// Format of times and distances on the program page.
 
 import { fixed } from "../../i18n/format";
 
-/** 12.4 s; 3:05.0 from a hundred seconds on. */
+/** Format 12.4 s, or 3:05.0 from a hundred seconds on. */
 export function seconds(value: number): string {
   if (value < 100) return `${fixed(value, 1)}\u202fs`;
   const rest = (value % 60).toFixed(1).padStart(4, "0");

@@ -1,4 +1,4 @@
-// The points that the text has: shown by the ghost, named, deleted.
+// The text's points: show with the ghost, rename, delete.
 
 import { useState } from "preact/hooks";
 import type { Words } from "../../i18n/program";
@@ -73,7 +73,7 @@ export function Points({ tell }: { tell: (words: Words) => void }) {
   );
 }
 
-/** Shows a point with the ghost, to look at and to teach on from. */
+/** Show a point with the ghost, as a start for teaching. */
 function goTo(point: Point, tell: (words: Words) => void): void {
   goToLine(point.line);
   const joints = description.value?.joints ?? [];

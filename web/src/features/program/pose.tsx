@@ -1,4 +1,4 @@
-// The ghost's tool in numbers; the gizmo in the 3-D view sets the same.
+// The ghost's tool pose as numbers; the gizmo in the 3-D view sets the same pose.
 
 import { useEffect, useState } from "preact/hooks";
 import { DASH, fixed } from "../../i18n/format";

@@ -1,4 +1,4 @@
-// Program: a teach program for one robot, written, taught, checked before it moves, and run.
+// Program: a teach program of one robot: write, teach, check before it moves, run.
 
 import { useEffect, useLayoutEffect, useState } from "preact/hooks";
 import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
@@ -34,7 +34,7 @@ import { Timeline } from "./timeline";
 import { Toolbar } from "./toolbar";
 import "./program.css";
 
-const MOVED = 0.005; // rad or m: farther from where the check began, it is of another motion
+const MOVED = 0.005; // rad or m: a larger distance from the check's start makes the check outdated
 const TOLD_MS = 8000;
 
 /** The page of a robot's program; without a robot, the choice of one. */
@@ -84,8 +84,8 @@ function Workbench({ site, robot }: RobotName) {
   const known = !stale && rows.length > 0 && positions.every((each) => each !== undefined);
 
   const there = Boolean(controller ?? description ?? lease);
-  // Of two robots in a row the first is closed before the second is opened: an effect after painting might
-  // run the other way round. A robot that nobody knows has no draft.
+  // Close the first of two robots before opening the second: effects after painting might run in reverse order.
+  // An unknown robot has no draft.
   useLayoutEffect(() => {
     if (!there) return;
     robotKey.value = key;
@@ -106,7 +106,7 @@ function Workbench({ site, robot }: RobotName) {
   useEffect(() => {
     program.value = running && !isStale("program", ageOf(running)) ? running.message : null;
   }, [running, running && isStale("program", ageOf(running))]);
-  // Who begins is shown what a program looks like.
+  // Show an example program to a beginner.
   useEffect(() => {
     if (!empty || rows.length === 0 || !description) return;
     setEmpty(false);
@@ -171,7 +171,7 @@ function Workbench({ site, robot }: RobotName) {
   );
 }
 
-/** Whether the robot is elsewhere than where the check began. */
+/** Return whether the robot is not where the check started. */
 function hasMoved(positions: readonly (number | undefined)[]): boolean {
   const start = path.value?.jointPositions;
   return start !== undefined && positions.some((each, i) => Math.abs((each ?? NaN) - (start[i] ?? NaN)) > MOVED);

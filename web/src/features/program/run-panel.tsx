@@ -1,4 +1,4 @@
-// Running the program: by whoever is in control, step by step, for everybody to see.
+// Running the program: started by the operator in control, visible to all.
 
 import { useState } from "preact/hooks";
 import type { ControllerState, ProgramState } from "../../gen/robomesh_pb";
@@ -21,18 +21,18 @@ import "./run-panel.css";
 export function RunPanel(props: { robotKey: string; controller: ControllerState | undefined }) {
   const { robotKey } = props;
   const [told, setTold] = useState<{ notice: Notice; of: Draft | null } | null>(null);
-  // Of another text or name it would say what is not so.
+  // A run of another text or name does not apply.
   const notice = told && (told.notice.kind === "busy" || told.of === draft.value) ? told.notice : null;
   const state = program.value;
   const running = state?.outcome === Outcome.RUNNING;
   const why = whyNotRun(robotKey, props.controller, running);
   const name = draft.value?.name.trim() || "program";
   const run = () => {
-    hideMoment(); // the ghost would stand in the robot's way on the picture
+    hideMoment(); // the ghost would hide the robot
     const of = draft.value;
     const values = { program: of?.text ?? "", programName: name };
     void command(robotKey, Command.RUN_PROGRAM, name, values, (notice) => {
-      // Once it runs, its progress says so.
+      // Once it runs, its progress is shown instead.
       if (notice.kind === "done" && !notice.mind) setTold(null);
       else setTold({ notice: notice.kind === "busy" ? { ...notice, text: p("asking_run") } : notice, of });
     });
@@ -51,7 +51,7 @@ export function RunPanel(props: { robotKey: string; controller: ControllerState 
   );
 }
 
-/** Why it cannot be run now, in words; "" when it can. What collides, the gateway refuses. */
+/** Explain why it cannot be run now; "" when it can. The gateway refuses collisions. */
 function whyNotRun(robotKey: string, controller: ControllerState | undefined, running: boolean): string {
   if (!draft.value?.text.trim()) return p("run_empty");
   const error = isCurrent() ? errorsOf(checked.value?.answer)[0] : undefined;
@@ -65,7 +65,7 @@ function Progress({ state }: { state: ProgramState }) {
   const { outcome, name, operator, line, statement, step, steps, durationS, text } = state;
   const level = outcome === Outcome.ENDED ? "alarm" : "normal";
   const word = p(outcome === Outcome.RUNNING ? "is_running" : outcome === Outcome.DONE ? "is_done" : "is_ended");
-  // Both times are the gateway's, which says so each second.
+  // Both times are from the gateway's clock, published each second.
   const gone = (ms(state.timestamp) - ms(state.since)) / 1000;
   const left = outcome === Outcome.RUNNING ? durationS - gone : 0;
   return (

@@ -1,17 +1,17 @@
-// The program that the gateway runs, or ran last: what every monitor is told of it.
+// The program that the gateway runs, or ran last, as it publishes it.
 
 import { signal } from "@preact/signals";
 import type { ProgramState } from "../../gen/robomesh_pb";
 import { ProgramState_Outcome as Outcome } from "../../gen/robomesh_pb";
 
-/** The newest, while it is fresh; null: nobody says so now. */
+/** The newest state while fresh; null: none. */
 export const program = signal<ProgramState | null>(null);
 
 export function isRunning(): boolean {
   return program.value?.outcome === Outcome.RUNNING;
 }
 
-/** The line that runs, where the text still has it as it runs; null: none does. */
+/** Return the running line if the text still contains it unchanged; null: none. */
 export function runningLine(lines: readonly string[]): number | null {
   const now = program.value;
   if (!now || now.outcome !== Outcome.RUNNING) return null;

@@ -1,9 +1,9 @@
-// How much a violation asks to be looked at, and what its kind is called.
+// Level and name of violations.
 
 import type { CheckAnswer_Violation } from "../../gen/robomesh_pb";
 import type { ProgramText } from "../../i18n/program";
 
-/** What a gateway that requires checks refuses is an alarm, the rest is a warning. */
+/** Return the level: an alarm if the gateway requires checks and refuses it, otherwise a warning. */
 export function severityOf({ refuses }: CheckAnswer_Violation): "warning" | "alarm" {
   return refuses ? "alarm" : "warning";
 }
@@ -18,5 +18,5 @@ const KINDS: Record<string, ProgramText> = {
   unreachable: "kind_unreachable",
 };
 
-/** The text of a kind; null: a kind of a newer check, shown as it is. */
+/** Return the text of a kind; null: a newer check's kind, shown unchanged. */
 export const kindText = (kind: string): ProgramText | null => KINDS[kind] ?? null;

@@ -1,4 +1,4 @@
-// What the 3-D view shows: the checked motion at a moment, or what is being taught. One at a time.
+// The 3-D view's overlay: the checked motion at a moment, or the pose being taught; one at a time.
 
 import { effect, signal } from "@preact/signals";
 import type { CheckAnswer_Violation } from "../../gen/robomesh_pb";
@@ -8,16 +8,16 @@ import { checked } from "./check";
 import { duration, moment, path, playing, positionsAt, redNow } from "./motion";
 import { robotKey } from "./subject";
 
-/** The violation that was clicked last. */
+/** The last violation that was clicked. */
 export const chosen = signal<CheckAnswer_Violation | null>(null);
 
-/** Shows the checked motion at a moment [s]. */
+/** Show the checked motion at a moment [s]. */
 export function showMoment(time: number): void {
   aimAt(null);
   moment.value = Math.min(duration.value, Math.max(0, time));
 }
 
-/** Shows what is being taught at joint positions [rad] or [m]; null: nothing. */
+/** Show the pose being taught at joint positions [rad] or [m]; null: none. */
 export function teach(positions: readonly number[] | null): void {
   hideMoment();
   aimAt(positions);
@@ -29,7 +29,7 @@ export function hideMoment(): void {
   chosen.value = null;
 }
 
-/** Keeps the view in step, until the returned function is called. */
+/** Update the view until the returned function is called. */
 export function keepShowing(): () => void {
   const ends = [
     effect(() => {
@@ -44,7 +44,7 @@ export function keepShowing(): () => void {
       const point = (i: number) => [points[3 * i] ?? 0, points[3 * i + 1] ?? 0, points[3 * i + 2] ?? 0] as const;
       toolPath.value = count ? Array.from({ length: count }, (_, i) => point(i)) : null;
     }),
-    // A new check: a moment stays where it still is; what was clicked is of the old one.
+    // After a new check keep the moment if it exists; the clicked violation belonged to the old check.
     effect(() => {
       void checked.value;
       chosen.value = null;

@@ -1,4 +1,4 @@
-// The robot that the program is for, as the page's panels know it.
+// The program's robot, for all panels of the page.
 
 import { computed, signal } from "@preact/signals";
 import { Matrix4 } from "three";
@@ -7,10 +7,10 @@ import { forwardOf } from "../../scene/forward-kinematics";
 
 export const robotKey = signal("");
 export const description = signal<Description | undefined>(undefined);
-/** Where the joints are [rad] or [m], in the description's order; null: not known now. */
+/** Joint positions [rad] or [m], in the description's order; null: not known now. */
 export const livePositions = signal<readonly number[] | null>(null);
 
-/** Placement of the tool in the base frame (16, by rows) at joint positions [rad] or [m]; null: no tool is known. */
+/** Return the tool's placement in the base frame (16, by rows) at joint positions [rad] or [m]; null: no tool. */
 export const toolAt = computed(() => {
   const of = description.value;
   const frame = of?.frames.find(({ name }) => name === "tool");

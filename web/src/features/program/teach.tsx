@@ -1,4 +1,4 @@
-// Teaching: points from the live robot, from sliders, from a pose; and the points that there are.
+// Teaching: points from the live robot, from sliders or from a pose; and the list of points.
 
 import { useState } from "preact/hooks";
 import { jointText, jointUnit } from "../../i18n/format";

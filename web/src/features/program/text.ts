@@ -1,4 +1,4 @@
-// The program's text as far as the page reads it: its points, and what is coloured. The check reads the rest.
+// The program's text as the page parses it: points and syntax colours. The check parses the rest.
 
 import type { Description, Description_Joint } from "../../gen/robomesh_pb";
 import { Description_Joint_Type as JointType } from "../../gen/robomesh_pb";
@@ -32,36 +32,36 @@ export function pointsOf(text: string): readonly Point[] {
   });
 }
 
-/** Lines (from 1) that move to a point. */
+/** Return the lines (from 1) that move to a point. */
 export function usesOf(text: string, name: string): readonly number[] {
   return text.split("\n").flatMap((line, index) => (MOVES_TO.exec(line)?.[2] === name ? [index + 1] : []));
 }
 
-/** The first of p1, p2, ... that is free. */
+/** Return the first free name of p1, p2, ... */
 export function freeName(text: string): string {
   const taken = new Set(pointsOf(text).map((point) => point.name));
   for (let number = 1; ; number++) if (!taken.has(`p${number}`)) return `p${number}`;
 }
 
-/** The text with a new point below the last one, and a move to it below the line of the cursor; that line's number. */
+/** Add a point below the last one, and a move to it below the cursor's line; return the text and that line's number. */
 export function withPoint(text: string, name: string, value: string, move: Move, cursorLine: number) {
   const lines = text.split("\n");
   const last = pointsOf(text).at(-1)?.line;
-  // Before the first statement, below the comments that begin the text.
+  // Before the first statement, below the initial comments.
   const first = lines.findIndex((line) => line.trim() && !line.trim().startsWith("#"));
   const at = last ?? (first < 0 ? lines.length : first);
   const point = `point ${name} = ${value}`;
   const moveAfter = Math.max(cursorLine, at);
   const indent = /^\s*/.exec(lines[moveAfter - 1] ?? "")?.[0] ?? "";
   const deeper = /^\s*repeat\b/.test(lines[moveAfter - 1] ?? "") ? "  " : "";
-  // A blank last line is written on, not left behind.
+  // Write on a blank last line.
   const blank = moveAfter > at && !(lines[moveAfter - 1] ?? "").trim() ? 1 : 0;
   lines.splice(moveAfter - blank, blank, `${indent}${deeper}${move} ${name}`);
   lines.splice(at, 0, point);
   return { text: lines.join("\n"), line: moveAfter - blank + 2 };
 }
 
-/** The text with a point named otherwise, wherever it stands. */
+/** Rename a point in the whole text. */
 export function renamed(text: string, from: string, to: string): string {
   return text
     .split("\n")
@@ -79,7 +79,7 @@ export function withoutLine(text: string, line: number): string {
     .join("\n");
 }
 
-/** Parts of a line with what they are. */
+/** Return the parts of a line with their kinds. */
 export function coloured(line: string): readonly { text: string; is: "" | "keyword" | "comment" }[] {
   const at = line.indexOf("#");
   const code = at < 0 ? line : line.slice(0, at);
@@ -97,13 +97,13 @@ export function coloured(line: string): readonly { text: string; is: "" | "keywo
   ].filter((part) => part.text);
 }
 
-/** Joint positions [rad] or [m] as a program writes them. */
+/** Format joint positions [rad] or [m] as a program writes them. */
 export function jointsText(joints: readonly Description_Joint[], positions: readonly number[]): string {
   const words = joints.map((joint, i) => short((positions[i] ?? 0) * jointUnit(joint).factor, joint));
   return `joints ${words.join(" ")}`;
 }
 
-/** Joint positions [rad] or [m] of a point; null: it has not one number a joint. */
+/** Return a point's joint positions [rad] or [m]; null: it does not have one number a joint. */
 export function jointsOf(joints: readonly Description_Joint[], point: Point): readonly number[] | null {
   if (point.numbers.length !== joints.length || point.numbers.some(Number.isNaN)) return null;
   return joints.map((joint, i) => (point.numbers[i] ?? 0) / jointUnit(joint).factor);
@@ -114,7 +114,7 @@ function short(value: number, joint: Description_Joint): string {
   return String(Number(text)).replace(/^-0$/, "0");
 }
 
-/** A program that a robot can run as it stands: to show what a program looks like. */
+/** Return an example program that the robot can run. */
 export function example(description: Description, comment: string): string {
   const home = description.joints.map((joint) => joint.home);
   const side = description.joints.map((joint, i) => {

@@ -1,4 +1,4 @@
-// The checked motion over time: a scrubber that moves the ghost, and the joints and the clearance as curves.
+// The checked motion over time: a slider that moves the ghost, and curves of joints and clearance.
 
 import { useEffect } from "preact/hooks";
 import { p } from "../../i18n/program";
@@ -35,7 +35,7 @@ export function Timeline() {
           clearance === null ? "" : p("clearance_now", { distance: distanceText(clearance) }),
         ]
           .filter(Boolean)
-          .join(" · "); // prettier-ignore
+          .join(" · ");
   return (
     <Panel
       name="timeline"
@@ -77,7 +77,7 @@ export function Timeline() {
   );
 }
 
-/** Where in time the violations are. */
+/** Marks of the violations along the time. */
 function Bands() {
   const total = duration.value;
   const violations = checked.value?.answer.violations ?? [];
@@ -98,7 +98,7 @@ function Bands() {
   );
 }
 
-/** Runs the moment on at the robot's own pace. */
+/** Advance the moment at the robot's real speed. */
 function usePlaying(): void {
   const on = playing.value;
   useEffect(() => {

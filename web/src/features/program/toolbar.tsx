@@ -1,4 +1,4 @@
-// Above the text: its name, files, undo and redo.
+// The toolbar above the text: name, files, undo and redo.
 
 import { useRef } from "preact/hooks";
 import type { Words } from "../../i18n/program";
@@ -8,7 +8,7 @@ import { description } from "./subject";
 import { example } from "./text";
 import "./toolbar.css";
 
-const LARGEST = 64 * 1024; // what a check reads
+const LARGEST = 64 * 1024; // the check's maximum
 
 export function Toolbar({ tell }: { tell: (words: Words) => void }) {
   const input = useRef<HTMLInputElement>(null);

@@ -1,4 +1,4 @@
-// What a recording's file holds, asked of its recorder: what it is, its events, its numbers.
+// Requests to a recorder about a recording's file: facts, events, numbers.
 
 import { create, fromBinary } from "@bufbuild/protobuf";
 import { timestampFromMs, timestampMs } from "@bufbuild/protobuf/wkt";
@@ -25,13 +25,13 @@ import type { RecordingName } from "../../ui/route";
 const WITHIN_S = 20;
 const MOST_EVENTS = 1000;
 
-/** Something asked for: null: not told yet. */
+/** An answer; null: not received yet. */
 export interface Asked<T> {
   value: T | null;
   problem: string;
 }
 
-/** Asks when what it depends on changes; the last answer stays until the next. */
+/** Send a request when its inputs change; the last answer is kept until the next. */
 function useAsked<T>(question: (() => Promise<T>) | null, depends: readonly unknown[]): Asked<T> {
   const [asked, setAsked] = useState<Asked<T>>({ value: null, problem: "" });
   const connected = lostAt.value === null;
@@ -52,7 +52,7 @@ function reason(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }
 
-/** What a recording is. */
+/** Return the facts of a recording. */
 export function useInfo(name: RecordingName | null): Asked<Recording> {
   return useAsked(
     name && (() => ask(keyOf(name, "info"), RecordingQuerySchema, { file: name.file }, RecordingSchema, WITHIN_S)),
@@ -60,13 +60,13 @@ export function useInfo(name: RecordingName | null): Asked<Recording> {
   );
 }
 
-/** An event, and when it came [s from the recording's start]. */
+/** An event with its time [s from the recording's start]. */
 export interface Happened {
   at: number;
   event: Event;
 }
 
-/** The events of a recording, oldest first, of every service, and what was asked of the robot. */
+/** Return the events of a recording, oldest first, of every service, and the audited requests. */
 export function useHappened(
   name: RecordingName | null,
   info: Recording | null,
@@ -105,7 +105,7 @@ export function useHappened(
   );
 }
 
-/** What somebody asked of the robot, told as an event. */
+/** Convert an audited request to an event. */
 function askedFor(entry: AuditEntry): Event {
   const { timestamp, operator, source, request, outcome, text } = entry;
   const words = outcome === Outcome.REFUSED ? "asked_refused" : outcome === Outcome.FAILED ? "asked_failed" : "asked";
@@ -121,7 +121,7 @@ function askedFor(entry: AuditEntry): Event {
   return event;
 }
 
-/** When a recording's first frames came [s from its start]; 0: it has none. */
+/** Return when a recording's first frames arrived [s from its start]; 0: it has none. */
 export function useFirst(name: RecordingName | null, info: Recording | null): number {
   return (
     useAsked(
@@ -146,7 +146,7 @@ export function useFirst(name: RecordingName | null, info: Recording | null): nu
   );
 }
 
-/** Which numbers a recording holds. */
+/** Return the names of the numbers in a recording. */
 export function useKnown(name: RecordingName | null): Asked<readonly string[]> {
   return useAsked(name && (async () => (await askSeries(name, {})).known), [name?.site, name?.file]);
 }
@@ -157,7 +157,7 @@ export interface Window {
   to: number;
 }
 
-/** Numbers of a recording over a part of it. */
+/** Return numbers of a recording over a part of it. */
 export function useSeries(
   name: RecordingName | null,
   info: Recording | null,

@@ -1,4 +1,4 @@
-// How a second recording lies beside the first: aligned at their starts, or at an event of each.
+// Alignment of a second recording with the first: at their starts, or at an event of each.
 
 import { eventText } from "../../i18n/event-text";
 import { momentText } from "../../i18n/recording-format";

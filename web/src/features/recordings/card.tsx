@@ -1,4 +1,4 @@
-// One recording in the list: what it looks like, what it holds, what was lost, and what can be done with it.
+// One recording in the list: thumbnail, contents, losses and actions.
 
 import type { Signal } from "@preact/signals";
 import { useState } from "preact/hooks";
@@ -111,7 +111,7 @@ export function Download(props: RecordingName & { name: string; kind: string; hi
   );
 }
 
-/** A picture out of the file; a drawing where there is none. */
+/** A thumbnail from the file; a drawing if it has none. */
 function Thumbnail({ site, recording }: { site: string; recording: Recording }) {
   const [none, setNone] = useState(false);
   if (isEmpty(recording)) {

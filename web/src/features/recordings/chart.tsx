@@ -1,4 +1,4 @@
-// Curves of one unit over a part of a recording, with a line at the moment that is played.
+// Curves of one unit over a part of a recording, with a line at the playback time.
 
 import type { ReadonlySignal } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
@@ -12,8 +12,8 @@ import { theme } from "../../ui/theme";
 import type { Window } from "./asked";
 import { commonOf, labelOf, shownUnit } from "./units";
 
-const GAP = 3; // times the usual step, and
-const GAP_S = 1; // at least so long: nothing was recorded between
+const GAP = 3; // a gap is longer than 3 usual intervals, and
+const GAP_S = 1; // at least so long
 const CLICK_PX = 4;
 export const CURVES = 7;
 
@@ -65,7 +65,7 @@ export function Chart(props: {
             return [look, look];
           }),
         ],
-        // Between the lowest and the highest of a piece everything was passed.
+        // The line crosses every value between the lowest and the highest of a segment.
         bands: curves.map(({ colour: index }, i) => ({
           series: [2 * i + 2, 2 * i + 1] as [number, number],
           fill: `${colour(`--curve-${(index % CURVES) + 1}`)}55`,
@@ -143,13 +143,13 @@ function Named({ curve, label, moment }: { curve: Curve; label: string; moment: 
   );
 }
 
-/** For how long a value stands [s]: after more, nothing was recorded. */
+/** Return how long a value is valid [s]; after that the data has a gap. */
 function heldFor({ timesS }: Series): number {
   const steps = timesS.slice(1).map((time, i) => time - (timesS[i] ?? 0));
   return Math.max(GAP_S, GAP * ([...steps].sort((a, b) => a - b)[steps.length >> 1] ?? 0));
 }
 
-/** The value at a time; null: none was recorded so shortly before. */
+/** Return the value at a time; null: none was recorded shortly before. */
 function valueAt({ timesS, lowest, highest }: Series, at: number, holds: number): number | null {
   let [from, to] = [0, timesS.length];
   while (from < to) {
@@ -161,7 +161,7 @@ function valueAt({ timesS, lowest, highest }: Series, at: number, holds: number)
   return i < 0 || at - (timesS[i] ?? 0) > holds ? null : ((lowest[i] ?? 0) + (highest[i] ?? 0)) / 2;
 }
 
-/** All curves over one column of times; where nothing was recorded, nothing is drawn. */
+/** Merge all curves into one column of times; gaps are not drawn. */
 function joined(curves: readonly Curve[], factor: number): uPlot.AlignedData {
   const tables = curves.map(({ series, shift }): uPlot.AlignedData => {
     const { timesS, lowest, highest } = series;
@@ -193,7 +193,7 @@ function push(
   high.push(most);
 }
 
-/** A little more than what was seen, and never so little that noise fills it. */
+/** Return the values' range and a margin, with a minimum so that noise does not fill it. */
 function padded(_: uPlot, min: number | null, max: number | null): [number, number] {
   if (min === null || max === null) return [0, 1];
   const room = Math.max((max - min) * 0.08, Math.abs(max) * 1e-3, 1e-6);

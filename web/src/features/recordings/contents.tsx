@@ -1,4 +1,4 @@
-// What a recording's file holds, and what can be taken out of it.
+// Contents of a recording's file, and exports from it.
 
 import { useState } from "preact/hooks";
 import type { Recording } from "../../gen/robomesh_pb";
@@ -15,7 +15,7 @@ export function Contents(props: {
   info: Recording | null;
   /** Of the replay; null: none is open. */
   robotKey: string | null;
-  /** Views that can be saved as they are played. */
+  /** Views that can be saved during playback. */
   views: readonly string[];
 }) {
   const { name, info } = props;
@@ -37,7 +37,7 @@ export function Contents(props: {
   );
 }
 
-/** Anywhere on the mesh; the view may be any other, and the size is `--size`. */
+/** A command for any machine of the mesh; another view and `--size` are possible. */
 function exportLine({ site, file }: RecordingName): string {
   return `robomesh recordings export ${site}/${file} ${file.replace(/\.mcap$/, ".mp4")} --view close`;
 }
@@ -80,7 +80,7 @@ function Topics({ info }: { info: Recording }) {
   );
 }
 
-/** A view's video as it is played from now on. */
+/** A button that saves a view's video during playback. */
 function LiveVideo({ robotKey, views, title }: { robotKey: string; views: readonly string[]; title: string }) {
   const [view, setView] = useState("");
   const chosen = views.includes(view) ? view : (views[0] ?? "");

@@ -1,4 +1,4 @@
-// The events of a recording: marks on its line of time, and the same in words.
+// Events of a recording: marks on its time line, and a list.
 
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { ReadonlySignal } from "@preact/signals";
@@ -15,14 +15,14 @@ import type { Asked, Happened } from "./asked";
 import "./contents.css";
 
 const NONE: readonly Happened[] = [];
-const MOST_MARKS = 200; // more cannot be told apart; the gravest are shown
+const MOST_MARKS = 200; // more are indistinguishable; the gravest are shown
 
 function severityOf({ event }: Happened): [string, string] {
   const [word, level] = SEVERITIES[event.severity] ?? ["severity_info", "normal"];
   return [t(word), level];
 }
 
-/** Near an end of the line, its words lean away from it. */
+/** At an end of the line, align the label inwards. */
 function sideOf(share: number): string {
   return share < 0.15 ? "early" : share > 0.85 ? "late" : "";
 }
@@ -56,7 +56,7 @@ export function EventMarks(props: { events: readonly Happened[]; duration: numbe
   );
 }
 
-/** In words, the one that happened last marked. */
+/** A list of events, the latest one marked. */
 export function EventList(props: {
   asked: Asked<{ list: readonly Happened[]; cut: boolean }>;
   moment: ReadonlySignal<number>;
@@ -67,7 +67,7 @@ export function EventList(props: {
   const times = useSignal<readonly number[]>([]);
   useEffect(() => void (times.value = list.map(({ at }) => at)), [list]);
   const last = useComputed(() => {
-    const moment = props.moment.value + 1e-3; // read in any case: with it the computed goes on
+    const moment = props.moment.value + 1e-3; // read in any case: it triggers the computed signal
     return times.value.findLastIndex((at) => at <= moment);
   }).value;
   return (

@@ -18,7 +18,7 @@ const HOUR_MS = 3_600_000;
 const SPANS = { any_time: Infinity, today: 24 * HOUR_MS, week: 168 * HOUR_MS } as const;
 type Span = keyof typeof SPANS;
 const LOW_BYTES = 2_000_000_000;
-const FULL_BYTES = 2_000_000; // less, and nothing can be written
+const FULL_BYTES = 2_000_000; // with less space nothing can be written
 const EVERY = "";
 
 const search = signal("");
@@ -108,7 +108,7 @@ function countText(shown: number, count: number): string {
   return count === 1 ? r("count_one") : r("count", { count });
 }
 
-/** How a site's recorder is: room on its disk, its flight recorder, what is wrong. */
+/** State of a site's recorder: free space, flight recorder, problems. */
 function SiteLine({ site, told: { list, problem }, named }: { site: string; told: Told; named: boolean }) {
   const [notice, setNotice] = useState<Notice | null>(null);
   const [of, setOf] = useState("");

@@ -1,4 +1,4 @@
-// The recordings of every site, asked of its recorder, with what the open ones tell of themselves.
+// The recordings of every site, from its recorder, with the published state of open ones.
 
 import { EmptySchema } from "@bufbuild/protobuf/wkt";
 import { signal } from "@preact/signals";
@@ -13,14 +13,14 @@ import { ageOf, isStale, useTopics } from "../../mesh/topics";
 const AGAIN_MS = 5000;
 const LIST_S = 10;
 
-/** What a site's recorder told last. */
+/** The last answer of a site's recorder. */
 export interface Told {
   list: RecordingList | null;
   problem: string;
 }
 const told = signal<ReadonlyMap<string, Told>>(new Map());
 
-/** Sites that have a recorder, and the console's own, which should. */
+/** Sites with a recorder, and the console's own site. */
 function sitesOf(keys: ReadonlySet<string>, own: string): readonly string[] {
   const sites = new Set(own ? [own] : []);
   for (const key of keys) {
@@ -44,7 +44,7 @@ async function look(site: string): Promise<void> {
   told.value = new Map(told.value).set(site, now);
 }
 
-/** A recording in the list, and whose it is: the file alone is not unique over sites. */
+/** A recording in the list with its site: file names are unique only within a site. */
 export interface Row {
   site: string;
   recording: Recording;
@@ -54,15 +54,15 @@ export interface Listed {
   sites: ReadonlyMap<string, Told>;
   /** Newest first. */
   rows: readonly Row[];
-  /** Nothing was told yet. */
+  /** No answer yet. */
   waiting: boolean;
 }
 
-/** Every recording of every site, the open ones as they are now. */
+/** Every recording of every site; open ones with their current state. */
 export function useListed(): Listed {
   const live = useTopics(RecordingSchema, "robomesh/*/*/recording");
   const sites = sitesOf(presence.value, hello.value?.site ?? "");
-  // One that began or ended is a change of the list.
+  // A recording that started or ended changes the list.
   const changes = [...live.values()].map(({ message }) => `${message.file}:${message.open}`).join(" ");
   const connected = lostAt.value === null;
   useEffect(() => {

@@ -1,4 +1,4 @@
-// Replays that this page opens: closed when it goes, and by the player when its connection does.
+// Replays that this page opens: it closes them, or the player does when the page's connection ends.
 
 import type { Signal } from "@preact/signals";
 import { useSignal } from "@preact/signals";
@@ -9,11 +9,11 @@ import { AskError, ask, hello, presence } from "../../mesh/connection";
 import { Replay } from "../../mesh/replay";
 import type { RecordingName } from "../../ui/route";
 
-const WITHIN_S = 15; // a long file is read first
-const COMES_WITHIN_MS = 1500; // presence is told after the greeting
+const WITHIN_S = 15; // the player first reads a long file
+const COMES_WITHIN_MS = 1500; // presence arrives after the greeting
 const MOMENT_EACH_MS = 40;
 const FOLLOW_EACH_MS = 200;
-const APART_S = 0.12; // farther, and the second is brought back
+const APART_S = 0.12; // a larger difference is corrected by a seek
 
 export interface Opened {
   replay: Replay | null;
@@ -21,7 +21,7 @@ export interface Opened {
   again: () => void;
 }
 
-/** Opens a recording and follows its replay; null: none is wanted. */
+/** Open a recording and follow its replay; null: none. */
 export function useOpened(name: RecordingName | null, paused = false): Opened {
   const [replay, setReplay] = useState<Replay | null>(null);
   const [problem, setProblem] = useState("");
@@ -63,7 +63,7 @@ export function useOpened(name: RecordingName | null, paused = false): Opened {
   return { replay, problem, again: () => setTries(tries + 1) };
 }
 
-/** Where a replay is, at the pace that a screen shows. */
+/** Return a replay's position, at the display's rate. */
 export function useMoment(replay: Replay | null): Signal<number> {
   const moment = useSignal(0);
   useEffect(() => {
@@ -80,7 +80,7 @@ export function useMoment(replay: Replay | null): Signal<number> {
   return moment;
 }
 
-/** Lets a second replay go as the first does, `shift` s ahead of it; beyond its ends it waits. */
+/** Keep a second replay `shift` s ahead of the first; beyond its ends it waits. */
 export function useFollowing(first: Replay | null, second: Replay | null, shift: number): void {
   useEffect(() => {
     if (!first || !second) return;

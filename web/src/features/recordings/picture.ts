@@ -1,9 +1,9 @@
-// The plots as they are shown, as a picture to keep.
+// Export of the displayed plots as a picture.
 
 const EDGE_PX = 16;
 const LINE_PX = 24;
 
-/** Downloads the charts within an element as one PNG. */
+/** Download the charts within an element as one PNG. */
 export function savePicture(element: HTMLElement, name: string): void {
   const style = getComputedStyle(document.documentElement);
   const colour = (variable: string) => style.getPropertyValue(variable).trim();

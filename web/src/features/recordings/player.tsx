@@ -1,4 +1,4 @@
-// A recording played back: 3-D, video, curves and events on one line of time; a second one beside it, if wanted.
+// Playback of a recording: 3-D, video, curves and events on one time line; optionally with a second recording.
 
 import { useEffect, useMemo, useState } from "preact/hooks";
 import type { Recording } from "../../gen/robomesh_pb";
@@ -27,7 +27,7 @@ import "./player.css";
 const NOBODY = "robomesh/-/-"; // until the replay has its name
 const NONE: readonly never[] = [];
 const nowhere = () => undefined;
-const FRAMES_HOLD_S = 1; // as they do live
+const FRAMES_HOLD_S = 1; // as for live frames
 
 export function Player({ first, second }: { first: RecordingName; second: RecordingName | null }) {
   const opened = useOpened(first);
@@ -145,7 +145,7 @@ function SecondVideo({ replay, arm, info }: { replay: Replay; arm: OfMoment; inf
   );
 }
 
-/** The replay's views of recorded video. */
+/** Return the replay's views of recorded video. */
 function viewsIn(info: Recording | null): readonly string[] {
   return info ? recordedViews(info).map(recordedView) : NONE;
 }

@@ -1,4 +1,4 @@
-// Any values of a recording as curves, a chart a unit, all linked to the moment that is played.
+// Values of a recording as curves, a chart a unit, linked to the playback time.
 
 import type { ReadonlySignal } from "@preact/signals";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
@@ -19,7 +19,7 @@ const MOST = 14;
 const FIRST = /^joints\/.*\/position$/;
 const NARROWEST_S = 0.2;
 
-/** The second recording beside the first: its time is `shift` s more. */
+/** The second recording: its time is `shift` s more. */
 export interface Beside {
   name: RecordingName;
   info: Recording | null;
@@ -120,7 +120,7 @@ export function Plots(props: {
   );
 }
 
-/** Curves by their unit, each value in a colour of its own, the second recording's in the same. */
+/** Group curves by unit; each value has its colour, the same in both recordings. */
 function byUnit(
   values: readonly string[],
   first: readonly Series[],

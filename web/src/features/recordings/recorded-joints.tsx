@@ -1,4 +1,4 @@
-// Joint positions as they were, within their limits.
+// Recorded joint positions within their limits.
 
 import type { JointStates } from "../../gen/foxglove/JointStates_pb";
 import type { Description } from "../../gen/robomesh_pb";

@@ -1,4 +1,4 @@
-// Recordings: the list of them, and their player.
+// Recordings: the list and the player.
 
 import "../../ui/replay.css";
 import type { RecordingName } from "../../ui/route";

@@ -1,4 +1,4 @@
-// The page of a robot that is a replay: as the robot was, driven as the replay is, and nothing to command.
+// The page of a replayed robot: its recorded state and the playback controls, without commands.
 
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import { useEffect, useState } from "preact/hooks";
@@ -83,7 +83,7 @@ export function ReplayRobot({ site, robot }: RobotName) {
   );
 }
 
-/** Follows a replay that somebody has opened, and leaves it to them. */
+/** Follow a replay that another page opened, without closing it. */
 function useReplay(key: string, state: ReplayState | undefined): Replay | null {
   const [replay, setReplay] = useState<Replay | null>(null);
   const known = state !== undefined;

@@ -1,4 +1,4 @@
-// Video of a replay: as it was recorded, or drawn now from the recorded joints.
+// Video of a replay: recorded, or rendered now from the recorded joints.
 
 import { useState } from "preact/hooks";
 import type { Description } from "../../gen/robomesh_pb";
@@ -12,11 +12,11 @@ import { Panel } from "../../ui/parts";
 import { useLive } from "../../video/live-video";
 import { standing } from "../../video/own-view";
 
-const PICTURE_HOLDS_S = 2; // a busy renderer films less often than it is asked to
+const PICTURE_HOLDS_S = 2; // a busy renderer delivers fewer frames than requested
 
 export function ReplayVideo(props: {
   replay: Replay | null;
-  /** Whether its joints are of this moment: views are drawn of them. */
+  /** Whether its joints are of the current moment, as rendered views require. */
   arm: OfMoment;
   description: Description | undefined;
   /** Names of its recorded views. */

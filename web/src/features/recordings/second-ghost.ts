@@ -1,4 +1,4 @@
-// The second recording's arm as a ghost over the first one's, where both have the same joints.
+// The second recording's arm as a ghost over the first one's, if both have the same joints.
 
 import { fromBinary } from "@bufbuild/protobuf";
 import { useEffect } from "preact/hooks";
@@ -11,7 +11,7 @@ import { ghostAt } from "../../scene/ghost";
 
 const names = (description: Description | undefined) => description?.joints.map((joint) => joint.name).join(" ") ?? "";
 
-/** Draws it over `robotKey`'s arm while its joints are `here`, of this moment; whether it can be. */
+/** Draw it over `robotKey`'s arm while its joints are `here`, of this moment; return whether it can be drawn. */
 export function useSecondGhost(
   robotKey: string,
   description: Description | undefined,

@@ -1,4 +1,4 @@
-// What drives a replay: play, pause, step, seek, speed, loop; and its events on the line of time.
+// Playback controls: play, pause, step, seek, speed, loop; and the events on the time line.
 
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { ReadonlySignal } from "@preact/signals";
@@ -115,7 +115,7 @@ function nearest(speed: number): number {
   );
 }
 
-/** Keys of the whole page, typing and what has keys of its own excepted. Space is a stop's while in control. */
+/** Handle the page's keys, except in fields and controls with keys. In control, Space requests a stop. */
 function useKeys(replay: Replay): void {
   useEffect(() => {
     const onKey = (event: KeyboardEvent) => {
@@ -136,7 +136,7 @@ function useKeys(replay: Replay): void {
         l: () => replay.setLoop(!replay.state.peek().loop),
       };
       const act = keys[event.key];
-      // A button that has the focus is pressed by space; the 3-D view is turned by arrows.
+      // Space presses a focused button; arrows turn the 3-D view.
       if (
         !act ||
         (event.key === " " && target?.closest("button, a")) ||

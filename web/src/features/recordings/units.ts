@@ -1,4 +1,4 @@
-// Recorded numbers as people read them: degrees and millimetres.
+// Units of recorded numbers: degrees and millimetres.
 
 interface Shown {
   unit: string;
@@ -20,14 +20,14 @@ export function shownUnit(unit: string): Shown {
   return SHOWN[unit] ?? { unit, factor: 1, decimals: 3 };
 }
 
-/** What all of some values end with, where there are several: "position"; empty: nothing. */
+/** Return the last part that all of several values share: "position"; empty: none. */
 export function commonOf(values: readonly string[]): string {
   const ends = new Set(values.map((value) => value.split("/").at(-1) ?? ""));
   const short = values.some((value) => value.split("/").length < 3);
   return ends.size === 1 && values.length > 1 && !short ? ([...ends][0] ?? "") : "";
 }
 
-/** A value's short name: "joints/waist/position" is "waist position", or "waist" where `common` is said beside it. */
+/** Return a value's short name: "joints/waist/position" is "waist position", or "waist" beside `common`. */
 export function labelOf(value: string, common: string): string {
   const chunks = value.split("/").slice(1);
   if (common) chunks.pop();

@@ -1,11 +1,11 @@
-// Which values are plotted, chosen by topic.
+// Choice of plotted values by topic.
 
 import { useState } from "preact/hooks";
 import type { RecordingsText } from "../../i18n/recordings";
 import { r } from "../../i18n/recordings";
 import { labelOf } from "./units";
 
-/** What people look for first, by its topic. */
+/** The most wanted values, by topic. */
 const GROUPS: Partial<Record<string, RecordingsText>> = {
   joints: "joints",
   kinematics: "tool_and_margins",

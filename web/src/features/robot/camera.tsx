@@ -1,4 +1,4 @@
-// The renderer's picture of the robot: a view of the description's, or what the 3-D view shows.
+// The renderer's picture of the robot: a view of the description, or the camera of the 3-D view.
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { Description, View } from "../../gen/robomesh_pb";
@@ -12,14 +12,14 @@ import type { Wanted } from "../../video/own-view";
 import { standing } from "../../video/own-view";
 import { saveBlob, saveStill, useRecording } from "./export";
 
-/** Where the video stands: beside the 3-D view, in its corner, or in its place. */
+/** Place of the video: beside the 3-D view, in its corner, or instead of it. */
 export type VideoPlace = "beside" | "inset" | "large";
 const PLACES: readonly VideoPlace[] = ["beside", "inset", "large"];
 
-/** The renderer has it of every robot: it follows the arm. */
+/** The renderer's view of every robot, which follows the arm. */
 const CLOSE = "close";
 const OWN = "own";
-/** Small, and few bits: for slow links. */
+/** A small picture of few bits, for slow links. */
 const FAR = "far";
 const OWN_SIZE = { width: 960, height: 540, fps: 30 };
 const LOOK_EACH_MS = 300;
@@ -29,7 +29,7 @@ export function Camera(props: {
   description: Description | undefined;
   place: VideoPlace;
   setPlace: (place: VideoPlace) => void;
-  /** What the 3-D view shows now; null: there is none. */
+  /** Camera of the 3-D view; null: there is none. */
   sceneView: () => View | null;
 }) {
   const { robotKey, description } = props;
@@ -114,7 +114,7 @@ function toggleFull(element: HTMLElement | null): Promise<void> | undefined {
   return document.fullscreenElement ? document.exitFullscreen() : element?.requestFullscreen();
 }
 
-/** What the 3-D view shows, once it has come to rest: each new view is a new stream of the renderer's. */
+/** Return the 3-D view's camera once it is at rest: each new camera is a new stream of the renderer. */
 function useOwnView(on: boolean, sceneView: () => View | null): View | null {
   const [view, setView] = useState<View | null>(null);
   const look = useRef(sceneView);

@@ -1,4 +1,4 @@
-// What happened to the robot, who asked what of it, newest first, and how its link does.
+// Events of the robot, audited requests, newest first, and the state of its link.
 
 import { useState } from "preact/hooks";
 import type { AuditEntry, ControllerState, Event } from "../../gen/robomesh_pb";

@@ -1,12 +1,12 @@
-// What one takes home from a live picture: a still as PNG, or a piece of the video as MP4.
+// Export of a live picture: a still as PNG, or a part of the video as MP4.
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../../i18n/texts";
 
-// A browser keeps what it records in memory.
+// A browser keeps the recording in memory.
 const MOST_BYTES = 512 * 1024 * 1024;
 
-/** A file for the browser to save. */
+/** Let the browser save a file. */
 export function saveBlob(blob: Blob, name: string): void {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(blob);
@@ -15,7 +15,7 @@ export function saveBlob(blob: Blob, name: string): void {
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
-/** With when it was taken: pt600-front-20261121-140211.png */
+/** Return a file name with the current time: pt600-front-20261121-140211.png */
 function dated(name: string): string {
   const at = new Date();
   const two = (value: number) => String(value).padStart(2, "0");
@@ -24,9 +24,9 @@ function dated(name: string): string {
   return name.replace(/(\.\w+)$/, `-${day}-${time}$1`);
 }
 
-/** The picture that is shown, as PNG.
+/** Return the displayed picture as PNG.
  *
- * @throws Error where there is none. */
+ * @throws Error if there is none. */
 export async function saveStill(shown: HTMLCanvasElement | HTMLImageElement | null): Promise<Blob> {
   let canvas = shown instanceof HTMLCanvasElement ? shown : null;
   if (shown instanceof HTMLImageElement) {
@@ -47,9 +47,9 @@ export interface VideoRecording {
   toggle: () => void;
 }
 
-/** A view's live MP4, kept from one press to the next, then saved; it ends by itself where there is no more room. */
+/** Record a view's live MP4 between two presses, then save it; it ends by itself when the memory limit is reached. */
 export function useRecording(address: string, name: string): VideoRecording {
-  const [since, setSince] = useState<number | null>(null); // 0: nothing has come yet
+  const [since, setSince] = useState<number | null>(null); // 0: no data yet
   const [seconds, setSeconds] = useState(0);
   const [problem, setProblem] = useState("");
   const end = useRef<AbortController | null>(null);

@@ -1,4 +1,4 @@
-// The joints of the last 60 seconds as curves.
+// Curves of the joints in the last 60 seconds.
 
 import { fromBinary } from "@bufbuild/protobuf";
 import { useEffect, useRef, useState } from "preact/hooks";
@@ -15,7 +15,7 @@ import { Panel, Toggle } from "../../ui/parts";
 import { theme } from "../../ui/theme";
 
 const SPAN_S = 60;
-const STEP_MS = 100; // finer than a pixel shows
+const STEP_MS = 100; // finer than a pixel
 const CLOCK_SET_MS = 5000;
 const CURVES = ["--curve-1", "--curve-2", "--curve-3", "--curve-4", "--curve-5", "--curve-6", "--curve-7"];
 
@@ -29,23 +29,23 @@ export function History({ robotKey, description }: { robotKey: string; descripti
   const joints = description?.joints ?? [];
   const names = joints.map((joint) => joint.name).join(" ");
   const topic = jointsTopic(robotKey);
-  // Angles to the left, lengths, where there are any, to the right, each at its own scale.
+  // Angles use the left axis, lengths the right.
   const units = [...new Set(joints.map((joint) => jointUnit(joint).unit))].sort().reverse();
 
   useEffect(() => {
     rows.time = [];
     rows.values = joints.map(() => []);
     const factors = joints.map((joint) => jointUnit(joint).factor);
-    let ahead = Infinity; // this page's clock before the source's, less the quickest way here, in ms
+    let ahead = Infinity; // page clock minus source clock at the least delay so far [ms]
     return watch(`${robotKey}/${topic}`, (sample) => {
       if (!sample.live) return;
       const early = ageClock() - sample.sourceTime;
       if (early < ahead || early - ahead > CLOCK_SET_MS) ahead = early;
       const last = rows.time.at(-1);
-      // By the source's time: what the network held back is drawn when it was.
+      // By source time: delayed samples are drawn at the time of their measurement.
       const at = (sample.sourceTime + ahead) / 1000;
       if (last !== undefined && at - last < STEP_MS / 1000) return;
-      // A gap is a gap: no line is drawn through what was not seen.
+      // Draw no line through a gap.
       if (last !== undefined && at - last > 1) append(last + 0.1, () => null);
       const states = new Map(
         fromBinary(JointStatesSchema, sample.payload).joints.map((joint) => [joint.name, joint.position]),
@@ -159,7 +159,7 @@ export function History({ robotKey, description }: { robotKey: string; descripti
   );
 }
 
-/** A scale's range: what was seen and a little more, never so little that noise fills it. */
+/** Return a scale's range: the values and a margin, with a minimum so that noise does not fill it. */
 function padded(_: uPlot, min: number | null, max: number | null): [number, number] {
   if (min === null || max === null) return [-90, 90];
   const room = Math.max(5, (max - min) * 0.08);

@@ -19,7 +19,7 @@ import { JointTrack } from "../../ui/joint-track";
 import { JointValue } from "../../ui/joint-value";
 import { Age, Choice, NoticeLine, Panel } from "../../ui/parts";
 
-const REACHED = 0.002; // rad or m: half of what a person reads off
+const REACHED = 0.002; // rad or m: half of what the page displays
 const ABANDONED_MS = 1500;
 const DEGREE = Math.PI / 180;
 const STEPS = ["0.1", "1", "5"] as const; // degrees or mm
@@ -46,12 +46,12 @@ export function JointsPanel(props: {
   const enabled = mine && !stale && !why;
   useNoticeEnd(notice, setNotice, props.motion);
 
-  // A target is shown until it is reached, or until nothing will reach it.
+  // Show a target until it is reached or abandoned.
   const resting = props.controller?.activity !== Activity.MOVING && props.controller?.activity !== Activity.HOLDING;
   const off = targets.some((target, i) => target !== undefined && Math.abs(target - (current[i] ?? target)) > REACHED);
   useEffect(() => {
     if (!enabled || (resting && !off)) setTargets([]);
-    // Homing, a stop or the controller's refusal left it behind.
+    // Homing, a stop or the controller's refusal abandoned it.
     const abandoned = resting && off ? setTimeout(() => setTargets([]), ABANDONED_MS) : undefined;
     return () => clearTimeout(abandoned);
   }, [enabled, resting, off]);
@@ -59,7 +59,7 @@ export function JointsPanel(props: {
     if (!mine) setNotice(null);
   }, [mine]);
 
-  // Only a motion that runs keeps its other targets: an abandoned one must not move a joint that nobody touched.
+  // Only a running motion keeps its other targets: an abandoned one must not move another joint.
   const running = resting ? [] : targets;
   const wantedAt = (index: number, value: number) =>
     rows.map((_, i) => (i === index ? value : (running[i] ?? current[i])));
@@ -89,12 +89,12 @@ export function JointsPanel(props: {
   const [size, setSize] = useState<(typeof STEPS)[number]>("1");
   const unmoved = !MOVES.has(props.controller?.activity ?? Activity.ACTIVITY_UNKNOWN);
   const steps = useSteps({ robotKey, joints: rows, current, enabled, resting: unmoved, tell: setNotice });
-  // In the middle of another motion a step would lead nobody knows where.
+  // The start of a step would be unknown during another motion.
   const canStep = enabled && (unmoved || steps.going);
   const units = [...new Set(rows.map((joint) => jointUnit(joint).unit))].join(" / ");
 
   const set = preview && rows[preview.index];
-  // On a phone the control panel may be out of sight.
+  // On a phone the control panel may be off the screen.
   const lost = controlNotice.value?.kind === "lost" ? controlNotice.value : null;
   const idle = set
     ? t("target_unsent", { joint: set.name, value: jointText(set, preview.value) })
@@ -188,7 +188,7 @@ export function JointsPanel(props: {
   );
 }
 
-/** A step a press: a key that is held down presses once. Space presses nothing here, it asks for a stop. */
+/** A button that steps once a press, without repeat. Space does not press it: Space requests a stop. */
 function StepButton(props: { name: string; sign: 1 | -1; enabled: boolean; press: () => void }) {
   return (
     <button

@@ -1,4 +1,4 @@
-// How the link to the controller does, what old client programs are attached, where the audit log ends.
+// Facts about the link to the controller, attached legacy clients, and the end of the audit log.
 
 import type { ControllerState } from "../../gen/robomesh_pb";
 import { count, fixed } from "../../i18n/format";
@@ -8,11 +8,11 @@ import type { Latest } from "../../mesh/topics";
 import { ageOf, isStale } from "../../mesh/topics";
 import { Unit } from "../../ui/parts";
 
-const HASH_SHOWN = 4; // bytes of the log's end: enough to compare by eye
+const HASH_SHOWN = 4; // bytes of the log's last hash: enough to compare by eye
 
 type Fact = [name: TextName, value: string, unit?: string];
 
-/** Only what is known: a controller of the old kind tells little. */
+/** Known facts only: legacy controllers report few. */
 export function LinkFacts({ controller }: { controller: Latest<ControllerState> | undefined }) {
   const state = controller?.message;
   if (!state) return <p class="footnote dim">{t("no_data")}</p>;

@@ -1,4 +1,4 @@
-// Of a robot at another site: how much of it is taken; and whether that site's times can be trusted.
+// A robot at another site: choice of topics, and a warning about that site's clocks.
 
 import { t } from "../../i18n/texts";
 import { isClockOff, useMesh } from "../../mesh/site-health";
@@ -21,7 +21,7 @@ export function FarChoice({ robotKey }: { robotKey: string }) {
   );
 }
 
-/** By that site's own watch; nothing is said where there is none. */
+/** The clock warning of that site's watch; nothing without a watch. */
 export function ClockHint({ site }: { site: string }) {
   const off = useMesh()
     .get(site)

@@ -1,4 +1,4 @@
-// The program that the gateway runs, or ran just now, in one line for everybody.
+// The program that the gateway runs, or ran last, in one line on every page of the robot.
 
 import type { Timestamp } from "@bufbuild/protobuf/wkt";
 import { timestampMs } from "@bufbuild/protobuf/wkt";
@@ -13,7 +13,7 @@ import { ageOf, isStale } from "../../mesh/topics";
 const SHOWN_MS = 60_000; // after its end
 const ENDS = new Set(["program.done", "program.ended"]);
 
-/** Whether there is a run to speak of: one that goes on, or one that ended within the last minute. */
+/** Return whether a run is in progress, or ended within the last minute. */
 export function isTold(
   latest: Latest<ProgramState> | undefined,
   events: readonly Event[],
@@ -23,7 +23,7 @@ export function isTold(
   if (outcome === Outcome.RUNNING) return true;
   if (outcome !== Outcome.DONE && outcome !== Outcome.ENDED) return false;
   const end = events.find(({ code }) => ENDS.has(code));
-  // Both times are the gateway's.
+  // Both times are from the gateway's clock.
   return end !== undefined && between(end.timestamp, timestamp) < SHOWN_MS;
 }
 

@@ -1,4 +1,4 @@
-// Recording from the robot's page: begin with a name and views, see what is written and lost, end.
+// Recording from the robot's page: start with a name and views, show written and lost messages, stop.
 
 import { signal } from "@preact/signals";
 import type { JSX } from "preact";
@@ -20,10 +20,10 @@ import "./record-panel.css";
 const NO_VIDEO = "-";
 const AS_THE_SITE = "";
 
-/** Whether the panel is open; it stays so from robot to robot. */
+/** Whether the panel is open, for all robots. */
 const shown = signal(false);
 
-/** What is being recorded of a robot, or was last, and for how long nothing was heard of it. */
+/** Return a robot's current or last recording, and how long its recorder has been silent. */
 function useRecording(robotKey: string): { recording: Recording | undefined; open: boolean; staleFor: number | null } {
   const latest = useTopic(RecordingSchema, `${robotKey}/recording`);
   const age = ageOf(latest);
@@ -31,7 +31,7 @@ function useRecording(robotKey: string): { recording: Recording | undefined; ope
   return { recording: latest?.message, open, staleFor: open && isStale("recording", age) ? (age ?? 0) : null };
 }
 
-/** Opens the panel, and tells meanwhile what is recorded. */
+/** A button that opens the panel and shows the recording's state. */
 export function RecordButton({ robotKey }: { robotKey: string }) {
   const { recording, open, staleFor } = useRecording(robotKey);
   const lost = open && recording ? lostText(recording) : "";
@@ -150,7 +150,7 @@ function Start(props: {
   );
 }
 
-/** The last one, to be looked at. */
+/** A link to the last recording. */
 function Last({ site, recording }: { site: string; recording: Recording | undefined }) {
   if (!recording?.name)
     return (

@@ -1,4 +1,4 @@
-// One robot: what it looks like, what it does, and control of it.
+// The page of one robot: picture, state and control.
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
@@ -40,7 +40,7 @@ import { ClockHint, FarChoice } from "./low-bandwidth";
 import { isTold, ProgramLine } from "./program-line";
 import { RecordButton, RecordPanel } from "./record-panel";
 
-/** The page of one robot that is live; a replay has a page of its own, without commands. */
+/** The page of a live robot; a replay has its own page, without commands. */
 export function Robot({ site, robot }: RobotName) {
   const key = `robomesh/${site}/${robot}`;
   const controller = useTopic(ControllerStateSchema, `${key}/controller`);
@@ -122,7 +122,7 @@ export function Robot({ site, robot }: RobotName) {
   );
 }
 
-/** When live states ended, as a time of day; null while they come, or before the first. */
+/** Return the time of day when live states ended; null: they are live, or none has arrived yet. */
 function useLostAt(stale: boolean, any: boolean): number | null {
   const [at, setAt] = useState<number | null>(null);
   useEffect(() => setAt(stale && any ? Date.now() : null), [stale, any]);
@@ -147,7 +147,7 @@ function Headline(props: {
   const message = controller?.message;
   const state = stateWord(controller, events);
   const facts: string[] = [];
-  // What was so is not said as if it were so.
+  // Do not show stale state as current.
   if (message && !isStale("controller", ageOf(controller))) {
     facts.push(
       t(message.mode === Mode.LOCAL ? "mode_local" : message.mode === Mode.REMOTE ? "mode_remote" : "mode_unknown"),
@@ -194,7 +194,7 @@ function Headline(props: {
           })}
         </span>
       )}
-      {/* In the place of what matters less, so that nothing below moves. */}
+      {/* Instead of less important facts, so that nothing below moves. */}
       {isTold(program, events) ? (
         <ProgramLine latest={program} />
       ) : (

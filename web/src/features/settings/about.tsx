@@ -1,4 +1,4 @@
-// What this is, and under which terms.
+// The product and its licence.
 
 import { s } from "../../i18n/settings";
 import { Panel } from "../../ui/parts";

@@ -1,4 +1,4 @@
-// The console's accounts, for an administrator: added, given another role or password, disabled, removed.
+// The console's accounts, for an administrator: add, change role or password, disable, remove.
 
 import { useEffect, useState } from "preact/hooks";
 import { fullTime } from "../../i18n/format";
@@ -28,7 +28,7 @@ export function Accounts() {
   useEffect(() => {
     fetch("/account/accounts", { cache: "no-store" })
       .then(async (answer) => answer.ok && setAccounts(((await answer.json()) as { accounts: Account[] }).accounts))
-      .catch(() => undefined); // the page says itself that the console is gone
+      .catch(() => undefined); // the page shows separately that the console is gone
   }, []);
   const change: Change = async (action, name, values = {}) => {
     try {
@@ -70,7 +70,7 @@ export function Accounts() {
 function Row({ account, change }: { account: Account; change: Change }) {
   const { name, role, disabled } = account;
   const [open, setOpen] = useState<"password" | "remove" | null>(null);
-  const own = name === me.value?.account; // nobody locks themselves out by a slip
+  const own = name === me.value?.account; // prevents locking oneself out
   const run = (action: string, values?: { role?: Role; password?: string }) =>
     void change(action, name, values).then(
       () => setOpen(null),

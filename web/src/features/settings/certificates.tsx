@@ -1,4 +1,4 @@
-// When the certificates of the mesh's processes end, as they tell it themselves; nothing where there are none.
+// Expiry of the certificates of the mesh's processes, as they report it; nothing without certificates.
 
 import { ageText } from "../../i18n/format";
 import { s } from "../../i18n/settings";
@@ -6,7 +6,7 @@ import { useMesh } from "../../mesh/site-health";
 import { Panel } from "../../ui/parts";
 import { Marked } from "./this-console";
 
-/** As robomesh/session.py names it in a process's health. */
+/** The name in a process's health message: see robomesh/session.py. */
 const SECONDS = "certificate_seconds";
 const SOON_S = 10 * 86_400;
 const DAY_S = 86_400;
@@ -15,7 +15,7 @@ export function Certificates() {
   const told = [...useMesh()].flatMap(([site, { message }]) =>
     message.services.flatMap((seen) => {
       const left = seen.values[SECONDS];
-      // Each watch tells of its own site's: one is told once.
+      // Every watch reports the certificates of its own site: show each once.
       return left === undefined || seen.site !== site ? [] : [{ key: `${site} ${seen.id}`, site, seen, left }];
     }),
   );

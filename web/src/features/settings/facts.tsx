@@ -1,4 +1,4 @@
-// Names with what they are, in two columns.
+// Names and values in two columns.
 
 import type { ComponentChildren } from "preact";
 

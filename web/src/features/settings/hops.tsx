@@ -1,4 +1,4 @@
-// Where the time goes on the way from a publisher to the watch: a line a hop, all to one scale.
+// Delays from a publisher to the watch: a line a hop, on one scale.
 
 import type { MeshState_Hop as Hop } from "../../gen/robomesh_pb";
 import { s } from "../../i18n/settings";

@@ -1,4 +1,4 @@
-// How this browser shows it; kept in this browser only.
+// Language and theme, kept in this browser only.
 
 import { s } from "../../i18n/settings";
 import { language, switchLanguage } from "../../i18n/texts";

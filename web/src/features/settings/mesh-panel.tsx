@@ -1,4 +1,4 @@
-// Every service of every site, as the sites' watches see them.
+// Every service of every site, as the sites' watches report them.
 
 import type { MeshState, MeshState_Seen as Seen } from "../../gen/robomesh_pb";
 import { ageText } from "../../i18n/format";
@@ -16,11 +16,11 @@ const GONE_TOLD_MS = 900_000;
 
 interface Known {
   seen: Seen;
-  /** When it was told of last, on this machine's clock [ms]. */
+  /** When it was last reported, on this machine's clock [ms]. */
   at: number;
 }
 
-/** What each watch told of since this page was opened: a service that it no longer tells of is gone, and shown so. */
+/** Reports of each watch since this page was opened: a service that is no longer reported is shown as gone. */
 const known = new Map<string, Map<string, Known>>();
 
 const nameOf = ({ site, service, id }: Seen): string => `${site} ${service} ${id}`;
@@ -49,7 +49,7 @@ export function MeshPanel() {
   );
 }
 
-/** A site that no watch tells of. */
+/** A site without a watch. */
 function PresentSite({ site }: { site: string }) {
   return (
     <div class="site-seen">

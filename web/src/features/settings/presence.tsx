@@ -1,4 +1,4 @@
-// Who is attached besides the services: monitors, consoles, and whoever is in control.
+// Attached clients besides the services: monitors, consoles, operators in control.
 
 import { s } from "../../i18n/settings";
 import { presence } from "../../mesh/connection";

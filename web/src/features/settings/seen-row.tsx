@@ -1,4 +1,4 @@
-// One process of the mesh: version, host, age, way, clock, losses, load.
+// One process of the mesh: version, host, age, delay, clock, losses, load.
 
 import { timestampMs } from "@bufbuild/protobuf/wkt";
 import type { MeshState, MeshState_Seen as Seen } from "../../gen/robomesh_pb";
@@ -23,8 +23,8 @@ export const COLUMNS = [
 ] as const;
 
 const MIB = 1024 * 1024;
-const LOSS = 0.005; // from there on the watch raises an alarm
-const IN_STEP_S = 0.005; // less is of no matter to anybody
+const LOSS = 0.005; // the watch raises an alarm from here on
+const IN_STEP_S = 0.005; // smaller offsets do not matter
 
 export function SeenRow(props: { of: string; seen: Seen; latest: Latest<MeshState>; goneAt: number | null }) {
   const { seen, latest, goneAt } = props;
@@ -108,7 +108,7 @@ function lossText({ lost, received }: Seen): string {
   return `${count(lost)} (${share < 0.01 ? "<0.01" : fixed(share, 2)} %)`;
 }
 
-/** How long it runs. */
+/** Return how long it has been running. */
 function forText(startedMs: number): string {
   return ageText(Math.max(0, (Date.now() - startedMs) / 1000));
 }

@@ -1,4 +1,4 @@
-// The browsers that are signed in: one's own, to an administrator everybody's; any of them can be ended.
+// Signed-in browsers: the account's own, an administrator's view of all; each can be signed out.
 
 import { useEffect, useState } from "preact/hooks";
 import { fullTime } from "../../i18n/format";
@@ -28,7 +28,7 @@ export function Sessions() {
     if (answer.ok) setSessions(((await answer.json()) as { sessions: Session[] }).sessions);
   };
   useEffect(() => {
-    const again = () => void look().catch(() => undefined); // the page says itself that the console is gone
+    const again = () => void look().catch(() => undefined); // the page shows separately that the console is gone
     again();
     const timer = setInterval(again, LOOK_EACH_MS);
     return () => clearInterval(timer);

@@ -1,4 +1,4 @@
-// How the mesh is, who is on it, and what one may set: of this browser, and of the console's accounts.
+// The settings page: health of the mesh, presence, this browser, and the console's accounts.
 
 import { me } from "../../mesh/account";
 import { hello } from "../../mesh/connection";

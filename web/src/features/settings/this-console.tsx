@@ -1,4 +1,4 @@
-// What this console is, how the page reaches it, and as whom.
+// This console, how the page reaches it, and the signed-in account.
 
 import type { ToPage_Hello as Hello } from "../../gen/robomesh_pb";
 import { DASH } from "../../i18n/format";

@@ -1,4 +1,4 @@
-// Which pictures the wall shows: a row a robot, a button a view.
+// Choice of the wall's pictures: a row a robot, a button a view.
 
 import { viewText } from "../../i18n/texts";
 import { w } from "../../i18n/wall";

@@ -1,16 +1,16 @@
-// How many columns fill a screen with pictures of about 16:9, and which size and shape of picture a tile is worth.
+// Layout of the wall: columns of pictures of about 16:9, and the stream size for a tile.
 
 import type { Wanted } from "../../video/own-view";
 import { standing } from "../../video/own-view";
 
 const GAP = 8;
-/** Height of a tile's line of words [px]. */
+/** Height of a tile's line of text [px]. */
 const LINE = 32;
 const NARROW = 600; // one column below
-const SCROLLS = 880; // below, the page scrolls, and its height says nothing
-const LEAST = 220; // a narrower tile shows nothing: then the wall scrolls
+const SCROLLS = 880; // the page scrolls below this width, and its height does not matter
+const LEAST = 220; // narrower tiles are unreadable: then the wall scrolls
 
-/** Columns of equal tiles, as large as they can be in a place of this size [px]. */
+/** Return the number of columns that makes equal tiles largest in an area [px]. */
 export function columnsFor(count: number, width: number, height: number): number {
   if (width < NARROW || count < 2) return 1;
   if (width < SCROLLS) return 2;
@@ -26,7 +26,7 @@ export function columnsFor(count: number, width: number, height: number): number
   return best.tile >= LEAST ? best.columns : most;
 }
 
-// Few sizes and shapes, so that tiles of about one size share one stream.
+// Few sizes and shapes, so that tiles of similar size share a stream.
 const SIZES = [
   { width: 320, fps: 10 },
   { width: 480, fps: 15 },
@@ -35,9 +35,9 @@ const SIZES = [
 ] as const;
 const WIDE = 16 / 9;
 const SHAPES = [WIDE, 4 / 3, 1, 3 / 4] as const;
-const ENOUGH = 1.2; // so much is a picture enlarged before the next size is asked for
+const ENOUGH = 1.2; // enlarge a picture so far before requesting the next size
 
-/** What to ask the renderer for, for a place of a size [px]: small for a small one, and of its shape, so that it is full. */
+/** Return the picture to request for an area [px]: of its shape, and not larger than needed. */
 export function wantedFor(view: string, width: number, height: number): Wanted {
   const away = (shape: number) => Math.abs(Math.log((shape * height) / width));
   const shape = [...SHAPES].sort((a, b) => away(a) - away(b))[0] ?? WIDE;

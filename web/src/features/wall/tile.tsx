@@ -1,4 +1,4 @@
-// One picture of the wall: live while it is on the screen, with the robot's state and the picture's age in words.
+// One picture of the wall: live while visible, with the robot's state and the picture's age.
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { ControllerState, Description } from "../../gen/robomesh_pb";

@@ -1,4 +1,4 @@
-// The Wall: any robots' views as video, as large as the screen allows.
+// The wall: views of any robots as video, as large as the screen allows.
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { Description } from "../../gen/robomesh_pb";
@@ -15,7 +15,7 @@ import { columnsFor } from "./grid";
 import { WallTile } from "./tile";
 import "./wall.css";
 
-/** The renderer has it of every robot: it follows the arm. */
+/** The renderer's view of every robot, which follows the arm. */
 const CLOSE = "close";
 
 function viewNames(description: Description | undefined): readonly string[] {
@@ -27,7 +27,7 @@ export function Wall({ chosen }: { chosen: readonly ViewName[] }) {
   const descriptions = useTopics(DescriptionSchema, "robomesh/*/*/description");
   useEffect(() => seeRobots([...controllers.keys(), ...descriptions.keys()]));
   const [choosing, setChoosing] = useState(false);
-  // Replays too, which the fleet leaves out.
+  // Includes replays, unlike the fleet.
   const described = [...descriptions.keys()].map((key) => key.replace(/\/[^/]+$/, ""));
   const known = new Set([...fleetRobots.value, ...described]);
   const robots: RobotViews[] = [...known].sort().map((key) => {
@@ -104,7 +104,7 @@ export function Wall({ chosen }: { chosen: readonly ViewName[] }) {
   );
 }
 
-/** The whole page on the whole screen: STOP stays where it is. */
+/** Show the whole page on the full screen, so that STOP stays visible. */
 function useFullScreen(): { on: boolean; toggle: () => Promise<void> } {
   const [on, setOn] = useState(document.fullscreenElement !== null);
   useEffect(() => {
