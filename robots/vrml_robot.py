@@ -69,7 +69,7 @@ def read_vrml_robot(path: Path, *, within: Path | None = None) -> VrmlRobot:
         reading.node(node, BASE, np.eye(4), 0)
     if not reading.joints:
         raise MeshError(path, "holds no robot: no Joint with a jointType of 'rotate' or 'slide'")
-    reading.drawing.tell()
+    reading.drawing.warn_of_skipped()
     tree = reading.tree()
     return VrmlRobot(reading.name or path.stem, tree, (*files.warnings(), *reading.notes))
 

@@ -1,1 +1,1 @@
-"""A folder a robot: its description and its meshes. To add one, see CONTRIBUTING."""
+"""Library of robots: a folder for each, with its description and meshes. CONTRIBUTING says how to add one."""

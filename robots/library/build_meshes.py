@@ -1,6 +1,6 @@
-"""Models the library's meshes and writes them: `python -m robots.library.build_meshes`.
+"""Generator of the library's mesh files: `python -m robots.library.build_meshes`.
 
-Their files are committed; this script is where they come from, and what to change them in.
+The files are committed. To change them, change this script and run it.
 """
 
 from collections.abc import Callable, Mapping
@@ -42,7 +42,7 @@ ROBOTS: Mapping[str, Mapping[str, Callable[[], list[Piece]]]] = {
 
 
 def mesh_file(robot: str, name: str) -> bytes:
-    """The content of one of the library's mesh files."""
+    """Return the content of one of the library's mesh files."""
     mesh = mesh_of(ROBOTS[robot][name]())
     return write_vrml(mesh).encode() if name.endswith(".wrl") else write_3ds(mesh)
 

@@ -1,6 +1,6 @@
-"""What arms are built of: hubs, cheeks, motor housings, bolts, covers; millimetres.
+"""Parts of arms: hubs, cheeks, motor housings, bolts, covers; in millimetres.
 
-A piece is a material and a solid. Round things are made along z and laid where they belong.
+A piece is a material and a solid. Round pieces are made along z and then moved into place.
 """
 
 from collections.abc import Iterable, Sequence
@@ -19,12 +19,12 @@ CASTING = Material("casting", (0.21, 0.225, 0.24), (0.2, 0.2, 0.2), shininess=0.
 STEEL = Material("steel", (0.74, 0.76, 0.78), (0.8, 0.8, 0.8), shininess=0.7)
 RUBBER = Material("rubber", (0.09, 0.09, 0.1), (0.05, 0.05, 0.05), shininess=0.05)
 
-# Below this, neighbouring faces are one smooth surface.
+# Faces that meet at a smaller angle are one smooth surface.
 CREASE = np.radians(36)
 
 
 def at(x: float = 0.0, y: float = 0.0, z: float = 0.0, *, axis: str = "+z") -> FloatArray:
-    """(4, 4) that lays something made along z at a point, along another axis ("-y")."""
+    """Return the (4, 4) transform that moves the origin to a point and turns z to another axis ("-y")."""
     columns = {
         "+z": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
         "-z": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
@@ -33,7 +33,7 @@ def at(x: float = 0.0, y: float = 0.0, z: float = 0.0, *, axis: str = "+z") -> F
         "+y": [[0, 0, 1], [1, 0, 0], [0, 1, 0]],
         "-y": [[0, 0, 1], [-1, 0, 0], [0, -1, 0]],
     }
-    # Rows: where x, y and z go.
+    # Rows: the images of x, y and z.
     placement = np.eye(4)
     placement[:3, :3] = np.array(columns[axis], dtype=np.float64).T
     placement[:3, 3] = (x, y, z)
@@ -41,34 +41,34 @@ def at(x: float = 0.0, y: float = 0.0, z: float = 0.0, *, axis: str = "+z") -> F
 
 
 def laid(pieces: Iterable[Piece], placement: FloatArray) -> list[Piece]:
-    """Pieces moved by a (4, 4) transform."""
+    """Return pieces moved by a (4, 4) transform."""
     return [(material, moved(solid, placement)) for material, solid in pieces]
 
 
 def turned_piece(material: Material, profile: Profile, *, fillet: float = 0.0) -> Piece:
-    """A turned body; its corners rounded."""
+    """Return a turned body with rounded corners."""
     largest = max(radius for radius, _ in profile)
     return material, turned(rounded(profile, fillet) if fillet else profile, _segments(largest))
 
 
 def _segments(radius: float) -> int:
-    """As many as the eye needs for a circle of this size."""
+    """Return the number of segments that makes a circle of this size look round."""
     sizes = [(45, 36), (30, 28), (8, 20), (0, 10)]
     return next(count for least, count in sizes if radius >= least)
 
 
 def drum(material: Material, radius: float, low: float, high: float, *, fillet: float = 0.0) -> Piece:
-    """A cylinder along z; its edges rounded by the fillet."""
+    """Return a cylinder along z, with edges rounded by the fillet."""
     return turned_piece(material, [(0, low), (radius, low), (radius, high), (0, high)], fillet=fillet)
 
 
 def bolts(
     circle: float, count: int, radius: float, low: float, high: float, *, start: float = 0.0
 ) -> list[Piece]:
-    """Socket-head bolts on a circle about z; `start` in degrees."""
+    """Return socket-head bolts on a circle about z; `start` in degrees."""
     angles = np.radians(start) + np.arange(count) * (2 * np.pi / count)
     head: list[tuple[float, float]] = [(radius, low), (radius, high), (0, high)]
-    if radius >= 8:  # the socket of a smaller one is not seen
+    if radius >= 8:  # the socket of a smaller bolt is invisible
         floor = high - 0.4 * radius
         head[1:] = [(radius, high - 0.2 * radius), (radius * 0.8, high)]
         head += [(radius * 0.5, high), (radius * 0.5, floor), (0, floor)]
@@ -78,7 +78,7 @@ def bolts(
 
 
 def motor(radius: float, low: float, high: float, *, fins: int = 5) -> list[Piece]:
-    """A motor housing along z: a flange, cooling fins, a domed cap with its bolts."""
+    """Return a motor housing along z: a flange, cooling fins, a domed cap with bolts."""
     length = high - low
     cap = low + 0.72 * length
     profile: list[tuple[float, float]] = [(0, low), (radius, low), (radius, low + 0.1 * length)]
@@ -95,7 +95,7 @@ def motor(radius: float, low: float, high: float, *, fins: int = 5) -> list[Piec
 def cover(
     radius: float, low: float, high: float, *, material: Material = CASTING, count: int = 6
 ) -> list[Piece]:
-    """A bolted cover along z: a disc with a raised middle."""
+    """Return a bolted cover along z: a disc with a raised middle."""
     middle = low + 0.62 * (high - low)
     profile = [
         (0, low),
@@ -120,7 +120,7 @@ def cheek(
     *,
     bevel: float = 5.0,
 ) -> Piece:
-    """A flat arm round two circles in x and y, from z low to z high."""
+    """Return a flat arm around two circles in x and y, from z low to z high."""
     outline = strap(np.array(start), start_radius, np.array(end), end_radius, count=36)
     return material, plate(outline, low, high, bevel)
 
@@ -133,7 +133,7 @@ def rounded_box(
     radius: float = 8.0,
     bevel: float = 4.0,
 ) -> Piece:
-    """A box with round corners about z and rounded edges."""
+    """Return a box with round corners about z and rounded edges."""
     outline = rectangle(size[0], size[1], radius, steps=3)
     solid = plate(outline, -size[2] / 2, size[2] / 2, bevel, steps=2)
     return material, moved(solid, at(*center))
@@ -142,11 +142,11 @@ def rounded_box(
 def tapered(
     material: Material, stations: Sequence[tuple[float, float, float, float]], radius: float
 ) -> Piece:
-    """A body along x through round-cornered sections.
+    """Return a body along x through sections with round corners.
 
     Args:
         stations: (x, size along y, size along z, middle in y) of each section.
-        radius: Of the sections' corners.
+        radius: Radius of the sections' corners.
     """
     sections = []
     for x, along_y, along_z, middle in _eased(stations).tolist():
@@ -155,13 +155,13 @@ def tapered(
     return material, lofted(sections)
 
 
-# How the ends of a tapered body are rounded off: taken from each side, and at which distance from the end.
+# Rounding of a tapered body's ends: the inset of each side, and its distance from the end.
 _END = np.array([[5.0, 0.0], [2.25, 0.8], [0.6, 2.5]])
 _END_LENGTH = 5.0
 
 
 def _eased(stations: Sequence[tuple[float, float, float, float]]) -> FloatArray:
-    """(n, 4): more stations between those given, so that sizes change softly, and round ends."""
+    """Return (n, 4) stations with more between those given, so that sizes change smoothly, and round ends."""
     given = np.array(stations, dtype=np.float64)
     steps = np.linspace(0, 1, 4)[:-1, None]
     soft = steps * steps * (3 - 2 * steps)
@@ -182,7 +182,7 @@ def _rounded_end(station: FloatArray, direction: int) -> FloatArray:
 
 
 def mesh_of(pieces: Iterable[Piece]) -> Mesh:
-    """Pieces as a mesh: a part a material, smooth but for its creases."""
+    """Return pieces as a mesh with a part for each material, smooth except at creases."""
     by_material: dict[Material, list[Solid]] = {}
     for material, solid in pieces:
         by_material.setdefault(material, []).append(solid)

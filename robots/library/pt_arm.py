@@ -1,6 +1,6 @@
-"""Bodies of the Pt500 and Pt600: a five-joint arm in forks, sized by its D-H rows. Nominal, as those are.
+"""Bodies of the Pt500 and Pt600, a five-joint arm with forks; nominal sizes from the D-H rows.
 
-Each function gives a link's pieces in that link's frame [mm]. `s` is the size: 1 for the Pt600.
+Each function returns a link's pieces in that link's frame [mm]. `s` is the scale: 1 for the Pt600.
 """
 
 import numpy as np
@@ -25,12 +25,12 @@ from robots.library.parts import (
 from robots.meshes.mesh import FloatArray
 from robots.meshes.solids import lofted, plate, rectangle, tube
 
-# The column's frame has its y axis up and its x axis forward: x forward, y left, z up, seen from there.
+# From x forward, y left, z up to the column's frame, which has x forward and y up.
 _UPRIGHT = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 
 def base(s: float, height: float) -> list[Piece]:
-    """Foot, pedestal and connector box; z up from the floor, `height` to the shoulder."""
+    """Return foot, pedestal and connector box; z up from the floor, `height` to the shoulder."""
     top = height - 168 * s
     foot = (CASTING, plate(rectangle(280 * s, 280 * s, 46 * s, steps=6), 0, 24 * s, 5 * s))
     pedestal = turned_piece(
@@ -68,7 +68,7 @@ def base(s: float, height: float) -> list[Piece]:
 
 
 def _rib(s: float, top: float) -> Piece:
-    """A web from the foot up to the pedestal, along x."""
+    """Return a rib from the foot up to the pedestal, along x."""
     outline = np.array([[96 * s, 22 * s], [152 * s, 22 * s], [152 * s, 30 * s], [96 * s, 0.62 * top]])
     sides = [np.column_stack([outline[:, 0], np.full(4, y), outline[:, 1]]) for y in (5 * s, -5 * s)]
     return PAINT, lofted(sides)
@@ -81,7 +81,7 @@ def _about_z(angle: float) -> FloatArray:
 
 
 def column(s: float) -> list[Piece]:
-    """Turntable and fork up to the shoulder axis, both motors."""
+    """Return turntable and fork up to the shoulder axis, with both motors."""
     upright: list[Piece] = [
         turned_piece(
             PAINT,
@@ -91,7 +91,7 @@ def column(s: float) -> list[Piece]:
         *bolts(102 * s, 12, 4.5 * s, -139 * s, -133 * s, start=15),
         (PAINT, _trunk(s)),
     ]
-    # The waist's motor stands behind the trunk.
+    # The waist's motor is behind the trunk.
     upright += laid(motor(44 * s, 0, 150 * s, fins=7), at(-84 * s, 0, -140 * s))
     pieces = laid(upright, _UPRIGHT)
     for side in (1, -1):
@@ -108,7 +108,7 @@ def _trunk(
 ) -> tuple[
     np.ndarray[tuple[int, int], np.dtype[np.float64]], np.ndarray[tuple[int, int], np.dtype[np.int64]]
 ]:
-    """From the round turntable to the square root of the fork, z up."""
+    """Return the transition from the round turntable to the square base of the fork, z up."""
     sections = []
     stations = [(-130, 184, 184, 91), (-124, 178, 186, 84), (-112, 168, 190, 62), (-98, 158, 192, 42)]
     stations += [(-86, 150, 192, 34), (-76, 146, 192, 32), (-71, 140, 186, 30), (-69, 132, 178, 28)]
@@ -119,7 +119,7 @@ def _trunk(
 
 
 def upper_arm(s: float, length: float) -> list[Piece]:
-    """From the shoulder's hub to the elbow's fork; x along the arm, the elbow at the origin."""
+    """Return the arm from the shoulder's hub to the elbow's fork; x along it, the elbow at the origin."""
     fork = length - 84 * s
     along: list[Piece] = [
         drum(PAINT, 66 * s, -57 * s, 57 * s, fillet=6 * s),
@@ -145,7 +145,7 @@ def upper_arm(s: float, length: float) -> list[Piece]:
 
 
 def _conduit(s: float, length: float) -> list[Piece]:
-    """The elbow motor's cable along the arm's side, in two clamps."""
+    """Return the elbow motor's cable along the arm's side, in two clamps."""
     t = np.linspace(0, 1, 21)
     path = np.column_stack(
         [
@@ -162,7 +162,7 @@ def _conduit(s: float, length: float) -> list[Piece]:
 
 
 def forearm(s: float, length: float) -> list[Piece]:
-    """From the elbow's hub to the wrist's fork; x along the arm, the wrist at the origin."""
+    """Return the arm from the elbow's hub to the wrist's fork; x along it, the wrist at the origin."""
     fork = length - 62 * s
     along: list[Piece] = [
         drum(CASTING, 47 * s, -38 * s, 38 * s, fillet=4 * s),
@@ -183,7 +183,7 @@ def forearm(s: float, length: float) -> list[Piece]:
         along.append(cheek(PAINT, (fork, 0), 30 * s, (length, 0), 34 * s, low, high, bevel=4 * s))
     along += laid(cover(30 * s, 0, 12 * s, count=5), at(length, 0, 45 * s))
     along += laid(cover(30 * s, 0, 12 * s, count=5), at(length, 0, -45 * s, axis="-z"))
-    # The wrist's two motors lie on the arm's back, clear of the upper arm when it folds.
+    # The wrist's two motors are on the arm's back, clear of the upper arm when it folds.
     for z in (-21 * s, 21 * s):
         along += laid(motor(19 * s, 0, 112 * s, fins=6), at(210 * s, 46 * s, z, axis="-x"))
     along.append(rounded_box(CASTING, (22 * s, 30 * s, 84 * s), (212 * s, 38 * s, 0), radius=6 * s))
@@ -191,7 +191,7 @@ def forearm(s: float, length: float) -> list[Piece]:
 
 
 def wrist(s: float) -> list[Piece]:
-    """The bending block: y along the pitch axis, z along the roll axis."""
+    """Return the pitch block: y along the pitch axis, z along the roll axis."""
     pieces = laid(
         [
             drum(CASTING, 33 * s, -26.5 * s, 26.5 * s, fillet=3 * s),
@@ -217,7 +217,7 @@ def wrist(s: float) -> list[Piece]:
 
 
 def flange(s: float, face: float) -> list[Piece]:
-    """The tool flange: bolt circle, pilot bore and dowel; its face at z = `face`, the tool's frame."""
+    """Return the tool flange: bolt circle, pilot bore and dowel; its face at z = `face`, the tool's frame."""
     low = 85 * s
     disc = turned_piece(
         STEEL,
@@ -238,7 +238,7 @@ def flange(s: float, face: float) -> list[Piece]:
         place = at(26 * s * float(np.cos(angle)), 26 * s * float(np.sin(angle)), face)
         holes += laid([drum(RUBBER, 3.6 * s, -2.0, 0.35)], place)
     dowel = laid([drum(CASTING, 2.6 * s, -2.0, 3.0 * s)], at(26 * s, 0, face))
-    # A mark on the rim, so that the roll can be seen.
+    # A mark on the rim, so that the roll is visible.
     mark = rounded_box(
         PAINT, (5 * s, 10 * s, 10 * s), (37.5 * s, 0, face - 6.5 * s), radius=1.5 * s, bevel=1 * s
     )

@@ -1,4 +1,4 @@
-"""Bodies of the Puma 560, in its link frames [mm]: trunk, shoulder drum, a wide upper arm, a slim wrist."""
+"""Bodies of the Puma 560 in its link frames [mm]: trunk, shoulder drum, wide upper arm, slim wrist."""
 
 import numpy as np
 
@@ -25,7 +25,7 @@ _A2, _A3 = 431.8, -20.3  # lengths of the D-H rows of shoulder and elbow
 
 
 def base() -> list[Piece]:
-    """Foot, trunk and connector box; z up from the floor."""
+    """Return foot, trunk and connector box; z up from the floor."""
     foot = (CASTING, plate(rectangle(350, 350, 60, steps=6), 0, 26, 5))
     trunk = turned_piece(
         PAINT,
@@ -47,7 +47,7 @@ def base() -> list[Piece]:
 
 
 def column() -> list[Piece]:
-    """The neck and the shoulder's drum; z along the shoulder's axis, y down."""
+    """Return the neck and the shoulder's drum; z along the shoulder's axis, y down."""
     neck = laid(
         [
             turned_piece(PAINT, [(0, -86), (95, -86), (95, -58), (84, -46), (84, 0), (0, 0)], fillet=8),
@@ -62,7 +62,7 @@ def column() -> list[Piece]:
 
 
 def upper_arm() -> list[Piece]:
-    """Beside the shoulder's drum; x along the arm, the elbow at the origin, z away from the trunk."""
+    """Return the arm next to the shoulder's drum; x along the arm, elbow at the origin, z off the trunk."""
     low, high = 48.0, 132.0
     outline = strap(np.array([-_A2, 0.0]), 104, np.zeros(2), 64, 56)
     rear = strap(np.array([-_A2 - 150, 0.0]), 76, np.array([-_A2, 0.0]), 104, 56)
@@ -87,7 +87,7 @@ def upper_arm() -> list[Piece]:
 
 
 def forearm() -> list[Piece]:
-    """From the elbow, at x = 20.3, up along z to the wrist; y along the elbow's axis."""
+    """Return the arm from the elbow, at x = 20.3, up along z to the wrist; y along the elbow's axis."""
     pieces = laid(
         [drum(PAINT, 62, -42, 40, fillet=5), drum(STEEL, 46, -44, 42, fillet=0)], at(-_A3, 0, 0, axis="+y")
     )
@@ -110,7 +110,7 @@ def forearm() -> list[Piece]:
 
 
 def wrist() -> list[Piece]:
-    """The roll cylinder and the fork of the bend; -y along the roll, z along the bend."""
+    """Return the roll cylinder and the fork of the bend; -y along the roll axis, z along the bend axis."""
     roll = laid(
         [
             turned_piece(PAINT, [(0, 34), (36, 34), (37, 66), (34, 80), (0, 80)], fillet=4),
@@ -127,14 +127,14 @@ def wrist() -> list[Piece]:
 
 
 def wrist_cage() -> list[Piece]:
-    """The bending block: y along the bend, z along the flange's axis."""
+    """Return the bending block: y along the bend axis, z along the flange's axis."""
     hub = laid([drum(CASTING, 30, -25.5, 25.5, fillet=3), drum(STEEL, 22, -27, 27, fillet=0)], at(axis="+y"))
     nose = turned_piece(CASTING, [(0, 0), (24, 0), (24, 22), (27, 25), (0, 25)], fillet=3)
     return [*hub, nose]
 
 
 def flange() -> list[Piece]:
-    """The tool flange, its face in the link's origin."""
+    """Return the tool flange, with its face at the link's origin."""
     disc = turned_piece(
         STEEL,
         [(0, -16), (20, -16), (20, -11), (31, -10), (31, 0), (11, 0), (11, -6), (0, -6)],

@@ -1,1 +1,1 @@
-"""Mesh files to triangles and back: VRML 2.0 and 3DS, read and written here."""
+"""Mesh files: readers and writers of VRML 2.0, 3DS, DXF, STEP, STL, OBJ, PLY, COLLADA and glTF."""

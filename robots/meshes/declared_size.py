@@ -1,7 +1,7 @@
-"""What a file of a foreign format says of itself, looked at before a library reads it.
+"""The sizes, units and names that a mesh file declares, read before a library reads the file.
 
-Counts that the file cannot hold are refused before anything is allocated for them; units, the
-upward axis, names of textures and files beside it are kept, for the libraries drop them.
+A count that the file cannot hold is rejected before memory is allocated for it. The unit, the upward
+axis and the names of textures and of other files are kept here, because the libraries drop them.
 """
 
 import json
@@ -16,28 +16,30 @@ from urllib.parse import unquote
 from robots.errors import MeshError
 from robots.meshes.text_repair import check_instances, counted_from_first, plain_text, utf8_xml
 
-# A robot's link is far below; a console that reads what people upload must not drown.
+# A robot's link is far smaller. The console reads uploaded files, so the limits must be firm.
 MAX_BYTES = 1 << 30
 MAX_VALUES = 100_000_000
-# Points and corners of triangles that nodes draw, each as often as they do.
+# Points and triangle corners, counted once for each node that draws them.
 MAX_DRAWN = 30_000_000
-# Each is a mesh of its own to trimesh, milliseconds each.
+# trimesh makes a mesh for each material, which takes milliseconds.
 _MOST_MATERIALS = 2000
 _JSON_CHUNK = 0x4E4F534A
 OWN_MARK = "robomesh"
 
 
 @dataclass(frozen=True)
-class Claims:
-    """What a file says of itself.
+class Declared:
+    """The properties that a file declares.
 
     Attributes:
+        unit_m: Length of the file's unit [m]; None if the file does not state one.
+        up: Upward axis, "y" or "z"; empty if the file does not state one.
         textures: Image by material name.
-        base_colors: Linear colour and opacity by material name, which trimesh rounds to bytes.
-        linear: Its colours are linear light, not sRGB.
-        missing: Files that it names and that are not there (or may not be read); materials only.
-        files: Files that it names, there or not, in its folder or below.
-        rewritten: What is read in its place, where the libraries cannot read it as it is.
+        base_colors: Linear colour and opacity by material name; trimesh would round them to bytes.
+        linear: The colours are linear light, not sRGB.
+        missing: Names of material files that do not exist or may not be read.
+        files: Files that this file names, existing or not, in its folder or below.
+        rewritten: Content to read instead of the file, if the libraries cannot read the file itself.
     """
 
     unit_m: float | None = None
@@ -51,27 +53,27 @@ class Claims:
     rewritten: bytes | None = None
 
 
-def claims_of(path: Path, kind: str) -> Claims:
-    """What a file of this kind ("ply") says of itself.
+def read_declared(path: Path, kind: str) -> Declared:
+    """Return the properties that a file of this kind ("ply") declares.
 
     Raises:
-        MeshError: If it cannot be opened, is huge, or claims what it cannot hold.
+        MeshError: If the file cannot be opened, is too large, or declares more than it can hold.
     """
     data = content(path)
     reader = _READERS.get(kind)
-    return reader(path, data) if reader is not None else Claims()
+    return reader(path, data) if reader is not None else Declared()
 
 
 def content(path: Path) -> bytes:
-    """A file's bytes.
+    """Return a file's bytes.
 
     Raises:
-        MeshError: If it cannot be read, is empty, or larger than MAX_BYTES.
+        MeshError: If it cannot be read, is empty, or is larger than MAX_BYTES.
     """
     try:
         size = path.stat().st_size
         if size > MAX_BYTES:
-            raise MeshError(path, f"is {size >> 20} MiB large; up to {MAX_BYTES >> 20} MiB are read")
+            raise MeshError(path, f"has {size >> 20} MiB; at most {MAX_BYTES >> 20} MiB are read")
         data = path.read_bytes()
     except OSError as error:
         raise MeshError(path, f"cannot be read: {error.strerror}") from error
@@ -80,26 +82,26 @@ def content(path: Path) -> bytes:
     return data
 
 
-def _stl(path: Path, data: bytes) -> Claims:
+def _stl(path: Path, data: bytes) -> Declared:
     if len(data) >= 84 and data[:5].lower() != b"solid":
         (count,) = struct.unpack_from("<I", data, 80)
         if 84 + 50 * count > len(data):
             raise MeshError(
                 path,
-                f"claims {count} triangles, {50 * count} bytes; {len(data) - 84} are there",
+                f"declares {count} triangles, which take {50 * count} bytes; {len(data) - 84} follow",
                 place="byte 80",
             )
-    return Claims()
+    return Declared()
 
 
 _SIZES = {"char": 1, "uchar": 1, "int8": 1, "uint8": 1, "short": 2, "ushort": 2, "int16": 2, "uint16": 2}
 _SIZES |= {"int": 4, "uint": 4, "float": 4, "int32": 4, "uint32": 4, "float32": 4, "double": 8, "float64": 8}
 
 
-def _ply(path: Path, data: bytes) -> Claims:
+def _ply(path: Path, data: bytes) -> Declared:
     end = data.find(b"end_header")
     if not data.startswith(b"ply") or end < 0:
-        raise MeshError(path, "is no PLY: it begins with 'ply' and has a line 'end_header'")
+        raise MeshError(path, "is not a PLY file: one begins with 'ply' and has a line 'end_header'")
     needed = 0
     text = b"format ascii" in data[:end]
     count = 0
@@ -107,19 +109,23 @@ def _ply(path: Path, data: bytes) -> Claims:
         words = line.split()
         if words[:1] == ["element"]:
             if len(words) != 3 or not (words[2].isascii() and words[2].isdigit()):
-                raise MeshError(path, f"{line!r}; 'element vertex 8' is right", place=f"line {number}")
+                raise MeshError(
+                    path, f"{line!r} must have the form 'element vertex 8'", place=f"line {number}"
+                )
             count = int(words[2])
         elif words[:1] == ["property"] and len(words) >= 3:
-            # A list is at least its count; a number of text at least a digit and a blank.
+            # A list takes at least the bytes of its count; a number in text takes a digit and a blank.
             needed += count * (2 if text else _SIZES.get(words[1] if words[1] != "list" else words[2], 1))
             if needed - 2 > len(data) - end:
                 raise MeshError(
-                    path, f"claims {count} rows; {len(data) - end} bytes are there", place=f"line {number}"
+                    path,
+                    f"declares {count} rows; only {len(data) - end} bytes follow",
+                    place=f"line {number}",
                 )
-    return Claims()
+    return Declared()
 
 
-def _obj(path: Path, data: bytes) -> Claims:
+def _obj(path: Path, data: bytes) -> Declared:
     warnings: list[str] = []
     textures: dict[str, str] = {}
     missing: list[str] = []
@@ -133,16 +139,16 @@ def _obj(path: Path, data: bytes) -> Claims:
             textures |= _mtl_textures(library)
         else:
             missing.append(found)
-            warnings.append(f"materials: no file {found!r} beside this one; drawn grey")
+            warnings.append(f"materials: no file {found!r} in this file's folder; drawn grey")
     _check_obj_numbers(path, rewritten)
     names = set(re.findall(r"(?m)^[ \t]*usemtl[ \t]+(.+?)[ \t\r]*$", rewritten))
     if len(names) > _MOST_MATERIALS:
         rewritten = re.sub(r"(?m)^[ \t]*usemtl[ \t].*$", "", rewritten)
-        warnings.append(f"{len(names)} materials; above {_MOST_MATERIALS} none is taken: drawn grey")
+        warnings.append(f"{len(names)} materials, more than {_MOST_MATERIALS}: all ignored, drawn grey")
     left_out = len(re.findall(r"(?m)^[ \t]*[lp][ \t]", text))
     if left_out:
         warnings.append(f"{left_out} lines or points are left out")
-    return Claims(
+    return Declared(
         textures=textures,
         files=(*files, *_textures_below(path, textures)),
         missing=tuple(missing),
@@ -152,22 +158,29 @@ def _obj(path: Path, data: bytes) -> Claims:
 
 
 def _check_obj_numbers(path: Path, text: str) -> None:
-    """Refuse a face of a vertex far beyond the last: trimesh makes room for all up to it."""
+    """Reject a face whose vertex number far exceeds the count: trimesh would allocate up to that number.
+
+    Raises:
+        MeshError: If there is one.
+    """
     count = len(re.findall(r"(?m)^[ \t]*v[nt]?[ \t]", text))
     digits = len(str(count)) + 1
     found = re.search(rf"(?m)^[ \t]*f[ \t](?:[^\n]*[ \t/])?(\d{{{digits},}})", text)
     if found is not None:
         line = text.count("\n", 0, found.start(1)) + 1
         number = found[1][:20]
-        raise MeshError(path, f"a face of vertex {number}, of {count} at most", place=f"line {line}")
+        raise MeshError(path, f"a face uses vertex {number}; there are at most {count}", place=f"line {line}")
 
 
 def _below(path: Path, address: str) -> Path | None:
-    """Where the file is that an address in another means; none above its folder: trimesh reads none."""
+    """Return the path that an address in a file names; None outside the file's folder.
+
+    trimesh reads no files outside the folder either.
+    """
     try:
         found = (path.parent / address.replace("\\", "/")).resolve()
         found.is_file()
-    except (OSError, ValueError):  # too long a name, or a zero in it
+    except (OSError, ValueError):  # the name is too long or has a zero byte
         return None
     return found if found.is_relative_to(path.parent.resolve()) else None
 
@@ -188,12 +201,12 @@ def _mtl_textures(library: Path) -> dict[str, str]:
     return textures
 
 
-def _dae(path: Path, data: bytes) -> Claims:
+def _dae(path: Path, data: bytes) -> Declared:
     given, data = data, utf8_xml(data)
     if b"<!ENTITY" in data or b"<!DOCTYPE" in data:
-        raise MeshError(path, "holds a DOCTYPE: a COLLADA file has none, and it can hide a bomb")
+        raise MeshError(path, "has a DOCTYPE or ENTITY, which can expand without limit; remove it")
     if b"COLLADA" not in data[:4096]:
-        raise MeshError(path, "is no COLLADA file: its first element is COLLADA")
+        raise MeshError(path, "is not a COLLADA file: the first element must be COLLADA")
     unit = re.search(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']\s*([-+0-9.eE]+)", data)
     axis = re.search(rb"<up_axis>\s*([XYZ])_UP\s*</up_axis>", data)
     try:
@@ -202,8 +215,8 @@ def _dae(path: Path, data: bytes) -> Claims:
         unit_m = 1.0
     check_instances(path, data)
     letter = axis.group(1).decode().lower() if axis else "y"
-    warnings = ("its upward axis is x: turn it by hand",) if letter == "x" else ()
-    return Claims(
+    warnings = ("its upward axis is x: rotate the mesh by hand",) if letter == "x" else ()
+    return Declared(
         unit_m=unit_m if 0 < unit_m < 1e6 else 1.0,
         up="z" if letter == "x" else letter,
         warnings=warnings,
@@ -211,47 +224,47 @@ def _dae(path: Path, data: bytes) -> Claims:
     )
 
 
-def _gltf(path: Path, data: bytes) -> Claims:
-    return _gltf_claims(path, _json(path, data))
+def _gltf(path: Path, data: bytes) -> Declared:
+    return _gltf_declared(path, _json(path, data))
 
 
-def _glb(path: Path, data: bytes) -> Claims:
+def _glb(path: Path, data: bytes) -> Declared:
     if len(data) < 20 or data[:4] != b"glTF":
-        raise MeshError(path, "is no GLB: it begins with 'glTF'")
+        raise MeshError(path, "is not a GLB file: one begins with 'glTF'")
     version, length, size, kind = struct.unpack_from("<IIII", data, 4)
     if version != 2:
-        raise MeshError(path, f"is glTF {version}; 2 is read", place="byte 4")
+        raise MeshError(path, f"is glTF version {version}; only version 2 is read", place="byte 4")
     if kind != _JSON_CHUNK or 20 + size > len(data) or length > len(data):
-        raise MeshError(path, f"is cut short or broken: says {length} bytes, {len(data)} are there")
-    return _gltf_claims(path, _json(path, data[20 : 20 + size]))
+        raise MeshError(path, f"is truncated or damaged: declares {length} bytes, has {len(data)}")
+    return _gltf_declared(path, _json(path, data[20 : 20 + size]))
 
 
 def _json(path: Path, data: bytes) -> dict[str, Any]:
     try:
         document = json.loads(data)
     except (ValueError, RecursionError) as error:
-        raise MeshError(path, f"its JSON is broken: {error}") from error
+        raise MeshError(path, f"its JSON is invalid: {error}") from error
     if not isinstance(document, dict):
-        raise MeshError(path, "its JSON is no object")
+        raise MeshError(path, "its JSON is not an object")
     return document
 
 
-def _gltf_claims(path: Path, document: dict[str, Any]) -> Claims:
+def _gltf_declared(path: Path, document: dict[str, Any]) -> Declared:
     required = [str(name) for name in _list(document, "extensionsRequired")]
     packed = [name for name in required if "draco" in name.lower() or "meshopt" in name.lower()]
     if packed:
-        raise MeshError(path, f"is compressed by {', '.join(packed)}; export it without compression")
+        raise MeshError(path, f"is compressed with {', '.join(packed)}; export it without compression")
     counts = [item.get("count", 0) for item in _list(document, "accessors") if isinstance(item, dict)]
     if any(not isinstance(count, int) or not 0 <= count <= MAX_VALUES for count in counts):
-        raise MeshError(path, f"an accessor that counts {max(map(str, counts))}; 0 to {MAX_VALUES} are read")
+        raise MeshError(path, f"an accessor's count is {max(map(str, counts))}; it must be 0 to {MAX_VALUES}")
     bare = sum(
         item.get("count", 0)
         for item in _list(document, "accessors")
         if isinstance(item, dict) and "bufferView" not in item
     )
     if bare > MAX_VALUES // 100:
-        raise MeshError(path, f"accessors of {bare} values that are nowhere in the file")
-    _no_circle(path, [node for node in _list(document, "nodes") if isinstance(node, dict)])
+        raise MeshError(path, f"accessors of {bare} values have no data in the file")
+    _check_tree(path, [node for node in _list(document, "nodes") if isinstance(node, dict)])
     _check_drawn(path, document)
     asset = document.get("asset")
     extras = asset.get("extras") if isinstance(asset, dict) else None
@@ -268,9 +281,9 @@ def _gltf_claims(path: Path, document: dict[str, Any]) -> Claims:
         if place is not None and place.is_file():
             files.append(place)
         else:
-            raise MeshError(path, f"buffer {address!r}: no such file beside this one", missing=address)
+            raise MeshError(path, f"buffer {address!r}: no such file in this folder", missing=address)
     textures = _gltf_textures(document)
-    return Claims(
+    return Declared(
         unit_m=1.0,
         up="z" if own else "y",
         textures=textures,
@@ -280,24 +293,34 @@ def _gltf_claims(path: Path, document: dict[str, Any]) -> Claims:
     )
 
 
-def _no_circle(path: Path, nodes: list[dict[str, Any]]) -> None:
-    """A node has one parent at most: then no walk visits more than there are, and only a ring hangs."""
+def _check_tree(path: Path, nodes: list[dict[str, Any]]) -> None:
+    """Check that no node has two parents and that no node is its own ancestor.
+
+    With one parent each, a walk visits no node twice, and only a cycle can make it endless.
+
+    Raises:
+        MeshError: If the nodes are no forest, or are nested deeper than 1000.
+    """
     parents: dict[int, int] = {}
     for number, node in enumerate(nodes):
         for child in _list(node, "children"):
             if child in parents:
-                raise MeshError(path, f"node {child} hangs on two others; glTF allows one")
+                raise MeshError(path, f"node {child} has two parents; glTF allows one")
             parents[child] = number
     for start in range(len(nodes)):
         seen, number = 0, start
         while number in parents:
             number, seen = parents[number], seen + 1
             if seen > min(1000, len(nodes)):
-                raise MeshError(path, f"node {start} is nested deeper than 1000, or in a circle")
+                raise MeshError(path, f"node {start} is nested deeper than 1000, or is its own ancestor")
 
 
 def _check_drawn(path: Path, document: dict[str, Any]) -> None:
-    """Refuse a small file of many nodes and primitives that all draw the same values."""
+    """Reject a small file whose many nodes and primitives all draw the same values.
+
+    Raises:
+        MeshError: If they draw more than MAX_DRAWN points and corners.
+    """
 
     def count(number: object) -> int:
         accessors = _list(document, "accessors")
@@ -316,7 +339,7 @@ def _check_drawn(path: Path, document: dict[str, Any]) -> None:
     meshes = [node.get("mesh") for node in _list(document, "nodes") if isinstance(node, dict)]
     drawn = sum(sizes[each] for each in meshes if isinstance(each, int) and 0 <= each < len(sizes))
     if drawn > MAX_DRAWN:
-        raise MeshError(path, f"draws {drawn} points and corners; up to {MAX_DRAWN} are read")
+        raise MeshError(path, f"draws {drawn} points and corners; at most {MAX_DRAWN} are read")
 
 
 def _gltf_base_colors(document: dict[str, Any]) -> dict[str, tuple[float, ...]]:
@@ -359,7 +382,7 @@ def _list(document: dict[str, Any], key: str) -> list[Any]:
     return value if isinstance(value, list) else []
 
 
-_READERS: Mapping[str, Callable[[Path, bytes], Claims]] = {
+_READERS: Mapping[str, Callable[[Path, bytes], Declared]] = {
     "stl": _stl,
     "ply": _ply,
     "obj": _obj,

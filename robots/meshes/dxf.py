@@ -1,11 +1,11 @@
-"""DXF files to meshes, parsed by ezdxf: what is drawn in the model space, blocks unfolded.
+"""DXF reader: the model space of a file that ezdxf has parsed, with blocks expanded.
 
     3DFACE, SOLID, TRACE, POLYLINE (polyface, polygon mesh), MESH     triangles
     LINE, LWPOLYLINE, POLYLINE, CIRCLE, ARC, ELLIPSE, SPLINE, POINT   wires
-    INSERT                                                            its block, placed, row by row
+    INSERT                                                            its block, once per row and column
     3DSOLID, BODY, REGION, SURFACE                                    named in a warning: they are ACIS
 
-Colours: an entity's own (true colour, or the index), its layer's (BYLAYER), its INSERT's (BYBLOCK).
+A colour is the entity's (true colour, or index), its layer's (BYLAYER) or its INSERT's (BYBLOCK).
 """
 
 import importlib
@@ -28,23 +28,23 @@ from robots.meshes.normals import creased
 from robots.meshes.polygons import Effort, ears
 
 MAX_ENTITIES = 1_000_000
-MAX_COPIES = 20_000  # of blocks: each takes ezdxf near a millisecond
+MAX_COPIES = 20_000  # of blocks: ezdxf takes about a millisecond for each
 MAX_DEPTH = 32
-_MOST_BROKEN = 20  # that are named
+_MOST_BROKEN = 20  # broken entities named in warnings
 _CREASE = np.radians(30)
 _BYBLOCK, _BYLAYER = 0, 256
 _CURVES = {"LINE", "LWPOLYLINE", "POLYLINE", "CIRCLE", "ARC", "ELLIPSE", "SPLINE"}
 _FLAT = {"3DFACE", "SOLID", "TRACE"}
 _READ = {"INSERT", "MESH", "POINT"} | _CURVES | _FLAT
 _ACIS = {"3DSOLID", "BODY", "REGION", "SURFACE", "EXTRUDEDSURFACE", "LOFTEDSURFACE", "REVOLVEDSURFACE"}
-# $INSUNITS [m]; 0 says nothing.
+# $INSUNITS [m]; 0 means unitless.
 UNITS_M = {1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 6: 1.0, 7: 1000.0, 8: 2.54e-8, 9: 2.54e-5, 10: 0.9144}
 UNITS_M |= {11: 1e-10, 12: 1e-9, 13: 1e-6, 14: 0.1}
 
 
 @dataclass(frozen=True)
-class _Look:
-    """What an INSERT hands down to its block: a colour for BYBLOCK, a layer for layer 0."""
+class _Appearance:
+    """The layer and colour of an entity; an INSERT's replace layer 0 and BYBLOCK in its block."""
 
     layer: str = "0"
     color: Color = (0.8, 0.8, 0.8)
@@ -57,9 +57,9 @@ class _Look:
 
 @dataclass
 class _Found:
-    polygons: dict[_Look, list[FloatArray]] = field(default_factory=dict)
-    lines: dict[_Look, list[FloatArray]] = field(default_factory=dict)
-    points: dict[_Look, list[FloatArray]] = field(default_factory=dict)
+    polygons: dict[_Appearance, list[FloatArray]] = field(default_factory=dict)
+    lines: dict[_Appearance, list[FloatArray]] = field(default_factory=dict)
+    points: dict[_Appearance, list[FloatArray]] = field(default_factory=dict)
     left_out: Counter[str] = field(default_factory=Counter)
     broken: dict[str, str] = field(default_factory=dict)
     entities: int = 0
@@ -67,41 +67,41 @@ class _Found:
 
 
 def read_dxf(path: Path) -> Mesh:
-    """The faces, lines and points of a .dxf file, in its own units and axes.
+    """Return the faces, lines and points of a .dxf file, in the file's units and axes.
 
     Raises:
-        MeshError: If it is not a DXF file, or one past mending.
+        MeshError: If it is not a DXF file, or is too damaged for ezdxf to recover.
     """
     content(path)
     try:
         drawing, warnings = open_drawing(path)
         found = _Found()
         for entity in drawing.modelspace():
-            _walk(path, drawing, entity, _Look(), found, 0)
+            _walk(path, drawing, entity, _Appearance(), found, 0)
         effort = Effort()
         effort.grant(sum(len(polygon) for polygons in found.polygons.values() for polygon in polygons))
-        parts = [_part(look, polygons, effort) for look, polygons in found.polygons.items()]
-        wires = [_lines(look, runs) for look, runs in found.lines.items()]
-        wires += [_points(look, points) for look, points in found.points.items()]
+        parts = [_part(appearance, polygons, effort) for appearance, polygons in found.polygons.items()]
+        wires = [_lines(appearance, runs) for appearance, runs in found.lines.items()]
+        wires += [_points(appearance, points) for appearance, points in found.points.items()]
         units = int(drawing.header.get("$INSUNITS", 0) or 0)
     except MeshError:
         raise
     except MemoryError as error:
-        raise MeshError(path, "needs more memory than there is") from error
-    # ezdxf raises whatever its code runs into on broken files.
+        raise MeshError(path, "needs more memory than is available") from error
+    # ezdxf raises arbitrary exceptions for damaged files.
     except Exception as error:
         first = next(iter(str(error).splitlines()), "")[:200]
-        raise MeshError(path, f"is no DXF that can be read: {first or type(error).__name__}") from error
+        raise MeshError(path, f"cannot be read as DXF: {first or type(error).__name__}") from error
     shapes: list[Part | Wire] = [*parts, *wires]
     for shape in shapes:
         if not np.isfinite(shape.vertices).all():
-            raise MeshError(path, f"layer {shape.name!r} has a point that is not finite")
+            raise MeshError(path, f"layer {shape.name!r} has a point with a non-finite coordinate")
     warnings += _left_out(found.left_out)
     warnings += [f"{what} left out: {reason}" for what, reason in found.broken.items()]
     if effort.spent:
-        warnings.append("concave faces take too much work to cut; some are drawn beyond their outline")
+        warnings.append("concave faces take too long to triangulate; some are drawn beyond their outline")
     if not shapes:
-        warnings.append("holds nothing that can be drawn")
+        warnings.append("has no shape that can be drawn")
     return Mesh(
         tuple(part for part in parts if len(part.triangles)),
         tuple(wires),
@@ -112,7 +112,7 @@ def read_dxf(path: Path) -> Mesh:
 
 
 def open_drawing(path: Path) -> tuple[Any, list[str]]:
-    """The drawing as ezdxf has it, and what was wrong with the file; raises whatever ezdxf runs into."""
+    """Return ezdxf's drawing and warnings about the file; any exception of ezdxf passes through."""
     ezdxf = _ezdxf()
     errors: Any = importlib.import_module("ezdxf.lldxf.const")
     logging.getLogger("ezdxf").setLevel(logging.CRITICAL)
@@ -121,11 +121,14 @@ def open_drawing(path: Path) -> tuple[Any, list[str]]:
     except (errors.DXFError, UnicodeDecodeError, ValueError, KeyError):
         recover: Any = importlib.import_module("ezdxf.recover")
         drawing, _ = recover.readfile(path)
-        return drawing, ["was broken; what ezdxf could save of it is here"]
+        return drawing, ["is damaged; only what ezdxf could recover is read"]
 
 
 def _ezdxf() -> Any:
-    """The library, which at its first import lists the machine's fonts in the user's cache: not there."""
+    """Import ezdxf with a temporary cache folder.
+
+    At its first import ezdxf would write a list of the machine's fonts to the user's cache.
+    """
     if "ezdxf" in sys.modules:
         return sys.modules["ezdxf"]
     before = os.environ.get("XDG_CACHE_HOME")
@@ -145,60 +148,64 @@ def _left_out(counts: Counter[str]) -> list[str]:
     solids = {name: count for name, count in counts.items() if name in _ACIS}
     if solids:
         listed = ", ".join(f"{count} {name}" for name, count in sorted(solids.items()))
-        warnings.append(f"{listed} left out: their shape is ACIS, which is not read; export STEP or STL")
+        warnings.append(f"{listed} left out: ACIS shapes are not read; export STEP or STL")
     others = sorted(set(counts) - set(solids))
     if others:
         warnings.append(f"left out: {', '.join(f'{counts[name]} {name}' for name in others[:20])}")
     return warnings
 
 
-def _walk(path: Path, drawing: Any, entity: Any, above: _Look, found: _Found, depth: int) -> None:
+def _walk(path: Path, drawing: Any, entity: Any, above: _Appearance, found: _Found, depth: int) -> None:
     found.entities += 1
     if found.entities > MAX_ENTITIES:
-        raise MeshError(path, f"draws more than {MAX_ENTITIES} entities, blocks unfolded")
+        raise MeshError(path, f"draws more than {MAX_ENTITIES} entities, with blocks expanded")
     if depth > MAX_DEPTH:
-        raise MeshError(path, f"INSERT {entity.dxf.name!r} is nested deeper than {MAX_DEPTH}, or in a circle")
+        raise MeshError(
+            path, f"INSERT {entity.dxf.name!r} is nested deeper than {MAX_DEPTH}, or contains itself"
+        )
     try:
         _draw(path, drawing, entity, above, found, depth)
     except (MeshError, MemoryError, RecursionError):
         raise
-    # ezdxf raises whatever its code runs into: one broken entity is no reason to refuse the others.
+    # ezdxf raises arbitrary exceptions; one broken entity must not make the whole file unreadable.
     except Exception as error:
         if len(found.broken) < _MOST_BROKEN:
             reason = next(iter(str(error).splitlines()), "")[:200] or type(error).__name__
             found.broken[f"{entity.dxftype()} {entity.dxf.handle}"] = f"it is broken: {reason}"
 
 
-def _draw(path: Path, drawing: Any, entity: Any, above: _Look, found: _Found, depth: int) -> None:
+def _draw(path: Path, drawing: Any, entity: Any, above: _Appearance, found: _Found, depth: int) -> None:
     kind = entity.dxftype()
-    # Not every entity has a layer and a transparency: ACAD_TABLE has none in ezdxf.
+    # Before the layer is read: some entities, such as ACAD_TABLE, have none in ezdxf.
     if kind not in _READ:
         found.left_out[kind] += 1
         return
-    look = _look(drawing, entity, above)
+    appearance = _appearance(drawing, entity, above)
     if kind == "INSERT":
         for one in _copies(path, entity, found):
             for child in one.virtual_entities(skipped_entity_callback=lambda e, _: _skip(e, found)):
-                _walk(path, drawing, child, look, found, depth + 1)
+                _walk(path, drawing, child, appearance, found, depth + 1)
     elif kind in _FLAT:
-        found.polygons.setdefault(look, []).append(_array(entity.wcs_vertices()))
+        found.polygons.setdefault(appearance, []).append(_array(entity.wcs_vertices()))
     elif kind == "MESH":
         corners = _array(entity.vertices)
         for face in entity.faces:
-            found.polygons.setdefault(look, []).append(corners[list(face)])
+            found.polygons.setdefault(appearance, []).append(corners[list(face)])
     elif kind == "POLYLINE" and (entity.is_poly_face_mesh or entity.is_polygon_mesh):
         for face in entity.virtual_entities():
-            found.polygons.setdefault(look, []).append(_array(face.wcs_vertices()))
+            found.polygons.setdefault(appearance, []).append(_array(face.wcs_vertices()))
     elif kind in _CURVES:
         curve = importlib.import_module("ezdxf.path").make_path(entity)
         corners = _array(curve.control_vertices())
         size = max(_size(corners), 1e-9)
-        # Flattened by halves until it is near enough: that never ends where nothing is near.
+        # `flattening` bisects until it is close enough, which never ends for a non-finite point.
         if not np.isfinite(size):
-            raise MeshError(path, f"{kind} on layer {look.layer!r} has a point that is not finite")
-        found.lines.setdefault(look, []).append(_array(curve.flattening(size / 200)))
+            raise MeshError(
+                path, f"{kind} on layer {appearance.layer!r} has a point with a non-finite coordinate"
+            )
+        found.lines.setdefault(appearance, []).append(_array(curve.flattening(size / 200)))
     else:
-        found.points.setdefault(look, []).append(_array([entity.dxf.location]))
+        found.points.setdefault(appearance, []).append(_array([entity.dxf.location]))
 
 
 def _skip(entity: Any, found: _Found) -> None:
@@ -210,12 +217,13 @@ def _copies(path: Path, insert: Any, found: _Found) -> Iterator[Any]:
     found.copies += count
     if found.copies > MAX_COPIES:
         raise MeshError(
-            path, f"INSERT {insert.dxf.name!r}: {found.copies} copies of blocks; up to {MAX_COPIES} are read"
+            path,
+            f"INSERT {insert.dxf.name!r}: {found.copies} copies of blocks; at most {MAX_COPIES} are read",
         )
     return iter(insert.multi_insert()) if count > 1 else iter([insert])
 
 
-def _look(drawing: Any, entity: Any, above: _Look) -> _Look:
+def _appearance(drawing: Any, entity: Any, above: _Appearance) -> _Appearance:
     layer = above.layer if entity.dxf.layer == "0" else entity.dxf.layer
     index = entity.dxf.get("color", _BYLAYER)
     if entity.dxf.hasattr("true_color"):
@@ -227,7 +235,7 @@ def _look(drawing: Any, entity: Any, above: _Look) -> _Look:
     transparency = float(entity.transparency)
     if getattr(entity, "is_transparency_by_block", False):
         transparency = above.transparency
-    return _Look(layer, color, min(max(transparency, 0.0), 1.0))
+    return _Appearance(layer, color, min(max(transparency, 0.0), 1.0))
 
 
 def _layer_color(drawing: Any, name: str) -> Color:
@@ -241,7 +249,7 @@ def _layer_color(drawing: Any, name: str) -> Color:
 
 def _indexed(index: int) -> Color:
     colors: Any = importlib.import_module("ezdxf.colors")
-    # 7 is "black or white", whatever the page is not: neither shows a shape.
+    # 7 is black or white, the opposite of the background; neither shows a shape well.
     if not 0 < index < 256 or index == 7:
         return 0.8, 0.8, 0.8
     red, green, blue = colors.aci2rgb(index)
@@ -260,7 +268,7 @@ def _size(points: FloatArray) -> float:
     return float(np.ptp(points, axis=0).max()) if len(points) else 0.0
 
 
-def _part(look: _Look, polygons: list[FloatArray], effort: Effort) -> Part:
+def _part(appearance: _Appearance, polygons: list[FloatArray], effort: Effort) -> Part:
     corners, triangles, count = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], 0
     for polygon in polygons:
         if len(polygon) < 3:
@@ -275,19 +283,20 @@ def _part(look: _Look, polygons: list[FloatArray], effort: Effort) -> Part:
         triangles.append(cut + count)
         count += len(polygon)
     made = creased(*welded(np.concatenate(corners), np.concatenate(triangles)), _CREASE)
-    # A drawing's faces have no outside that is agreed on.
-    return Part(look.layer, look.material, *made, two_sided=True)
+    # DXF does not define which side of a face is outside.
+    return Part(appearance.layer, appearance.material, *made, two_sided=True)
 
 
-def _lines(look: _Look, runs: list[FloatArray]) -> Wire:
+def _lines(appearance: _Appearance, runs: list[FloatArray]) -> Wire:
     pairs: list[IndexArray] = []
     start = 0
     for run in runs:
         steps = np.arange(start, start + len(run) - 1, dtype=np.int64)
         pairs.append(np.column_stack([steps, steps + 1]))
         start += len(run)
-    return Wire(look.layer, look.material, np.concatenate(runs), np.concatenate(pairs))
+    return Wire(appearance.layer, appearance.material, np.concatenate(runs), np.concatenate(pairs))
 
 
-def _points(look: _Look, points: list[FloatArray]) -> Wire:
-    return Wire(look.layer, look.material, np.concatenate(points), np.zeros((0, 2), dtype=np.int64))
+def _points(appearance: _Appearance, points: list[FloatArray]) -> Wire:
+    none = np.zeros((0, 2), dtype=np.int64)
+    return Wire(appearance.layer, appearance.material, np.concatenate(points), none)

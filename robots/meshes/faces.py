@@ -1,7 +1,7 @@
-"""Faces with normals and colours of their own to triangles of vertices: what a graphics card takes.
+"""Conversion of polygon faces to triangles with one normal and colour per vertex, for a graphics card.
 
-A face has any number of corners; each corner has a point, and may have a normal and a colour by
-number. Corners with the same three become one vertex.
+A face has any number of corners. Each corner refers by number to a point, and optionally to a normal
+and a colour. Corners that share all three become one vertex.
 """
 
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ from robots.meshes.polygons import Effort, area_vectors, bent_inwards, ears, fan
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Rows of values, and which of them each corner has."""
+    """Rows of values, and the row number of each corner."""
 
     values: FloatArray
     chosen: IndexArray
@@ -30,10 +30,12 @@ class Faces:
         points: (n, 3).
         corners: (c,) point numbers, face after face.
         sizes: (f,) corners of each face.
-        normals: (m, 3) unit vectors by corner; none: made from the faces.
+        normals: (m, 3) unit vectors by corner; None: computed from the faces.
         colors: (m, 3) by corner.
         ccw: Corners run counter-clockwise, seen from outside.
-        crease: Faces that meet at less [rad] are drawn as one smooth surface.
+        solid: Only the outer side is drawn.
+        convex: Every face is convex.
+        crease: Faces that meet at a smaller angle [rad] are drawn as one smooth surface.
     """
 
     points: FloatArray
@@ -49,10 +51,12 @@ class Faces:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Triangles; not solid: seen from both sides; colours (v, 3) or none.
+    """Triangles.
 
     Attributes:
-        rough: Concave faces took too much work, and some triangles lie outside of their face.
+        colors: (v, 3), or None.
+        solid: Only the outer side is drawn.
+        rough: Concave faces took too long to triangulate, so some triangles are outside their face.
     """
 
     vertices: FloatArray
@@ -64,7 +68,7 @@ class Surface:
 
 
 def kept_faces(faces: Faces, kept: NDArray[np.bool_]) -> Faces:
-    """Only some of the faces, (f,)."""
+    """Return the faces for which the (f,) mask is true."""
     if kept.all():
         return faces
     corners = np.repeat(kept, faces.sizes)
@@ -82,16 +86,16 @@ def kept_faces(faces: Faces, kept: NDArray[np.bool_]) -> Faces:
 
 
 def surface(faces: Faces, effort: Effort) -> Surface:
-    """The triangles of faces; those of less than three corners are left out.
+    """Return the triangles of the faces; faces with fewer than three corners are left out.
 
     Args:
-        effort: What may go into concave faces of the whole file, less after it.
+        effort: Work budget for the concave faces of the whole file; reduced by this call.
     """
     faces = kept_faces(faces, faces.sizes >= 3)
     triangles, rough = _triangles(faces, effort)
     normals = _generated(faces) if faces.normals is None else faces.normals
     colors = faces.colors
-    # Flat facets share no vertex; else the corners of one point, normal and colour are one.
+    # Flat facets share no vertices. Otherwise corners with one point, normal and colour are merged.
     kept = np.arange(len(faces.corners))
     if faces.normals is not None or faces.crease > 0:
         kept, triangles = _joined(faces, normals, triangles)
@@ -108,7 +112,7 @@ def surface(faces: Faces, effort: Effort) -> Surface:
 
 
 def _generated(faces: Faces) -> Table:
-    """Normals of faces that have none."""
+    """Compute normals for faces that have none."""
     owners = np.repeat(np.arange(len(faces.sizes)), faces.sizes)
     areas = area_vectors(faces.points, faces.corners, faces.sizes)
     areas = areas if faces.ccw else -areas
@@ -119,7 +123,7 @@ def _generated(faces: Faces) -> Table:
 
 
 def _triangles(faces: Faces, effort: Effort) -> tuple[IndexArray, bool]:
-    """(t, 3) corners of the triangles, and whether some are rough."""
+    """Return the (t, 3) corners of the triangles, and whether some are outside their face."""
     if not len(faces.sizes):
         return np.zeros((0, 3), dtype=np.int64), False
     triangles, _ = fans(faces.sizes)
@@ -137,10 +141,10 @@ def _triangles(faces: Faces, effort: Effort) -> tuple[IndexArray, bool]:
 
 
 def _joined(faces: Faces, normals: Table, triangles: IndexArray) -> tuple[IndexArray, IndexArray]:
-    """Which corners stay as vertices, and the triangles of those."""
+    """Return the corners that become vertices, and the triangles as numbers of those vertices."""
     keys = corner_keys(faces.corners, normals.values[normals.chosen])
     if faces.colors is not None:
-        # Numbered first: a point, a normal and a colour do not fit into one key.
+        # Number the keys first: a point, a normal and a colour do not fit into 64 bits.
         _, keys = np.unique(keys, return_inverse=True)
         keys = keys * len(faces.colors.values) + faces.colors.chosen
     _, kept, vertex = np.unique(keys, return_index=True, return_inverse=True)

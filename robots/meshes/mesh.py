@@ -1,6 +1,6 @@
-"""What a mesh file holds, whatever its format: painted triangles, lines and points.
+"""Content of a mesh file in any format: triangles, lines and points with materials.
 
-All in the file's own units and axes.
+Coordinates are in the file's units and axes.
 """
 
 from dataclasses import dataclass, field, replace
@@ -15,7 +15,7 @@ Color = tuple[float, float, float]
 
 PAINT = "paint"
 _MIXERS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
-_STILL = np.eye(3)
+_NO_ROTATION = np.eye(3)
 
 
 @dataclass(frozen=True)
@@ -23,9 +23,9 @@ class Material:
     """A surface; colours are sRGB, each number 0 to 1.
 
     Attributes:
-        name: In the file; "paint" is what a description's colour replaces.
-        transparency: 0 opaque, 1 not to be seen.
-        texture: Name of the image that the file puts on it; kept by name, not drawn.
+        name: Name in the file; a robot description's colour replaces the material "paint".
+        transparency: 0 opaque, 1 invisible.
+        texture: Name of the texture image; the image is not drawn.
     """
 
     name: str = ""
@@ -45,8 +45,8 @@ class Part:
         vertices: (v, 3).
         normals: (v, 3) unit vectors, outwards.
         triangles: (t, 3) vertex numbers, counter-clockwise seen from outside.
-        two_sided: Both faces are to be drawn.
-        colors: (v, 4) sRGB and opacity, 0 to 1, instead of the material's; none: the material's.
+        two_sided: Both sides are drawn.
+        colors: (v, 4) sRGB and opacity, 0 to 1, instead of the material's; None: the material's.
     """
 
     name: str
@@ -65,7 +65,7 @@ class Wire:
     Attributes:
         vertices: (v, 3).
         segments: (s, 2) vertex numbers; (0, 2) for points.
-        colors: (v, 4) sRGB and opacity, 0 to 1, instead of the material's; none: the material's.
+        colors: (v, 4) sRGB and opacity, 0 to 1, instead of the material's; None: the material's.
     """
 
     name: str
@@ -77,11 +77,11 @@ class Wire:
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A place in a file's hierarchy that parts turn about; the parts themselves stand where they are drawn.
+    """A pivot in a file's hierarchy, about which parts turn; the parts' vertices are already in place.
 
     Attributes:
-        name: Its own; parts of this name move with it.
-        parent: Number of the node that carries it; -1 for none.
+        name: Parts with this name move with the node.
+        parent: Number of the parent node; -1 for none.
         node_to_file: (4, 4); its origin is the pivot.
     """
 
@@ -92,16 +92,16 @@ class Node:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A mesh file's whole content.
+    """The whole content of a mesh file.
 
     Attributes:
-        wires: Its lines and points; they count as no triangles and in no bounds.
-        warnings: What the reader found odd but could read, a sentence each.
-        missing: Files that it names and that are not there, as it names them; drawn without.
-        files: The other files that its reader looked for, there or not: its content is theirs too.
-        nodes: Its hierarchy, where the format has one that says more than the parts do (3DS).
-        unit_m: Length of its unit [m] as the file, or its format, states it; none: it does not.
-        up: Its upward axis as the file, or its format, states it, "y" or "z"; empty: it does not.
+        wires: Lines and points; triangle counts and bounds do not include them.
+        warnings: Irregularities that the reader could handle, a sentence each.
+        missing: Names, as in the file, of other files that do not exist; the mesh is drawn without them.
+        files: Other files that the reader looked for, existing or not: the content depends on them.
+        nodes: Hierarchy, if the format has one that adds to the parts (3DS).
+        unit_m: Length of the unit [m] that the file or its format states; None if neither does.
+        up: Upward axis, "y" or "z", that the file or its format states; empty if neither does.
     """
 
     parts: tuple[Part, ...] = ()
@@ -115,25 +115,29 @@ class Mesh:
 
     @property
     def triangle_count(self) -> int:
-        """Number of triangles of all parts."""
+        """Total number of triangles."""
         return sum(len(part.triangles) for part in self.parts)
 
 
 def welded(vertices: FloatArray, triangles: IndexArray) -> tuple[FloatArray, IndexArray]:
-    """Vertices at one place made one, as smoothing needs it; every triangle is kept."""
-    places = np.ascontiguousarray(vertices + 0.0)  # -0 is 0
-    bits = places.view(np.uint64)
-    # Sorting one number a vertex takes a tenth of sorting three; two places may share it.
+    """Merge vertices that have the same position, which smoothing needs; every triangle is kept.
+
+    Returns:
+        Vertices (w, 3) and triangles (t, 3).
+    """
+    positions = np.ascontiguousarray(vertices + 0.0)  # turns -0 into 0
+    bits = positions.view(np.uint64)
+    # Sorting one hash per vertex takes a tenth of the time of sorting three numbers; hashes may collide.
     keys = (bits * _MIXERS[: bits.shape[1]]).sum(axis=1)
     keys ^= keys >> np.uint64(29)
     _, kept, number = np.unique(keys, return_index=True, return_inverse=True)
-    if not np.array_equal(places[kept][number], places):
-        _, kept, number = np.unique(places, axis=0, return_index=True, return_inverse=True)
-    return places[kept], number.reshape(-1)[triangles].astype(np.int64)
+    if not np.array_equal(positions[kept][number], positions):
+        _, kept, number = np.unique(positions, axis=0, return_index=True, return_inverse=True)
+    return positions[kept], number.reshape(-1)[triangles].astype(np.int64)
 
 
 def bounds(mesh: Mesh) -> tuple[FloatArray, FloatArray]:
-    """Least and greatest corner, (3,) each, of the vertices that triangles use; zeros for an empty mesh."""
+    """Return the lower and upper corner, (3,) each, of the vertices in triangles; zeros for an empty mesh."""
     used = [part.vertices[np.unique(part.triangles)] for part in mesh.parts if len(part.triangles)]
     if not used:
         return np.zeros(3), np.zeros(3)
@@ -142,14 +146,14 @@ def bounds(mesh: Mesh) -> tuple[FloatArray, FloatArray]:
 
 
 def placed(wire: Wire, placement: FloatArray) -> Wire:
-    """A wire moved by a (4, 4) affine transform."""
+    """Return a wire moved by a (4, 4) affine transform."""
     return replace(wire, vertices=wire.vertices @ placement[:3, :3].T + placement[:3, 3])
 
 
 def transformed(part: Part, placement: FloatArray) -> Part:
-    """A part moved by a (4, 4) affine transform; a mirroring one turns the triangles over."""
+    """Return a part moved by a (4, 4) affine transform; a mirroring one reverses the triangles' winding."""
     linear = placement[:3, :3]
-    if (linear == _STILL).all():  # many of many thousands of parts are only shifted
+    if (linear == _NO_ROTATION).all():  # large files have thousands of parts that are only shifted
         return replace(part, vertices=part.vertices + placement[:3, 3])
     triangles = part.triangles[:, ::-1] if np.linalg.det(linear) < 0 else part.triangles
     return replace(
@@ -161,7 +165,7 @@ def transformed(part: Part, placement: FloatArray) -> Part:
 
 
 def transformed_mesh(mesh: Mesh, placement: FloatArray) -> Mesh:
-    """A whole mesh, wires and nodes too, moved by a (4, 4) affine transform."""
+    """Return a mesh with its wires and nodes moved by a (4, 4) affine transform."""
     return replace(
         mesh,
         parts=tuple(transformed(part, placement) for part in mesh.parts),
@@ -171,15 +175,15 @@ def transformed_mesh(mesh: Mesh, placement: FloatArray) -> Mesh:
 
 
 def _normal_transform(linear: FloatArray) -> FloatArray:
-    """The cofactors: as the inverse transpose, but for its length, and there for singular matrices too."""
+    """Return the cofactor matrix: parallel to the inverse transpose, but defined for singular matrices."""
     one, other = linear[[1, 2, 0]], linear[[2, 0, 1]]
-    # Rows crossed with rows, without numpy.cross: it is slow for files of thousands of parts.
+    # Not numpy.cross, which is slow for files with thousands of parts.
     cofactors = one[:, [1, 2, 0]] * other[:, [2, 0, 1]] - one[:, [2, 0, 1]] * other[:, [1, 2, 0]]
     return cofactors if np.linalg.det(linear) >= 0 else -cofactors
 
 
 def unit(vectors: FloatArray) -> FloatArray:
-    """(n, 3) vectors at length one; zero, and what is too long to measure, becomes zero."""
+    """Return (n, 3) vectors scaled to length one; zero vectors and those of infinite length become zero."""
     with np.errstate(over="ignore", invalid="ignore"):
         lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
     measured = (lengths > 0) & np.isfinite(lengths)

@@ -1,4 +1,4 @@
-"""Normals where a file gives none: smooth over gentle edges, sharp at creases."""
+"""Vertex normals for files without them: smooth across gentle edges, sharp at creases."""
 
 from collections.abc import Callable, Iterator
 from itertools import pairwise
@@ -11,25 +11,25 @@ from robots.meshes.polygons import area_vectors
 
 Split = tuple[FloatArray, FloatArray, IndexArray]
 _Flags = NDArray[np.bool_]
-# Whether face `one[k]` and face `other[k]` are smooth together, for each k.
+# Returns for each k whether faces `one[k]` and `other[k]` are smoothed together.
 _Smooth = Callable[[IndexArray, IndexArray], _Flags]
 
-# Pairs of corners looked at together: some tens of MB.
+# Pairs of corners in one batch: some tens of MB.
 _PAIRS = 200_000
-# A vertex of more faces, such as the tip of a fine cone, stays faceted: its pairs would be millions.
+# A vertex with more faces, such as the tip of a fine cone, stays faceted: it would have millions of pairs.
 _MOST_AT_ONE_VERTEX = 700
 
 
 def creased(vertices: FloatArray, triangles: IndexArray, crease_angle: float) -> Split:
-    """Vertices split where faces meet at more than the crease angle.
+    """Split vertices where faces meet at more than the crease angle, and compute normals.
 
     Args:
         vertices: (v, 3).
         triangles: (t, 3).
-        crease_angle: Faces that meet at less are drawn as one smooth surface [rad]; 0: flat facets.
+        crease_angle: Faces that meet at a smaller angle [rad] become one smooth surface; 0: flat facets.
 
     Returns:
-        Vertices (w, 3), normals (w, 3) and triangles (t, 3), the same surface.
+        Vertices (w, 3), normals (w, 3) and triangles (t, 3) of the same surface.
     """
     areas = _areas(vertices, triangles)
     normals = crease_normals(triangles.ravel(), np.repeat(np.arange(len(triangles)), 3), areas, crease_angle)
@@ -37,7 +37,10 @@ def creased(vertices: FloatArray, triangles: IndexArray, crease_angle: float) ->
 
 
 def grouped(vertices: FloatArray, triangles: IndexArray, groups: IndexArray) -> Split:
-    """As `creased`, by 3DS smoothing groups: faces are smooth together that share a bit of (t,) `groups`."""
+    """Split vertices by 3DS smoothing groups; faces that share a bit of (t,) `groups` become smooth.
+
+    Returns the same arrays as `creased`.
+    """
 
     def smooth(one: IndexArray, other: IndexArray) -> _Flags:
         share: _Flags = (groups[one] & groups[other]) != 0
@@ -51,12 +54,12 @@ def grouped(vertices: FloatArray, triangles: IndexArray, groups: IndexArray) -> 
 def crease_normals(
     corners: IndexArray, owners: IndexArray, areas: FloatArray, crease_angle: float
 ) -> FloatArray:
-    """(c, 3) normal at each corner of each face, of the faces there that meet at less than the angle.
+    """Return the (c, 3) normal of each corner, averaged over the faces that meet at less than the angle.
 
     Args:
-        corners: (c,) number of the vertex at each corner.
-        owners: (c,) number of the face that each corner is of.
-        areas: (f, 3) normals of the faces, as long as their area.
+        corners: (c,) vertex number of each corner.
+        owners: (c,) face number of each corner.
+        areas: (f, 3) face normals, with the length of the face's area.
         crease_angle: [rad].
     """
     sums = [np.bincount(corners, weights=areas[owners, axis]) for axis in range(3)]
@@ -64,7 +67,8 @@ def crease_normals(
     if crease_angle >= np.pi:
         return normals
     facing = unit(areas)
-    # Faces that all lie within half the angle of one direction meet at less than the angle: most do.
+    # Faces within half the angle of their mean direction meet at less than the angle. Most vertices pass
+    # this quick test.
     far = np.einsum("ij,ij->i", facing[owners], normals) <= np.cos(crease_angle / 2)
     rough = (np.bincount(corners, weights=far) > 0)[corners]
     limit = np.cos(crease_angle)
@@ -78,11 +82,11 @@ def crease_normals(
 
 
 def joined(points: FloatArray, corners: IndexArray, normals: FloatArray) -> Split:
-    """Corners of one point and (nearly) one normal become one vertex.
+    """Merge corners that have one point and (nearly) one normal into one vertex.
 
     Args:
-        corners: (t, 3) point at each corner of each triangle.
-        normals: (3 t, 3) normal there.
+        corners: (t, 3) point number of each corner of each triangle.
+        normals: (3 t, 3) normal of each corner.
     """
     keys = corner_keys(corners.ravel(), normals)
     _, kept, vertex = np.unique(keys, return_index=True, return_inverse=True)
@@ -90,9 +94,9 @@ def joined(points: FloatArray, corners: IndexArray, normals: FloatArray) -> Spli
 
 
 def corner_keys(corners: IndexArray, normals: FloatArray) -> IndexArray:
-    """(c,) a number of the point and the normal of each corner, to tell corners that are one vertex.
+    """Return a (c,) key from the point and the normal of each corner; equal keys mean one vertex.
 
-    Normals are told apart to 1/1024; points up to 2**30.
+    Normals are rounded to 1/1024; point numbers may go up to 2**30.
     """
     rounded = np.round(normals * 1023).astype(np.int64) + 1023
     keys: IndexArray = (corners << 33) | (rounded[:, 0] << 22) | (rounded[:, 1] << 11) | rounded[:, 2]
@@ -106,8 +110,8 @@ def _areas(vertices: FloatArray, triangles: IndexArray) -> FloatArray:
 def _corner_normals(
     corners: IndexArray, owners: IndexArray, areas: FloatArray, smooth: _Smooth
 ) -> FloatArray:
-    """Each corner's normal from the faces at its vertex that are smooth with its own."""
-    # Weighted by area: the small triangles of a fillet must not tilt the plane beside it.
+    """Return each corner's normal from the faces at its vertex that are smoothed with the corner's face."""
+    # Weighted by area: the small triangles of a fillet must not tilt the plane next to it.
     sums = areas[owners]
     for first, second in _pairs(corners):
         kept = smooth(owners[first], owners[second])
@@ -118,7 +122,7 @@ def _corner_normals(
 
 
 def _pairs(corners: IndexArray) -> Iterator[tuple[IndexArray, IndexArray]]:
-    """All ordered pairs of different corners that share a vertex, in pieces."""
+    """Yield all ordered pairs of different corners that share a vertex, in batches."""
     order = np.argsort(corners, kind="stable")
     ranked = corners[order]
     starts = np.flatnonzero(np.diff(ranked, prepend=-1))
@@ -134,7 +138,7 @@ def _pairs(corners: IndexArray) -> Iterator[tuple[IndexArray, IndexArray]]:
 
 
 def _pairs_of(order: IndexArray, starts: IndexArray, counts: IndexArray) -> tuple[IndexArray, IndexArray]:
-    # Corner k of a vertex with c corners is repeated c times, beside the c corners in turn.
+    # Corner k of a vertex with c corners is repeated c times, paired with each of the c corners.
     per_vertex = counts**2
     run = np.repeat(np.arange(len(counts)), per_vertex)
     within = np.arange(len(run)) - np.repeat(np.cumsum(per_vertex) - per_vertex, per_vertex)

@@ -1,7 +1,7 @@
-"""Polygons to triangles: fans where they are convex, ears where they are not.
+"""Triangulation of polygons: fans for convex ones, ear clipping for the others.
 
-Polygons are (c,) point numbers of their corners, one after the other, and (p,) how many corners
-each has, at least three.
+Polygons are given as (c,) point numbers of the corners of all polygons in order, and (p,) numbers of
+corners of each polygon, at least three.
 """
 
 import numpy as np
@@ -9,40 +9,40 @@ from numpy.typing import NDArray
 
 from robots.meshes.mesh import FloatArray, IndexArray
 
-# Looking for an ear costs about as much as ordering so many corners; looking at one closely, as so many.
+# Costs in units of sorting one corner: to test a corner for an ear, to test one point inside the ear, and
+# to skip a reflex corner.
 _TRY = 1000
 _LOOK = 50
-# Going past a corner that bends inwards.
 _STEP = 10
-# A corner needs a try or two. Beyond that some seconds' work is the most, however many faces a file has.
+# A corner needs a try or two. The budget beyond that is a few seconds for a whole file.
 _A_CORNER = 3 * _TRY
 _BEYOND = 150_000_000
 
 
 class Effort:
-    """The work that the polygons of one file are worth; when it is spent, the rest is cut anyhow."""
+    """The work budget for the polygons of one file; when it is spent, the rest is cut without tests."""
 
     def __init__(self) -> None:
         self.left = _BEYOND
 
     def grant(self, corners: int) -> None:
-        """Allow what polygons of so many corners need where they are not made to be slow."""
+        """Add the work that ordinary polygons with this many corners need."""
         self.left += _A_CORNER * corners
 
     @property
     def spent(self) -> bool:
-        """Whether some triangles may lie outside of their polygon, or over others."""
+        """Whether the budget is spent, so that triangles may overlap or leave their polygon."""
         return self.left < 0
 
 
 def starts_of(sizes: IndexArray) -> IndexArray:
-    """(p,) where each polygon's corners begin."""
+    """Return the (p,) indices of each polygon's first corner."""
     starts: IndexArray = np.cumsum(sizes) - sizes
     return starts
 
 
 def fans(sizes: IndexArray) -> tuple[IndexArray, IndexArray]:
-    """(t, 3) corners of the triangles of convex polygons, and (t,) the polygon of each."""
+    """Return the (t, 3) corners of the triangles of convex polygons, and each triangle's (t,) polygon."""
     if (sizes == 3).all():
         return np.arange(3 * len(sizes)).reshape(-1, 3), np.arange(len(sizes))
     counts = sizes - 2
@@ -53,14 +53,17 @@ def fans(sizes: IndexArray) -> tuple[IndexArray, IndexArray]:
 
 
 def area_vectors(points: FloatArray, corners: IndexArray, sizes: IndexArray) -> FloatArray:
-    """(p, 3) Newell's normals, counter-clockwise from their tip, as long as twice the area."""
+    """Return the (p, 3) Newell normals of the polygons, with a length of twice the area.
+
+    Seen from the tip of its normal, a polygon runs counter-clockwise.
+    """
     if not len(sizes):
         return np.zeros((0, 3))
     starts = starts_of(sizes)
     if (sizes == 3).all():
         a, b, c = (points[corners[k::3]] for k in range(3))
         return cross(b - a, c - a)
-    # From the first corner: far from the origin the plain sum would lose digits.
+    # Relative to the first corner: far from the origin the plain sum would lose digits.
     arms = points[corners] - np.repeat(points[corners[starts]], sizes, axis=0)
     following = np.arange(1, len(corners) + 1)
     following[starts + sizes - 1] = starts
@@ -69,7 +72,7 @@ def area_vectors(points: FloatArray, corners: IndexArray, sizes: IndexArray) -> 
 
 
 def cross(one: FloatArray, other: FloatArray) -> FloatArray:
-    """(n, 3) cross products, three times as fast as `numpy.cross`."""
+    """Return (n, 3) cross products, three times as fast as `numpy.cross`."""
     result = np.empty_like(one)
     for axis in range(3):
         second, third = (axis + 1) % 3, (axis + 2) % 3
@@ -78,7 +81,7 @@ def cross(one: FloatArray, other: FloatArray) -> FloatArray:
 
 
 def bent_inwards(points: FloatArray, corners: IndexArray, sizes: IndexArray) -> NDArray[np.bool_]:
-    """(p,) which polygons have a corner that bends inwards, so that a fan would not do."""
+    """Return a (p,) mask of the polygons with a reflex corner, which a fan cannot triangulate."""
     starts = starts_of(sizes)
     before, after = np.arange(-1, len(corners) - 1), np.arange(1, len(corners) + 1)
     before[starts] = starts + sizes - 1
@@ -92,14 +95,17 @@ def bent_inwards(points: FloatArray, corners: IndexArray, sizes: IndexArray) -> 
 
 
 def ears(corners: FloatArray, effort: Effort) -> IndexArray:
-    """(n - 2, 3) corners of the triangles of any simple polygon, in its own order, by ear clipping.
+    """Triangulate a simple polygon by ear clipping.
 
     Args:
-        corners: (n, 3), in a plane or nearly.
-        effort: What may go into it, less after it.
+        corners: (n, 3), nearly in a plane.
+        effort: Work budget; reduced by this call.
+
+    Returns:
+        (n - 2, 3) corner numbers, with the polygon's winding.
     """
     normal = area_vectors(corners, np.arange(len(corners)), np.array([len(corners)]))[0]
-    # Seen along the largest axis of the normal, so that the polygon keeps its shape and its sense.
+    # Projected along the largest component of the normal, which keeps shape and winding.
     axis = int(np.argmax(np.abs(normal)))
     flat = corners[:, [(axis + 1) % 3, (axis + 2) % 3]]
     if normal[axis] < 0:
@@ -108,7 +114,7 @@ def ears(corners: FloatArray, effort: Effort) -> IndexArray:
 
 
 class _Clipping:
-    """A ring of corners that loses an ear at a time; counter-clockwise."""
+    """A counter-clockwise ring of corners from which ears are cut one by one."""
 
     def __init__(self, flat: FloatArray, effort: Effort) -> None:
         self.x: list[float] = flat[:, 0].tolist()
@@ -117,13 +123,13 @@ class _Clipping:
         self.before = [count - 1, *range(count - 1)]
         self.after = [*range(1, count), 0]
         self.flat = flat
-        # Only a corner that bends inwards can lie in an ear; one that has ceased to never does again.
+        # Only a reflex corner can be inside an ear; a corner that becomes convex stays convex.
         self.inward = np.array([self.turn(corner) <= 0 for corner in range(count)])
         self.sort(np.argsort(flat[:, 0]))
         self.effort = effort
 
     def sort(self, order: IndexArray) -> None:
-        """Keep those of the corners, ordered by x, that bend inwards."""
+        """Keep the reflex corners of those given, which are ordered by x."""
         self.order = order[self.inward[order]]
         self.sorted_x = self.flat[self.order, 0]
         self.gone = 0
@@ -136,7 +142,8 @@ class _Clipping:
                 self.effort.left -= _STEP
                 corner, missed = self.after[corner], missed + 1
                 continue
-            # None is clean (it crosses itself, or is flat), or the work is spent: any corner will do.
+            # Cut here even without an ear if no corner is one (the polygon crosses itself or is flat) or
+            # the budget is spent.
             before, after = self.before[corner], self.after[corner]
             found.append((before, corner, after))
             self.after[before], self.before[after] = after, before
@@ -146,8 +153,8 @@ class _Clipping:
                     self.gone += 1
             if self.gone > len(self.order) // 2 and not self.effort.spent:
                 self.sort(self.order)
-            # The next ear is likely beside this one (an arm is eaten from its end); on either side in turn,
-            # or all would hang on one corner, long and thin.
+            # The next ear is probably next to this one. Alternate the sides, or all triangles would be long
+            # and thin and share one corner.
             corner, missed, left = before if left % 2 else after, 0, left - 1
         found.append((self.before[corner], corner, self.after[corner]))
         return found
@@ -156,7 +163,7 @@ class _Clipping:
         return self.side(self.before[corner], corner, self.after[corner])
 
     def side(self, a: int, b: int, c: int) -> float:
-        """Above 0: c lies left of the way from a to b."""
+        """Return a positive number if c is left of the line from a to b."""
         x, y = self.x, self.y
         return (x[b] - x[a]) * (y[c] - y[b]) - (y[b] - y[a]) * (x[c] - x[b])
 
@@ -164,7 +171,7 @@ class _Clipping:
         a, b, c = self.before[corner], corner, self.after[corner]
         tips = self.flat[[a, b, c]]
         low, high = tips.min(axis=0), tips.max(axis=0)
-        # The corners in the ear's bounding box that bend inwards.
+        # Reflex corners within the ear's bounding box.
         near = self.order[
             np.searchsorted(self.sorted_x, low[0]) : np.searchsorted(self.sorted_x, high[0], side="right")
         ]
@@ -172,11 +179,11 @@ class _Clipping:
         heights = self.flat[near, 1]
         near = near[self.inward[near] & (heights >= low[1]) & (heights <= high[1])]
         x, y = self.x, self.y
-        places = {(x[a], y[a]), (x[b], y[b]), (x[c], y[c])}
+        tip_positions = {(x[a], y[a]), (x[b], y[b]), (x[c], y[c])}
         for other in near.tolist():
             self.effort.left -= _LOOK
-            # A bridge to a hole visits a point twice: a corner at the same place does not spoil the ear.
-            if (x[other], y[other]) in places:
+            # A bridge to a hole visits a point twice, so a corner at the same position does not count.
+            if (x[other], y[other]) in tip_positions:
                 continue
             if self.side(a, b, other) >= 0 and self.side(b, c, other) >= 0 and self.side(c, a, other) >= 0:
                 return False

@@ -1,4 +1,4 @@
-"""Mesh files by their ending, and by what they hold where the ending is wrong."""
+"""Choice of a mesh file's reader by its content, or by its ending where the content is ambiguous."""
 
 import inspect
 from collections.abc import Callable, Mapping
@@ -33,7 +33,7 @@ READERS: Mapping[str, Callable[..., Mesh]] = {
     ".stp": read_step,
 }
 _IGES = {".igs", ".iges"}
-# Who says what they are; OBJ and VRML without a header do not.
+# Formats with a signature; OBJ, and VRML without its header, have none.
 _BEGINNINGS = (
     (b"#VRML", ".wrl"),
     (b"glTF", ".glb"),
@@ -45,37 +45,37 @@ _BEGINNINGS = (
 
 
 def read_mesh(path: Path, progress: Progress | None = None, *, within: Path | None = None) -> Mesh:
-    """A mesh file's content, in its own units and axes.
+    """Return a mesh file's content, in the file's units and axes.
 
     Args:
-        progress: Called now and then with how much is done, 0 to 1, by readers that can tell.
-        within: Only files below this folder are read beside it; others count as missing.
+        progress: Called with the completed fraction, 0 to 1, by readers that know it.
+        within: Other files are read below this folder only; files elsewhere count as missing.
 
     Raises:
-        MeshError: If its ending is not one that is read, or the file is not what it says it is.
+        MeshError: If the format is not supported, or the file is invalid.
     """
     ending = path.suffix.lower()
     if ending in _IGES:
-        raise MeshError(path, "IGES is not read: export STEP (.step), which every CAD program writes too")
-    held = _held(path)
-    kind = held or ending
+        raise MeshError(path, "IGES is not supported: export STEP (.step), which every CAD program writes")
+    kind = _kind_of_content(path) or ending
     if kind == "iges":
-        raise MeshError(path, "holds IGES, which is not read: export STEP (.step)")
+        raise MeshError(path, "contains IGES, which is not supported: export STEP (.step)")
     reader = READERS.get(kind)
     if reader is None:
-        raise MeshError(path, f"ending {path.suffix!r} is not read; {', '.join(READERS)} are")
+        raise MeshError(path, f"ending {path.suffix!r} is not supported; use {', '.join(READERS)}")
     options: dict[str, Any] = {"progress": progress, "within": within, "kind": kind.lstrip(".")}
     taken = inspect.signature(reader).parameters
     mesh = reader(path, **{name: value for name, value in options.items() if name in taken})
     if READERS.get(ending) is reader and (kind == ending or reader is not read_trimesh):
         return mesh
     return replace(
-        mesh, warnings=(f"ends in {ending!r} but holds {kind[1:].upper()}; read as that", *mesh.warnings)
+        mesh,
+        warnings=(f"ends in {ending!r} but contains {kind[1:].upper()}; read as that", *mesh.warnings),
     )
 
 
-def _held(path: Path) -> str:
-    """The ending that a file's first bytes ask for; empty where they do not tell."""
+def _kind_of_content(path: Path) -> str:
+    """Return the ending that fits a file's first bytes, or "iges"; empty if they are ambiguous."""
     try:
         with path.open("rb") as file:
             head = file.read(1024)

@@ -1,4 +1,4 @@
-"""Fewer triangles where a mesh has more than are of use to whoever looks at it."""
+"""Reduction of a mesh to a number of triangles that is enough for display."""
 
 import importlib
 from dataclasses import replace
@@ -10,12 +10,12 @@ from robots.meshes.mesh import Mesh, Part, welded
 from robots.meshes.normals import creased
 
 _CREASE = np.radians(30)
-# Smaller parts are left whole: a screw's few triangles are its shape.
+# Smaller parts are not reduced: a screw needs its few triangles.
 _LEAST = 64
 
 
 def lightened(mesh: Mesh, most: int) -> Mesh:
-    """A mesh of about `most` triangles; the mesh itself where it has no more."""
+    """Return the mesh reduced to about `most` triangles, or unchanged if it has no more."""
     count = mesh.triangle_count
     if count <= most:
         return mesh
@@ -36,7 +36,7 @@ def _light(part: Part, kept: float) -> Part:
     if part.colors is None:
         made = creased(points.astype(np.float64), faces.astype(np.int64), _CREASE)
         return replace(part, vertices=made[0], normals=made[1], triangles=made[2])
-    # Each new vertex has the colour of the first old one that became it.
+    # Each new vertex has the colour of the first old vertex that was merged into it.
     points, faces, became = library.replay_simplification(
         vertices.astype(np.float32), triangles.astype(np.int32), collapses
     )

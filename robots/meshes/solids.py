@@ -1,6 +1,6 @@
-"""Bodies to model with: turned profiles, lofted sections, plates, tubes.
+"""Constructors of solids: turned profiles, lofted sections, plates, tubes.
 
-A solid is (vertices, triangles), triangles counter-clockwise from outside. Outlines are (n, 2),
+A solid is (vertices, triangles), with triangles counter-clockwise seen from outside. Outlines are (n, 2),
 counter-clockwise.
 """
 
@@ -16,9 +16,9 @@ Profile = Sequence[tuple[float, float]]
 
 
 def turned(profile: Profile, segments: int) -> Solid:
-    """A profile of (radius, z) turned about z; it goes up along the outside.
+    """Return the solid of a profile of (radius, z) rotated about z; z increases along the outside.
 
-    A radius of zero is one point on the axis; a profile that does not begin or end there stays open.
+    A radius of zero is one point on the axis. A profile that does not begin or end on the axis stays open.
     """
     angles = np.arange(segments) * (2 * np.pi / segments)
     circle = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -37,9 +37,10 @@ def turned(profile: Profile, segments: int) -> Solid:
 
 
 def lofted(sections: Sequence[FloatArray]) -> Solid:
-    """Closed sections, (n, 3) each of as many points, joined, and closed at both ends.
+    """Return the solid that joins closed sections, (n, 3) each, and is closed at both ends.
 
-    Each section runs counter-clockwise seen from the next one. The first and last are star-shaped.
+    All sections have the same number of points. Each runs counter-clockwise seen from the next one.
+    The first and the last must be star-shaped.
     """
     count = len(sections[0])
     rings = [np.arange(count) + count * number for number in range(len(sections))]
@@ -49,7 +50,7 @@ def lofted(sections: Sequence[FloatArray]) -> Solid:
 
 
 def _skin(rings: Sequence[IndexArray]) -> IndexArray:
-    """Triangles between rings of vertex numbers that follow one another; those without area are left out."""
+    """Return the triangles between consecutive rings of vertex numbers, without degenerate ones."""
     pieces = []
     for below, above in pairwise(rings):
         next_below, next_above = np.roll(below, -1), np.roll(above, -1)
@@ -62,7 +63,7 @@ def _skin(rings: Sequence[IndexArray]) -> IndexArray:
 
 
 def rounded(profile: Profile, radius: float, steps: int = 2) -> list[tuple[float, float]]:
-    """A profile with its inner corners filleted, each by what its neighbours leave room for."""
+    """Return a profile with filleted inner corners; a fillet shrinks where its neighbours are close."""
     points = np.array(profile, dtype=np.float64)
     result = [points[0]]
     for before, corner, after in zip(points, points[1:], points[2:], strict=False):
@@ -74,7 +75,7 @@ def rounded(profile: Profile, radius: float, steps: int = 2) -> list[tuple[float
             result.append(corner)
             continue
         reach = min(radius / np.tan(half), 0.48 * min(lengths))
-        # A quadratic curve, tangent to both sides; from a true arc the eye cannot tell it.
+        # A quadratic curve tangent to both sides, which looks like an arc.
         for t in np.linspace(0, 1, steps + 1):
             start, end = corner + reach * to_before, corner + reach * to_after
             result.append((1 - t) ** 2 * start + 2 * t * (1 - t) * corner + t**2 * end)
@@ -83,7 +84,7 @@ def rounded(profile: Profile, radius: float, steps: int = 2) -> list[tuple[float
 
 
 def rectangle(width: float, height: float, radius: float, steps: int = 5) -> FloatArray:
-    """(4 (steps + 1), 2): a rectangle about the origin with round corners."""
+    """Return the (4 (steps + 1), 2) outline of a rectangle with round corners, centred on the origin."""
     radius = min(radius, width / 2 * 0.999, height / 2 * 0.999)
     points = []
     for quarter, (x, y) in enumerate([(1, 1), (-1, 1), (-1, -1), (1, -1)]):
@@ -96,7 +97,7 @@ def rectangle(width: float, height: float, radius: float, steps: int = 5) -> Flo
 def strap(
     start: FloatArray, start_radius: float, end: FloatArray, end_radius: float, count: int
 ) -> FloatArray:
-    """(count, 2): the outline of a band round two circles; `count` is even."""
+    """Return the (count, 2) outline of a band around two circles; `count` is even."""
     along = np.subtract(end, start)
     length = float(np.linalg.norm(along))
     heading = float(np.arctan2(along[1], along[0]))
@@ -112,7 +113,7 @@ def strap(
 
 
 def plate(outline: FloatArray, low: float, high: float, bevel: float, steps: int = 3) -> Solid:
-    """A convex outline in x and y, from z low to z high, its edges rounded."""
+    """Return a plate with a convex outline in x and y, from z low to z high, with rounded edges."""
     turns = np.linspace(0, np.pi / 2, steps + 1)
     below = [(bevel * (1 - np.sin(turn)), low + bevel * (1 - np.cos(turn))) for turn in turns]
     above = [(inset, high + low - z) for inset, z in reversed(below)]
@@ -122,14 +123,14 @@ def plate(outline: FloatArray, low: float, high: float, bevel: float, steps: int
 
 
 def shrunk(outline: FloatArray, inset: float) -> FloatArray:
-    """A convex outline moved inwards."""
+    """Return a convex outline moved inwards."""
     along = np.roll(outline, -1, axis=0) - np.roll(outline, 1, axis=0)
     outwards = unit(np.column_stack([along[:, 1], -along[:, 0]]))
     return outline - inset * outwards
 
 
 def tube(path: FloatArray, radius: float, segments: int) -> Solid:
-    """A round tube along (n, 3) points, closed at both ends."""
+    """Return a round tube along (n, 3) points, closed at both ends."""
     directions = unit(np.gradient(path, axis=0))
     side = np.cross(directions[0], np.eye(3)[int(np.argmin(np.abs(directions[0])))])
     angles = np.arange(segments) * (2 * np.pi / segments)
@@ -143,7 +144,7 @@ def tube(path: FloatArray, radius: float, segments: int) -> Solid:
 
 
 def box(low: FloatArray, high: FloatArray) -> Solid:
-    """A box between two corners, (3,) each."""
+    """Return a box between two corners, (3,) each."""
     x, y, z = np.meshgrid(*np.column_stack([low, high]), indexing="ij")
     vertices = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -152,15 +153,15 @@ def box(low: FloatArray, high: FloatArray) -> Solid:
 
 
 def ball(radius: float, segments: int) -> Solid:
-    """A sphere about the origin."""
+    """Return a sphere centred on the origin."""
     angles = np.linspace(-np.pi / 2, np.pi / 2, segments // 2 + 1)[1:-1]
     middle = [(radius * float(np.cos(angle)), radius * float(np.sin(angle))) for angle in angles]
     return turned([(0.0, -radius), *middle, (0.0, radius)], segments)
 
 
 def moved(solid: Solid, placement: FloatArray) -> Solid:
-    """A solid moved by a (4, 4) transform; a mirroring one turns its triangles over."""
+    """Return a solid moved by a (4, 4) transform; a mirroring one reverses the triangles' winding."""
     vertices, triangles = solid
     linear = placement[:3, :3]
-    turned_over = triangles[:, ::-1] if np.linalg.det(linear) < 0 else triangles
-    return vertices @ linear.T + placement[:3, 3], turned_over
+    reversed_triangles = triangles[:, ::-1] if np.linalg.det(linear) < 0 else triangles
+    return vertices @ linear.T + placement[:3, 3], reversed_triangles

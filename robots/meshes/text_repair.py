@@ -1,4 +1,4 @@
-"""Text of OBJ and COLLADA files as trimesh can read it, and what it would draw of their instances."""
+"""Repairs to the text of OBJ and COLLADA files for trimesh, and a limit on COLLADA instances."""
 
 import codecs
 import re
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from robots.errors import MeshError
 
-# Nodes that draw something, each as often as it is instanced; and numbers of their faces.
+# Geometry instances, counted once for each instance, and the numbers in their face lists.
 _MOST_INSTANCES = 20_000
 _MOST_NUMBERS = 50_000_000
 _MOST_NESTED = 100
@@ -19,11 +19,11 @@ _COUNTED = re.compile(r"[ \t]*(v|vt|vn|f)[ \t]")
 
 
 def plain_text(data: bytes) -> str:
-    """Decode text: UTF-16 with or without its mark, else UTF-8, with a replacement for what is neither."""
+    """Decode text as UTF-16, with or without a byte order mark, or as UTF-8; replace invalid bytes."""
     for mark, encoding in _UTF16.items():
         if data.startswith(mark):
             return data[len(mark) :].decode(encoding, errors="replace")
-    # Of ASCII in UTF-16, every other byte is zero.
+    # In ASCII text encoded as UTF-16, every other byte is zero.
     head = data[:64]
     for encoding, zeros, letters in (
         ("utf-16-le", head[1::2], head[::2]),
@@ -35,9 +35,9 @@ def plain_text(data: bytes) -> str:
 
 
 def utf8_xml(data: bytes) -> bytes:
-    """Recode an XML document that is UTF-16 as UTF-8, and begin it with its declaration.
+    """Return an XML document as UTF-8, without leading blank lines.
 
-    Some programs write an empty line first, which XML does not allow and other readers accept.
+    Some programs write an empty first line, which XML does not allow but other readers accept.
     """
     text = plain_text(data)
     if data.removeprefix(codecs.BOM_UTF8)[:64] == text[:64].encode():
@@ -46,10 +46,10 @@ def utf8_xml(data: bytes) -> bytes:
 
 
 def counted_from_first(path: Path, text: str) -> str:
-    """Replace the numbers of an OBJ's faces that count backwards (-1: the last vertex so far).
+    """Replace negative vertex numbers in an OBJ file's faces (-1: the last vertex so far).
 
     Raises:
-        MeshError: If one counts back beyond the first.
+        MeshError: If one goes back beyond the first vertex.
     """
     if not _NEGATIVE_FACE.search(text):
         return text
@@ -73,22 +73,24 @@ def _corner(path: Path, line: int, word: str, counts: dict[str, int]) -> str:
         if text.startswith("-") and text[1:].isdecimal():
             forward = count + 1 + int(text[:20])
             if forward < 1:
-                raise MeshError(path, f"a face of vertex {text[:20]}, of {count}", place=f"line {line}")
+                raise MeshError(
+                    path, f"a face uses vertex {text[:20]}; there are {count}", place=f"line {line}"
+                )
             text = str(forward)
         numbers.append(text)
     return "/".join(numbers)
 
 
 def check_instances(path: Path, data: bytes) -> None:
-    """Refuse a COLLADA file whose nodes instance each other to more than can be drawn.
+    """Reject a COLLADA file whose nested instances add up to more than can be drawn.
 
     Raises:
-        MeshError: If it draws too much, nodes hold themselves, or it is not XML.
+        MeshError: If it draws too much, a node contains itself, or it is not XML.
     """
     try:
         root = Xml.fromstring(data)
     except (Xml.ParseError, ValueError, LookupError) as error:
-        raise MeshError(path, f"is no DAE that can be read: {error}") from None
+        raise MeshError(path, f"cannot be read as DAE: {error}") from None
     sizes: dict[str, int] = {}
     nodes: dict[str, Xml.Element] = {}
     for element in root.iter():
@@ -106,13 +108,16 @@ def check_instances(path: Path, data: bytes) -> None:
             if instances > _MOST_INSTANCES or numbers > _MOST_NUMBERS:
                 raise MeshError(
                     path,
-                    f"draws {instances} instances of {numbers} numbers; up to {_MOST_INSTANCES} and "
+                    f"draws {instances} instances with {numbers} numbers; at most {_MOST_INSTANCES} and "
                     f"{_MOST_NUMBERS} are read",
                 )
 
 
 class _Drawn:
-    """How many geometries, and numbers of their faces, an element draws; each node is counted once."""
+    """A count of the geometry instances, and of the numbers in their face lists, that an element draws.
+
+    The result of each node is cached.
+    """
 
     def __init__(self, path: Path, sizes: dict[str, int], nodes: dict[str, Xml.Element]) -> None:
         self.path = path
@@ -122,7 +127,9 @@ class _Drawn:
 
     def of(self, element: Xml.Element, depth: int) -> tuple[int, int]:
         if depth > _MOST_NESTED:
-            raise MeshError(self.path, f"nodes are nested deeper than {_MOST_NESTED}, or hold themselves")
+            raise MeshError(
+                self.path, f"nodes are nested deeper than {_MOST_NESTED}, or a node contains itself"
+            )
         instances = numbers = 0
         for more, of_them in self._children(element, depth):
             instances += more

@@ -1,7 +1,7 @@
-"""STL, OBJ, PLY, DAE, GLB and glTF to meshes, read by trimesh.
+"""Reader of STL, OBJ, PLY, DAE, GLB and glTF files, based on trimesh.
 
-Every triangle of the file is kept, as it stands, placed by the file's own nodes; axes and units
-stay the file's. Normals that a file does not give are smooth up to 30 degrees.
+Every triangle of the file is kept and placed by the file's nodes, in the file's axes and units. Missing
+normals are computed, smooth up to 30 degrees.
 """
 
 import importlib
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from robots.errors import MeshError
-from robots.meshes.declared_size import Claims, claims_of
+from robots.meshes.declared_size import Declared, read_declared
 from robots.meshes.mesh import (
     Color,
     FloatArray,
@@ -35,63 +35,67 @@ _CREASE = np.radians(30)
 
 
 def read_trimesh(path: Path, *, kind: str = "") -> Mesh:
-    """The content of an STL, OBJ, PLY, DAE, GLB or glTF file, in its own units and axes.
+    """Return the content of an STL, OBJ, PLY, DAE, GLB or glTF file, in the file's units and axes.
 
-    Files that it names are read below its own folder only; others count as missing.
+    Other files that it names are read below its folder only; files elsewhere count as missing.
 
     Args:
-        kind: The ending that says what it is ("stl"); the file's own unless given.
+        kind: The format as a file ending ("stl"); the file's ending by default.
 
     Raises:
-        MeshError: If it is not what its ending says, or holds what cannot be drawn.
+        MeshError: If the file is not of that format, or has a vertex that is not finite.
     """
     kind = kind or path.suffix.lower().lstrip(".")
-    claims = claims_of(path, kind)
-    found = _drawn(path, kind, claims)
+    declared = read_declared(path, kind)
+    found = _drawn(path, kind, declared)
     parts = tuple(part for part in found if isinstance(part, Part) and len(part.triangles))
     wires = tuple(wire for wire in found if isinstance(wire, Wire) and len(wire.vertices))
     _check(path, kind, parts, wires)
-    warnings = claims.warnings
+    warnings = declared.warnings
     textures = sorted({part.material.texture for part in parts} - {""})
     if textures:
         warnings = (*warnings, f"textures are kept by name, not drawn: {', '.join(textures[:10])}")
     if not parts and not wires:
-        warnings = (*warnings, "holds nothing that can be drawn")
+        warnings = (*warnings, "has no shape that can be drawn")
     return Mesh(
         parts,
         wires,
         warnings=warnings,
-        missing=claims.missing,
-        files=claims.files,
-        unit_m=claims.unit_m,
-        up=claims.up,
+        missing=declared.missing,
+        files=declared.files,
+        unit_m=declared.unit_m,
+        up=declared.up,
     )
 
 
-def _drawn(path: Path, kind: str, claims: Claims) -> list[Part | Wire]:
-    """What trimesh finds in a file; its errors, whatever they are, as ours."""
+def _drawn(path: Path, kind: str, declared: Declared) -> list[Part | Wire]:
+    """Return the shapes that trimesh reads from a file.
+
+    Raises:
+        MeshError: For any exception of trimesh.
+    """
     trimesh: Any = importlib.import_module("trimesh")
-    # What it logs are tracebacks; what matters of them is raised here.
+    # trimesh logs tracebacks; the cause is raised here instead.
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)
     try:
         with np.errstate(all="ignore"), warnings_module.catch_warnings():
-            warnings_module.simplefilter("ignore")  # its own arithmetic's, on nothing that is kept
+            warnings_module.simplefilter("ignore")  # about intermediate values that are not kept
             scene = trimesh.load_scene(
-                str(path) if claims.rewritten is None else io.BytesIO(claims.rewritten),
+                str(path) if declared.rewritten is None else io.BytesIO(declared.rewritten),
                 file_type=kind,
-                resolver=trimesh.resolvers.FilePathResolver(str(path)) if claims.rewritten else None,
+                resolver=trimesh.resolvers.FilePathResolver(str(path)) if declared.rewritten else None,
                 process=False,
                 maintain_order=True,
-                skip_materials=bool(claims.missing),
+                skip_materials=bool(declared.missing),
             )
-            return list(_parts(scene, claims))
+            return list(_parts(scene, declared))
     except MeshError:
         raise
     except MemoryError as error:
-        raise MeshError(path, "needs more memory than there is") from error
-    # Its readers raise whatever their code runs into.
+        raise MeshError(path, "needs more memory than is available") from error
+    # trimesh's readers raise arbitrary exceptions for damaged files.
     except Exception as error:
-        raise MeshError(path, f"is no {kind.upper()} that can be read: {_reason(error)}") from error
+        raise MeshError(path, f"cannot be read as {kind.upper()}: {_reason(error)}") from error
 
 
 def _reason(error: Exception) -> str:
@@ -103,41 +107,41 @@ def _check(path: Path, kind: str, parts: tuple[Part, ...], wires: tuple[Wire, ..
     shapes: list[Part | Wire] = [*parts, *wires]
     for shape in shapes:
         if not np.isfinite(shape.vertices).all():
-            raise MeshError(path, f"{shape.name!r} has a vertex that is not finite; numbers are right")
+            raise MeshError(path, f"{shape.name!r} has a vertex with a non-finite coordinate")
     if not parts and not wires and kind == "stl":
-        raise MeshError(path, "is no STL: it holds no facet")
+        raise MeshError(path, "is not an STL file: it has no facet")
 
 
-def _parts(scene: Any, claims: Claims) -> Iterator[Part | Wire]:
+def _parts(scene: Any, declared: Declared) -> Iterator[Part | Wire]:
     for node in scene.graph.nodes_geometry:
         placement, key = scene.graph[node]
         shape = scene.geometry[key]
         matrix = np.asarray(placement, dtype=np.float64)
         if hasattr(shape, "faces"):
-            yield transformed(_part(str(key), shape, claims), matrix)
+            yield transformed(_part(str(key), shape, declared), matrix)
         else:
-            yield placed(_wire(str(key), shape, claims), matrix)
+            yield placed(_wire(str(key), shape, declared), matrix)
 
 
-def _part(name: str, shape: Any, claims: Claims) -> Part:
+def _part(name: str, shape: Any, declared: Declared) -> Part:
     vertices = np.array(shape.vertices, dtype=np.float64).reshape(-1, 3)
     triangles = np.array(shape.faces, dtype=np.int64).reshape(-1, 3)
     if len(triangles) and not 0 <= triangles.min() <= triangles.max() < len(vertices):
-        raise ValueError(f"a triangle names vertex {triangles.max()}; there are {len(vertices)}")
-    # Normals of the file are in its cache before anything is asked; else trimesh would make smooth ones.
+        raise ValueError(f"a triangle uses vertex {triangles.max()}; there are {len(vertices)}")
+    # The cache holds the file's normals. The public property would compute smooth normals if there are none.
     given = shape._cache.cache.get("vertex_normals")
     if given is not None:
         given = np.asarray(given)
         given = given if given.shape == vertices.shape and np.isfinite(given).all() else None
     visual = shape.visual
-    material, two_sided = _material(visual, claims)
+    material, two_sided = _material(visual, declared)
     colors = None
     if visual.kind == "face":
-        colors = _rgba(visual.face_colors, claims)[np.repeat(np.arange(len(triangles)), 3)]
+        colors = _rgba(visual.face_colors, declared)[np.repeat(np.arange(len(triangles)), 3)]
     elif visual.kind == "vertex":
-        colors = _rgba(visual.vertex_colors, claims)
+        colors = _rgba(visual.vertex_colors, declared)
     elif visual.kind == "texture" and "color" in getattr(visual, "vertex_attributes", {}):
-        colors = _rgba(visual.vertex_attributes["color"], claims)
+        colors = _rgba(visual.vertex_attributes["color"], declared)
     if given is None and colors is None:
         vertices, given, triangles = creased(*welded(vertices, triangles), _CREASE)
     elif given is None or (colors is not None and len(colors) != len(vertices)):
@@ -152,7 +156,7 @@ def _part(name: str, shape: Any, claims: Claims) -> Part:
 def _unrolled(
     vertices: FloatArray, normals: FloatArray | None, triangles: IndexArray, colors: FloatArray | None
 ) -> tuple[FloatArray, FloatArray, IndexArray, FloatArray | None]:
-    """Each corner a vertex of its own: colours of faces, and creases beside colours of vertices."""
+    """Make each corner a separate vertex, for colours of faces, or for creases between coloured vertices."""
     flat = triangles.ravel()
     if normals is None:
         placed, smooth, faces = creased(*welded(vertices, triangles), _CREASE)
@@ -168,32 +172,32 @@ def _uniform(colors: FloatArray) -> bool:
     return len(colors) > 0 and bool((colors == colors[0]).all())
 
 
-def _rgba(values: Any, claims: Claims) -> FloatArray:
-    """(n, 4), 0 to 1, sRGB."""
+def _rgba(values: Any, declared: Declared) -> FloatArray:
+    """Return (n, 4) sRGB colours with opacity, 0 to 1."""
     values = np.asarray(values)
     scale = np.iinfo(values.dtype).max if values.dtype.kind in "ui" else 1.0
     colors = np.ones((len(values), 4))
     colors[:, : values.shape[1]] = np.clip(values.astype(np.float64)[:, :4] / scale, 0, 1)
-    if claims.linear:
+    if declared.linear:
         colors[:, :3] = srgb_of_linear(colors[:, :3])
     return colors
 
 
 def srgb_of_linear(values: FloatArray) -> FloatArray:
-    """Linear light, 0 to 1, as sRGB."""
+    """Convert linear light, 0 to 1, to sRGB."""
     low = values <= 0.0031308
     result: FloatArray = np.where(low, 12.92 * values, 1.055 * np.maximum(values, 0) ** (1 / 2.4) - 0.055)
     return result
 
 
-def _material(visual: Any, claims: Claims) -> tuple[Material, bool]:
+def _material(visual: Any, declared: Declared) -> tuple[Material, bool]:
     found = getattr(visual, "material", None)
     if visual.kind != "texture" or found is None:
         return Material(), False
     name = str(getattr(found, "name", "") or "")
-    texture = claims.textures.get(name, "")
+    texture = declared.textures.get(name, "")
     if hasattr(found, "baseColorFactor"):
-        return _physical(found, name, texture, claims), bool(getattr(found, "doubleSided", False))
+        return _physical(found, name, texture, declared), bool(getattr(found, "doubleSided", False))
     written = getattr(found, "kwargs", None) or {}
     diffuse = tuple(written["kd"]) if "kd" in written else np.asarray(found.diffuse)[:3] / 255
     specular = tuple(written["ks"]) if "ks" in written else (0.0, 0.0, 0.0)
@@ -203,7 +207,7 @@ def _material(visual: Any, claims: Claims) -> tuple[Material, bool]:
             diffuse=_color(diffuse),
             specular=_color(specular),
             emissive=_color(written.get("ke", (0.0, 0.0, 0.0))),
-            # Phong's exponent, 0 to 1000, as VRML counts it (128 is 1).
+            # Phong's exponent, 0 to 1000, in VRML's scale (128 is 1).
             shininess=float(np.clip(float(written.get("ns", 25.6)) / 128, 0, 1)),
             transparency=_clipped(
                 _first(written["tr"]) if "tr" in written else 1 - _first(written.get("d", 1))
@@ -214,16 +218,16 @@ def _material(visual: Any, claims: Claims) -> tuple[Material, bool]:
     )
 
 
-def _physical(found: Any, name: str, texture: str, claims: Claims) -> Material:
-    base = claims.base_colors.get(name, found.baseColorFactor)
-    rgba = _rgba(np.asarray([base if base is not None else (1.0, 1.0, 1.0, 1.0)]), claims)[0]
-    # Without its picture a white texture's base says nothing: grey, as materials are without colour.
+def _physical(found: Any, name: str, texture: str, declared: Declared) -> Material:
+    base = declared.base_colors.get(name, found.baseColorFactor)
+    rgba = _rgba(np.asarray([base if base is not None else (1.0, 1.0, 1.0, 1.0)]), declared)[0]
+    # Textures are not drawn, so a textured material without a base colour gets the default grey.
     diffuse = (0.8, 0.8, 0.8) if texture and base is None else rgba[:3]
     glow = found.emissiveFactor
     emissive = (0.0, 0.0, 0.0) if glow is None else np.asarray(glow, dtype=np.float64)[:3]
-    if claims.linear:
+    if declared.linear:
         emissive = srgb_of_linear(np.clip(np.asarray(emissive), 0, 1))
-    blended = not claims.linear or str(found.alphaMode or "OPAQUE") == "BLEND"
+    blended = not declared.linear or str(found.alphaMode or "OPAQUE") == "BLEND"
     return Material(
         name=name,
         diffuse=_color(diffuse),
@@ -246,12 +250,12 @@ def _color(values: Any) -> Color:
     return red, green, blue
 
 
-def _wire(name: str, shape: Any, claims: Claims) -> Wire:
+def _wire(name: str, shape: Any, declared: Declared) -> Wire:
     """Lines of a path, or points."""
     vertices = np.array(shape.vertices, dtype=np.float64).reshape(-1, 3)
     if not hasattr(shape, "entities"):
         given = np.asarray(shape.colors) if getattr(shape, "colors", None) is not None else np.zeros((0, 4))
-        colors = _rgba(given, claims) if len(given) == len(vertices) > 0 else None
+        colors = _rgba(given, declared) if len(given) == len(vertices) > 0 else None
         return Wire(name, Material(), vertices, np.zeros((0, 2), dtype=np.int64), colors)
     runs = [np.asarray(entity.points, dtype=np.int64) for entity in shape.entities]
     pairs = [np.column_stack([run[:-1], run[1:]]) for run in runs]

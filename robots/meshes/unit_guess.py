@@ -1,4 +1,4 @@
-"""What a mesh file's numbers are on import: its unit and its upward axis, stated or guessed from size."""
+"""Unit and upward axis of an imported mesh file, as stated by the file or guessed from its size."""
 
 from dataclasses import dataclass
 
@@ -8,19 +8,19 @@ from robots.meshes.mesh import FloatArray, Mesh, bounds
 
 # A robot's link, from a small wrist to a long boom [m].
 LEAST_M, MOST_M = 0.005, 5.0
-# What robots' files are in. Hardly a size fits both: from 5 units on they are millimetres.
+# Units that robots' files use. Few sizes fit both: from 5 units on, the unit is the millimetre.
 _LIKELY = (0.001, 1.0)
 _NAMES = {0.001: "millimetres", 1.0: "metres", 0.01: "centimetres", 0.0254: "inches", 0.3048: "feet"}
 
 
 @dataclass(frozen=True)
 class Guess:
-    """How to bring a file's numbers into a link's frame.
+    """The unit and the upward axis of a file.
 
     Attributes:
-        scale_m: Length of its unit [m].
-        up: Its upward axis, "y" or "z".
-        sentence: Why, for people.
+        scale_m: Length of the unit [m].
+        up: Upward axis, "y" or "z".
+        sentence: The reason, for the operator.
     """
 
     scale_m: float
@@ -29,31 +29,32 @@ class Guess:
 
 
 def guess(mesh: Mesh) -> Guess:
-    """Unit and upward axis: what the file states; else the unit in which it is as large as a robot's link.
+    """Return the file's unit and upward axis.
 
-    Files that say nothing (VRML, 3DS, STL, OBJ, PLY) are taken z up, as robots' are.
+    A missing unit is guessed: the one in which the mesh is as large as a robot's link. A missing axis (VRML,
+    3DS, STL, OBJ, PLY) is z, as is usual for robots.
     """
     low, high = bounds(mesh)
     size = float((high - low).max())
     up = mesh.up or "z"
-    axis = f"{up} up" + ("" if mesh.up else " taken")
+    axis = f"{up} up" + ("" if mesh.up else " assumed")
     if mesh.unit_m is not None:
         odd = "" if size == 0 or LEAST_M <= size * mesh.unit_m <= MOST_M else "; odd for a robot's link"
         return Guess(
             mesh.unit_m,
             up,
-            f"in {_name(mesh.unit_m)}, as the file says: {_length(size * mesh.unit_m)} large{odd}; {axis}",
+            f"in {_name(mesh.unit_m)}, as the file states: {_length(size * mesh.unit_m)} large{odd}; {axis}",
         )
     if size == 0:
-        return Guess(0.001, up, f"holds no triangles to judge by: taken for millimetres; {axis}")
+        return Guess(0.001, up, f"no triangles to judge the size by: millimetres assumed; {axis}")
     fitting = [unit for unit in _LIKELY if LEAST_M <= size * unit <= MOST_M]
     unit = fitting[0] if fitting else _LIKELY[0]
     why = f"{_length(size * unit)} large" + ("" if fitting else ", odd for a robot's link: check it")
-    return Guess(unit, up, f"taken for {_name(unit)}, for it says no unit: {why}; {axis}")
+    return Guess(unit, up, f"{_name(unit)} assumed, the file states no unit: {why}; {axis}")
 
 
 def file_to_link(found: Guess) -> FloatArray:
-    """(4, 4) from the file's units and axes to metres, z up."""
+    """Return the (4, 4) transform from the file's units and axes to metres, z up."""
     matrix = np.diag([found.scale_m, found.scale_m, found.scale_m, 1.0])
     if found.up == "y":
         turned = np.eye(4)

@@ -1,6 +1,6 @@
-"""Meshes to GLB: triangles, lines and points, colours of materials and of vertices, axes as they are.
+"""GLB writer: triangles, lines and points, with the colours of materials and vertices.
 
-glTF's own axes are y up; a robot's are z up and are not turned: `asset.extras` says so to our reader.
+glTF defines y as up. A robot's axes are z up and are not rotated; `asset.extras` marks that for our reader.
 The same mesh gives the same bytes. Source: glTF 2.0, Khronos Group.
 """
 
@@ -20,7 +20,7 @@ _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 _FLOAT, _UINT = 5126, 5125
 _VERTICES, _INDICES = 34962, 34963
 _POINTS, _LINES, _TRIANGLES = 0, 1, 4
-# How some materials reflect (metallic, roughness); mesh files of this age cannot say it.
+# Metallic and roughness factors of some materials; the older mesh formats cannot state them.
 _FINISHES = {"paint": (0.0, 0.45), "casting": (0.25, 0.6), "steel": (0.85, 0.3), "rubber": (0.0, 0.9)}
 
 
@@ -51,7 +51,7 @@ class _Document:
 
 
 def glb_of(mesh: Mesh) -> bytes:
-    """A mesh as binary glTF, in metres if the mesh is; a mesh a material, lines and points after them."""
+    """Return a mesh as binary glTF, in the mesh's unit: one glTF mesh per material, then lines and points."""
     document = _Document()
     for part in merged(mesh.parts):
         if len(part.triangles):
@@ -63,7 +63,7 @@ def glb_of(mesh: Mesh) -> bytes:
 
 
 def merged(parts: Iterable[Part]) -> list[Part]:
-    """Parts of one material joined: fewer to draw."""
+    """Join parts of one material, so that there are fewer to draw."""
     groups: dict[tuple[Material, bool, bool], list[Part]] = {}
     for part in parts:
         groups.setdefault((part.material, part.two_sided, part.colors is not None), []).append(part)
@@ -110,7 +110,7 @@ def _add(document: _Document, shape: Part | Wire, indices: NDArray[np.int64], mo
 def _material(shape: Part | Wire, number: int, both: bool, blended: bool) -> dict[str, Any]:
     material = shape.material
     metallic, roughness = _FINISHES.get(material.name, (0.0, 0.55))
-    # Colours of vertices take the material's place: its own must not darken them.
+    # glTF multiplies vertex colours by the base colour, so the base is white.
     base = (
         [1.0, 1.0, 1.0, 1.0]
         if shape.colors is not None
@@ -165,18 +165,18 @@ def _floats(array: FloatArray) -> NDArray[np.float32]:
 
 
 def _unit(normals: FloatArray) -> FloatArray:
-    """glTF wants length one: where a triangle without area has no normal, z serves."""
+    """Replace missing normals of degenerate triangles by z: glTF requires length one."""
     none = ~np.isfinite(normals).all(axis=1) | (np.abs(normals).max(axis=1, initial=0.0) == 0)
     return np.where(none[:, None], [0.0, 0.0, 1.0], normals) if none.any() else normals
 
 
 def linear(colors: FloatArray) -> FloatArray:
-    """sRGB, 0 to 1, as linear light: what glTF holds."""
+    """Convert sRGB, 0 to 1, to linear light, which glTF uses."""
     result: FloatArray = np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
     return result
 
 
 def linear_color(color: Color) -> list[float]:
-    """One sRGB colour as linear light."""
+    """Convert one sRGB colour to linear light."""
     found: list[float] = linear(np.array(color, dtype=np.float64)).tolist()
     return found

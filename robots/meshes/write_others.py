@@ -1,4 +1,4 @@
-"""Meshes to STL, OBJ and PLY, in the units and axes that they have."""
+"""Writers of STL, OBJ and PLY files, in the mesh's units and axes."""
 
 from collections.abc import Iterator
 
@@ -8,28 +8,28 @@ from robots.meshes.mesh import FloatArray, Material, Mesh, Part
 from robots.meshes.mesh import unit as unit_vectors
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
-_VERTEX = np.dtype([("place", "<f4", 3), ("normal", "<f4", 3), ("color", "u1", 4)])
+_VERTEX = np.dtype([("position", "<f4", 3), ("normal", "<f4", 3), ("color", "u1", 4)])
 _FACE = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
 
 
 def write_stl(mesh: Mesh) -> bytes:
-    """A binary .stl file: shape alone."""
+    """Return a binary .stl file, which has the shape only."""
     corners = np.concatenate(
         [np.zeros((0, 3, 3)), *(part.vertices[part.triangles] for part in mesh.parts)], dtype=np.float64
     )
     facets = np.zeros(len(corners), dtype=_FACET)
     facets["corners"] = corners
     facets["normal"] = unit_vectors(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    # It must not begin with "solid": that is what a text STL does.
+    # The header must not begin with "solid", which marks a text STL.
     return b"robomesh".ljust(80) + np.uint32(len(facets)).tobytes() + facets.tobytes()
 
 
 def write_ply(mesh: Mesh) -> bytes:
-    """A binary .ply file: shape and colours, those of materials given to vertices."""
+    """Return a binary .ply file with the shape and the colours, materials' colours given to vertices."""
     vertices, faces, count = [], [], 0
     for part in mesh.parts:
         rows = np.zeros(len(part.vertices), dtype=_VERTEX)
-        rows["place"], rows["normal"] = part.vertices, part.normals
+        rows["position"], rows["normal"] = part.vertices, part.normals
         rows["color"] = np.round(_colors(part) * 255)
         cut = np.zeros(len(part.triangles), dtype=_FACE)
         cut["count"], cut["corners"] = 3, part.triangles + count
@@ -58,7 +58,7 @@ def _colors(part: Part) -> FloatArray:
 
 
 def write_obj(mesh: Mesh, library: str) -> tuple[str, str]:
-    """The texts of an .obj file and of its materials, the .mtl file named `library`."""
+    """Return the text of an .obj file, and the text of its materials for the .mtl file named `library`."""
     names: dict[Material, str] = {}
     for part in mesh.parts:
         base = "_".join(part.material.name.split()) or "material"

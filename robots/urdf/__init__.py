@@ -1,1 +1,1 @@
-"""URDF: robots read from it, and written as it."""
+"""Reader and writer of URDF."""

@@ -1,4 +1,4 @@
-"""What a description by URDF must hold: its keys fit the URDF's joints and links."""
+"""Checks that a URDF description's keys fit the joints and links of its URDF."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -11,14 +11,14 @@ from robots.units import position_factor
 
 
 def urdf_problems(description: UrdfDescription) -> Iterator[Problem]:
-    """Every contradiction between a description and its URDF, and inside it."""
+    """Yield every contradiction between a description and its URDF, and within the description."""
     tree = tree_of(description)
     links = tuple(link.name for link in tree.links)
     free = {tree.joints[number].name: tree.joints[number] for number in tree.free}
     known = _rows(description, free)
     yield from known
     if not known:
-        # Only rows that name joints can be brought together with them.
+        # Further checks need rows that all name joints of the URDF.
         joints = joints_of(description.model_copy(update={"constraints": ()}))
         homes = {}
         for name, kind, home in zip(joints.names, joints.types, joints.home.tolist(), strict=True):
@@ -33,7 +33,7 @@ def urdf_problems(description: UrdfDescription) -> Iterator[Problem]:
             )
     moved = description.tool.link not in (None, TOOL_FRAME) or _is_moved(description.tool)
     if TOOL_FRAME in links and moved:
-        yield Problem(("tool",), "tool: the URDF has a link named 'tool', and that is where the tool is")
+        yield Problem(("tool",), "tool: the URDF has a link named 'tool', which already places the tool")
 
 
 def _rows(description: UrdfDescription, free: dict[str, TreeJoint]) -> list[Problem]:
@@ -42,10 +42,10 @@ def _rows(description: UrdfDescription, free: dict[str, TreeJoint]) -> list[Prob
     for place, row in enumerated("joint", description.joints):
         joint = free.get(row.name)
         if joint is None:
-            text = f"joint {row.name!r}: the URDF has no such joint that moves{nearest(row.name, free)}"
+            text = f"joint {row.name!r}: the URDF has no such movable joint{nearest(row.name, free)}"
             found.append(Problem((*place, "name"), text))
         elif counts[row.name] > 1:
-            text = f"joint {row.name!r}: {counts[row.name]} tables have that name; one is right"
+            text = f"joint {row.name!r}: {counts[row.name]} tables have that name; keep one"
             found.append(Problem((*place, "name"), text))
         else:
             found += _row(description, place, row, joint)
@@ -60,7 +60,7 @@ def _row(
     limits = row.limits or (joint.lower / factor, joint.upper / factor)
     yield from limit_problems(place, row.name, limits, row.home, unit)
     if row.limits and not joint.continuous:
-        # To the rounding of a number that people write.
+        # Tolerates rounding of hand-written numbers.
         slack = 1e-6 * (joint.upper - joint.lower)
         if row.limits[0] * factor < joint.lower - slack or row.limits[1] * factor > joint.upper + slack:
             lower, upper = joint.lower / factor, joint.upper / factor

@@ -1,4 +1,4 @@
-"""Where the files are that a URDF names: `package://`, `file://`, or a path beside it."""
+"""Lookup of the files that a URDF names: `package://`, `file://`, or a path relative to the URDF."""
 
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -9,13 +9,13 @@ Resolve = Callable[[str], Path | None]
 
 
 def files_of(urdf: Path, packages: Sequence[Path] = (), *, confined: Path | None = None) -> Resolve:
-    """A function from an address in the URDF to the file, None where there is none.
+    """Return a function from an address in the URDF to the file, or to None if the file does not exist.
 
-    A package is looked for in the folders given (each may hold it, or be it), in ROS_PACKAGE_PATH and
-    AMENT_PREFIX_PATH, and in the folders above the URDF.
+    A package is looked for in the given folders (each may contain the package, or be the package), in
+    ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, and in the folders above the URDF.
 
     Args:
-        confined: Only what lies in this folder is found; the environment is not asked.
+        confined: Find files in this folder only, and ignore the environment.
     """
 
     def resolve(address: str) -> Path | None:
@@ -57,5 +57,5 @@ def _from_environment() -> Iterator[Path]:
 def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
-    except (OSError, ValueError):  # too long, or with a zero byte
+    except (OSError, ValueError):  # the name is too long or has a zero byte
         return False

@@ -1,7 +1,7 @@
-"""Reading URDF: its joints and links as a tree.
+"""Reader of URDF: joints and links as a tree.
 
-What it means is ROS's `urdf` and Pinocchio's reading of it; names are made safe for keys and files,
-and what is odd but usable is told in a note. Inertia, transmissions and plug-ins are read over.
+The interpretation is that of ROS's `urdf` and of Pinocchio. Names are made safe for keys and files. A note
+reports each irregularity that could be handled. Inertia, transmissions and plug-ins are ignored.
 
 Source: https://wiki.ros.org/urdf/XML.
 """
@@ -22,28 +22,28 @@ from robots.poses import FloatArray, axis_rotation
 from robots.schema import JointType
 from robots.urdf.files import Resolve
 from robots.urdf.shapes import Shapes
-from robots.urdf.values import WrongElement, numbers, origin, said
+from robots.urdf.values import WrongElement, numbers, origin, quoted
 
 MOST_URDF_CHARACTERS = 20_000_000
 _MOST_LINKS = 2_000
 _TYPES = {"revolute": JointType.ROTARY, "continuous": JointType.ROTARY, "prismatic": JointType.PRISMATIC}
-# A continuous joint gets limits, for sliders, planners and controllers want some: every direction can be
-# reached either way round, and a cable lives.
+# A continuous joint gets limits, which sliders, planners and controllers need. Every direction can be
+# reached from both sides, and a cable is not wound up.
 _CONTINUOUS = 2 * pi
-# Where a file gives no speed [rad/s], [m/s].
+# Defaults if a file gives no speed [rad/s], [m/s].
 _SPEEDS = {JointType.ROTARY: pi / 2, JointType.PRISMATIC: 0.25}
 
 
 @dataclass(frozen=True, eq=False)
 class UrdfRobot:
-    """What a URDF holds.
+    """The robot in a URDF.
 
     Attributes:
-        name: As the file has it.
-        notes: What was odd and how it was taken, a sentence each.
-        missing: Mesh files that were not found, as the URDF names them.
-        unchecked: Those of them that a collision check would use.
-        ignored: Pairs of links that an SRDF says need no check, and its file name.
+        name: The name in the file.
+        notes: Irregularities and how they were handled, a sentence each.
+        missing: Mesh files that were not found, as named in the URDF.
+        unchecked: Missing files that a collision check would use.
+        ignored: Pairs of links that an SRDF excludes from checks, and the SRDF's file name.
     """
 
     name: str
@@ -55,14 +55,14 @@ class UrdfRobot:
 
 
 def read_urdf(text: str, source: Path, *, resolve: Resolve) -> UrdfRobot:
-    """The robot in a URDF's text.
+    """Return the robot in a URDF's text.
 
     Args:
-        source: For messages.
-        resolve: The file that an address in the URDF stands for; None: there is none.
+        source: Name of the file for error messages.
+        resolve: Returns the file for an address in the URDF, or None if there is none.
 
     Raises:
-        DescriptionError: If it is no URDF of an arm; the text names the element and what would be right.
+        DescriptionError: If it is not a URDF of an arm; the text names the element and what it must be.
     """
     try:
         return _Reading(_root(text), resolve).robot()
@@ -74,7 +74,7 @@ def _root(text: str) -> Xml.Element:
     if len(text) > MOST_URDF_CHARACTERS:
         raise WrongElement(f"has {len(text):,} characters; at most {MOST_URDF_CHARACTERS:,} are read")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise WrongElement("has a DOCTYPE or ENTITY, which no URDF needs; take it out")
+        raise WrongElement("has a DOCTYPE or ENTITY, which no URDF needs; remove it")
     try:
         root = Xml.fromstring(text.lstrip("\ufeff \t\r\n"))
     except (Xml.ParseError, ValueError) as error:
@@ -85,15 +85,15 @@ def _root(text: str) -> Xml.Element:
            for element in root.iter() if isinstance(element.tag, str)):  # fmt: skip
         raise WrongElement(_XACRO)
     if root.tag != "robot":
-        raise WrongElement(f"<{root.tag}>: a URDF's outermost element is <robot>")
+        raise WrongElement(f"<{root.tag}>: a URDF's outermost element must be <robot>")
     return root
 
 
-_XACRO = "is xacro, from which a URDF is made first: xacro robot.xacro > robot.urdf"
+_XACRO = "is xacro; convert it to a URDF first: xacro robot.xacro > robot.urdf"
 
 
 class _Reading:
-    """One file while it is read."""
+    """The state of reading one file."""
 
     def __init__(self, root: Xml.Element, resolve: Resolve) -> None:
         self.root = root
@@ -105,8 +105,8 @@ class _Reading:
         self.shapes = Shapes(root, resolve)
         self.tree_joints: list[TreeJoint] = []
         self.tree_links: list[TreeLink] = []
-        # Joints that stand still, at this position; joints that follow, by the followed one's name.
-        self.still: dict[str, float] = {}
+        # Positions of the joints that cannot move, and numbers in the tree of the joints that can.
+        self.fixed_positions: dict[str, float] = {}
         self.numbers: dict[str, int] = {}
 
     def robot(self) -> UrdfRobot:
@@ -119,26 +119,26 @@ class _Reading:
             raise WrongElement(f"has {len(self.links):,} links; at most {_MOST_LINKS:,} are read")
         if len(roots) > 1:
             raise WrongElement(
-                f"links {_listed(roots)}: more than one has no joint above it; a robot has one root"
+                f"links {_listed(roots)}: more than one link has no parent joint; a robot has one root"
             )
         if not roots:
             raise WrongElement(
-                f"joint {next(iter(self.joints))!r}: the links run in a circle; a robot has one root"
+                f"joint {next(iter(self.joints))!r}: the links form a cycle; a robot has one root"
             )
         self._walk(roots[0], children)
         if len(self.tree_links) < len(self.links):
             reached = {link.name for link in self.tree_links}
             lost = [name for name in self.links if self.link_names[name] not in reached]
-            raise WrongElement(f"links {_listed(lost)}: run in a circle; a robot is a tree")
+            raise WrongElement(f"links {_listed(lost)}: form a cycle; a robot is a tree")
         tree = Tree(tuple(self._followers()), tuple(self.tree_links))
         if not tree.free:
-            raise WrongElement("has no joint that moves; an arm has at least one")
+            raise WrongElement("has no movable joint; an arm has at least one")
         notes = (*self.notes, *self.shapes.notes)
         name = self.root.get("name") or "robot"
         return UrdfRobot(name, tree, notes, tuple(self.shapes.missing), tuple(self.shapes.unchecked))
 
     def _safe_names(self, kind: str, elements: Mapping[str, Xml.Element]) -> dict[str, str]:
-        """Names that may stand in keys, files and frames; most are so already."""
+        """Return for each name a variant that is valid in keys, file names and frames."""
         safe: dict[str, str] = {}
         for name in elements:
             changed = re.sub(r"[^A-Za-z0-9_.-]", "_", name)
@@ -151,7 +151,7 @@ class _Reading:
         return safe
 
     def _children(self) -> dict[str, list[tuple[str, str]]]:
-        """Joints below each link, with the link that each carries, in the file's order."""
+        """Return for each link its child joints and their child links, in file order."""
         children: dict[str, list[tuple[str, str]]] = {}
         carried: dict[str, str] = {}
         for name, joint in self.joints.items():
@@ -163,14 +163,14 @@ class _Reading:
                 ends.append(link)
             if ends[1] in carried:
                 raise WrongElement(
-                    f"joint {name!r} child link {ends[1]!r}: joint {carried[ends[1]]!r} carries it already"
+                    f"joint {name!r} child link {ends[1]!r}: joint {carried[ends[1]]!r} already has it"
                 )
             carried[ends[1]] = name
             children.setdefault(ends[0], []).append((name, ends[1]))
         return children
 
     def _walk(self, root: str, children: Mapping[str, list[tuple[str, str]]]) -> None:
-        """Links and joints from the root outwards, a chain to its end before the next."""
+        """Add links and joints to the tree in depth-first order."""
         waiting: list[tuple[str, str | None, int, FloatArray]] = [(root, None, BASE, np.eye(4))]
         while waiting:
             link, joint, number, link_to_joint = waiting.pop()
@@ -183,7 +183,10 @@ class _Reading:
             ]
 
     def _step(self, name: str, parent: int, link_to_joint: FloatArray) -> tuple[int, FloatArray]:
-        """The joint's number and the link's frame there; a joint that stands still is none."""
+        """Add a joint; return the number of the joint that moves its link, and the link's frame in it.
+
+        A joint that cannot move is not added: its parent's number is returned.
+        """
         element = self.joints[name]
         what = f"joint {name!r}"
         placement = link_to_joint @ origin(element, what)
@@ -191,13 +194,13 @@ class _Reading:
         if kind == "fixed":
             return parent, placement
         if kind not in _TYPES:
-            known = "revolute, continuous, prismatic and fixed are"
-            raise WrongElement(f"{what} type {kind!r}: is not one that an arm has; {known}")
+            known = "revolute, continuous, prismatic and fixed"
+            raise WrongElement(f"{what} type {kind!r}: is not supported; use {known}")
         axis = self._axis(element, what)
         lower, upper, speed = self._limits(element, what, kind)
         if lower == upper and element.find("mimic") is None:
-            self.notes.append(f"{what}: its limits leave it no way, so it stands still at {lower:g}")
-            self.still[name] = lower
+            self.notes.append(f"{what}: its limits are equal, so it is fixed at {lower:g}")
+            self.fixed_positions[name] = lower
             return parent, placement @ moved(_TYPES[kind], axis, lower)
         joint = TreeJoint(
             name=self.joint_names[name],
@@ -221,8 +224,8 @@ class _Reading:
         )
         length = float(np.linalg.norm(vector))
         if length < 1e-9:
-            raise WrongElement(f"{what} axis xyz = {said(axis, 'xyz')}: is zero; it must point somewhere")
-        # One that is of length one as exactly as its file's digits say stays as it is.
+            raise WrongElement(f"{what} axis xyz = {quoted(axis, 'xyz')}: is zero; it must have a direction")
+        # A vector of length one keeps exactly the digits of the file.
         return vector if length == 1.0 else vector / length
 
     def _limits(self, element: Xml.Element, what: str, kind: str) -> tuple[float, float, float]:
@@ -233,23 +236,23 @@ class _Reading:
         (lower,), (upper,), (speed,) = (
             numbers(limit, key, 1, f"{what} limit", "0") for key in ("lower", "upper", "velocity")
         )
-        unsaid = speed <= 0
-        if unsaid:
+        no_speed = speed <= 0
+        if no_speed:
             speed = _SPEEDS[_TYPES[kind]]
-            self.notes.append(f"{what}: no speed is given, {speed:.4g} {unit}/s is taken")
-        if kind == "revolute" and lower == upper == 0 and unsaid:
+            self.notes.append(f"{what}: has no velocity limit; {speed:.4g} {unit}/s is assumed")
+        if kind == "revolute" and lower == upper == 0 and no_speed:
             kind = "continuous"
-            self.notes.append(f"{what}: its limits are all zero, so nobody filled them in; none are taken")
+            self.notes.append(f"{what}: its limits are all zero, probably not filled in, and are ignored")
         if kind == "continuous":
             return -_CONTINUOUS, _CONTINUOUS, speed
         if lower > upper:
             raise WrongElement(
-                f"{what} limit lower = {lower:g}, upper = {upper:g}: the lower must be below the upper"
+                f"{what} limit lower = {lower:g}, upper = {upper:g}: lower must be less than upper"
             )
         return lower, upper, speed
 
     def _followers(self) -> Iterator[TreeJoint]:
-        """The joints, each that mimics another with the free one that it follows in the end."""
+        """Yield the joints; a mimic joint refers to the free joint at the end of its chain."""
         free = [name for name in self.numbers if self.joints[name].find("mimic") is None]
         for name, number in self.numbers.items():
             joint = self.tree_joints[number]
@@ -257,8 +260,9 @@ class _Reading:
                 yield joint
                 continue
             leader, multiplier, offset = self._followed(name)
-            if leader in self.still and free:
-                leader, multiplier, offset = free[0], 0.0, multiplier * self.still[leader] + offset
+            if leader in self.fixed_positions and free:
+                offset += multiplier * self.fixed_positions[leader]
+                leader, multiplier = free[0], 0.0
             yield replace(joint, mimic=Mimic(self.numbers[leader], multiplier, offset))
 
     def _followed(self, name: str) -> tuple[str, float, float]:
@@ -266,8 +270,8 @@ class _Reading:
         seen = {name}
         while (mimic := self.joints[name].find("mimic")) is not None:
             leader = mimic.get("joint", "")
-            if leader not in self.numbers and leader not in self.still:
-                raise WrongElement(f"{what} joint {leader!r}: no such joint that moves")
+            if leader not in self.numbers and leader not in self.fixed_positions:
+                raise WrongElement(f"{what} joint {leader!r}: no such movable joint")
             if leader in seen:
                 raise WrongElement(f"{what} joint {leader!r}: follows itself")
             (factor,) = numbers(mimic, "multiplier", 1, what, "1")
@@ -275,13 +279,13 @@ class _Reading:
             multiplier, offset = multiplier * factor, multiplier * shift + offset
             seen.add(leader)
             name = leader
-            if leader in self.still:
+            if leader in self.fixed_positions:
                 break
         return name, multiplier, offset
 
 
 def moved(kind: JointType, axis: FloatArray, position: float) -> FloatArray:
-    """(4, 4) of what a joint does to its link at a position [rad] or [m]."""
+    """Return the (4, 4) motion of a joint's link at a position [rad] or [m]."""
     placement = np.eye(4)
     if kind is JointType.PRISMATIC:
         placement[:3, 3] = position * axis
@@ -297,7 +301,7 @@ def _by_name(root: Xml.Element, kind: str) -> dict[str, Xml.Element]:
             raise WrongElement(f"<{kind}> number {number + 1}: has no name")
     for name, count in Counter(element.get("name", "") for element in elements).items():
         if count > 1:
-            raise WrongElement(f"{kind} {name!r}: {count} have that name; each needs its own")
+            raise WrongElement(f"{kind} {name!r}: {count} have that name; names must be unique")
     return {element.get("name", ""): element for element in elements}
 
 

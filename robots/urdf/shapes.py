@@ -1,4 +1,4 @@
-"""What the links of a URDF look like, and what of them is checked: their visual and collision geometry."""
+"""Visual and collision geometry of the links of a URDF."""
 
 import xml.etree.ElementTree as Xml
 from math import cos, pi
@@ -14,18 +14,19 @@ from robots.urdf.files import Resolve
 from robots.urdf.values import WrongElement, numbers, origin
 
 _ROUND = 32
-# Of collision geometry, faces go about what is round, not through it: a check must not miss the half per
-# cent between them.
+# The faces of round collision geometry enclose the true shape. Inscribed faces would leave half a per cent
+# of the radius unchecked.
 _ROUNDER = 1 / cos(pi / _ROUND)
 _Paint = tuple[tuple[float, float, float], float]
 
 
 class Shapes:
-    """The shapes of one URDF while it is read.
+    """The state of reading the shapes of one URDF.
 
     Attributes:
-        missing: Mesh files that were not found, as the file names them.
-        unchecked: Those of them that a collision check would use.
+        missing: Mesh files that were not found, as named in the file.
+        unchecked: Missing files that a collision check would use.
+        notes: Irregularities and how they were handled, a sentence each.
     """
 
     def __init__(self, root: Xml.Element, resolve: Resolve) -> None:
@@ -34,14 +35,17 @@ class Shapes:
         self.unchecked: list[str] = []
         self.notes: list[str] = []
         self._paints: dict[str, _Paint] = {}
-        # A material may be named before the element that says what it is.
+        # A material may be used before the element that defines it.
         for material in root.iter("material"):
             paint = _paint(material)
             if paint is not None:
                 self._paints[material.get("name", "")] = paint
 
     def of(self, link: Xml.Element, name: str) -> tuple[tuple[Shape, ...], tuple[Shape, ...]]:
-        """The shapes of a link that are drawn, and those that are checked in their place; in its frame."""
+        """Return the shapes of a link that are drawn, and other shapes for collision checks, if any.
+
+        Both are in the link's frame. The second is empty if the drawn shapes are checked too.
+        """
         collisions = link.findall("collision")
         drawn = [
             self._shape(element, f"link {name!r} visual", checked=not collisions)
@@ -73,7 +77,7 @@ class Shapes:
             return shape
         solid = _solid(found, f"{what} {found.tag}", rounder=_ROUNDER if element.tag == "collision" else 1.0)
         if solid is None:
-            self.notes.append(f"{what}: {found.tag} is no shape that is drawn; left out")
+            self.notes.append(f"{what}: shape {found.tag} is not supported; left out")
             return None
         vertices, normals, triangles = creased(*solid, pi / 6)
         mesh = Mesh(parts=(Part("", Material(), vertices, normals, triangles),))
@@ -95,16 +99,16 @@ class Shapes:
             if address not in self.missing:
                 self.missing.append(address)
             return None
-        # As in ROS: the colour is for files that have none of their own.
+        # As in ROS, the colour applies only to formats without colours.
         if path.suffix.lower() != ".stl":
             color, opacity = None, None
         scale = numbers(element, "scale", 3, f"{what} mesh", "1 1 1")
-        # The unit that COLLADA states counts, its upward axis does not: as ROS has it.
+        # As in ROS, the unit that COLLADA states is used, its upward axis is not.
         return Shape(path, placement @ np.diag([*scale, 1.0]), color, opacity, in_stated_unit=True)
 
 
 def _same(one: Shape, other: Shape) -> bool:
-    """Return whether two shapes have one geometry, whatever their colours."""
+    """Return whether two shapes have the same geometry; colours may differ."""
     if not np.array_equal(one.shape_to_link, other.shape_to_link):
         return False
     if isinstance(one.mesh, Mesh) and isinstance(other.mesh, Mesh):
@@ -123,10 +127,10 @@ def _paint(material: Xml.Element) -> _Paint | None:
 
 
 def _solid(element: Xml.Element, what: str, *, rounder: float) -> Solid | None:
-    """A box, a ball, a cylinder or a capsule.
+    """Return a box, sphere, cylinder or capsule; None for any other element.
 
     Args:
-        rounder: Factor of the radius of what is round.
+        rounder: Factor for the radius of round shapes.
     """
     match element.tag:
         case "box":

@@ -1,4 +1,4 @@
-"""Reading what SRDF adds to a URDF: a home position, and pairs of links that need no collision check.
+"""Reader of SRDF, which adds to a URDF a home position and pairs of links without a collision check.
 
 Source: https://wiki.ros.org/srdf.
 """
@@ -11,21 +11,22 @@ from robots.kinematic_tree import Tree
 from robots.urdf.values import WrongElement, numbers
 
 _MOST_BYTES = 4_000_000
-# What a robot's own people call the position that it starts from, the best first.
+# Usual names of a robot's home position, the preferred first.
 _HOMES = ("home", "default", "arm_up", "half_sitting", "standing")
 
 
 def srdf_beside(urdf: Path, robot: str) -> tuple[Path | None, str]:
-    """The SRDF of a URDF's robot, and a note if one was passed over: it names another robot.
+    """Return the SRDF of a URDF's robot, and a note if a file was rejected because it names another robot.
 
-    It is in the URDF's folder, or in `srdf` beside its folder `urdf` or `robots`. It has the URDF's file
-    name; else it names the robot; else it is alone with the URDF, and names the robot's series, or no robot.
+    It is in the URDF's folder, or in `srdf` next to the URDF's folder `urdf` or `robots`. In order of
+    preference: a file with the URDF's name; a file that names the robot; the only SRDF with the only URDF,
+    if it names the robot's series, or no robot.
     """
     folders = [urdf.parent]
-    # Packages put the two apart; beyond a package nobody's file is read.
+    # ROS packages keep the two in separate folders; files outside the package are not read.
     if urdf.parent.name in ("urdf", "robots"):
         folders.append(urdf.parent.parent / "srdf")
-    found, alone = [], []
+    found, only_files = [], []
     for folder in folders:
         try:
             here = sorted(folder.glob("*.srdf"))
@@ -33,7 +34,7 @@ def srdf_beside(urdf: Path, robot: str) -> tuple[Path | None, str]:
         except OSError:
             continue
         found += here
-        alone += here if single else []
+        only_files += here if single else []
     for path in found:
         if path.stem == urdf.stem:
             return path, ""
@@ -41,16 +42,16 @@ def srdf_beside(urdf: Path, robot: str) -> tuple[Path | None, str]:
         if _robot_name(path) == robot:
             return path, ""
     note = ""
-    for path in alone:
+    for path in only_files:
         named = _robot_name(path)
         if _may_be(named, robot):
             return path, ""
-        note = f"{path.name}: is of the robot {named!r}; it is not used"
+        note = f"{path.name}: is for the robot {named!r}; it is not used"
     return None, note
 
 
 def _may_be(named: str, robot: str) -> bool:
-    """Whether an SRDF names no robot, this one, or its series: abb_irb2400_12_155 is an abb_irb2400."""
+    """Return whether an SRDF names no robot, this one, or its series: abb_irb2400 for abb_irb2400_12_155."""
     named, robot = named.casefold(), robot.casefold()
     return named in ("", robot) or robot.startswith((f"{named}_", f"{named}-"))
 
@@ -63,7 +64,7 @@ def _robot_name(path: Path) -> str:
 
 
 def ignored_beside(urdf: Path, robot: str, tree: Tree) -> tuple[list[tuple[tuple[str, str], str]], str]:
-    """Pairs that the SRDF beside a URDF leaves out, each with its name, and a note if it cannot be used."""
+    """Return the pairs that a URDF's SRDF excludes, with the SRDF's name, and a note if it is unusable."""
     path, note = srdf_beside(urdf, robot)
     if path is None:
         return [], note
@@ -78,15 +79,16 @@ def ignored_beside(urdf: Path, robot: str, tree: Tree) -> tuple[list[tuple[tuple
 
 
 def read_srdf(text: str, source: Path, tree: Tree) -> tuple[dict[str, float], list[tuple[str, str]]]:
-    """Home of some joints [rad] or [m] by name, and the pairs, of what the tree has.
+    """Return home positions by joint name [rad] or [m], and excluded pairs, for joints and links of the tree.
 
-    Pairs that an SRDF leaves out because they never touched (MoveIt's reason "Never") stay checked.
+    Pairs excluded because they never touched in samples (MoveIt's reason "Never") are not returned, so that
+    they stay checked.
 
     Raises:
-        DescriptionError: If it is no SRDF.
+        DescriptionError: If it is not an SRDF.
     """
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise DescriptionError(source, ["has a DOCTYPE or ENTITY, which no SRDF needs; take it out"])
+        raise DescriptionError(source, ["has a DOCTYPE or ENTITY, which no SRDF needs; remove it"])
     try:
         root = Xml.fromstring(text.strip())
         return _home(root, tree), _ignored(root, tree)
@@ -105,7 +107,7 @@ def _home(root: Xml.Element, tree: Tree) -> dict[str, float]:
     home = {}
     for element in state.findall("joint"):
         joint = free.get(element.get("name", ""))
-        # A free-flying base's seven numbers are no joint's position.
+        # The seven numbers of a free-floating base are not a joint position.
         if joint is None or len(element.get("value", "").split()) != 1:
             continue
         (position,) = numbers(element, "value", 1, f"group_state joint {joint.name!r}", "")

@@ -1,4 +1,4 @@
-"""Numbers and placements in URDF's attributes."""
+"""Parsing of numbers and placements in URDF attributes."""
 
 import xml.etree.ElementTree as Xml
 from math import isfinite
@@ -7,19 +7,19 @@ import numpy as np
 
 from robots.poses import FloatArray, rpy_rotation
 
-# No arm is as long: the file is in millimetres.
+# No arm is this long: such a file is in millimetres.
 _FARTHEST_M = 100.0
 
 
 class WrongElement(Exception):
-    """What is wrong with an element, in words."""
+    """An invalid element; the text says what is wrong and what it must be."""
 
 
 def numbers(element: Xml.Element | None, key: str, count: int, what: str, default: str) -> list[float]:
-    """The numbers of an attribute; those of `default` where it is not there.
+    """Return the numbers in an attribute, or in `default` if the attribute is missing.
 
     Raises:
-        WrongElement: If there are not `count` finite ones.
+        WrongElement: If there are not exactly `count` finite numbers.
     """
     text = default if element is None else element.get(key, default)
     try:
@@ -28,18 +28,18 @@ def numbers(element: Xml.Element | None, key: str, count: int, what: str, defaul
         values = []
     if len(values) != count or not all(map(isfinite, values)):
         wanted = "a number" if count == 1 else f"{count} numbers"
-        raise WrongElement(f"{what} {key} = {said(element, key)}: must be {wanted}")
+        raise WrongElement(f"{what} {key} = {quoted(element, key)}: must be {wanted}")
     return values
 
 
-def said(element: Xml.Element | None, key: str) -> str:
-    """An attribute as the file has it, cut where it is long."""
+def quoted(element: Xml.Element | None, key: str) -> str:
+    """Return an attribute in quotes, truncated to 60 characters."""
     text = "" if element is None else element.get(key, "")
     return repr(text if len(text) <= 60 else f"{text[:57]}...")
 
 
 def origin(element: Xml.Element, what: str) -> FloatArray:
-    """(4, 4) of an element's <origin>."""
+    """Return the (4, 4) placement in an element's <origin>."""
     placement = np.eye(4)
     found = element.find("origin")
     if found is not None:
@@ -47,6 +47,6 @@ def origin(element: Xml.Element, what: str) -> FloatArray:
         xyz = numbers(found, "xyz", 3, f"{what} origin", "0 0 0")
         if max(map(abs, xyz)) > _FARTHEST_M:
             farthest = f"more than {_FARTHEST_M:g} m; a URDF counts in metres"
-            raise WrongElement(f"{what} origin xyz = {said(found, 'xyz')}: {farthest}")
+            raise WrongElement(f"{what} origin xyz = {quoted(found, 'xyz')}: {farthest}")
         placement[:3, 3] = xyz
     return placement

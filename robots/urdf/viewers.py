@@ -1,6 +1,6 @@
-"""URDFs of a mesh's robots as one, for viewers: links named as the frames are, meshes by address.
+"""One URDF of all robots, for external viewers: links have the names of the frames, meshes have addresses.
 
-Plain text work: whoever shows robots needs no kinematics.
+Works on the URDF text only, without kinematics.
 """
 
 import math
@@ -10,20 +10,20 @@ from dataclasses import dataclass
 
 MeshUri = Callable[[str], str | None]
 
-# What the frames of several sites hang in.
+# The frame above the frames of several sites.
 WORLD = "robomesh"
-# How far a floor goes beyond the robots that stand on it, and how thick it is drawn [m].
+# Margin of a floor around the robots on it, and its drawn thickness [m].
 _FLOOR_M = 1.6
 _PLATE_M = 0.004
 
 
 @dataclass(frozen=True)
 class Fixture:
-    """What stands in a robot's cell.
+    """A fixture of a robot's cell.
 
     Attributes:
-        pose: Fixture to site, 16, by rows.
-        uri: Where its mesh is; None: it has none.
+        pose: Fixture to site, 16 numbers by rows.
+        uri: Address of the mesh; None: no mesh.
     """
 
     name: str
@@ -33,14 +33,14 @@ class Fixture:
 
 @dataclass(frozen=True)
 class Viewed:
-    """A robot to be shown.
+    """A robot to show.
 
     Attributes:
-        urdf: As its description tells it, links without a prefix.
-        base_to_site: 16, by rows.
-        mesh_uri: Where a link's mesh is, by the link's name; None: it has none.
-        fixtures: Of its cell; the other robots of it have the same.
-        floor_m: Height of its cell's floor, in the site's frame; None: it has none.
+        urdf: The URDF of its description, with links without a prefix.
+        base_to_site: 16 numbers by rows.
+        mesh_uri: Returns the address of a link's mesh by the link's name, or None without a mesh.
+        fixtures: Fixtures of its cell, the same for all robots of the cell.
+        floor_m: Height of its cell's floor in the site's frame [m]; None: no floor.
     """
 
     site: str
@@ -53,11 +53,11 @@ class Viewed:
 
 
 def prefixed(urdf: str, prefix: str, mesh_uri: MeshUri, *, joints: bool = False) -> Xml.Element:
-    """A URDF whose links are named as the frames are, each with its mesh and nothing else to be seen.
+    """Return a URDF with prefixed link names, in which each link shows its mesh only.
 
     Args:
-        prefix: Of its links: `<site>/<robot>/`.
-        joints: Its joints get the prefix too.
+        prefix: Prefix of the links, `<site>/<robot>/`.
+        joints: Also prefix the joints.
 
     Raises:
         ValueError: If it is not XML.
@@ -65,7 +65,7 @@ def prefixed(urdf: str, prefix: str, mesh_uri: MeshUri, *, joints: bool = False)
     try:
         root = Xml.fromstring(urdf)
     except Xml.ParseError as error:
-        raise ValueError(f"no URDF: {error}") from None
+        raise ValueError(f"is not a URDF: {error}") from None
     for link in root.iter("link"):
         name = link.get("name", "")
         link.set("name", prefix + name)
@@ -83,12 +83,12 @@ def prefixed(urdf: str, prefix: str, mesh_uri: MeshUri, *, joints: bool = False)
 
 
 def together(robots: Iterable[Viewed], *, plain_joints: bool) -> str:
-    """The robots as one URDF, each where it stands in its site; what is no URDF is left out.
+    """Return one URDF of all robots at their places in their sites; invalid URDFs are left out.
 
-    The root is the site's frame; with several sites, which lie to each other nobody knows how, `WORLD`.
+    The root is the site's frame. With several sites, whose relative placement is unknown, it is `WORLD`.
 
     Args:
-        plain_joints: Joints keep their own names: only where there is one robot.
+        plain_joints: Joints keep their names without a prefix; only for a single robot.
     """
     whole = Xml.Element("robot", name=WORLD)
     known = list(robots)
@@ -119,13 +119,13 @@ def together(robots: Iterable[Viewed], *, plain_joints: bool) -> str:
 
 
 def _add_floors(whole: Xml.Element, robots: Sequence[Viewed]) -> None:
-    """One plate a site and height, below all robots whose floor it is; its upper side is the floor."""
+    """Add a plate for each site and floor height, below all its robots; the upper side is the floor."""
     floors: dict[tuple[str, float], list[Sequence[float]]] = {}
     for robot in robots:
         if robot.floor_m is not None and len(robot.base_to_site) == 16:
             floors.setdefault((robot.site, robot.floor_m), []).append(robot.base_to_site)
     for number, ((site, height), bases) in enumerate(sorted(floors.items())):
-        # No fixture's name has a full stop.
+        # A fixture's name cannot contain a full stop, so the names cannot clash.
         name = f"{site}/floor.{number}"
         x, y = ([base[column] for base in bases] for column in (3, 7))
         link = Xml.SubElement(whole, "link", name=name)
@@ -174,9 +174,9 @@ def _fixed(whole: Xml.Element, parent: str, child: str, pose: Sequence[float] = 
 
 
 def _rpy(pose: Sequence[float]) -> tuple[float, float, float]:
-    """URDF's fixed-axis angles of a placement, 16 by rows [rad]."""
+    """Return URDF's fixed-axis angles [rad] of a placement, 16 numbers by rows."""
     across = math.hypot(pose[0], pose[4])
     pitch = math.atan2(-pose[8], across)
-    if across < 1e-9:  # straight up or down: yaw can take all of the turning
+    if across < 1e-9:  # straight up or down: roll and yaw are one rotation, given as yaw
         return 0.0, pitch, math.atan2(-pose[1], pose[5])
     return math.atan2(pose[9], pose[10]), pitch, math.atan2(pose[4], pose[0])

@@ -1,9 +1,9 @@
-"""Descriptions as URDF.
+"""Writer of descriptions as URDF.
 
-URDF puts a link's frame on its joint's axis; a D-H link's frame is elsewhere. So each such joint moves
-a bare link "<joint>_axis", and the link proper hangs on that by a fixed joint: every link, the tool
-and the named frames keep the names and the frames that they have everywhere else. A robot that came
-from a URDF keeps its links and joints; those that were fixed together hang on the first of them.
+URDF puts a link's frame on its joint's axis, but a D-H link's frame is elsewhere. So each such joint moves
+an empty link "<joint>_axis", to which a fixed joint attaches the actual link. Every link, the tool and the
+named frames keep the names and frames that they have everywhere else. A robot read from a URDF keeps its
+links and joints; links that were fixed together are attached to the first of them.
 """
 
 import xml.etree.ElementTree as Xml
@@ -19,12 +19,12 @@ from robots.schema import JointType, RobotDescription
 
 
 def glb_beside(link: str) -> str:
-    """The mesh of a link, as a file in the folder meshes beside the URDF."""
+    """Return the path of a link's mesh in the folder meshes next to the URDF."""
     return f"meshes/{link}.glb"
 
 
 def collision_beside(link: str) -> str:
-    """What is checked of a link, as a file in the folder meshes beside the URDF."""
+    """Return the path of a link's collision mesh in the folder meshes next to the URDF."""
     return f"meshes/{link}_collision.glb"
 
 
@@ -34,13 +34,13 @@ def to_urdf(
     mesh_uri: Callable[[str], str] = glb_beside,
     collision_uri: Callable[[str], str] | None = None,
 ) -> str:
-    """Return a description as URDF text, with the meshes that `robots.glb.link_meshes` gives.
+    """Return a description as URDF text that refers to the meshes of `robots.glb.link_meshes`.
 
-    Limits and speeds are the description's, which may be tighter than those of the URDF that it is of.
+    Limits and speeds are the description's, which may be tighter than those of its URDF.
 
     Args:
-        mesh_uri: Address of a link's GLB by the link's name.
-        collision_uri: Of the GLB that `robots.glb.collision_meshes` gives; None: `mesh_uri` for both uses.
+        mesh_uri: Returns the address of a link's GLB by the link's name.
+        collision_uri: The same for the GLB of `robots.glb.collision_meshes`; None: `mesh_uri` for both.
     """
     tree = tree_of(description)
     joints = joints_of(description)
@@ -58,18 +58,18 @@ def tree_urdf(
     mesh_uri: Callable[[str], str] = glb_beside,
     collision_uri: Callable[[str], str] | None = collision_beside,
 ) -> str:
-    """A tree of joints and links as URDF text.
+    """Return a tree of joints and links as URDF text.
 
     Args:
-        frames: Bare frames by name: the link that carries each, and where it is there (4, 4) [m].
-        mesh_uri: Address of the GLB of a link that has a shape, by the link's name.
-        collision_uri: As `to_urdf`.
+        frames: Named frames without a link: the link that carries each, and its (4, 4) pose there [m].
+        mesh_uri: Returns the address of the GLB of a link with a shape, by the link's name.
+        collision_uri: See `to_urdf`.
     """
     robot = Xml.Element("robot", name=name)
     robot.append(
         Xml.Comment(" Efforts are not known: 0. Meshes are in metres, z upwards, in their link's frame. ")
     )
-    # What is there already keeps its name; links and joints that are made for URDF get others.
+    # Existing links and joints keep their names; those added for URDF get unused names.
     links = {link.name for link in tree.links}
     bare = {frame: place for frame, place in (frames or {}).items() if frame not in links}
     taken = {*links, *bare}
@@ -78,7 +78,7 @@ def tree_urdf(
     for number in (BASE, *range(len(tree.joints))):
         joint = None if number == BASE else tree.joints[number]
         here = [link for link in tree.links if link.joint == number]
-        # The element that the joint moves: the first link, where it stands in the joint's own frame.
+        # The joint's child: the first link if its frame is the joint's frame, otherwise an empty link.
         first = here[0].name if here and (here[0].link_to_joint == np.eye(4)).all() else None
         carrier = first or _unused(f"{joint.name if joint else 'base'}_axis", taken)
         if first is None:
@@ -169,5 +169,5 @@ def _add_origin(element: Xml.Element, placement: FloatArray) -> None:
 
 
 def _exact(value: float) -> str:
-    """All of a double's digits, so that nothing is lost on the way back."""
+    """Format a number with all digits of a double, so that reading it gives the same number."""
     return f"{float(value):.17g}"

@@ -66,7 +66,7 @@ def test_faces_of_an_obj_may_count_backwards(tmp_path: Path) -> None:
 
 
 def test_face_that_counts_back_beyond_the_first_is_named(tmp_path: Path) -> None:
-    with pytest.raises(MeshError, match="line 4: a face of vertex -9, of 3"):
+    with pytest.raises(MeshError, match="line 4: a face uses vertex -9; there are 3"):
         read_mesh(written(tmp_path, "a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -9 -2 -1\n"))
 
 
@@ -87,7 +87,7 @@ def test_nodes_of_collada_that_instance_each_other_to_billions_are_refused(tmp_p
     with pytest.raises(MeshError, match="1000000000 instances"):
         read_mesh(written(tmp_path, "a.dae", dae(library, '<instance_node url="#n9"/>')))
     ring = '<library_nodes><node id="r"><instance_node url="#r"/></node></library_nodes>'
-    with pytest.raises(MeshError, match="hold themselves"):
+    with pytest.raises(MeshError, match="contains itself"):
         read_mesh(written(tmp_path, "a.dae", dae(ring, '<instance_node url="#r"/>')))
     thrice = read_mesh(written(tmp_path, "b.dae", dae(library, '<instance_node url="#n1"/>')))
     assert thrice.triangle_count == 10
@@ -154,7 +154,7 @@ def test_step_that_needs_too_much_memory_says_so(tmp_path: Path, monkeypatch: py
         with pytest.raises(MeshError, match="needs more than 6 GB of memory to read"):
             read_mesh(file)
     done.returncode = 1
-    with pytest.raises(MeshError, match="finds no STEP model in it"):
+    with pytest.raises(MeshError, match="found no STEP model"):
         read_mesh(file)
 
 

@@ -45,7 +45,7 @@ def test_colour_and_transparency_stay(box: Path, ending: str) -> None:
 def test_glb_is_in_metres_and_the_guess_is_said(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
     target = box.with_name("out.glb")
     assert run(["mesh", "convert", str(box), str(target)]) == 0
-    assert "taken for millimetres" in capsys.readouterr().err
+    assert "millimetres assumed" in capsys.readouterr().err
     np.testing.assert_allclose(bounds(read_mesh(target)), [[-0.05, -0.1, -0.15], [0.05, 0.1, 0.15]])
 
 
@@ -127,4 +127,6 @@ def test_info_prints_the_agreed_json(box: Path, capsys: pytest.CaptureFixture[st
 
 def test_info_tells_people_the_unit_that_it_takes(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["mesh", "info", str(box)]) == 0
-    assert "taken for millimetres, for it says no unit: 300 mm large; z up taken" in capsys.readouterr().out
+    assert (
+        "millimetres assumed, the file states no unit: 300 mm large; z up assumed" in capsys.readouterr().out
+    )

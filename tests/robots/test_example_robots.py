@@ -24,8 +24,8 @@ FILES = [] if FOLDER is None else sorted(str(path.relative_to(FOLDER)) for path 
 NAMES = () if FOLDER is None else tuple(EXAMPLES)
 REFUSED = {
     "alex_description/urdf/alex_psyonic_hands.urdf": "mimic joint 'index_q1': no such joint that moves",
-    "hector_description/robots/quadrotor_base.urdf": "has no joint that moves",
-    "iris_description/robots/iris_simple.urdf": "has no joint that moves",
+    "hector_description/robots/quadrotor_base.urdf": "has no movable joint",
+    "iris_description/robots/iris_simple.urdf": "has no movable joint",
     "ur_description/urdf/ur3.urdf": "has no <link>",
 }
 

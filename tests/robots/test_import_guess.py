@@ -23,26 +23,26 @@ def a_cube(size: float, unit_m: float | None = None, up: str = "") -> Mesh:
 @pytest.mark.parametrize(
     ("mesh", "scale_m", "up", "sentence"),
     [
-        (a_cube(300), 0.001, "z", "taken for millimetres, for it says no unit: 300 mm large; z up taken"),
-        (a_cube(0.3), 1.0, "z", "taken for metres, for it says no unit: 300 mm large; z up taken"),
-        (a_cube(4.9), 1.0, "z", "taken for metres, for it says no unit: 4.9 m large; z up taken"),
-        (a_cube(5.1), 0.001, "z", "taken for millimetres, for it says no unit: 5.1 mm large; z up taken"),
+        (a_cube(300), 0.001, "z", "millimetres assumed, the file states no unit: 300 mm large; z up assumed"),
+        (a_cube(0.3), 1.0, "z", "metres assumed, the file states no unit: 300 mm large; z up assumed"),
+        (a_cube(4.9), 1.0, "z", "metres assumed, the file states no unit: 4.9 m large; z up assumed"),
+        (a_cube(5.1), 0.001, "z", "millimetres assumed, the file states no unit: 5.1 mm large; z up assumed"),
         (
             a_cube(60000),
             0.001,
             "z",
-            f"taken for millimetres, for it says no unit: 60 m large, {ODD}: check it; z up taken",
+            f"millimetres assumed, the file states no unit: 60 m large, {ODD}: check it; z up assumed",
         ),
-        (a_cube(0.3, 1.0, "y"), 1.0, "y", "in metres, as the file says: 300 mm large; y up"),
-        (a_cube(12, 0.0254, "z"), 0.0254, "z", "in inches, as the file says: 305 mm large; z up"),
+        (a_cube(0.3, 1.0, "y"), 1.0, "y", "in metres, as the file states: 300 mm large; y up"),
+        (a_cube(12, 0.0254, "z"), 0.0254, "z", "in inches, as the file states: 305 mm large; z up"),
         (
             a_cube(300, 1.0, "y"),
             1.0,
             "y",
-            "in metres, as the file says: 300 m large; odd for a robot's link; y up",
+            "in metres, as the file states: 300 m large; odd for a robot's link; y up",
         ),
-        (a_cube(1, 0.07), 0.07, "z", "in units of 0.07 m, as the file says: 70 mm large; z up taken"),
-        (Mesh(), 0.001, "z", "holds no triangles to judge by: taken for millimetres; z up taken"),
+        (a_cube(1, 0.07), 0.07, "z", "in units of 0.07 m, as the file states: 70 mm large; z up assumed"),
+        (Mesh(), 0.001, "z", "no triangles to judge the size by: millimetres assumed; z up assumed"),
     ],
 )
 def test_guess_says_what_and_why(mesh: Mesh, scale_m: float, up: str, sentence: str) -> None:

@@ -148,7 +148,7 @@ def test_obj_keeps_polygons_materials_and_what_is_degenerate(tmp_path: Path) -> 
 def test_obj_without_its_materials_is_grey_and_says_so(tmp_path: Path) -> None:
     mesh = read(tmp_path, "a.obj", OBJ)
     assert mesh.triangle_count == 4
-    assert mesh.warnings[0] == "materials: no file 'a.mtl' beside this one; drawn grey"
+    assert mesh.warnings[0] == "materials: no file 'a.mtl' in this file's folder; drawn grey"
 
 
 def test_material_file_above_the_files_folder_counts_as_missing(tmp_path: Path) -> None:
@@ -156,7 +156,7 @@ def test_material_file_above_the_files_folder_counts_as_missing(tmp_path: Path) 
     inner = tmp_path / "inner"
     inner.mkdir()
     mesh = read(inner, "a.obj", OBJ.replace("a.mtl", "../a.mtl"))
-    assert mesh.warnings[0] == "materials: no file '../a.mtl' beside this one; drawn grey"
+    assert mesh.warnings[0] == "materials: no file '../a.mtl' in this file's folder; drawn grey"
     assert all(part.material.diffuse != (1.0, 0.0, 0.0) for part in mesh.parts)
 
 
@@ -237,7 +237,7 @@ def test_gltf_reads_its_buffer_from_beside_it_and_misses_it_in_words(tmp_path: P
     document = gltf()
     data = base64.b64decode(document["buffers"][0]["uri"].split(",")[1])
     document["buffers"][0]["uri"] = "a.bin"
-    with pytest.raises(MeshError, match=r"buffer 'a\.bin': no such file beside this one"):
+    with pytest.raises(MeshError, match=r"buffer 'a\.bin': no such file in this folder"):
         read(tmp_path, "a.gltf", json.dumps(document))
     (tmp_path / "a.bin").write_bytes(data)
     mesh = read(tmp_path, "a.gltf", json.dumps(document))
@@ -249,33 +249,37 @@ def test_gltf_reads_its_buffer_from_beside_it_and_misses_it_in_words(tmp_path: P
     ("name", "content", "expected"),
     [
         ("a.stl", b"", "is empty"),
-        ("a.stl", b"\0" * 50, "is no STL"),
-        ("a.stl", binary_stl(TRIANGLE, count=4_000_000_000), "byte 80: claims 4000000000 triangles"),
+        ("a.stl", b"\0" * 50, "is not an STL"),
+        ("a.stl", binary_stl(TRIANGLE, count=4_000_000_000), "byte 80: declares 4000000000 triangles"),
         ("a.stl", binary_stl(((float("nan"), 0.0, 0.0), *TRIANGLE[1:])), "not finite"),
-        ("a.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0\n", "is no STL"),
-        ("a.obj", "v 0 0 0\nf 1 2 3\n", "is no OBJ that can be read"),
-        ("a.obj", "v 0 0 0\nf 1 1//1 14141414/2\n", "line 2: a face of vertex 14141414, of 1 at most"),
-        ("a.obj", "v 0 0 zero\nv 0 0 1\nv 1 1 1\nf 1 2 3\n", "is no OBJ that can be read"),
-        ("a.ply", PLY.replace("vertex 4", "vertex 4000000000"), "line 4: claims 4000000000 rows"),
-        ("a.ply", PLY.replace("4 0 1 2 3", "4 0 1 2 9"), "names vertex 9; there are 4"),
-        ("a.ply", PLY[:150], "is no PLY"),
-        ("a.dae", DAE[:600], "is no DAE that can be read"),
-        ("a.dae", DAE.replace("<asset>", "<!DOCTYPE x><asset>"), "holds a DOCTYPE"),
-        ("a.glb", b"glTF\2\0\0\0", "is no GLB"),
-        ("a.glb", b"glTF" + struct.pack("<4I", 2, 99, 99, 0x4E4F534A), "is cut short"),
-        ("a.gltf", "{", "its JSON is broken"),
+        ("a.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0\n", "is not an STL"),
+        ("a.obj", "v 0 0 0\nf 1 2 3\n", "cannot be read as OBJ"),
+        (
+            "a.obj",
+            "v 0 0 0\nf 1 1//1 14141414/2\n",
+            "line 2: a face uses vertex 14141414; there are at most 1",
+        ),
+        ("a.obj", "v 0 0 zero\nv 0 0 1\nv 1 1 1\nf 1 2 3\n", "cannot be read as OBJ"),
+        ("a.ply", PLY.replace("vertex 4", "vertex 4000000000"), "line 4: declares 4000000000 rows"),
+        ("a.ply", PLY.replace("4 0 1 2 3", "4 0 1 2 9"), "uses vertex 9; there are 4"),
+        ("a.ply", PLY[:150], "is not a PLY"),
+        ("a.dae", DAE[:600], "cannot be read as DAE"),
+        ("a.dae", DAE.replace("<asset>", "<!DOCTYPE x><asset>"), "has a DOCTYPE"),
+        ("a.glb", b"glTF\2\0\0\0", "is not a GLB"),
+        ("a.glb", b"glTF" + struct.pack("<4I", 2, 99, 99, 0x4E4F534A), "is truncated"),
+        ("a.gltf", "{", "its JSON is invalid"),
         (
             "a.gltf",
             json.dumps(gltf(extensionsRequired=["KHR_draco_mesh_compression"])),
             "without compression",
         ),
-        ("a.gltf", json.dumps(gltf(nodes=[{"mesh": 0, "children": [0]}])), "in a circle"),
+        ("a.gltf", json.dumps(gltf(nodes=[{"mesh": 0, "children": [0]}])), "is its own ancestor"),
         (
             "a.gltf",
             json.dumps(gltf(accessors=[{"componentType": 5126, "count": 4_000_000_000, "type": "VEC3"}])),
-            "an accessor that counts 4000000000",
+            "an accessor's count is 4000000000",
         ),
-        ("a.xyz", b"0 0 0\n", "ending '.xyz' is not read; .wrl"),
+        ("a.xyz", b"0 0 0\n", "ending '.xyz' is not supported; use .wrl"),
     ],
 )
 def test_broken_file_is_told_in_one_line(
@@ -291,12 +295,12 @@ def test_broken_file_is_told_in_one_line(
 @pytest.mark.parametrize(
     ("name", "content", "expected"),
     [
-        ("a.obj", ASCII_STL, "ends in '.obj' but holds STL; read as that"),
-        ("a.stl", PLY, "ends in '.stl' but holds PLY; read as that"),
+        ("a.obj", ASCII_STL, "ends in '.obj' but contains STL; read as that"),
+        ("a.stl", PLY, "ends in '.stl' but contains PLY; read as that"),
         (
             "a.3ds",
             "#VRML V2.0 utf8\nShape { geometry Box { } }",
-            "ends in '.3ds' but holds WRL; read as that",
+            "ends in '.3ds' but contains WRL; read as that",
         ),
     ],
 )

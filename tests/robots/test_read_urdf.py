@@ -250,7 +250,7 @@ def test_joint_whose_limits_leave_no_way_stands_still_there() -> None:
 
 def test_speed_that_is_not_given_is_taken_with_a_note() -> None:
     robot = read(with_change('velocity="3"', ""))
-    assert robot.notes == ("joint 'turn': no speed is given, 1.571 rad/s is taken",)
+    assert robot.notes == ("joint 'turn': has no velocity limit; 1.571 rad/s is assumed",)
 
 
 @pytest.mark.parametrize(
@@ -258,11 +258,11 @@ def test_speed_that_is_not_given_is_taken_with_a_note() -> None:
     [
         ('<robot name="skew">', '<robot name="skew"', "is not XML: "),
         ('<?xml version="1.0"?>', '<!DOCTYPE a [<!ENTITY b "c">]>', "has a DOCTYPE or ENTITY"),
-        ('<link name="world"/>', '<xacro:arm prefix=""/>', "is xacro, from which a URDF is made"),
+        ('<link name="world"/>', '<xacro:arm prefix=""/>', "is xacro; convert it to a URDF first"),
         ('xyz="1 2 3"', 'xyz="${x} 2 3"', "is xacro"),
         ('<link name="world"/>', "", "joint 'stand' parent link 'world': no such link"),
         ('<link name="world"/>', '<link name="world"/><link name="island"/>',
-         "links 'world', 'island': more than one has no joint above it"),
+         "links 'world', 'island': more than one link has no parent joint"),
         ('<link name="world"/>', '<link name="world"/><link name="world"/>', "link 'world': 2 have"),
         ('<link name="world"/>', '<link name="world"/><link/>', "<link> number 2: has no name"),
         ('<joint name="stand"', '<joint name="turn"', "joint 'turn': 2 have that name"),
@@ -274,7 +274,7 @@ def test_speed_that_is_not_given_is_taken_with_a_note() -> None:
         ('xyz="0.1 0.2 0.3"', 'xyz="nan 0 0"', "joint 'turn' origin xyz = 'nan 0 0': must be 3 numbers"),
         ('lower="-1" upper="2"', 'lower="2" upper="-1"', "joint 'turn' limit lower = 2, upper = -1: "),
         (LIMIT, "", "joint 'turn': has no <limit lower upper velocity>; a revolute joint needs one"),
-        ('type="revolute"', 'type="floating"', "joint 'turn' type 'floating': is not one that an arm has"),
+        ('type="revolute"', 'type="floating"', "joint 'turn' type 'floating': is not supported"),
         ('mimic joint="left_finger"', 'mimic joint="finger"', "joint 'right_finger' mimic joint 'finger'"),
         ('mimic joint="left_finger"', 'mimic joint="right_finger"',
          "joint 'right_finger' mimic joint 'right_finger': follows itself"),
@@ -302,7 +302,7 @@ def test_links_that_run_in_a_circle_apart_from_the_root_are_told() -> None:
         f'<link name="{a}"/><joint name="{a}{b}" type="fixed"><parent link="{a}"/><child link="{b}"/></joint>'
         for a, b in (("one", "two"), ("two", "one"))
     )
-    with pytest.raises(DescriptionError, match="links 'one', 'two': run in a circle; a robot is a tree"):
+    with pytest.raises(DescriptionError, match="links 'one', 'two': form a cycle; a robot is a tree"):
         read(ARM.replace("</robot>", circle + "</robot>"))
 
 
@@ -344,9 +344,9 @@ def test_changed_bytes_give_a_robot_or_an_error_in_words() -> None:
     ("text", "expected"),
     [
         ("", "is not XML"),
-        ("<html/>", "<html>: a URDF's outermost element is <robot>"),
+        ("<html/>", "<html>: a URDF's outermost element must be <robot>"),
         ('<robot name="r"/>', "has no <link>"),
-        ('<robot name="r"><link name="a"/></robot>', "has no joint that moves"),
+        ('<robot name="r"><link name="a"/></robot>', "has no movable joint"),
     ],
 )
 def test_what_is_no_arm_is_told(text: str, expected: str) -> None:

@@ -352,7 +352,7 @@ def test_an_srdf_alone_with_a_urdf_is_used_unless_it_names_another_robot(
     plan = plan_of(load(model))
     assert (("base", "hand") in dict(plan.ignored)) is ignored
     assert run(["robot", "check", str(model)]) == 0
-    found = f"any.srdf: is of the robot '{name}'; it is not used"
+    found = f"any.srdf: is for the robot '{name}'; it is not used"
     assert (found in capsys.readouterr().out) is not ignored
 
 

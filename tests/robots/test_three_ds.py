@@ -78,7 +78,7 @@ def test_any_byte_changed_is_a_mesh_or_an_error(tmp_path: Path) -> None:
         (b"#VRML V2.0 utf8\n", "is not a 3DS file"),
         (
             b"MM\xff\xff\x00\x00",
-            "byte 0: chunk 4D4D of 65535 bytes; 6 are left there; read as far as it goes",
+            "byte 0: chunk 4D4D has 65535 bytes; 6 are left; read to the end",
         ),
     ],
 )

@@ -174,7 +174,7 @@ def test_hierarchy_in_a_circle_is_left_out(tmp_path: Path) -> None:
     keyframes = chunk(0xB000, key_object("tetra", 0, 1), key_object("b", 1, 0))
     mesh = read(tmp_path, a_file(an_object(vertices(), faces()), keyframes=keyframes))
     assert mesh.nodes == ()
-    assert "hangs deeper than 1000, or on itself; the hierarchy is left out" in mesh.warnings[0]
+    assert "is nested deeper than 1000, or is its own ancestor; the hierarchy is left out" in mesh.warnings[0]
     assert mesh.triangle_count == 4
 
 
@@ -191,14 +191,14 @@ def test_outermost_lengths_that_lie_are_read_over(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("contents", "expected"),
     [
-        (chunk(0x4110, b"\xff\xff"), "a list of 65535 that needs 786420 bytes; 0 are there"),
-        (chunk(0x4110, b"\x01"), "a list without its count"),
-        (struct.pack("<HI", 0x4110, 0xFFFFFFFF), "chunk 4110 of 4294967295 bytes; 6 are left there"),
-        (struct.pack("<HI", 0x4110, 0), "chunk 4110 of 0 bytes"),
+        (chunk(0x4110, b"\xff\xff"), "a list of 65535 needs 786420 bytes; 0 follow"),
+        (chunk(0x4110, b"\x01"), "a list has no count"),
+        (struct.pack("<HI", 0x4110, 0xFFFFFFFF), "chunk 4110 has 4294967295 bytes; 6 are left"),
+        (struct.pack("<HI", 0x4110, 0), "chunk 4110 has 0 bytes"),
         (vertices() + faces(numbers=[(0, 1, 4)]), "object 'tetra': vertex 4; there are 4"),
         (vertices([(0, 0, 0), (1, 0, 0), (float("nan"), 0, 0), (1, 1, 1)]) + faces(), "not finite"),
         (vertices() + faces(painted("m", 9)), "face 9; there are 4"),
-        (vertices() + faces(chunk(0x4130, b"endless")), "a name that does not end"),
+        (vertices() + faces(chunk(0x4130, b"endless")), "a name does not end with a zero byte"),
     ],
 )
 def test_broken_object_is_refused_with_its_byte(tmp_path: Path, contents: bytes, expected: str) -> None:

@@ -94,5 +94,5 @@ def test_invalid_urdf_is_left_out_and_the_others_stay():
     bad = Viewed("here", "bad", "<robot", (), lambda link: None)
     text = together([bad, viewed("here", "pt600", pinocchio.SE3.Identity())], plain_joints=False)
     assert "here/pt600/base" in text
-    with pytest.raises(ValueError, match="no URDF"):
+    with pytest.raises(ValueError, match="is not a URDF"):
         prefixed("<robot", "", lambda link: None)

@@ -45,9 +45,9 @@ def test_papers_sample_is_read_with_warnings(tmp_path: Path) -> None:
     assert high.tolist() == [25.08, 30.8, 13.86]
     assert mesh.parts[0].material.diffuse == (0.7, 0.7, 0.7)
     assert mesh.warnings == (
-        "line 1, column 1: a blank in the header, '# VRML'; it should be '#VRML V2.0 utf8'",
+        "line 1, column 1: the header has a blank, '# VRML'; it should be '#VRML V2.0 utf8'",
         "line 4, column 16: the name '1-FACES' begins with a digit; taken as it is",
-        "line 8, column 17: a sign stands apart from its digits; read as one number",
+        "line 8, column 17: a sign is separated from its digits by a blank; read as one number",
     )
 
 
@@ -157,7 +157,7 @@ def test_grid_that_claims_what_is_not_there_is_refused(draw: Draw) -> None:
     refused_in_time(
         draw,
         "Shape { geometry ElevationGrid { xDimension 4000000000 zDimension 4000000000 height [ 0 0 ] } }",
-        "height has 2 numbers; 4000000000 x 4000000000 of them are asked for",
+        "height has 2 numbers; 4000000000 x 4000000000 are needed",
     )
 
 

@@ -116,7 +116,7 @@ def test_lines_have_colors_by_vertex_and_by_line(
 def test_lines_to_points_that_are_not_there_are_left_out_with_a_warning(draw: Draw) -> None:
     mesh = draw(f"Shape {{ geometry IndexedLineSet {{ {POINTS} coordIndex [ 0 1 7 2 3 ] }} }}")
     assert lines(mesh.wires[0]) == [[[0, 0, 0], [1, 0, 0]], [[1, 1, 0], [0, 1, 0]]]
-    assert "coordIndex holds 7; there are 4 points, 0 to 3" in mesh.warnings[0]
+    assert "coordIndex contains 7; there are 4 points, 0 to 3" in mesh.warnings[0]
 
 
 def test_points_stand_where_the_transform_puts_them(draw: Draw) -> None:

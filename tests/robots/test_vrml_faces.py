@@ -149,7 +149,7 @@ def test_given_normals_stay_as_they_are_when_faces_run_clockwise(draw: Draw) -> 
 def test_normals_that_are_too_few_are_left_out_with_a_warning(draw: Draw) -> None:
     mesh = draw(f"Shape {{ geometry IndexedFaceSet {{ normal Normal {{ vector [ 1 0 0 ] }} {TWO_FACES} }} }}")
     assert mesh.warnings == (
-        "line 2, column 18: IndexedFaceSet: normal 1 is asked for; there are 1: no normal is taken",
+        "line 2, column 18: IndexedFaceSet: normal number 1; there are 1: normal is ignored",
     )
     np.testing.assert_allclose(mesh.parts[0].normals[0], [0, 0, 1])
 
@@ -211,7 +211,7 @@ def test_faces_of_points_that_are_not_there_are_left_out_with_a_warning(draw: Dr
     assert mesh.triangle_count == 1
     place, _, said = mesh.warnings[0].partition(": ")
     assert place == "line 2, column 18"
-    assert said == ("IndexedFaceSet: coordIndex holds 9; there are 6 points, 0 to 5: 2 faces are left out")
+    assert said == ("IndexedFaceSet: coordIndex contains 9; there are 6 points, 0 to 5: 2 faces are left out")
 
 
 def test_face_set_without_points_draws_nothing(draw: Draw) -> None:

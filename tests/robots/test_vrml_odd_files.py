@@ -34,13 +34,13 @@ def read(folder: Path, data: bytes) -> Mesh:
 @pytest.mark.parametrize(
     ("text", "warning"),
     [
-        (SHAPE, "line 1, column 1: no header '#VRML V2.0 utf8'; read as VRML 2.0 all the same"),
-        (f"#hello\n{SHAPE}", "line 1, column 1: no header"),
-        (f"# VRML V2.0 utf8\n{SHAPE}", "line 1, column 1: a blank in the header, '# VRML'"),
-        (f"{HEADER}{SHAPE} }} ] }}", "line 3, column 79: a '}' too many; passed over"),
+        (SHAPE, "line 1, column 1: the header '#VRML V2.0 utf8' is missing; read as VRML 2.0"),
+        (f"#hello\n{SHAPE}", "line 1, column 1: the header '#VRML V2.0 utf8' is missing"),
+        (f"# VRML V2.0 utf8\n{SHAPE}", "line 1, column 1: the header has a blank, '# VRML'"),
+        (f"{HEADER}{SHAPE} }} ] }}", "line 3, column 79: an extra '}'; skipped"),
         (f"{HEADER}DEF 12 {SHAPE} USE 12", "line 2, column 5: the name '12' begins with a digit"),
         (f"{HEADER}DEF 3-a.b:c {SHAPE}", "line 2, column 5: the name '3-a.b:c' begins with a digit"),
-        (f"{HEADER}Transform {{ translation 1 - 2 3 }} {SHAPE}", "line 2, column 27: a sign stands apart"),
+        (f"{HEADER}Transform {{ translation 1 - 2 3 }} {SHAPE}", "line 2, column 27: a sign is separated"),
     ],
 )
 def test_odd_file_is_read_with_a_warning(tmp_path: Path, text: str, warning: str) -> None:
@@ -52,7 +52,7 @@ def test_odd_file_is_read_with_a_warning(tmp_path: Path, text: str, warning: str
 def test_latin_1_is_read_with_a_warning(tmp_path: Path) -> None:
     mesh = read(tmp_path, f"{HEADER}# Stück\nDEF Grün {SHAPE}".encode("latin-1"))
     assert mesh.parts[0].name == "Grün"
-    assert mesh.warnings == ("line 2, column 5: no UTF-8; the file is read as Latin-1",)
+    assert mesh.warnings == ("line 2, column 5: is not UTF-8; the file is read as Latin-1",)
 
 
 # Read without one: the standard allows it, or it does no harm.
@@ -110,16 +110,16 @@ def test_list_with_comments_and_signs_apart_keeps_every_number(draw: Draw) -> No
     [
         (b"", "is empty"),
         (b" \n\0", "is empty"),
-        (b"#hello", "is not VRML 2.0: it begins '#hello', not '#VRML V2.0 utf8'"),
-        (b"solid \0\0 {", "is not VRML 2.0: it holds binary data"),
+        (b"#hello", "is not VRML 2.0: it begins with '#hello', not '#VRML V2.0 utf8'"),
+        (b"solid \0\0 {", "is not VRML 2.0: it contains binary data"),
         (b"#VRML V1.0 ascii\nSeparator { }", "line 1, column 1: is VRML 1.0; only VRML 2.0 is read"),
         (b"#X3D V3.0 utf8\nGroup { }", "line 1, column 1: is X3D; only VRML 2.0 is read"),
         (b"#Inventor V2.1 ascii\nSeparator { }", "line 1, column 1: is Inventor; only VRML 2.0 is read"),
-        (gzip.compress(HEADER.encode(), mtime=0)[:-9], "is compressed by gzip, and cut short"),
-        (gzip.compress(HEADER.encode(), mtime=0)[:10] + b"\xff" * 20, "is compressed by gzip, and broken"),
+        (gzip.compress(HEADER.encode(), mtime=0)[:-9], "is gzip data, but truncated"),
+        (gzip.compress(HEADER.encode(), mtime=0)[:10] + b"\xff" * 20, "is gzip data, but damaged"),
         (
             gzip.compress(b" " * (20 << 20), mtime=0),
-            "unpacks to more than 16 MiB; a mesh does not shrink like that",
+            "unpacks to more than 16 MiB, too much for a mesh of its size",
         ),
     ],
 )
@@ -149,10 +149,10 @@ def face_set(points: str, rest: str = "coordIndex [ 0 1 2 ]") -> str:
         ("Shape { geometry }", "line 2, column 18: a value of geometry was expected, not '}'"),
         ("Shape }", "line 2, column 7: '{' after 'Shape' was expected, not '}'"),
         ("Shape Box { }", "line 2, column 7: '{' after 'Shape' was expected, not 'Box'"),
-        ("Group { children [ Shape { } ", "line 2, column 18: a '[' that is never closed"),
+        ("Group { children [ Shape { } ", "line 2, column 18: this '[' is never closed"),
         ("Group { children [ 1 Shape { } ] }", "column 22: a number or ']' was expected, not 'Shape'"),
         ("Group { 5 }", "line 2, column 9: a field of Group or '}' was expected, not '5'"),
-        ('WorldInfo { title "open }', "line 2, column 19: a string that does not end"),
+        ('WorldInfo { title "open }', "line 2, column 19: this string does not end"),
         ("DEF", "line 2, column 4: a name after DEF was expected, not the end of the file"),
         ("DEF A { }", "line 2, column 7: a node was expected, not '{'"),
         ("USE { }", "line 2, column 5: a name after USE was expected, not '{'"),
@@ -173,12 +173,12 @@ def face_set(points: str, rest: str = "coordIndex [ 0 1 2 ]") -> str:
         (face_set("0 0 1e39"), "line 2, column 66: 1e39 is too large for a number"),
         (face_set("0 0 -1.#IND"), "a number was expected, not '1.#IND'"),
         (face_set("0 0 1.2.3"), "line 2, column 66: a number or ']' was expected, not '1.2.3'"),
-        (face_set("0 0 0", "coordIndex [ 0 0.5 1 ]"), "coordIndex holds 0.5; it takes whole numbers"),
-        (face_set("0 0 0", "coordIndex [ 1e30 ]"), "coordIndex holds 1e+30; it takes numbers of points"),
+        (face_set("0 0 0", "coordIndex [ 0 0.5 1 ]"), "coordIndex contains 0.5; it takes whole numbers"),
+        (face_set("0 0 0", "coordIndex [ 1e30 ]"), "coordIndex contains 1e+30; it takes point numbers"),
         ("Transform { translation 1e39 0 0 }", "line 2, column 25: 1e39 is too large for a number"),
         (
             "Transform { scale 1e30 1 1 children Transform { scale 1e31 1 1 } }",
-            "line 2, column 37: Transform: goes with those around it beyond all sizes",
+            "line 2, column 37: Transform: nested transforms reach beyond 1e+60",
         ),
         ("Shape { geometry ElevationGrid { xDimension 3 zDimension 2 } }", "height has 0 numbers; 3 x 2"),
         ("Group { children " * 200, "line 2, column 2041: nested deeper than 120"),
@@ -211,7 +211,7 @@ def test_long_junk_makes_a_short_error(draw: Draw) -> None:
 
 def test_what_is_quoted_of_a_file_cannot_steer_a_terminal(draw: Draw) -> None:
     mesh = draw(f"Evil\x1b {{ }} {SHAPE}")
-    assert mesh.warnings == ("line 2, column 1: Evil?: no node of VRML 2.0; read over",)
+    assert mesh.warnings == ("line 2, column 1: Evil?: is not a node of VRML 2.0; skipped",)
     with pytest.raises(MeshError) as caught:
         draw("Evil\x1b [31m")
     assert caught.value.reason == r"'{' after 'Evil\x1b' was expected, not '['"
@@ -222,7 +222,7 @@ def test_what_is_quoted_of_a_file_cannot_steer_a_terminal(draw: Draw) -> None:
 
 @given(st.text(alphabet='{}[]"#-+.,01eEx \n\\ABDEFSU', max_size=60))
 def test_any_text_is_tokens_to_its_end_or_refused(text: str) -> None:
-    with suppress(MeshError):  # of a string that does not end
+    with suppress(MeshError):  # of this string does not end
         lexer = Lexer(Source(Path("a.wrl"), text))
         for _ in range(len(text) + 1):
             if lexer.kind is Kind.END:

@@ -124,7 +124,7 @@ def test_switch_draws_nothing_unless_told_which(draw: Draw, which: str) -> None:
 def test_switch_with_levels_is_read_as_if_they_were_choices(draw: Draw) -> None:
     mesh = draw(f"Switch {{ whichChoice 1 level [ {BOX} {SHAPE} ] }}")
     assert mesh.triangle_count == 1
-    assert mesh.warnings == ("line 2, column 1: Switch: has 'level', as LOD; it is taken for its 'choice'",)
+    assert mesh.warnings == ("line 2, column 1: Switch: has 'level', a field of LOD; read as 'choice'",)
 
 
 # DEF and USE
@@ -158,7 +158,7 @@ def test_use_of_a_name_that_is_not_there_is_left_out_with_a_warning(draw: Draw, 
     assert mesh.triangle_count == 1
     column = text.index("USE") + 1
     assert mesh.warnings == (
-        f"line 2, column {column}: USE Nobody: nothing of that name was DEFined before; left out",
+        f"line 2, column {column}: USE Nobody: no node was DEFined with that name before; left out",
     )
 
 
@@ -216,7 +216,7 @@ def test_proto_can_hold_protos_of_its_own(draw: Draw) -> None:
         Outer {{ }} Inner {{ }}"""
     )
     assert [triangle[0] for triangle in corners(mesh)] == [[1, 0, 0], [2, 0, 0]]
-    assert mesh.warnings == ("line 7, column 19: Inner: no node of VRML 2.0; read over",)
+    assert mesh.warnings == ("line 7, column 19: Inner: is not a node of VRML 2.0; skipped",)
 
 
 def test_names_in_a_proto_are_its_own(draw: Draw) -> None:
@@ -327,7 +327,7 @@ def test_inline_in_an_externproto_is_beside_its_own_file(tmp_path: Path) -> None
     ("url", "trouble"),
     [
         ('"none.wrl#P"', "'none.wrl': no such file"),
-        ('"library.wrl#None"', "'library.wrl' holds no PROTO None"),
+        ('"library.wrl#None"', "'library.wrl' contains no PROTO None"),
         ('[ "none.wrl#P" "http://x.org/a.wrl#P" ]', "'http://x.org/a.wrl': no such file"),
         ("[ ]", "has no address"),
     ],
@@ -348,10 +348,10 @@ def test_externprotos_that_lead_back_to_themselves_are_refused(tmp_path: Path) -
     path = write(
         tmp_path, "a.wrl", 'EXTERNPROTO Q [ ] "b.wrl#Q" PROTO P [ ] { Group { children Q { } } } P { }'
     )
-    with pytest.raises(MeshError, match=r"EXTERNPROTO . leads back to itself"):
+    with pytest.raises(MeshError, match=r"EXTERNPROTO . contains itself"):
         read_vrml(path)
     itself = write(tmp_path, "c.wrl", 'EXTERNPROTO P [ ] "c.wrl#P" P { }')
-    with pytest.raises(MeshError, match="EXTERNPROTO P leads back to itself"):
+    with pytest.raises(MeshError, match="EXTERNPROTO P contains itself"):
         read_vrml(itself)
 
 
@@ -410,9 +410,9 @@ def test_file_of_which_everything_is_missing_is_empty_and_names_it(tmp_path: Pat
 
 def test_inlines_that_lead_back_to_themselves_are_refused(tmp_path: Path) -> None:
     write(tmp_path, "b.wrl", 'Inline { url "a.wrl" }')
-    with pytest.raises(MeshError, match=r"b\.wrl, line 2, column 1: Inline: 'a.wrl' leads back to itself"):
+    with pytest.raises(MeshError, match=r"b\.wrl, line 2, column 1: Inline: 'a.wrl' includes itself"):
         read_vrml(write(tmp_path, "a.wrl", 'Inline { url "b.wrl" }'))
-    with pytest.raises(MeshError, match="leads back to itself"):
+    with pytest.raises(MeshError, match="includes itself"):
         read_vrml(write(tmp_path, "c.wrl", 'Inline { url "./c.wrl" }'))
 
 
@@ -421,7 +421,7 @@ def test_inline_may_be_used_many_times_and_its_warnings_come_once(tmp_path: Path
     path = write(tmp_path, "a.wrl", 'Inline { url "b.wrl" } Inline { url "b.wrl" } Company { }')
     mesh = read_vrml(path)
     assert mesh.triangle_count == 2
-    assert mesh.warnings == ("b.wrl, line 3, column 79: Company: no node of VRML 2.0; read over",)
+    assert mesh.warnings == ("b.wrl, line 3, column 79: Company: is not a node of VRML 2.0; skipped",)
 
 
 def test_error_in_an_inline_names_its_file(tmp_path: Path) -> None:
@@ -458,7 +458,7 @@ def test_nodes_that_draw_nothing_are_named_once(draw: Draw) -> None:
     )
     assert mesh.triangle_count == 1
     assert mesh.warnings == (
-        "line 2, column 1: nothing is drawn of: WorldInfo, TimeSensor, Script, PointLight, Viewpoint",
+        "line 2, column 1: not drawn: WorldInfo, TimeSensor, Script, PointLight, Viewpoint",
     )
 
 
@@ -471,9 +471,9 @@ def test_nodes_that_nobody_knows_are_named_once_each(draw: Draw) -> None:
     assert mesh.triangle_count == 1
     said = [warning.split(": ", 1)[1] for warning in mesh.warnings]
     assert sorted(said) == [
-        "Company: no node of VRML 2.0; read over",
-        "NurbsSurface: is no geometry of VRML 2.0; left out",
-        "Other: no node of VRML 2.0; read over",
+        "Company: is not a node of VRML 2.0; skipped",
+        "NurbsSurface: is not a geometry node of VRML 2.0; left out",
+        "Other: is not a node of VRML 2.0; skipped",
         "Text: is not drawn",
     ]
 

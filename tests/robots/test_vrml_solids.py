@@ -100,7 +100,7 @@ def test_parts_of_a_cone_can_be_left_out(draw: Draw) -> None:
 def test_size_below_zero_is_taken_without_its_sign_with_a_warning(draw: Draw) -> None:
     mesh = draw("Shape { geometry Sphere { radius -2 } }")
     assert bounds(mesh)[1].tolist() == [2, 2, 2]
-    assert mesh.warnings == ("line 2, column 18: Sphere: a size of -2; it should be above 0",)
+    assert mesh.warnings == ("line 2, column 18: Sphere: a size is -2; it must be above 0",)
 
 
 # ElevationGrid
@@ -200,7 +200,7 @@ def test_one_scale_and_orientation_are_for_all_points(draw: Draw) -> None:
 
 def test_values_that_are_too_few_are_told(draw: Draw) -> None:
     mesh = draw("Shape { geometry Extrusion { scale [ 1 1, 2 2 ] spine [ 0 0 0, 0 1 0, 0 2 0 ] } }")
-    assert "scale has 2 values for 3 spine points; the last is for the rest" in mesh.warnings[0]
+    assert "scale has 2 values for 3 spine points; the last is repeated" in mesh.warnings[0]
     with pytest.raises(MeshError, match="scale is empty"):
         draw("Shape { geometry Extrusion { scale [ ] } }")
 
@@ -208,7 +208,7 @@ def test_values_that_are_too_few_are_told(draw: Draw) -> None:
 def test_extrusion_of_one_point_draws_nothing_and_says_so(draw: Draw) -> None:
     mesh = draw("Shape { geometry Extrusion { spine [ 0 0 0 ] } }")
     assert mesh.parts == ()
-    assert "of 1 spine and 5 crossSection points" in mesh.warnings[0]
+    assert "has 1 spine and 5 crossSection points" in mesh.warnings[0]
 
 
 def test_ccw_false_turns_an_extrusion_inside_out(draw: Draw) -> None:

@@ -72,7 +72,7 @@ def test_a_step_file_is_converted_in_the_confined_worker(page):
 def test_a_broken_step_file_is_told(page):
     answer = converted(page, "part.step", b"ISO-10303-21;\nHEADER;\nnonsense")
     assert answer.status == 422
-    assert answer.text.startswith("part.step: is no STEP that can be read")
+    assert answer.text.startswith("part.step: cannot be read as STEP")
 
 
 @pytest.mark.slow

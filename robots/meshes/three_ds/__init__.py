@@ -1,1 +1,1 @@
-"""3DS, the files of 3D Studio: reading their meshes, materials and hierarchy, and writing them."""
+"""Reader and writer of 3DS, the files of 3D Studio: meshes, materials and hierarchy."""

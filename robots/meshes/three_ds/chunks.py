@@ -1,6 +1,6 @@
-"""The chunks that a 3DS file is made of.
+"""The chunks of a 3DS file.
 
-chunk = id:uint16 length:uint32 data        length counts these 6 bytes too; little-endian
+chunk = id:uint16 length:uint32 data        length includes these 6 bytes; little-endian
 """
 
 import struct
@@ -27,75 +27,79 @@ class Chunk:
 
 @dataclass(frozen=True)
 class Source:
-    """A file's bytes, and what was odd in them."""
+    """A file's bytes, and the warnings about them."""
 
     path: Path
     data: bytes
     warnings: list[str] = field(default_factory=list)
 
     def chunks(self, start: int, end: int, *, lenient: bool = False) -> Iterator[Chunk]:
-        """The chunks side by side between two bytes.
+        """Yield the consecutive chunks between two bytes.
 
         Args:
-            lenient: A length that overruns ends with what is there, and is warned of: some programs
-                write the outermost ones wrong, and what lies inside is whole all the same.
+            lenient: Cut a chunk that is too long, with a warning, instead of raising. Some programs write
+                wrong lengths for the outermost chunks, although the content is complete.
 
         Raises:
-            MeshError: If a chunk is longer than what holds it, with its byte.
+            MeshError: If a chunk is longer than its container; the error has the byte.
         """
         while end - start >= _HEADER.size:
             identity, length = _HEADER.unpack_from(self.data, start)
-            problem = f"chunk {identity:04X} of {length} bytes; {end - start} are left there"
+            problem = f"chunk {identity:04X} has {length} bytes; {end - start} are left"
             if length < _HEADER.size:
                 if not lenient:
                     raise self.error(start, problem)
-                self.warn(f"byte {start}: {problem}; what follows is left out")
+                self.warn(f"byte {start}: {problem}; the rest is left out")
                 return
             stop = start + length
             if stop > end:
                 if not lenient:
                     raise self.error(start, problem)
-                self.warn(f"byte {start}: {problem}; read as far as it goes")
+                self.warn(f"byte {start}: {problem}; read to the end")
                 stop = end
             yield Chunk(identity, start + _HEADER.size, stop)
             start = stop
 
     def text(self, start: int, end: int) -> tuple[str, int]:
-        """A string that ends with a zero byte, and the byte after it."""
+        """Return a string that ends with a zero byte, and the position after it."""
         zero = self.data.find(b"\0", start, end)
         if zero < 0:
-            raise self.error(start, "a name that does not end")
+            raise self.error(start, "a name does not end with a zero byte")
         return self.data[start:zero].decode("latin-1"), zero + 1
 
     def array(self, start: int, end: int, kind: str, width: int) -> tuple[NDArray[np.float64], int]:
-        """A count (uint16) and as many rows; and the byte after them."""
+        """Return the rows of a list that begins with their count (uint16), and the position after it."""
         if end - start < 2:
-            raise self.error(start, "a list without its count")
+            raise self.error(start, "a list has no count")
         (count,) = struct.unpack_from("<H", self.data, start)
         size = count * width * np.dtype(kind).itemsize
         if start + 2 + size > end:
-            raise self.error(start, f"a list of {count} that needs {size} bytes; {end - start - 2} are there")
+            raise self.error(start, f"a list of {count} needs {size} bytes; {end - start - 2} follow")
         return self.numbers(start + 2, kind, count * width).reshape(count, width), start + 2 + size
 
     def numbers(self, start: int, kind: str, count: int) -> NDArray[np.float64]:
-        """(count,) numbers from a byte on; they may be anything, NaN too."""
-        with np.errstate(invalid="ignore"):  # signalling NaN
+        """Return (count,) numbers from a byte on; they may be NaN."""
+        with np.errstate(invalid="ignore"):  # a signalling NaN raises a flag
             return np.frombuffer(self.data, kind, count, start).astype(np.float64)
 
     def floats(self, start: int, end: int, count: int) -> NDArray[np.float64]:
-        """(count,) numbers; refused where they are cut short or not finite."""
+        """Return (count,) finite numbers.
+
+        Raises:
+            MeshError: If they are truncated or not finite.
+        """
         if end - start < 4 * count:
-            raise self.error(start, f"{count} numbers are due; {max(end - start, 0)} bytes are there")
+            raise self.error(start, f"{count} numbers are needed; {max(end - start, 0)} bytes follow")
         found = self.numbers(start, "<f4", count)
         if not np.isfinite(found).all():
-            raise self.error(start, f"{found.tolist()}; finite numbers are right")
+            raise self.error(start, f"{found.tolist()} must be finite")
         return found
 
     def error(self, position: int, reason: str) -> MeshError:
-        """What is wrong, with its byte."""
+        """Return an error at a byte."""
         return MeshError(self.path, reason, place=f"byte {position}")
 
     def warn(self, warning: str) -> None:
-        """Keep a warning; a broken file has no end of them."""
+        """Record a warning once; at most a hundred, because a damaged file can cause any number."""
         if len(self.warnings) < 100 and warning not in self.warnings:
             self.warnings.append(warning)

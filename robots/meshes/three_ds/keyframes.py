@@ -1,13 +1,13 @@
-"""The key frames of a 3DS file: which object hangs on which, and about which point it turns.
+"""The key frames of a 3DS file: the hierarchy of objects and their pivots.
 
     B000 ── B002 object ── B030 number, B010 name flags:uint16 flags:uint16 parent:uint16, B011 instance,
                            B013 pivot, B020 position, B021 rotation, B022 scale
     track = flags:uint16 unused:8 count:uint32 then keys
     key   = frame:uint32 flags:uint16 [a float for each of the flags' low 5 bits] values
 
-The first key of each track repeats the mesh's own local frame (4160) in the real files looked at (but for
-the turn of one that was saved in mid-motion), so vertices need no moving by it. Rotations are clockwise
-about their axis: only so do the same files' keys give their local frames.
+In the real files examined, the first key of each track repeats the mesh's local frame (4160), so vertices
+need not be moved by it. (One file was saved in mid-motion and has another rotation.) Rotations are clockwise
+about their axis: only then do the keys of those files agree with their local frames.
 """
 
 import struct
@@ -35,20 +35,20 @@ class _Entry:
 
 
 def nodes_of(source: Source, chunk: Chunk) -> tuple[Node, ...]:
-    """The hierarchy, in the file's order; parents may come after their children."""
+    """Return the hierarchy in file order; a parent may follow its children."""
     entries: list[_Entry] = []
     for child in source.chunks(chunk.start, chunk.end):
         if child.id == _OBJECT:
             entries.append(_entry(source, child, len(entries)))
-    places = {entry.number: place for place, entry in enumerate(entries)}
-    parents = [places.get(entry.parent, -1) if entry.parent != _NONE else -1 for entry in entries]
+    indices = {entry.number: index for index, entry in enumerate(entries)}
+    parents = [indices.get(entry.parent, -1) if entry.parent != _NONE else -1 for entry in entries]
     counted = Counter(entry.name for entry in entries if entry.name != _DUMMY)
     for name, count in counted.items():
         if count > 1:
             source.warn(f"object {name!r}: {count - 1} copies of it in the key frames are not drawn")
     return tuple(
-        Node(_name(entry), parents[place], _to_file(source, entries, parents, place))
-        for place, entry in enumerate(entries)
+        Node(_name(entry), parents[index], _to_file(source, entries, parents, index))
+        for index, entry in enumerate(entries)
     )
 
 
@@ -58,16 +58,19 @@ def _name(entry: _Entry) -> str:
     return f"{entry.name}.{entry.instance}" if entry.instance else entry.name
 
 
-def _to_file(source: Source, entries: list[_Entry], parents: list[int], place: int) -> FloatArray:
+def _to_file(source: Source, entries: list[_Entry], parents: list[int], index: int) -> FloatArray:
     matrix, seen = np.eye(4), 0
-    start = place
-    while place >= 0:
-        to_parent = entries[place].to_parent
+    start = index
+    while index >= 0:
+        to_parent = entries[index].to_parent
         if to_parent is not None:
             matrix = to_parent @ matrix
-        place, seen = parents[place], seen + 1
+        index, seen = parents[index], seen + 1
         if seen > 1000:
-            raise source.error(0, f"key frames: {entries[start].name!r} hangs deeper than 1000, or on itself")
+            raise source.error(
+                0,
+                f"key frames: {entries[start].name!r} is nested deeper than 1000, or is its own ancestor",
+            )
     return matrix
 
 
@@ -97,7 +100,7 @@ def _entry(source: Source, chunk: Chunk, number: int) -> _Entry:
 
 
 def _first_key(source: Source, chunk: Chunk, default: FloatArray) -> FloatArray:
-    """The values of a track's first key; the default where it has none."""
+    """Return the values of a track's first key; the default if the track is empty."""
     if chunk.end - chunk.start < 14:
         return default
     (count,) = struct.unpack_from("<I", source.data, chunk.start + 10)
@@ -105,6 +108,6 @@ def _first_key(source: Source, chunk: Chunk, default: FloatArray) -> FloatArray:
         return default
     start = chunk.start + 14
     if chunk.end - start < 6:
-        raise source.error(start, f"a track of {count} keys that holds none")
+        raise source.error(start, f"a track declares {count} keys but contains none")
     (flags,) = struct.unpack_from("<H", source.data, start + 4)
     return source.floats(start + 6 + 4 * (flags & 31).bit_count(), chunk.end, len(default))

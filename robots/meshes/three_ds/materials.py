@@ -2,7 +2,7 @@
 
 AFFF ── A000 name, A020 diffuse, A030 specular, A040 shininess, A050 transparency,
         A080 / A084 self-illuminated, A081 two-sided, A200 texture ── A300 its file's name
-colour   = 0010 (3 floats) | 0011 (3 bytes), both as seen | 0012 (bytes) | 0013 (floats), both linear
+colour   = 0010 (3 floats) | 0011 (3 bytes), both sRGB | 0012 (bytes) | 0013 (floats), both linear
 fraction = 0030 (percent, int16) | 0031 (float)
 """
 
@@ -20,14 +20,14 @@ _LINEAR = (0x0012, 0x0013)
 
 @dataclass(frozen=True)
 class Surface:
-    """A material and whether both sides of what it covers are drawn."""
+    """A material, and whether both sides of its faces are drawn."""
 
     material: Material = field(default_factory=Material)
     two_sided: bool = False
 
 
 def surface_of(source: Source, chunk: Chunk) -> Surface:
-    """What a material chunk says; what it does not say stays as it is by default."""
+    """Return a material chunk's material, with defaults for missing properties."""
     material, two_sided, glow = Material(), False, 0.0
     for child in source.chunks(chunk.start, chunk.end):
         if child.id == 0xA000:
@@ -53,7 +53,7 @@ def surface_of(source: Source, chunk: Chunk) -> Surface:
 
 
 def _color(source: Source, chunk: Chunk, default: Color) -> Color:
-    """The colour as it is seen, where there is one; else the linear one."""
+    """Return the sRGB colour if there is one, otherwise the linear one."""
     found: dict[bool, Color] = {}
     for child in source.chunks(chunk.start, chunk.end):
         size = child.end - child.start

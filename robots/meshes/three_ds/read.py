@@ -1,16 +1,16 @@
-"""3DS files to meshes.
+"""Reader of 3DS files.
 
     4D4D main
     ├── 3D3D editor
-    │   ├── 0100 unit in inches, of no use: nobody sets it
+    │   ├── 0100 unit in inches, ignored: no program sets it
     │   ├── AFFF material
     │   └── 4000 object: name, then 4100 mesh ── 4110 vertices, 4120 faces ── 4130 faces of a material
     │                                                                     └── 4150 smoothing groups
     │                                        └── 4160 local frame
     └── B000 key frames
 
-Vertices stand where they are drawn already. The local frame and the key frames say how an object was
-built and how it moves; applying them to a still picture (as some readers do) puts it in the wrong place.
+Vertices are already in place. The local frame and the key frames say how an object was built and how it
+moves; some readers apply them to a static mesh, which puts it in the wrong place.
 """
 
 from collections.abc import Iterator
@@ -41,12 +41,12 @@ class _Object:
 
 
 def read_3ds(path: Path) -> Mesh:
-    """The triangles of a .3ds file, in its own units and axes, and its hierarchy.
+    """Return the triangles and the hierarchy of a .3ds file, in the file's units and axes.
 
     Each node's origin is its object's pivot; parts have their object's name.
 
     Raises:
-        MeshError: If it is not a 3DS file, or a broken one, with the byte.
+        MeshError: If it is not a 3DS file, or is damaged; the error has the byte.
     """
     try:
         data = path.read_bytes()
@@ -59,7 +59,7 @@ def read_3ds(path: Path) -> Mesh:
     objects: list[_Object] = []
     nodes: tuple[Node, ...] = ()
     main = next(source.chunks(0, len(data), lenient=True), None)
-    # What follows the main chunk is not the file's.
+    # Bytes after the main chunk do not belong to the file.
     for section in source.chunks(main.start, main.end, lenient=True) if main is not None else ():
         if section.id == _EDITOR:
             for chunk in source.chunks(section.start, section.end, lenient=True):
@@ -71,13 +71,13 @@ def read_3ds(path: Path) -> Mesh:
         elif section.id == _KEYFRAMES:
             try:
                 nodes = nodes_of(source, section)
-            except MeshError as error:  # nothing is drawn by them
+            except MeshError as error:  # the triangles do not depend on the hierarchy
                 source.warn(f"{error.place}: {error.reason}; the hierarchy is left out")
     parts = tuple(part for found in objects for part in _parts(source, found, surfaces))
     if not parts:
         if source.warnings:
             raise MeshError(path, source.warnings[0])
-        source.warn("holds no triangles")
+        source.warn("has no triangles")
     textures = sorted({part.material.texture for part in parts} - {""})
     if textures:
         source.warn(f"textures are kept by name, not drawn: {', '.join(textures[:10])}")
@@ -106,7 +106,7 @@ def _object(source: Source, name: str, chunk: Chunk) -> _Object:
         number = int(found.triangles[wrong][0])
         raise source.error(chunk.start, f"object {name!r}: vertex {number}; there are {len(found.vertices)}")
     if not np.isfinite(found.vertices[found.triangles.ravel()]).all():
-        raise source.error(chunk.start, f"object {name!r}: a vertex that is not finite")
+        raise source.error(chunk.start, f"object {name!r}: a vertex has a non-finite coordinate")
     return found
 
 
@@ -157,9 +157,9 @@ def _parts(source: Source, found: _Object, surfaces: dict[str, Surface]) -> Iter
 
 
 def _volume(vertices: FloatArray, triangles: IndexArray) -> float:
-    """Six times the volume that a closed surface holds; negative if it is inside out.
+    """Return six times the volume of a closed surface; negative if it is inside out.
 
-    A mirrored object's faces are the wrong way round in some programs' files, and not in others'.
+    Some programs reverse the faces of a mirrored object, others do not.
     """
     a, b, c = (vertices[triangles[:, corner]] - vertices.mean(axis=0) for corner in range(3))
     return float(np.einsum("ij,ij->", a, np.cross(b, c)))

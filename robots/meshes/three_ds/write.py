@@ -1,4 +1,4 @@
-"""Meshes to 3DS: an object a part. Its normals are the reader's: vertices are split where edges are sharp."""
+"""Writer of 3DS files: an object for each part. Split vertices keep edges sharp; readers compute normals."""
 
 import struct
 
@@ -11,7 +11,7 @@ _MOST = 65535
 
 
 def write_3ds(mesh: Mesh) -> bytes:
-    """The content of a .3ds file; the same mesh gives the same bytes.
+    """Return the content of a .3ds file; the same mesh gives the same bytes.
 
     Raises:
         ValueError: If a part has more than 65,535 vertices or triangles.
@@ -56,9 +56,7 @@ def _percent(fraction: float) -> bytes:
 
 def _object(name: str, part: Part) -> bytes:
     if max(len(part.vertices), len(part.triangles)) > _MOST:
-        raise ValueError(
-            f"part {part.name!r} has more than {_MOST} vertices or triangles; 3DS cannot hold it"
-        )
+        raise ValueError(f"part {part.name!r} has more than {_MOST} vertices or triangles, the limit of 3DS")
     count = len(part.triangles)
     corners = np.column_stack([part.triangles, np.full(count, 7)]).astype("<u2")  # 7: all three edges seen
     faces = _chunk(

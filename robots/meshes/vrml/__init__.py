@@ -1,1 +1,1 @@
-"""VRML 2.0 (VRML97): reading what it draws, and writing it. Source: ISO/IEC 14772-1:1997."""
+"""Reader and writer of VRML 2.0 (VRML97). Source: ISO/IEC 14772-1:1997."""

@@ -1,4 +1,4 @@
-"""What each node of a VRML scene draws, and where.
+"""Conversion of a VRML scene's nodes to placed parts and wires.
 
 Source: ISO/IEC 14772-1:1997, clause 6.
 """
@@ -19,17 +19,17 @@ from robots.meshes.vrml.protos import node_of, resolved
 from robots.meshes.vrml.transform import transform_matrix
 from robots.meshes.vrml.values import color, nodes_of, number, strings
 
-# A few USEs of USEs can make billions of nodes.
+# A few nested USEs can expand to billions of nodes.
 MAX_NODES = 200_000
 MAX_TRIANGLES = 10_000_000
-# Larger ones are made again at each USE: kept ones would double the memory.
+# Geometry with more vertices is not cached but made again at each USE: the cache would double the memory.
 _MOST_KEPT = 10_000
 
-# Of scales of scales: far below what overflows.
+# Limit of nested scales, far below an overflow.
 _FARTHEST = 1e60
 
 _IDENTITY = np.eye(4)
-# The last four are of H-Anim, for files that leave out its PROTOs.
+# Joint, Humanoid and Site, as well as Segment, are H-Anim's, for files that leave out its PROTOs.
 _MOVING = {"Transform", "Joint", "Humanoid", "Site"}
 _GROUPS = {"Group", "Anchor", "Billboard", "Collision", "Segment", *_MOVING}
 _NOT_DRAWN = {
@@ -62,7 +62,7 @@ _NOT_DRAWN = {
 
 @dataclass
 class Drawing:
-    """Collects what nodes draw."""
+    """A collection of the parts and wires that nodes draw."""
 
     files: Files
     parts: list[Part] = field(default_factory=list)
@@ -70,19 +70,19 @@ class Drawing:
     _effort: Effort = field(default_factory=Effort)
     _drawn: int = 0
     _triangles: int = 0
-    _read_over: dict[str, Node] = field(default_factory=dict)
+    _skipped: dict[str, Node] = field(default_factory=dict)
     _geometry: dict[Node, Surface | Strokes] = field(default_factory=dict)
     _materials: dict[Node, Material] = field(default_factory=dict)
 
     def draw(self, node: Node, placement: FloatArray, inside: tuple[Path, ...], depth: int = 0) -> None:
-        """Draw a node and what is in it.
+        """Draw a node and its children.
 
         Args:
             placement: (4, 4) from the node's coordinates to the mesh's.
-            inside: The files that are being drawn, the node's own last.
+            inside: The files that are being drawn, from the outermost to the node's.
 
         Raises:
-            MeshError: If a field of it cannot be what it is, or too much is drawn.
+            MeshError: If a field has an invalid value, or too much is drawn.
         """
         self._drawn += 1
         if self._drawn > MAX_NODES:
@@ -101,7 +101,7 @@ class Drawing:
             if found.type in _MOVING:
                 below = placement @ transform_matrix(found)
                 if np.abs(below).max() > _FARTHEST:
-                    raise node.error("goes with those around it beyond all sizes")
+                    raise node.error(f"nested transforms reach beyond {_FARTHEST:g}")
             for child in self._children(found):
                 self.draw(child, below, inside, depth + 1)
 
@@ -113,11 +113,11 @@ class Drawing:
         if node.type == "Switch":
             choices = nodes_of(node, "choice") or nodes_of(node, "children")
             if not choices and "level" in node.fields:
-                node.warn("has 'level', as LOD; it is taken for its 'choice'", once="level of a Switch")
+                node.warn("has 'level', a field of LOD; read as 'choice'", once="level of a Switch")
                 choices = nodes_of(node, "level")
             which = number(node, "whichChoice", -1.0)
             return choices[int(which) : int(which) + 1] if 0 <= which < len(choices) else []
-        self._read_over.setdefault(node.type, node)
+        self._skipped.setdefault(node.type, node)
         return []
 
     def _shape(self, node: Node, placement: FloatArray, name: str) -> None:
@@ -149,21 +149,22 @@ class Drawing:
             two_sided=not drawn.solid,
             colors=_with_opacity(drawn.colors, material),
         )
-        still = np.array_equal(placement, _IDENTITY)
-        self.parts.append(part if still else transformed(part, placement))
+        unmoved = np.array_equal(placement, _IDENTITY)
+        self.parts.append(part if unmoved else transformed(part, placement))
 
     def _made(self, shape: Node) -> Surface | Strokes | None:
         drawn: Surface | Strokes
         if shape.type in GEOMETRY:
             drawn = GEOMETRY[shape.type](shape, self._effort)
             if drawn.rough:
-                shape.warn("concave faces take too much work to cut; some are drawn beyond their outline")
+                shape.warn("concave faces take too long to triangulate; some are drawn beyond their outline")
         elif shape.type in STROKES:
             drawn = STROKES[shape.type](shape)
         else:
             known = shape.type == "Text"
             shape.warn(
-                "is not drawn" if known else "is no geometry of VRML 2.0; left out", once=f"no {shape.type}"
+                "is not drawn" if known else "is not a geometry node of VRML 2.0; left out",
+                once=f"no {shape.type}",
             )
             return None
         if len(drawn.vertices) <= _MOST_KEPT:
@@ -171,7 +172,7 @@ class Drawing:
         return drawn
 
     def _material(self, shape: Node) -> Material:
-        """A Shape's material; ambientIntensity, which glTF has no place for, is dropped."""
+        """Return a Shape's material, without ambientIntensity, which glTF cannot express."""
         appearance = node_of(shape, "appearance")
         if appearance is None:
             return _material(None, "")
@@ -187,8 +188,8 @@ class Drawing:
         if texture is None or not addresses:
             return ""
         if self.files.find(texture.source, addresses) is None:
-            trouble = self.files.trouble(addresses[0])
-            texture.warn(f"{addresses[0][:200]!r}: {trouble}", once=f"texture {addresses[0]}")
+            reason = self.files.reason_missing(addresses[0])
+            texture.warn(f"{addresses[0][:200]!r}: {reason}", once=f"texture {addresses[0]}")
         return addresses[0]
 
     def _inline(self, node: Node, placement: FloatArray, inside: tuple[Path, ...], depth: int) -> None:
@@ -196,28 +197,28 @@ class Drawing:
         found = self.files.find(node.source, addresses)
         if found is None:
             if addresses:
-                trouble = self.files.trouble(addresses[0])
-                node.warn(f"{addresses[0][:200]!r}: {trouble}; it is left out", once=f"inline {addresses[0]}")
+                reason = self.files.reason_missing(addresses[0])
+                node.warn(f"{addresses[0][:200]!r}: {reason}; it is left out", once=f"inline {addresses[0]}")
             return
         if found in inside:
-            raise node.error(f"{addresses[0][:200]!r} leads back to itself")
+            raise node.error(f"{addresses[0][:200]!r} includes itself")
         for root in self.files.scene(found).nodes:
             self.draw(root, placement, (*inside, found), depth + 1)
 
-    def tell(self) -> None:
-        """Warn, once each, of the nodes that were read over."""
-        known = [name for name in self._read_over if name in _NOT_DRAWN]
+    def warn_of_skipped(self) -> None:
+        """Warn, once for each type, of nodes that were skipped."""
+        known = [name for name in self._skipped if name in _NOT_DRAWN]
         if known:
-            node = self._read_over[known[0]]
-            node.source.warn(node.position, f"nothing is drawn of: {', '.join(known)}")
-        for name, node in self._read_over.items():
+            node = self._skipped[known[0]]
+            node.source.warn(node.position, f"not drawn: {', '.join(known)}")
+        for name, node in self._skipped.items():
             if name not in _NOT_DRAWN:
-                node.warn("no node of VRML 2.0; read over", once=f"unknown {name}")
+                node.warn("is not a node of VRML 2.0; skipped", once=f"unknown {name}")
 
 
 def _material(node: Node | None, texture: str) -> Material:
     if node is None:
-        # White, by 6.3 and 6.41; and unlit there, but shape is what a robot's mesh has to show.
+        # White, by 6.3 and 6.41. The standard also says unlit, but without light the shape cannot be seen.
         return Material(diffuse=(1.0, 1.0, 1.0), texture=texture)
     none: Color = (0.0, 0.0, 0.0)
     return Material(
@@ -232,7 +233,7 @@ def _material(node: Node | None, texture: str) -> Material:
 
 
 def _with_opacity(colors: FloatArray | None, material: Material) -> FloatArray | None:
-    """(v, 4) of (v, 3)."""
+    """Return (v, 4) colours from (v, 3), with the material's opacity."""
     if colors is None:
         return None
     return np.column_stack([colors, np.full(len(colors), 1.0 - material.transparency)])

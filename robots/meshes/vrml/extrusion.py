@@ -1,4 +1,4 @@
-"""Extrusion: a cross-section moved along a spine.
+"""VRML's Extrusion: a cross-section moved along a spine.
 
 Source: ISO/IEC 14772-1:1997, 6.18.
 """
@@ -13,26 +13,26 @@ from robots.meshes.vrml.transform import rotations
 from robots.meshes.vrml.values import flag, number, rows
 
 _MOST_POINTS = 5_000_000
-# The sine of an angle that counts as none.
+# Sine of an angle below which the spine counts as straight.
 _STRAIGHT = 1e-9
 
 
 def extrusion(node: Node) -> Faces:
-    """Sides, each a quadrilateral, and caps.
+    """Return the sides, as quadrilaterals, and the caps of an Extrusion.
 
     Raises:
-        MeshError: If it is of millions of points.
+        MeshError: If it has millions of points.
     """
     spine = _rows(node, "spine", [[0, 0, 0], [0, 1, 0]])
     section = _rows(node, "crossSection", [[1, 1], [1, -1], [-1, -1], [-1, 1], [1, 1]])
     count, width = len(spine), len(section)
     if count < 2 or width < 2:
-        node.warn(f"of {count} spine and {width} crossSection points; nothing of it is drawn")
+        node.warn(f"has {count} spine and {width} crossSection points, both need 2; not drawn")
         return Faces(np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
     if count * width > _MOST_POINTS:
         raise node.error(f"{count} x {width} points; at most {_MOST_POINTS} are drawn")
     points = _points(node, spine, section)
-    # Where a curve closes, its last points are its first: smooth across the seam.
+    # The last points of a closed curve are its first ones, so that the seam is smooth.
     numbers = np.arange(count * width).reshape(count, width)
     closed = bool((section[0] == section[-1]).all()) and width > 2
     if closed:
@@ -60,7 +60,7 @@ def extrusion(node: Node) -> Faces:
 
 
 def _points(node: Node, spine: FloatArray, section: FloatArray) -> FloatArray:
-    """(n * w, 3): the cross-section at each point of the spine, scaled and turned."""
+    """Return the (n * w, 3) points: the cross-section at each point of the spine, scaled and rotated."""
     count = len(spine)
     scale = _at_each(node, _rows(node, "scale", [[1, 1]]), count, "scale")
     turns = rotations(_at_each(node, _rows(node, "orientation", [[0, 0, 1, 0]]), count, "orientation"))
@@ -72,7 +72,7 @@ def _points(node: Node, spine: FloatArray, section: FloatArray) -> FloatArray:
 
 
 def section_planes(spine: FloatArray) -> FloatArray:
-    """(n, 3, 3) the spine-aligned cross-section plane (SCP) at each point: x, y and z as columns."""
+    """Return the (n, 3, 3) spine-aligned cross-section plane (SCP) at each point: x, y and z as columns."""
     # Points that coincide have the same plane.
     different = np.ones(len(spine), dtype=bool)
     different[1:] = (np.diff(spine, axis=0) != 0).any(axis=1)
@@ -95,7 +95,7 @@ def section_planes(spine: FloatArray) -> FloatArray:
         planes = np.broadcast_to(_straight_plane(along[0]), (len(path), 3, 3))
     else:
         third = _carried(unit(bends))
-        # Flipped where the bend changes its side; each flip turns all that follow.
+        # The bend's axis flips where the spine bends to the other side; each flip applies to all that follow.
         turned = np.einsum("ij,ij->i", third[1:], third[:-1]) < 0
         third[1:] *= np.where(np.cumsum(turned) % 2, -1.0, 1.0)[:, None]
         if closed:
@@ -106,7 +106,7 @@ def section_planes(spine: FloatArray) -> FloatArray:
 
 
 def _carried(vectors: FloatArray) -> FloatArray:
-    """Where a vector is zero the one before it, and at the beginning the first that is not."""
+    """Replace zero vectors by the one before, and at the beginning by the first that is not zero."""
     there = np.flatnonzero(vectors.any(axis=1))
     if not len(there):
         return vectors
@@ -116,7 +116,7 @@ def _carried(vectors: FloatArray) -> FloatArray:
 
 
 def _straight_plane(along: FloatArray) -> FloatArray:
-    """Of a straight spine: the least turn that brings the y axis onto it."""
+    """Return a straight spine's plane: the smallest rotation of the y axis onto the spine."""
     y = np.array([0.0, 1.0, 0.0])
     axis = np.cross(y, along)
     angle = np.arctan2(np.linalg.norm(axis), along[1])
@@ -132,9 +132,9 @@ def _rows(node: Node, name: str, default: list[list[float]]) -> FloatArray:
 
 
 def _at_each(node: Node, values: FloatArray, count: int, name: str) -> FloatArray:
-    """(count, w): one value is for all, and of too many the last are left out."""
+    """Return (count, w) values, one for each spine point, by repeating the last or dropping extra ones."""
     if 1 < len(values) < count:
-        node.warn(f"{name} has {len(values)} values for {count} spine points; the last is for the rest")
+        node.warn(f"{name} has {len(values)} values for {count} spine points; the last is repeated")
     if not len(values):
-        raise node.error(f"{name} is empty; it takes one value, or one a spine point")
+        raise node.error(f"{name} is empty; it takes one value, or one for each spine point")
     return values[np.minimum(np.arange(count), len(values) - 1)]

@@ -1,4 +1,4 @@
-"""The files of a scene: the one that is read, and those that it names by Inline and EXTERNPROTO."""
+"""The files of a VRML scene: the main file, and those that it names by Inline and EXTERNPROTO."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -14,36 +14,37 @@ _MOST_FILES = 2000
 
 @dataclass
 class Files:
-    """Files that have been read, by path; each is read once.
+    """The files of a scene; each is read once.
 
     Attributes:
-        within: Files elsewhere count as missing; none: any place will do.
-        missing: Files that are not there, as they are named, each once.
-        outside: Those of them that are not looked for: they lie elsewhere.
-        asked: Where files were looked for, found there or not, each once.
+        within: Only files below this folder are read, others count as missing; None: no restriction.
+        scenes: The files that have been read, by path.
+        missing: Names of files that were not found, each once.
+        outside: Names, among those, of files that are not below `within`.
+        looked_up: Paths at which files were looked for, each once.
     """
 
     within: Path | None = None
     scenes: dict[Path, Scene] = field(default_factory=dict)
     missing: dict[str, None] = field(default_factory=dict)
     outside: dict[str, None] = field(default_factory=dict)
-    asked: dict[Path, None] = field(default_factory=dict)
+    looked_up: dict[Path, None] = field(default_factory=dict)
     _count: Count = field(default_factory=Count)
 
     def scene(self, path: Path, progress: Callable[[float], None] | None = None) -> Scene:
-        """A file's scene; the files of its EXTERNPROTOs are read too.
+        """Return a file's scene, after reading it and the files of its EXTERNPROTOs.
 
         Raises:
-            MeshError: If one of them cannot be read.
+            MeshError: If one of the files cannot be read.
         """
         unlinked = self._read(path, progress)
         while unlinked:
             proto = unlinked.pop()
             for address in proto.urls or []:
-                where, _, name = address.partition("#")
-                found = self.find(proto.source, [where])
+                file_name, _, name = address.partition("#")
+                found = self.find(proto.source, [file_name])
                 if found is None:
-                    proto.trouble = f"{where!r}: {self.trouble(where)}"
+                    proto.reason_missing = f"{file_name!r}: {self.reason_missing(file_name)}"
                     continue
                 unlinked += self._read(found)
                 protos = self.scenes[found].protos
@@ -51,53 +52,56 @@ class Files:
                 if target is not None:
                     proto.target = target
                     break
-                proto.trouble = f"{where!r} holds no PROTO {name}".rstrip()
+                proto.reason_missing = f"{file_name!r} contains no PROTO {name}".rstrip()
             _refuse_cycle(proto)
         return self.scenes[path]
 
     def _read(self, path: Path, progress: Callable[[float], None] | None = None) -> list[Proto]:
-        """Read a file that has not been read; its EXTERNPROTOs."""
+        """Read a file unless it has been read already; return its EXTERNPROTOs, none in that case."""
         if path in self.scenes:
             return []
         if len(self.scenes) >= _MOST_FILES:
-            raise MeshError(path, f"is one of more than {_MOST_FILES} files of one scene")
+            raise MeshError(path, f"is one file too many: a scene may use {_MOST_FILES}")
         source = load(path)
         source.count = self._count
         scene = self.scenes[path] = parse_vrml(source, progress)
         return list(scene.externals)
 
     def find(self, source: Source, addresses: Sequence[str]) -> Path | None:
-        """The first file there is of those that another names; None, and the first is missing."""
+        """Return the first existing file of those that a file names.
+
+        If there is none, return None and add the first address to `missing`.
+        """
         for name in (name for address in addresses for name in _names(address)):
             try:
                 path = (source.path.parent / name).resolve()
                 if self.within is not None and not path.is_relative_to(self.within.resolve()):
                     self.outside[addresses[0][:200]] = None
                     continue
-                self.asked[path] = None
+                self.looked_up[path] = None
                 if path.is_file():
                     return path
-            except (OSError, ValueError):  # too long a name, or a zero in it
+            except (OSError, ValueError):  # the name is too long or has a zero byte
                 continue
         if addresses and addresses[0]:
             self.missing[addresses[0][:200]] = None
         return None
 
-    def trouble(self, address: str) -> str:
-        """Why a file is not read that `find` has not found, in words."""
+    def reason_missing(self, address: str) -> str:
+        """Return the reason in words why `find` did not find a file."""
         if self.within is not None and address[:200] in self.outside:
-            return f"no such file in the folder {self.within.resolve().name!r}, and no other is read"
+            return f"no such file in the folder {self.within.resolve().name!r}; other folders are not read"
         return "no such file"
 
     def warnings(self) -> Iterator[str]:
-        """What was odd in any of them; of others than the first with their names."""
+        """Yield the warnings of all files; those of files other than the first with the file's name."""
         for number, scene in enumerate(self.scenes.values()):
             for warning in scene.source.warnings:
                 yield warning if number == 0 else f"{scene.source.path.name}, {warning}"
 
 
 def _names(address: str) -> list[str]:
-    """What a file may be called: exporters write backslashes, and blanks as %20."""
+    """Return the file names that an address may mean: exporters write backslashes, and %20 for blanks."""
     plain = address.strip().removeprefix("file://").removeprefix("file:")
     if not plain or "://" in plain:
         return []
@@ -106,14 +110,14 @@ def _names(address: str) -> list[str]:
 
 
 def _refuse_cycle(start: Proto) -> None:
-    """Raise if a PROTO holds itself, which only those of other files can."""
+    """Raise MeshError if a PROTO contains itself, which is possible only through other files."""
     seen: set[int] = set()
-    ahead = [start]
-    while ahead:
-        proto = ahead.pop()
+    pending = [start]
+    while pending:
+        proto = pending.pop()
         for used in [*proto.uses, *([proto.target] if proto.target is not None else [])]:
             if used is start:
-                raise start.source.error(start.position, f"EXTERNPROTO {start.name} leads back to itself")
+                raise start.source.error(start.position, f"EXTERNPROTO {start.name} contains itself")
             if id(used) not in seen:
                 seen.add(id(used))
-                ahead.append(used)
+                pending.append(used)

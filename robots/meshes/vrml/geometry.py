@@ -1,6 +1,6 @@
-"""VRML 2.0 geometry nodes to triangles.
+"""Triangles of VRML 2.0 geometry nodes.
 
-Source: ISO/IEC 14772-1:1997, clause 6 (each node's own).
+Source: ISO/IEC 14772-1:1997, clause 6 (the clause of each node).
 """
 
 from collections.abc import Callable, Mapping
@@ -42,7 +42,7 @@ def _indexed_face_set(node: Node, effort: Effort) -> Surface:
         owners = np.repeat(np.arange(len(sizes)), sizes)
         kept = np.bincount(owners, weights=wrong, minlength=len(sizes)) == 0
         node.warn(
-            f"coordIndex holds {faces.corners[wrong][0]}; there are {len(points)} points, 0 to "
+            f"coordIndex contains {faces.corners[wrong][0]}; there are {len(points)} points, 0 to "
             f"{len(points) - 1}: {np.count_nonzero(~kept)} faces are left out"
         )
         faces = kept_faces(faces, kept)
@@ -50,9 +50,10 @@ def _indexed_face_set(node: Node, effort: Effort) -> Surface:
 
 
 def runs(listed: IndexArray) -> tuple[IndexArray, IndexArray]:
-    """Of an index list with an end (-1) after each run: where its numbers stand, and how many each run has.
+    """Split an index list into runs that end with -1; the last run may lack its end.
 
-    The last run may do without its end.
+    Returns:
+        Positions in the list of the numbers that are no end, and the length of each run.
     """
     ended = listed < 0
     placed = np.flatnonzero(~ended)
@@ -63,47 +64,47 @@ def runs(listed: IndexArray) -> tuple[IndexArray, IndexArray]:
 def _by_corner(
     node: Node, name: str, placed: IndexArray, sizes: IndexArray, listed: IndexArray
 ) -> Table | None:
-    """The normal or colour of each corner, by the rules of 6.23; none where the node has none."""
+    """Return the normal or colour of each corner, by the rules of 6.23; None if the node has none."""
     values = table_of(node, name)
     if not len(values):
         return None
     given = indices(node, f"{name}Index")
     if flag(node, f"{name}PerVertex", True):
         if len(given) and len(given) <= int(placed.max(initial=-1)):
-            node.warn(f"{name}Index is shorter than coordIndex; no {name} is taken")
+            node.warn(f"{name}Index is shorter than coordIndex; {name} is ignored")
             return None
         chosen = (given if len(given) else listed)[placed]
     else:
         faces = given[given >= 0] if len(given) else np.arange(len(sizes))
         if len(faces) < len(sizes):
-            node.warn(f"{name}Index has {len(faces)} numbers for {len(sizes)} faces; no {name} is taken")
+            node.warn(f"{name}Index has {len(faces)} numbers for {len(sizes)} faces; {name} is ignored")
             return None
         chosen = np.repeat(faces[: len(sizes)], sizes)
     return checked(node, name, values, chosen)
 
 
 def table_of(node: Node, name: str) -> FloatArray:
-    """(n, 3) unit vectors of the Normal node in `normal`, or colours of the Color node in `color`."""
+    """Return (n, 3) unit vectors of the Normal node in `normal`, or colours of the Color node in `color`."""
     if name == "normal":
         return unit(rows(node_of(node, "normal"), "vector", 3))
     return np.clip(rows(node_of(node, "color"), "color", 3), 0.0, 1.0)
 
 
 def checked(node: Node, name: str, values: FloatArray, chosen: IndexArray) -> Table | None:
-    """A table whose numbers are all there; otherwise none, with a warning."""
+    """Return a table, or None with a warning if a chosen number is out of range."""
     wrong: NDArray[np.bool_] = (chosen < 0) | (chosen >= len(values))
     if wrong.any():
-        node.warn(f"{name} {chosen[wrong][0]} is asked for; there are {len(values)}: no {name} is taken")
+        node.warn(f"{name} number {chosen[wrong][0]}; there are {len(values)}: {name} is ignored")
         return None
     return Table(values, chosen)
 
 
 def _elevation_grid(node: Node, effort: Effort) -> Surface:
-    """Heights above a grid in x and z; each square of it is a face (6.17)."""
+    """Return the surface of heights above a grid in x and z; each square of the grid is a face (6.17)."""
     columns, lines = int(number(node, "xDimension", 0)), int(number(node, "zDimension", 0))
     heights = numbers(node, "height", [])
     if columns < 0 or lines < 0 or columns * lines > len(heights):
-        raise node.error(f"height has {len(heights)} numbers; {columns} x {lines} of them are asked for")
+        raise node.error(f"height has {len(heights)} numbers; {columns} x {lines} are needed")
     across, along = np.arange(columns), np.arange(lines)
     z, x = np.meshgrid(
         along * number(node, "zSpacing", 1.0), across * number(node, "xSpacing", 1.0), indexing="ij"
@@ -165,9 +166,9 @@ def _cone(node: Node, _: Effort) -> Surface:
 def _stretched(one: Surface, node: Node, x: float, y: float, z: float) -> Surface:
     stretch = np.array([x, y, z])
     if (stretch <= 0).any():
-        node.warn(f"a size of {stretch.min():g}; it should be above 0")
+        node.warn(f"a size is {stretch.min():g}; it must be above 0")
         stretch = np.abs(stretch)
-    # By the cofactors, which are there for a size of 0 too.
+    # The cofactors are defined for a size of 0 too.
     normals = unit(one.normals * stretch[[1, 2, 0]] * stretch[[2, 0, 1]])
     return Surface(one.vertices * stretch, normals, one.triangles)
 
@@ -185,7 +186,7 @@ def _unit_ball() -> Surface:
 
 @cache
 def _unit_turned(top_radius: float, kept: tuple[bool, ...]) -> Surface:
-    """A cylinder (or, with a top radius of 0, a cone) about y from -1 to 1: bottom, side and top."""
+    """Return the kept ones of bottom, side and top of a cylinder about y from -1 to 1; radius 0: a cone."""
     profiles = [
         [(0.0, -1.0), (1.0, -1.0)],
         [(1.0, -1.0), (top_radius, 1.0)],
@@ -196,8 +197,8 @@ def _unit_turned(top_radius: float, kept: tuple[bool, ...]) -> Surface:
         if not wanted:
             continue
         points, faces = turned(profile, SEGMENTS)
-        about_y = points[:, [1, 2, 0]]  # z to y: a cyclic change keeps the sense of the triangles
-        # Smooth round it, sharp between the profiles.
+        about_y = points[:, [1, 2, 0]]  # z to y: a cyclic permutation keeps the winding
+        # Smooth around the axis, sharp between the profiles.
         some_vertices, some_normals, some_triangles = creased(about_y, faces, np.radians(60))
         vertices.append(some_vertices)
         normals.append(some_normals)

@@ -1,13 +1,13 @@
-"""VRML97 text to tokens.
+"""Lexer of VRML97 text.
 
     numbers     number *( blank number )
     number      [+-] [blanks] ( digits [. digits] | . digits ) [e [+-] digits] | 0x hex
     string      " ... "   with \\" and \\\\ inside
-    word        anything else without blanks and { } [ ] " # (an IS or a field's name)
+    word        any other text without blanks and { } [ ] " # (an IS or a field's name)
     mark        { } [ ]
     blank       space, tab, line end, comma; # to the end of the line
 
-Number lists are most of a file: they are taken whole, by NumPy, not token by token.
+Most of a file is number lists, so NumPy parses each list as a whole instead of token by token.
 
 Source: ISO/IEC 14772-1:1997, annex A.
 """
@@ -25,7 +25,7 @@ from robots.meshes.vrml.source import Source
 
 
 class Kind(Enum):
-    """What a token is."""
+    """The kind of a token."""
 
     NUMBERS = "numbers"
     STRING = "string"
@@ -34,7 +34,7 @@ class Kind(Enum):
     END = "end of the file"
 
 
-# Possessive (*+): blanks that were skipped once are never tried again in another way.
+# Possessive quantifiers (*+) prevent backtracking into blanks.
 _BLANKS = r"(?:[\s,]++|\#[^\n\r]*+)*+"
 _DIGITS = r"(?:0[xX][0-9a-fA-F]++|(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]++)?)"
 _NUMBER = rf"""(?:[+-][ \t]*+)?{_DIGITS}(?=[\s,\[\]{{}}"\#]|$)"""
@@ -53,20 +53,20 @@ _LIST_OF_NUMBERS = re.compile(rf"{_BLANKS}(?=[-+.0-9\]])", re.VERBOSE)
 _BLANK = re.compile(r"[\s,]")
 _SPLIT_SIGN = re.compile(r"([+-])[ \t]+(?=[0-9.])")
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
-# "1.#QNAN" is what a Microsoft compiler prints for what is no number; the # begins no comment there.
+# Programs built with a Microsoft compiler print NaN as "1.#QNAN"; the # does not begin a comment there.
 _NO_NUMBER = re.compile(r"[0-9]\.#(?:IND|QNAN|SNAN|INF)")
-# VRML's floats are of single precision; larger ones would overflow where they are multiplied.
+# VRML's floats have single precision; larger numbers would overflow in products.
 _LARGEST = float(np.finfo(np.float32).max)
 _PIECE = 1 << 20
-# Below, a list of numbers is not worth the calls that set NumPy's faster way up.
+# Shorter lists [characters] parse faster without NumPy.
 _SHORT = 500
 
 
 class Lexer:
-    """Stands at a token; `advance` goes to the next.
+    """A cursor at the current token; `advance` moves it to the next.
 
     Attributes:
-        kind, text, start: Of the token; a string's text is without quotes and escapes.
+        kind, text, start: The current token; a string's text is without quotes and escapes.
     """
 
     def __init__(self, source: Source, progress: Callable[[float], None] | None = None) -> None:
@@ -80,18 +80,18 @@ class Lexer:
         self.advance()
 
     def advance(self) -> None:
-        """Go to the next token; after the last, stay at the end.
+        """Move to the next token; after the last, stay at the end.
 
         Raises:
-            MeshError: At a string that does not end.
+            MeshError: If a string does not end.
         """
         match = _TOKEN.match(self._all, self._end)
         name = match.lastgroup if match is not None else None
-        if match is None or name is None:  # cannot be: any character begins one of them
-            raise self.source.error(self._end, "text that is no VRML")
+        if match is None or name is None:  # unreachable: any character begins a token
+            raise self.source.error(self._end, "this text is not VRML")
         self.start, self._end = match.start(name), match.end()
         if name == "OPEN":
-            raise self.source.error(self.start, "a string that does not end: a '\"' is missing")
+            raise self.source.error(self.start, "this string does not end: a '\"' is missing")
         self.kind, self.text = _KINDS[name], match[name]
         if name == "STRING":
             self.start -= 1
@@ -99,29 +99,29 @@ class Lexer:
                 self.text = _ESCAPE.sub(r"\1", self.text)
 
     def is_mark(self, mark: str) -> bool:
-        """Whether the token is this one of { } [ ]."""
+        """Return whether the current token is this one of { } [ ]."""
         return self.text == mark and self.kind is Kind.MARK
 
     def is_word(self, *words: str) -> bool:
-        """Whether the token is one of these words."""
+        """Return whether the current token is one of these words."""
         return self.kind is Kind.WORD and self.text in words
 
     def found(self) -> str:
-        """The token in words, for an error."""
+        """Return the current token in words, for an error."""
         if self.kind is Kind.END:
             return "the end of the file"
         text = self.text.split()[0] if self.kind is Kind.NUMBERS else self.text
         return repr(text if len(text) <= 40 else text[:40] + "…")
 
     def expected(self, what: str) -> MeshError:
-        """An error: something else was to stand here."""
+        """Return an error that says what was expected instead of the current token."""
         return self.source.error(self.start, f"{what} was expected, not {self.found()}")
 
     def numbers(self) -> list[float]:
-        """The numbers of a NUMBERS token, and of those that follow after a comment; goes on behind them.
+        """Return the numbers of consecutive NUMBERS tokens, which comments separate, and move past them.
 
         Raises:
-            MeshError: At a number that is too large.
+            MeshError: If a number is too large.
         """
         values: list[float] = []
         while self.kind is Kind.NUMBERS:
@@ -145,7 +145,10 @@ class Lexer:
         return values
 
     def number_list(self) -> FloatArray | None:
-        """At "[": what stands up to "]" if it begins with a number, and go on behind it; otherwise None."""
+        """Return the numbers between "[", the current token, and "]", and move past it.
+
+        Return None and stay if the list does not begin with a number.
+        """
         first = _LIST_OF_NUMBERS.match(self._all, self._end)
         if first is None:
             return None
@@ -159,7 +162,7 @@ class Lexer:
         return np.concatenate(pieces) if pieces else np.zeros(0)
 
     def _fast_pieces(self, start: int, end: int) -> list[FloatArray] | None:
-        """The numbers in a span; None if there is anything but numbers and blanks."""
+        """Return the numbers in a span; None if it contains anything but numbers and blanks."""
         pieces = []
         while start < end:
             blank = _BLANK.search(self._all, min(start + _PIECE, end), end)
@@ -181,7 +184,7 @@ class Lexer:
         return pieces
 
     def _slow_list(self) -> FloatArray:
-        """A list with comments, signs apart or mistakes in it; goes on behind it."""
+        """Return the numbers of a list with comments, detached signs or errors, and move past it."""
         opening = self.start
         self.advance()
         values: list[float] = []
@@ -192,7 +195,7 @@ class Lexer:
             values += self._run()
             self.advance()
         if self.kind is Kind.END:
-            raise self.source.error(opening, "a '[' that is never closed")
+            raise self.source.error(opening, "this '[' is never closed")
         if not self.is_mark("]"):
             raise self.expected("a number or ']'")
         self.advance()
@@ -202,22 +205,24 @@ class Lexer:
         split = _SPLIT_SIGN.search(text)
         if split is None:
             return text
-        # Chen, Zhang, Xue 2001 prints "- 25.08"; files like that exist.
+        # Chen, Zhang, Xue 2001 prints "- 25.08", and some files do too.
         self.source.warn(
-            start + split.start(), "a sign stands apart from its digits; read as one number", once="sign"
+            start + split.start(),
+            "a sign is separated from its digits by a blank; read as one number",
+            once="sign",
         )
         return _SPLIT_SIGN.sub(r"\1", text)
 
 
 def _parsed(text: str) -> FloatArray | None:
-    """The numbers of a text without commas; None if one of them is none."""
+    """Return the numbers of a text without commas; None if a word is not a number."""
     try:
         if len(text) < _SHORT:
             values = np.array([float(word) for word in text.split()])
         else:
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
-                # Vertex numbers, half of most files, parse three times as fast as whole numbers.
+                # Vertex numbers, half of most files, parse three times as fast as integers.
                 whole = not any(mark in text for mark in ".eE")
                 values = np.fromstring(text, dtype=np.int64 if whole else np.float64, sep=" ").astype(
                     np.float64, copy=False

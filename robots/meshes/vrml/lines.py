@@ -1,4 +1,4 @@
-"""IndexedLineSet and PointSet: lines and points, with their colours.
+"""Lines and points of VRML's IndexedLineSet and PointSet, with their colours.
 
 Source: ISO/IEC 14772-1:1997, 6.24 and 6.36.
 """
@@ -18,7 +18,12 @@ from robots.meshes.vrml.values import flag, indices, rows
 
 @dataclass(frozen=True, eq=False)
 class Strokes:
-    """Lines, (s, 2) vertex numbers, or without any the vertices as points; colours (v, 3) or none."""
+    """Lines, or points.
+
+    Attributes:
+        segments: (s, 2) vertex numbers of lines; if empty, the vertices are points.
+        colors: (v, 3), or None.
+    """
 
     vertices: FloatArray
     segments: IndexArray
@@ -36,8 +41,8 @@ def _indexed_line_set(node: Node) -> Strokes:
     wrong = corners >= len(points)
     if wrong.any():
         node.warn(
-            f"coordIndex holds {corners[wrong][0]}; there are {len(points)} points, 0 to "
-            f"{len(points) - 1}: the lines there are left out"
+            f"coordIndex contains {corners[wrong][0]}; there are {len(points)} points, 0 to "
+            f"{len(points) - 1}: the lines to it are left out"
         )
         segments = segments[~wrong[segments].any(axis=1)]
         corners = np.where(wrong, 0, corners)
@@ -54,12 +59,12 @@ def _line_colors(node: Node, listed: IndexArray, placed: IndexArray, owners: Ind
     given = indices(node, "colorIndex")
     if flag(node, "colorPerVertex", True):
         if len(given) and len(given) <= int(placed.max(initial=-1)):
-            node.warn("colorIndex is shorter than coordIndex; no color is taken")
+            node.warn("colorIndex is shorter than coordIndex; color is ignored")
             return None
         return checked(node, "color", colors, (given if len(given) else listed)[placed])
     lines = given[given >= 0] if len(given) else np.arange(int(owners.max(initial=-1)) + 1)
     if len(lines) <= int(owners.max(initial=-1)):
-        node.warn(f"colorIndex has {len(lines)} numbers, fewer than there are lines; no color is taken")
+        node.warn(f"colorIndex has {len(lines)} numbers, fewer than there are lines; color is ignored")
         return None
     return checked(node, "color", colors, lines[owners])
 
@@ -69,7 +74,7 @@ def _point_set(node: Node) -> Strokes:
     colors = table_of(node, "color")
     none = np.zeros((0, 2), dtype=np.int64)
     if len(colors) and len(colors) < len(points):
-        node.warn(f"{len(colors)} colors for {len(points)} points; no color is taken")
+        node.warn(f"{len(colors)} colors for {len(points)} points; color is ignored")
     return Strokes(points, none, colors[: len(points)] if len(colors) >= len(points) > 0 else None)
 
 

@@ -1,12 +1,12 @@
-"""VRML97 tokens to a scene: nodes with their fields, DEF and USE joined, PROTO kept.
+"""Parser of VRML97 tokens to a scene: nodes with fields; USE is resolved, PROTO is kept.
 
     scene     = *( node | PROTO | EXTERNPROTO | ROUTE )
     node      = [ DEF name ] type "{" *( field value | field IS name | PROTO | ROUTE | script interface ) "}"
               | USE name
     value     = number... | string | TRUE | FALSE | NULL | node | "[" *value "]"
 
-The grammar is read without a table of field types: a value shows what it is, and what a node
-needs is asked for where it is drawn (`robots.meshes.vrml.drawing`). So unknown nodes do no harm.
+The parser needs no table of field types: a value's syntax shows its kind, and a field's type is checked
+when the node is drawn (`robots.meshes.vrml.drawing`). So unknown nodes are harmless.
 
 Source: ISO/IEC 14772-1:1997, annex A.
 """
@@ -22,25 +22,25 @@ from robots.meshes.mesh import FloatArray
 from robots.meshes.vrml.lexer import Kind, Lexer
 from robots.meshes.vrml.source import Source
 
-# A scene nested deeper is broken, or made to exhaust the stack.
+# A scene that is nested deeper is damaged, or meant to exhaust the stack.
 MAX_DEPTH = 120
 
 
 @dataclass(frozen=True, slots=True)
 class Is:
-    """`IS name`: the value of a field of the PROTO around it."""
+    """`IS name`: a reference to a field of the enclosing PROTO."""
 
     name: str
 
 
 @dataclass(eq=False, slots=True)
 class Node:
-    """A node; the same object stands wherever USE names it.
+    """A node; every USE of its name refers to the same object.
 
     Attributes:
-        name: Of its DEF.
-        proto: What it is an instance of, when no node of the standard.
-        position: Where its type stands in the source's text.
+        position: Position of the node's type in the source's text.
+        name: The name in its DEF; empty without one.
+        proto: The PROTO that it instantiates; None for a node of the standard.
     """
 
     type: str
@@ -51,11 +51,11 @@ class Node:
     proto: "Proto | None" = None
 
     def error(self, reason: str) -> MeshError:
-        """An error in this node, with its place and type."""
+        """Return an error with the node's place and type."""
         return self.source.error(self.position, f"{self.type}: {reason}")
 
     def warn(self, warning: str, *, once: str = "") -> None:
-        """Note what is odd about this node, with its place and type."""
+        """Record a warning with the node's place and type."""
         self.source.warn(self.position, f"{self.type}: {warning}", once=once)
 
 
@@ -64,12 +64,12 @@ class Proto:
     """A PROTO or EXTERNPROTO.
 
     Attributes:
-        defaults: Values of its fields.
-        body: Of which the first node is drawn; an EXTERNPROTO's is in another file.
-        urls: Of an EXTERNPROTO: where it may be found.
-        target: Of an EXTERNPROTO: what was found there.
-        trouble: Of an EXTERNPROTO: why nothing was found.
-        uses: The PROTOs that stand in its body.
+        defaults: Default values of its fields.
+        body: Its nodes, of which the first is drawn; an EXTERNPROTO's body is in another file.
+        urls: Addresses of an EXTERNPROTO; None for a PROTO.
+        target: The PROTO found for an EXTERNPROTO.
+        reason_missing: Why no PROTO was found for an EXTERNPROTO.
+        uses: The PROTOs instantiated in its body.
     """
 
     name: str
@@ -79,7 +79,7 @@ class Proto:
     body: list[Node] = field(default_factory=list)
     urls: list[str] | None = None
     target: "Proto | None" = None
-    trouble: str = "has no address"
+    reason_missing: str = "has no address"
     uses: list["Proto"] = field(default_factory=list)
 
 
@@ -90,7 +90,7 @@ _ACCESS = ("eventIn", "eventOut", *_VALUED)
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A file's root nodes, its PROTOs by name in their order, and its EXTERNPROTOs of any scope."""
+    """A file's root nodes, its PROTOs by name in file order, and the EXTERNPROTOs of all scopes."""
 
     source: Source
     nodes: list[Node]
@@ -99,10 +99,10 @@ class Scene:
 
 
 def parse_vrml(source: Source, progress: Callable[[float], None] | None = None) -> Scene:
-    """The scene of a VRML 2.0 text.
+    """Parse a VRML 2.0 text.
 
     Raises:
-        MeshError: If it is not VRML 2.0, with line and column.
+        MeshError: If it is not VRML 2.0; the error has the line and column.
     """
     parser = _Parser(Lexer(source, progress), {}, {}, [])
     return Scene(source, parser.statements(""), parser.protos, parser.externals)
@@ -110,7 +110,7 @@ def parse_vrml(source: Source, progress: Callable[[float], None] | None = None) 
 
 @dataclass
 class _Parser:
-    """Recursive descent; names of DEF and PROTO are those of the scope."""
+    """A recursive-descent parser of one scope of DEF and PROTO names."""
 
     lexer: Lexer
     names: dict[str, Node]
@@ -120,7 +120,7 @@ class _Parser:
     depth: int = 0
 
     def statements(self, end: str) -> list[Node]:
-        """Nodes and PROTOs up to a mark, or to the end of the file."""
+        """Parse nodes and PROTOs up to a mark, or to the end of the file if `end` is empty."""
         lexer, nodes = self.lexer, list[Node]()
         while True:
             if lexer.kind is Kind.END:
@@ -132,14 +132,14 @@ class _Parser:
                     lexer.advance()
                     return nodes
                 if not end and lexer.text in "}]":
-                    lexer.source.warn(lexer.start, f"a {lexer.text!r} too many; passed over")
+                    lexer.source.warn(lexer.start, f"an extra {lexer.text!r}; skipped")
                     lexer.advance()
                     continue
             if not self.declaration():
                 nodes += self.node()
 
     def declaration(self) -> bool:
-        """Read a PROTO, EXTERNPROTO or ROUTE if one stands here."""
+        """Parse a PROTO, EXTERNPROTO or ROUTE if one begins here; return whether one did."""
         lexer = self.lexer
         if not lexer.is_word("PROTO", "EXTERNPROTO", "ROUTE"):
             return False
@@ -175,7 +175,7 @@ class _Parser:
             proto.urls = [url for url in urls if isinstance(url, str)] if isinstance(urls, list) else []
             self.externals.append(proto)
         else:
-            # Names inside a PROTO are its own; PROTOs defined outside can be used inside.
+            # DEF names inside a PROTO are local; PROTOs defined outside can be used inside.
             inner = _Parser(lexer, {}, dict(self.protos), self.externals, proto, self.depth + 1)
             inner.check_depth(proto.position)
             self.mark("{", "before a PROTO's body")
@@ -187,7 +187,7 @@ class _Parser:
             raise self.lexer.source.error(position, f"nested deeper than {MAX_DEPTH}")
 
     def node(self) -> list[Node]:
-        """A node, or none for NULL."""
+        """Parse a node; return it in a list, which is empty for NULL and for an undefined USE."""
         lexer = self.lexer
         if lexer.kind is not Kind.WORD:
             raise lexer.expected("a node")
@@ -199,7 +199,7 @@ class _Parser:
             name = self.name("a name after USE")
             if name in self.names:
                 return [self.names[name]]
-            lexer.source.warn(position, f"USE {name}: nothing of that name was DEFined before; left out")
+            lexer.source.warn(position, f"USE {name}: no node was DEFined with that name before; left out")
             return []
         name = ""
         if word == "DEF":
@@ -208,7 +208,7 @@ class _Parser:
                 raise lexer.expected("a node")
             word, position = lexer.text, lexer.start
             lexer.advance()
-        # A name stands in memory once, however many nodes have it.
+        # Interned, so that nodes of one type share the string.
         node = Node(intern(word), {}, lexer.source, position, name, self.protos.get(word))
         if node.proto is not None and self.inside is not None:
             self.inside.uses.append(node.proto)
@@ -217,7 +217,7 @@ class _Parser:
         self.check_depth(position)
         self.body(node)
         self.depth -= 1
-        # After the body: a node cannot USE itself.
+        # Only now, so that a node cannot USE itself.
         if name:
             self.names[name] = node
         return [node]
@@ -246,7 +246,7 @@ class _Parser:
             self.value(name)
 
     def value(self, of: str) -> Value:
-        """The value of the field `of`."""
+        """Parse the value of the field `of`."""
         lexer = self.lexer
         if lexer.kind is Kind.NUMBERS:
             return np.array(lexer.numbers())
@@ -275,11 +275,11 @@ class _Parser:
         nodes: list[Node] = []
         while not lexer.is_mark("]"):
             if lexer.kind is Kind.END:
-                raise lexer.source.error(opening, "a '[' that is never closed")
+                raise lexer.source.error(opening, "this '[' is never closed")
             if lexer.kind is Kind.STRING:
                 strings.append(lexer.text)
                 lexer.advance()
-            elif lexer.is_word("TRUE", "FALSE"):  # MFBool is of no node that is drawn
+            elif lexer.is_word("TRUE", "FALSE"):  # no node that is drawn has a list of booleans
                 lexer.advance()
             elif not self.declaration():
                 nodes += self.node()
@@ -287,7 +287,7 @@ class _Parser:
         return strings or nodes
 
     def name(self, what: str) -> str:
-        """A name; exporters write some that VRML does not allow, such as 1-FACES or 12."""
+        """Parse a name, including invalid ones that exporters write, such as 1-FACES or 12."""
         lexer = self.lexer
         if lexer.kind is Kind.NUMBERS and len(lexer.text.split()) > 1:
             raise lexer.expected(what)
@@ -296,7 +296,7 @@ class _Parser:
         name = lexer.text
         if name[0].isdigit():
             lexer.source.warn(
-                lexer.start, f"the name {name[:40]!r} begins with a digit; taken as it is", once="digit"
+                lexer.start, f"the name {name[:40]!r} begins with a digit; accepted", once="digit"
             )
         lexer.advance()
         return name

@@ -1,4 +1,4 @@
-"""PROTO: what an instance stands for.
+"""Instantiation of PROTOs.
 
 Source: ISO/IEC 14772-1:1997, 4.8.
 """
@@ -8,35 +8,35 @@ from dataclasses import replace
 from robots.meshes.vrml.parser import MAX_DEPTH, Is, Node, Proto, Value
 from robots.meshes.vrml.values import nodes_of
 
-# Nodes and fields that uses of PROTOs make, drawn or not: a few PROTOs of PROTOs can make billions.
+# Most nodes and fields that instances may make, drawn or not: a few nested PROTOs can make billions.
 MAX_MADE = 5_000_000
 
 
 def node_of(node: Node | None, name: str) -> Node | None:
-    """A field's one node; for an instance of a PROTO the node that it stands for."""
+    """Return a field's single node, with PROTOs resolved."""
     found = nodes_of(node, name) if node is not None else []
     return resolved(found[0]) if found else None
 
 
 def resolved(node: Node) -> Node | None:
-    """The node of the standard that a node stands for; none for an empty PROTO.
+    """Return the standard node that a node resolves to; None for an empty PROTO.
 
     Raises:
-        MeshError: If its PROTOs lead back to themselves.
+        MeshError: If a PROTO contains itself.
     """
     step: Node | None = node
     for _ in range(MAX_DEPTH):
         if step is None or step.proto is None:
             return step
         step = instance(step, step.proto)
-    raise node.error("a PROTO that leads back to itself")
+    raise node.error("this PROTO contains itself")
 
 
 def instance(use: Node, proto: Proto) -> Node | None:
-    """One step: the PROTO's first body node with the values of this use; only the first is drawn."""
+    """Return the first node of a PROTO's body, the only one drawn, with the values of this use."""
     definition = found_proto(proto)
     if definition is None:
-        use.warn(f"EXTERNPROTO {proto.name}: {proto.trouble}", once=f"extern {proto.name}")
+        use.warn(f"EXTERNPROTO {proto.name}: {proto.reason_missing}", once=f"extern {proto.name}")
         return replace(use, proto=None)
     if not definition.body:
         return None
@@ -45,7 +45,7 @@ def instance(use: Node, proto: Proto) -> Node | None:
 
 
 def found_proto(proto: Proto) -> Proto | None:
-    """The PROTO that an EXTERNPROTO was found to name; a PROTO itself."""
+    """Return the PROTO that an EXTERNPROTO refers to, None if it was not found; a PROTO itself."""
     seen: Proto | None = proto
     for _ in range(MAX_DEPTH):
         if seen is None or seen.urls is None:
@@ -62,7 +62,7 @@ def _charge(use: Node, amount: int) -> None:
 
 
 def _filled(node: Node, given: dict[str, Value], use: Node, done: dict[Node, Node]) -> Node:
-    """A body's node with its IS resolved; itself, if it holds none."""
+    """Return a body's node with every IS resolved; the same object if it contains none."""
     _charge(use, 1)
     if node in done:
         return done[node]
@@ -72,7 +72,7 @@ def _filled(node: Node, given: dict[str, Value], use: Node, done: dict[Node, Nod
     for name, value in node.fields.items():
         if isinstance(value, Is):
             changed = True
-            # Without a default and not given (an event, say): as if it were not written.
+            # Without a given value or a default (an event, say), the field is left out.
             if value.name in given:
                 fields[name] = given[value.name]
         elif isinstance(value, list) and value and isinstance(value[0], Node):

@@ -1,4 +1,4 @@
-"""VRML 2.0 files to meshes.
+"""Reader of VRML 2.0 files.
 
 Source: ISO/IEC 14772-1:1997.
 """
@@ -12,45 +12,45 @@ from robots.meshes.mesh import Mesh
 from robots.meshes.vrml.drawing import Drawing
 from robots.meshes.vrml.files import Files
 
-# How much of the time goes into the text.
+# Share of the time that parsing takes.
 _READ = 0.7
 
 
 def read_vrml(
     path: Path, progress: Callable[[float], None] | None = None, *, within: Path | None = None
 ) -> Mesh:
-    """What a .wrl file draws, in its own units and axes; Inline files are read too.
+    """Return the content of a .wrl file, in the file's units and axes; Inline files are read too.
 
-    Joints of a robot stand at zero.
+    A robot's joints are at zero.
 
     Args:
-        progress: Called now and then with how much is done, 0 to 1.
-        within: Only files below this folder are read; others count as missing.
+        progress: Called with the completed fraction, 0 to 1.
+        within: Only files below this folder are read; files elsewhere count as missing.
 
     Raises:
-        MeshError: If it is not a VRML 2.0 file that can be read, with line and column.
+        MeshError: If it is not a readable VRML 2.0 file; the error has the line and column.
     """
-    told = progress if progress is not None else _nobody
+    report = progress if progress is not None else _ignore_progress
     files = Files(within)
     path = path if within is None else path.resolve()
-    scene = files.scene(path, lambda done: told(done * _READ))
+    scene = files.scene(path, lambda done: report(done * _READ))
     drawing, inside = Drawing(files), (path, path.resolve())
-    # Each goes when it is drawn: a tree of many small nodes is larger than what it draws.
-    ahead, count = scene.nodes[::-1], len(scene.nodes)
+    # Each node is freed once drawn: a tree of many small nodes takes more memory than its triangles.
+    pending, count = scene.nodes[::-1], len(scene.nodes)
     scene.nodes.clear()
-    while ahead:
-        drawing.draw(ahead.pop(), np.eye(4), inside)
-        told(1.0 - (1.0 - _READ) * len(ahead) / count)
-    told(1.0)
-    drawing.tell()
+    while pending:
+        drawing.draw(pending.pop(), np.eye(4), inside)
+        report(1.0 - (1.0 - _READ) * len(pending) / count)
+    report(1.0)
+    drawing.warn_of_skipped()
     return Mesh(
         tuple(drawing.parts),
         wires=tuple(drawing.wires),
         warnings=tuple(files.warnings()),
         missing=tuple(files.missing),
-        files=tuple(files.asked),
+        files=tuple(files.looked_up),
     )
 
 
-def _nobody(_: float) -> None:
-    """Nobody asked how far it is."""
+def _ignore_progress(_: float) -> None:
+    """Ignore a progress report."""

@@ -1,4 +1,4 @@
-"""Where a VRML node puts what stands in it."""
+"""The placement of a VRML node's children."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from robots.poses import axis_rotation
 
 
 def transform_matrix(node: Node) -> FloatArray:
-    """(4, 4) of a Transform: `T C R SR S -SR -C` (6.52)."""
+    """Return the (4, 4) matrix of a Transform: `T C R SR S -SR -C` (6.52)."""
     given = node.fields
     matrix = np.eye(4)
     linear = matrix[:3, :3]
@@ -29,5 +29,5 @@ def transform_matrix(node: Node) -> FloatArray:
 
 
 def rotations(axis_angles: FloatArray) -> FloatArray:
-    """(..., 3, 3) of (..., 4) axes, of any length, and angles [rad]; an axis of 0 turns nothing."""
+    """Return (..., 3, 3) rotations from (..., 4) axes of any length and angles [rad]; axis 0: no rotation."""
     return axis_rotation(axis_angles[..., :3], axis_angles[..., 3])

@@ -1,4 +1,4 @@
-"""The values of a node's fields, as what they should be; a wrong one is an error with its place."""
+"""Typed access to the fields of a node; a value of a wrong type is an error with its place."""
 
 from collections.abc import Sequence
 from typing import cast
@@ -10,7 +10,11 @@ from robots.meshes.vrml.parser import Node
 
 
 def numbers(node: Node, name: str, default: Sequence[float], count: int | None = None) -> FloatArray:
-    """A field's numbers, `count` of them where it is given."""
+    """Return a field's numbers.
+
+    Raises:
+        MeshError: If they are not numbers, or not `count` of them.
+    """
     value = node.fields.get(name)
     if value is None:
         return np.array(default, dtype=np.float64)
@@ -24,12 +28,12 @@ def numbers(node: Node, name: str, default: Sequence[float], count: int | None =
 
 
 def number(node: Node, name: str, default: float) -> float:
-    """A field's one number."""
+    """Return a field's single number."""
     return float(numbers(node, name, [], 1)[0]) if name in node.fields else default
 
 
 def rows(node: Node | None, name: str, width: int) -> FloatArray:
-    """(n, width) of a list such as Coordinate's point; (0, width) without it."""
+    """Return a list, such as Coordinate's point, as (n, width); (0, width) without a node."""
     if node is None:
         return np.zeros((0, width))
     flat = numbers(node, name, [])
@@ -39,19 +43,19 @@ def rows(node: Node | None, name: str, width: int) -> FloatArray:
 
 
 def indices(node: Node, name: str) -> IndexArray:
-    """A list of whole numbers; any below 0 is an end."""
+    """Return a list of integers; negative ones mark ends."""
     flat = numbers(node, name, [])
     if len(flat) and np.abs(flat).max() >= 2**53:
-        raise node.error(f"{name} holds {np.abs(flat).max():g}; it takes numbers of points")
+        raise node.error(f"{name} contains {np.abs(flat).max():g}; it takes point numbers")
     found = flat.astype(np.int64)
     wrong = found != flat
     if wrong.any():
-        raise node.error(f"{name} holds {flat[int(np.argmax(wrong))]:g}; it takes whole numbers")
+        raise node.error(f"{name} contains {flat[int(np.argmax(wrong))]:g}; it takes whole numbers")
     return found
 
 
 def color(node: Node, name: str, default: Color) -> Color:
-    """A colour, each part brought into 0 to 1."""
+    """Return a colour, with each component clipped to 0 to 1."""
     if name not in node.fields:
         return default
     red, green, blue = (min(max(part, 0.0), 1.0) for part in numbers(node, name, default, 3).tolist())
@@ -59,23 +63,26 @@ def color(node: Node, name: str, default: Color) -> Color:
 
 
 def flag(node: Node, name: str, default: bool) -> bool:
-    """TRUE or FALSE; anything else counts as the default."""
+    """Return a boolean; the default for any other value."""
     value = node.fields.get(name)
     return value if isinstance(value, bool) else default
 
 
 def strings(node: Node, name: str) -> list[str]:
-    """A field's strings."""
+    """Return a field's strings."""
     value = node.fields.get(name)
     return cast(list[str], value) if _is_list_of(value, str) else []
 
 
 def nodes_of(node: Node, name: str) -> list[Node]:
-    """A field's nodes."""
+    """Return a field's nodes."""
     value = node.fields.get(name)
     return cast(list[Node], value) if _is_list_of(value, Node) else []
 
 
 def _is_list_of(value: object, kind: type) -> bool:
-    """A list is all of one kind, so its first entry tells; each use of a long one looks at no more."""
+    """Return whether a value is a non-empty list of this type.
+
+    Lists have one type, so checking the first entry is enough, and fast for long lists.
+    """
     return isinstance(value, list) and len(value) > 0 and isinstance(value[0], kind)

@@ -1,4 +1,4 @@
-"""Meshes to VRML 2.0 text: a Shape a part, its normals given, its material DEFined by its name."""
+"""Writer of VRML 2.0 text: a Shape for each part, with normals; materials are DEFined by name."""
 
 import re
 from collections.abc import Iterator
@@ -9,10 +9,10 @@ _DECIMALS = 3
 
 
 def write_vrml(mesh: Mesh, *, decimals: int = _DECIMALS) -> str:
-    """The text of a .wrl file; the same mesh gives the same text.
+    """Return the text of a .wrl file; the same mesh gives the same text.
 
     Args:
-        decimals: Of vertices.
+        decimals: Decimals of vertex coordinates.
     """
     return "\n".join(["#VRML V2.0 utf8", *_lines(mesh, decimals)]) + "\n"
 
@@ -50,7 +50,7 @@ def _face_set(part: Part, decimals: int) -> Iterator[str]:
         yield "    solid FALSE"
     yield f"    coord Coordinate {{ point [\n{_rows(part.vertices, decimals)}\n    ] }}"
     yield f"    normal Normal {{ vector [\n{_rows(part.normals, _DECIMALS)}\n    ] }}"
-    # Without normalIndex the corners' normals are those of coordIndex.
+    # Without normalIndex, coordIndex selects the normals too.
     yield f"    coordIndex [\n{_faces(part.triangles)}\n    ]"
     yield "  }"
 
@@ -71,7 +71,7 @@ def _short(value: float, decimals: int) -> str:
 
 
 def _node_name(name: str, taken: set[str]) -> str:
-    """The nearest name that VRML allows and that is not taken."""
+    """Return the closest name that VRML allows and that is not taken."""
     base = re.sub(r"[\x00-\x20\x22\x23\x27\x2b-\x2e\x5b-\x5d\x7b\x7d\x7f]", "_", name) or "material"
     if base[0].isdigit():
         base = f"m{base}"
