@@ -1,4 +1,4 @@
-"""Pictures of the mesh's robots, off screen: scene, cameras, OpenGL, overlay, encoders, and the service.
+"""Off-screen rendering of the mesh's robots: scene, cameras, OpenGL, overlay, encoders, and the service.
 
-It learns robots only from the mesh, and draws only what somebody watches.
+Robots are known only from the mesh, and only views with subscribers are drawn.
 """

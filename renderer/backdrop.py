@@ -1,4 +1,4 @@
-"""What does not move: a calm gradient and the floor's grid, drawn once a camera and kept."""
+"""Static background: a gradient and the floor's grid, drawn once for each camera and cached."""
 
 import moderngl
 import numpy as np
@@ -10,7 +10,7 @@ from renderer.scene import square_m
 
 FloatArray = NDArray[np.float64]
 
-# Seen so flat, the floor is a line.
+# The floor is drawn as a line if the view direction's z is below this.
 EDGE_ON = 0.05
 _LINE_TONE = (0.30, 0.34, 0.39, 0.9)
 _MOST = 8
@@ -18,7 +18,7 @@ _EXTENT, _SQUARES_PER_LARGE = 6.0, 5
 
 
 class Backdrops:
-    """Backdrops of a drawing's cameras."""
+    """The backdrops of a drawing's cameras."""
 
     def __init__(self, context: moderngl.Context, programs: Programs, size: tuple[int, int]) -> None:
         self._context, self._programs, self._size = context, programs, size
@@ -37,25 +37,26 @@ class Backdrops:
         radius: float,
         floor: float | None,
     ) -> moderngl.Framebuffer:
-        """The backdrop of a camera, drawn when it is first asked for.
+        """Return the backdrop of a camera, drawn at the first request.
 
         Args:
             site_to_clip: (4, 4) of the camera.
-            center: (3,) of the arm's room, in the site's frame [m].
-            radius: Of the room [m].
-            floor: Its height [m]; None: there is none.
+            center: (3,) centre of the arm's workspace, in the site's frame [m].
+            radius: Radius of the workspace [m].
+            floor: Height of the floor [m]; None: no floor.
         """
         key = (site_to_clip.tobytes(), floor)
         backdrop = self._kept.pop(key, None)
         if backdrop is None:
-            # A camera on a link has a new one with each picture: it must not cost the others theirs.
-            backdrop = self._take_place()
+            # A camera on a link needs a new backdrop for each picture. The oldest is evicted, so the
+            # backdrops of other cameras, which are used more often, stay in the cache.
+            backdrop = self._free_framebuffer()
             middle = None if floor is None else np.array([*center[:2], floor])
             self._draw(backdrop, camera, site_to_clip, middle, radius)
         self._kept[key] = backdrop
         return backdrop
 
-    def _take_place(self) -> moderngl.Framebuffer:
+    def _free_framebuffer(self) -> moderngl.Framebuffer:
         if len(self._kept) >= _MOST:
             return self._kept.pop(next(iter(self._kept)))
         return self._context.framebuffer([self._context.renderbuffer(self._size, 4)])
@@ -68,12 +69,12 @@ class Backdrops:
         middle: FloatArray | None,
         radius: float,
     ) -> None:
-        """Seen edge-on, the floor is a line on squared paper."""
+        """Draw gradient and grid; a floor seen edge-on is a line, with the grid upright behind it."""
         forward = camera.forward
         target.use()
         self._context.enable_only(moderngl.BLEND)
         self._context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
-        # Looked at from above, there is no horizon to shade towards.
+        # A view from above has no horizon, so it gets no gradient.
         set_uniforms(self._programs.backdrop, level=1.0 - abs(float(forward[2])) ** 4)
         self._gradient.render(vertices=3)
         if middle is None:
@@ -81,7 +82,7 @@ class Backdrops:
         edge_on = camera.orthographic and abs(forward[2]) < EDGE_ON
         extent, square = _EXTENT * radius, square_m(radius)
         coarse = _SQUARES_PER_LARGE * square
-        # Lines stay where they are in the site, wherever the scene's middle is.
+        # The grid is fixed in the site, independent of the scene's centre.
         floor = np.array([*np.round(middle[:2] / coarse) * coarse, middle[2]])
         up = np.array([0.0, 0.0, 1.0])
         origin, u, v = floor, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])

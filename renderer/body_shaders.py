@@ -1,8 +1,8 @@
-"""The shaders of bodies: soft light from above, a lamp, what the studio mirrors; in linear light.
+"""Shaders of bodies: soft light from above, a lamp, reflections of a studio; in linear light.
 
-Specular after Walter et al. 2007 (GGX) and Karis 2013 (environment, fitted); tones after the Khronos
-PBR Neutral Tone Mapper, which leaves a paint its colour (without its toe: black is not told from
-black on a monitor in a hall).
+Specular light after Walter et al. 2007 (GGX) and Karis 2013 (environment, fitted). Tone mapping after the
+Khronos PBR Neutral Tone Mapper, which preserves a paint's colour (without its toe: shades of black cannot
+be distinguished on a monitor in a factory hall).
 """
 
 from renderer.shaders import COLORS, COMMON
@@ -31,7 +31,7 @@ void main() {
 """
 )
 
-# FULL: the lamp's shadow falls on bodies too.
+# FULL: also the lamp's shadow on bodies.
 BODY_FRAGMENT = (
     COLORS
     + """
@@ -135,7 +135,7 @@ out vec4 color;
 void main() { color = vec4(tone.rgb, 1.0) * tone.a; }
 """
 
-# Already in clip coordinates: lines of a width in pixels, see `renderer.ribbons`.
+# Vertices are already in clip coordinates: lines with a width in pixels, see `renderer.ribbons`.
 RIBBON_VERTEX = """#version 330
 in vec4 place, tone;
 out vec4 shade;
@@ -151,7 +151,7 @@ out vec4 color;
 void main() { color = vec4(shade.rgb, 1.0) * shade.a; }
 """
 
-# Depth alone, as the lamp sees it.
+# Depth only, seen from the lamp.
 LAMP_VERTEX = """#version 330
 uniform mat4 site_to_lamp, part_to_site;
 in vec3 position;

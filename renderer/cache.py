@@ -1,4 +1,4 @@
-"""What was got or computed once, kept by its content in the user's cache folder."""
+"""Cache of received and prepared meshes in the user's cache folder, by content hash."""
 
 import contextlib
 import hashlib
@@ -13,18 +13,18 @@ from renderer import mesh as mesh_module
 from renderer.mesh import Mesh, prepared
 from robomesh.atomic_write import open_atomically, write_atomically
 
-# Counted up whenever a mesh is prepared differently.
+# Incremented with each change of the preparation of meshes.
 _VERSION = 4
 
 
 def cache_folder() -> Path:
-    """`robomesh/renderer` in the user's cache folder."""
+    """Return the folder `robomesh/renderer` in the user's cache folder."""
     base = os.environ.get("XDG_CACHE_HOME")
     return (Path(base) if base else Path("~/.cache").expanduser()) / "robomesh" / "renderer"
 
 
 def stored_glb(sha256: str, folder: Path) -> bytes | None:
-    """A mesh that came over the mesh before; None where it is not there, or not what it was."""
+    """Return a mesh file received before; None if it is missing or damaged."""
     try:
         data = (folder / f"{sha256}.glb").read_bytes()
     except OSError:
@@ -33,14 +33,14 @@ def stored_glb(sha256: str, folder: Path) -> bytes | None:
 
 
 def store_glb(data: bytes, folder: Path) -> None:
-    """Keep a mesh by its hash; a folder that cannot be written costs time later, no more."""
+    """Store a mesh file by its hash; if the folder cannot be written, it is received again next time."""
     with contextlib.suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
         write_atomically(folder / f"{hashlib.sha256(data).hexdigest()}.glb", data, fsync=False)
 
 
 def prepared_once(glb: bytes, *, color: str, folder: Path) -> Mesh:
-    """As `renderer.mesh.prepared`, from the cache where it was done before.
+    """Return the result of `renderer.mesh.prepared`, from the cache if possible.
 
     Raises:
         GlbError: If it is not GLB.

@@ -1,6 +1,6 @@
-"""Cameras: where they stand, what they see, and where a point lands in the picture.
+"""Cameras: pose, projection, and fitting to a set of points.
 
-Camera frame: x right, y up, looking along -z. Pixels count from the picture's upper left corner.
+Camera frame: x right, y up, view direction -z. Pixels count from the picture's upper left corner.
 """
 
 from dataclasses import dataclass, replace
@@ -12,7 +12,8 @@ FloatArray = NDArray[np.float64]
 
 FIELD_OF_VIEW = float(np.deg2rad(30.0))
 _NEAREST_M = 0.01
-# A close-up stays as it is while its object fills so much of it, and keeps off its edges.
+# A close-up camera stays as it is while its object fills at least this share of the picture and keeps this
+# distance from the edges; a new one gets this margin.
 _CLOSE_LEAST, _CLOSE_EDGE, _CLOSE_MARGIN = 0.68, 0.03, 1.16
 
 
@@ -22,10 +23,10 @@ class Camera:
 
     Attributes:
         eye: (3,) [m].
-        target: (3,) what is in the picture's middle [m].
+        target: (3,) point in the picture's centre [m].
         up: (3,) direction that is upwards in the picture.
-        half_height: Half of what an orthographic picture's height shows [m]; None: perspective.
-        field_of_view: Of a perspective picture's height [rad].
+        half_height: Half the height that an orthographic picture shows [m]; None: perspective.
+        field_of_view: Vertical field of view of a perspective picture [rad].
     """
 
     eye: FloatArray
@@ -36,7 +37,7 @@ class Camera:
 
     @property
     def orthographic(self) -> bool:
-        """Whether lines that are parallel in space are so in the picture."""
+        """Whether the projection is orthographic."""
         return self.half_height is not None
 
     @property
@@ -46,11 +47,11 @@ class Camera:
 
 
 def site_to_camera(camera: Camera) -> FloatArray:
-    """(4, 4) transform from the site's frame to the camera's."""
+    """Return the (4, 4) transform from the site's frame to the camera's."""
     backward = -camera.forward
     right = np.cross(camera.up, backward)
     if np.linalg.norm(right) < 1e-9 * np.linalg.norm(camera.up):
-        # Looking along "up": any right will do, and the picture must not be empty.
+        # The view direction is along "up": choose any right, or the picture would be empty.
         right = np.cross([0.0, 1.0, 0.0] if abs(backward[1]) < 0.9 else [1.0, 0.0, 0.0], backward)
     right = _unit(right)
     transform = np.eye(4)
@@ -60,9 +61,9 @@ def site_to_camera(camera: Camera) -> FloatArray:
 
 
 def projection(camera: Camera, aspect: float, *, near: float, far: float) -> FloatArray:
-    """(4, 4) camera frame to clip coordinates, y **down**: the first row drawn is the picture's first.
+    """Return (4, 4) camera frame to clip coordinates, y **down**: the first row drawn is the picture's first.
 
-    Turning the picture here costs nothing; turning it after it was read costs a copy a frame.
+    Flipping the picture here costs nothing; flipping it after reading costs a copy of each frame.
     """
     matrix = np.zeros((4, 4))
     if camera.half_height is not None:
@@ -82,7 +83,7 @@ def projection(camera: Camera, aspect: float, *, near: float, far: float) -> Flo
 
 
 def site_to_clip(camera: Camera, aspect: float, *, center: FloatArray, radius: float) -> FloatArray:
-    """(4, 4) site frame to clip coordinates, with the depth that a sphere's content needs."""
+    """Return (4, 4) site frame to clip coordinates, with a depth range that contains a sphere."""
     distance = float((center - camera.eye) @ camera.forward)
     far = max(distance + radius, 2.0 * _NEAREST_M)
     near = distance - radius
@@ -94,24 +95,24 @@ def site_to_clip(camera: Camera, aspect: float, *, center: FloatArray, radius: f
 def pixels(
     camera: Camera, size: tuple[int, int], points: FloatArray, *, aspect: float | None = None
 ) -> FloatArray:
-    """(n, 2) where points land, x to the right and y downwards from the upper left corner [px].
+    """Project points to (n, 2) pixels, x to the right and y downwards from the upper left corner.
 
     Args:
         size: Width and height [px].
         points: (n, 3) in the site's frame [m], in front of a perspective camera.
-        aspect: Where pixels are not square: the picture's width over its height.
+        aspect: Width over height of the picture, if pixels are not square.
     """
     width, height = size
     matrix = projection(camera, aspect or width / height, near=0.1, far=100.0) @ site_to_camera(camera)
     clip = np.c_[points, np.ones(len(points))] @ matrix.T
-    landed: FloatArray = (clip[:, :2] / clip[:, 3:] + 1.0) / 2.0 * np.array(size)
-    return landed
+    projected: FloatArray = (clip[:, :2] / clip[:, 3:] + 1.0) / 2.0 * np.array(size)
+    return projected
 
 
 def fitted(camera: Camera, aspect: float, points: FloatArray, *, margin: float = 1.06) -> Camera:
-    """The camera with everything in the picture's middle and as large as it goes, its direction kept.
+    """Return a camera with the same direction that shows the points centred and as large as possible.
 
-    It moves sideways, and an orthographic one is given its scale, a perspective one its distance.
+    An orthographic camera changes its scale, a perspective one its distance.
 
     Args:
         points: (n, 3) in the site's frame [m].
@@ -124,8 +125,8 @@ def fitted(camera: Camera, aspect: float, points: FloatArray, *, margin: float =
         moved = camera.eye + across @ to_camera, camera.target + across @ to_camera
         scale = float(max(half_height, half_width / aspect, 1e-3) * margin)
         return Camera(*moved, camera.up, half_height=scale)
-    # A point is within the picture's upper edge where up + slope * backward is at most what the
-    # eye's distance and height allow: the outermost point at each edge decides.
+    # A point is below the picture's upper edge if up + slope * backward is at most what the eye's
+    # distance and height allow: the outermost point at each edge decides.
     slope = np.tan(camera.field_of_view / 2.0) / margin
     distances, middle = [1e-3], []
     for along, edge in ((right, slope * aspect), (up, slope)):
@@ -137,9 +138,9 @@ def fitted(camera: Camera, aspect: float, points: FloatArray, *, margin: float =
 
 
 def close_up(camera: Camera, aspect: float, points: FloatArray) -> Camera:
-    """A camera that points fill, in the same direction: the given one as long as they do.
+    """Return the camera if the points fill its picture well, otherwise a fitted one with the same direction.
 
-    A camera that moved with every picture would make what stands still seem to move.
+    A camera that moved with every picture would make static bodies seem to move.
 
     Args:
         points: (n, 3) in the site's frame [m].

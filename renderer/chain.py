@@ -1,6 +1,6 @@
-"""The links of a URDF: where they are at given joint positions, and how far they come.
+"""Placements of the links of a URDF at given joint positions, and the space that they can reach.
 
-What a description tells over the mesh is enough for both, so the renderer needs no robot model.
+The published description is enough for both, so the renderer needs no robot model.
 """
 
 import xml.etree.ElementTree as ElementTree
@@ -19,7 +19,7 @@ _SAMPLES = 600
 
 @dataclass(frozen=True, eq=False)
 class ChainJoint:
-    """A joint of the chain; `kind` as in URDF."""
+    """A joint of the chain; `kind` is the type in the URDF."""
 
     name: str
     kind: str
@@ -33,33 +33,33 @@ class ChainJoint:
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Joints from the root outwards: each one's parent link comes before its child."""
+    """Joints in order from the root: a joint's parent link comes before its child link."""
 
     root: str
     joints: tuple[ChainJoint, ...]
 
 
 def read_chain(urdf: str) -> Chain:
-    """The chain of a URDF.
+    """Return the chain of a URDF.
 
     Raises:
-        ChainError: If it is no URDF, or its joints do not hang together.
+        ChainError: If it is not a URDF, or its joints are not connected.
     """
     try:
         robot = ElementTree.fromstring(urdf)
         waiting = [_joint(element) for element in robot.findall("joint")]
         links = [link.attrib["name"] for link in robot.findall("link")]
     except (ElementTree.ParseError, KeyError, ValueError) as error:
-        raise ChainError(f"a description whose URDF cannot be read: {error!r}") from None
+        raise ChainError(f"the description's URDF cannot be read: {error!r}") from None
     children = {joint.child for joint in waiting}
     roots = [link for link in links if link not in children]
     if len(roots) != 1:
-        raise ChainError(f"a URDF with {len(roots)} root links ({', '.join(roots)}): one is right")
+        raise ChainError(f"the URDF has {len(roots)} root links ({', '.join(roots)}); it must have one")
     placed, ordered = {roots[0]}, list[ChainJoint]()
     while waiting:
         ready = [joint for joint in waiting if joint.parent in placed]
         if not ready:
-            raise ChainError(f"a URDF whose joint {waiting[0].name!r} hangs on nothing")
+            raise ChainError(f"the URDF's joint {waiting[0].name!r} is not connected to the root")
         ordered += ready
         placed |= {joint.child for joint in ready}
         waiting = [joint for joint in waiting if joint.parent not in placed or joint.child not in placed]
@@ -67,10 +67,10 @@ def read_chain(urdf: str) -> Chain:
 
 
 def placements(chain: Chain, positions: Mapping[str, float | FloatArray]) -> dict[str, FloatArray]:
-    """(..., 4, 4) link to base of every link; joints that are not named stand at 0.
+    """Return (..., 4, 4) link to base by link; joints without a position are at 0.
 
     Args:
-        positions: By joint [rad] or [m], one or, all alike, many.
+        positions: Positions by joint [rad] or [m]: numbers, or arrays of the same shape.
     """
     placed: dict[str, FloatArray] = {chain.root: np.eye(4)}
     for joint in chain.joints:
@@ -80,14 +80,14 @@ def placements(chain: Chain, positions: Mapping[str, float | FloatArray]) -> dic
 
 
 def reach(chain: Chain, points: Mapping[str, FloatArray]) -> FloatArray:
-    """(n, 3) where links' origins and points on them come within the limits, in the base frame [m].
+    """Return (n, 3) positions that link origins and points on links can reach, in the base frame [m].
 
-    A sample of it, the same each time, with every joint at 0 in it.
+    They are from a fixed random sample of joint positions within the limits, plus all joints at 0.
 
     Args:
-        points: (k, 3) by link, in its frame [m].
+        points: (k, 3) points by link, in the link's frame [m].
     """
-    # Towards the limits more often than not: that is where an arm is longest.
+    # The sample is denser near the limits, where an arm reaches farthest.
     shares = np.random.default_rng(0).beta(0.7, 0.7, (len(chain.joints), _SAMPLES))
     positions = {
         joint.name: np.append(joint.lower + share * (joint.upper - joint.lower), 0.0)
@@ -144,7 +144,7 @@ def _numbers(text: str) -> FloatArray:
 
 
 def _motion(joint: ChainJoint, position: FloatArray) -> FloatArray:
-    """(..., 4, 4) what a joint's positions add to its origin."""
+    """Return the (..., 4, 4) motion of a joint at its positions, relative to its origin."""
     motion = np.tile(np.eye(4), (*position.shape, 1, 1))
     if joint.kind in ("revolute", "continuous"):
         motion[..., :3, :3] = rotation(joint.axis, position)
@@ -154,7 +154,7 @@ def _motion(joint: ChainJoint, position: FloatArray) -> FloatArray:
 
 
 def rotation(axis: FloatArray, angle: FloatArray) -> FloatArray:
-    """(..., 3, 3) rotation about a unit axis by angles [rad] (Rodrigues)."""
+    """Return (..., 3, 3) rotations about a unit axis by angles [rad] (Rodrigues)."""
     x, y, z = axis
     across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     sine, cosine = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]

@@ -1,4 +1,4 @@
-"""Smooth where a surface is round, sharp where it is not: normals and edges by the crease angle."""
+"""Normals and sharp edges by the crease angle: round surfaces are smooth, edges sharp."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,14 +6,14 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-# Below this angle between two faces the surface is round.
+# A surface is smooth where two faces meet at a smaller angle.
 CREASE = float(np.deg2rad(38.0))
-# Vertices nearer than this are one: exporters split them for their normals' sake.
+# Closer vertices are merged: exporters split them to store several normals.
 _WELD_M = 1e-5
 
 
 def weld(positions: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
-    """The same triangles with one vertex a place; those without an area are left out."""
+    """Merge vertices at the same position, and drop triangles without area."""
     _, first, number = np.unique(
         np.round(positions / _WELD_M).astype(np.int64), axis=0, return_index=True, return_inverse=True
     )
@@ -25,19 +25,19 @@ def weld(positions: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArr
 
 
 def face_vectors(positions: FloatArray, triangles: IntArray) -> FloatArray:
-    """(t, 3) outward normals, twice the area long."""
+    """Return (t, 3) outward normals with a length of twice the area."""
     a, b, c = (positions[triangles[:, corner]] for corner in range(3))
     vectors: FloatArray = np.cross(b - a, c - a)
     return vectors
 
 
 def crease_normals(positions: FloatArray, triangles: IntArray, *, crease: float = CREASE) -> FloatArray:
-    """(t, 3, 3) a normal for each corner: the mean of the faces around it that are not across a crease.
+    """Return the (t, 3, 3) normal of each corner: the mean over adjacent faces that no crease separates.
 
     Args:
         positions: (v, 3), welded.
         triangles: (t, 3).
-        crease: Angle between two faces from which the edge is sharp [rad].
+        crease: Angle between two faces from which their edge is sharp [rad].
     """
     vectors = face_vectors(positions, triangles)
     unit = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
@@ -46,7 +46,7 @@ def crease_normals(positions: FloatArray, triangles: IntArray, *, crease: float 
     face_of = order // 3
     counts = np.bincount(corners, minlength=len(positions))
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    # Every pair (corner, face at the same vertex), in one array.
+    # All pairs (corner, face at the same vertex) in one array.
     sizes = counts[corners[order]]
     mine = np.repeat(np.arange(len(order)), sizes)
     ends = np.cumsum(sizes)
@@ -64,7 +64,7 @@ def crease_normals(positions: FloatArray, triangles: IntArray, *, crease: float 
 
 
 def sharp_edges(positions: FloatArray, triangles: IntArray, *, crease: float = CREASE) -> FloatArray:
-    """(e, 2, 3) ends of the edges between faces that a crease divides."""
+    """Return the (e, 2, 3) ends of the sharp edges."""
     vectors = face_vectors(positions, triangles)
     unit = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
     sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])

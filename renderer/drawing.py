@@ -1,8 +1,8 @@
-"""Drawing a scene: backdrop and grid, the floor's shadow, the bodies over them.
+"""Drawing of a scene: backdrop and grid, the floor's shadow, then the bodies.
 
-What does not move is drawn once a camera. Only the bodies need several samples a pixel, and only
-the rectangle of the picture that they fill is drawn and resolved: on software OpenGL that halves
-the time.
+The static background is drawn once for each camera. Only the bodies need several samples per pixel, and
+only the rectangle of the picture that they fill is drawn and resolved. In software OpenGL that halves the
+time.
 """
 
 from collections.abc import Iterable, Sequence
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from renderer.backdrop import EDGE_ON, Backdrops
 from renderer.body_shaders import KEY
 from renderer.cameras import Camera, site_to_clip
-from renderer.lighting import Lamp
+from renderer.lighting import LampShadow
 from renderer.mesh import Mesh
 from renderer.obstruction import contains, hides
 from renderer.opengl import Uploaded, columns, compile_programs, set_uniforms, upload
@@ -28,26 +28,27 @@ FloatArray = NDArray[np.float64]
 Bodies = list[tuple[Part, Uploaded]]
 
 _EDGE_TONE = (0.06, 0.07, 0.09, 0.42)
-# Linear red, green, blue, and their share of a body's paint; then its opacity.
+# Linear red, green, blue, and their share in a body's colour; then its opacity.
 _FINISHES: dict[Finish, tuple[tuple[float, float, float, float], float]] = {
     Finish.PLAIN: ((0.0, 0.0, 0.0, 0.0), 1.0),
     Finish.STALE: ((0.0, 0.0, 0.0, 0.0), 1.0),
     Finish.RED: ((0.80, 0.03, 0.02, 0.85), 1.0),
     Finish.GHOST: ((0.05, 0.28, 0.85, 1.0), 0.38),
 }
-# Of a fixture between the camera and the arm.
+# Opacity of a fixture between the camera and the arm.
 _SEEN_THROUGH = 0.16
-# A fence a mile off must not take the depth's steps from the arm: over the arm's room.
+# Largest radius of the drawn space, over that of the arm's workspace: a distant fence must not use up the
+# precision of the depth buffer.
 _FARTHEST = 6.0
 _MOST_RIBBON_BYTES = 1 << 20
-# Where no floor returns light or shades what is near it.
+# Height of the floor if there is none: far below, where it reflects no light.
 _NO_FLOOR = -1e6
-# How far faces stand behind where they are (factor, units), and a ghost's behind a body's.
+# Polygon offsets (factor, units) of bodies and of ghosts, which are behind bodies at the same place.
 _BACK = ((1.0, 2.0), (3.0, 12.0))
 
 
 class Shading(StrEnum):
-    """How much light is computed.
+    """The quality of shading.
 
     FAST: a soft shadow on the floor. FULL: the lamp's shadow on robots and fixtures too.
     """
@@ -57,10 +58,10 @@ class Shading(StrEnum):
 
 
 class Drawing:
-    """Draws scenes of the meshes that it was given, at one size, in the context's thread.
+    """A drawing surface of one size with its meshes; used in the context's thread only.
 
     Attributes:
-        renderer_name: What draws, in the driver's words.
+        renderer_name: The OpenGL driver's name of the renderer.
     """
 
     def __init__(
@@ -84,7 +85,7 @@ class Drawing:
         self._final = context.framebuffer([context.renderbuffer(size, 4)])
         self._backdrops = Backdrops(context, programs, size)
         self._shadow = FloorShadow(context, programs)
-        self._lamp = Lamp(context, programs) if Shading(shading) is Shading.FULL else None
+        self._lamp = LampShadow(context, programs) if Shading(shading) is Shading.FULL else None
         self._compose = context.vertex_array(programs.compose, [])
         self._ribbon_buffer = context.buffer(reserve=_MOST_RIBBON_BYTES, dynamic=True)
         self._ribbon = context.vertex_array(
@@ -94,18 +95,18 @@ class Drawing:
         self._picture = np.empty((size[1], size[0], 3), dtype=np.uint8)
 
     def has(self, name: str) -> bool:
-        """Whether it was given that mesh."""
+        """Return whether the mesh was added."""
         return name in self._meshes
 
     def add(self, name: str, mesh: Mesh) -> None:
-        """Take a mesh; one of that name before is forgotten."""
+        """Add a mesh; it replaces one of the same name."""
         self.forget([name])
         with self.context:
             self._meshes[name] = upload(self.context, self._programs, mesh)
         self._shadow.forget()
 
     def forget(self, names: Iterable[str]) -> None:
-        """Let meshes go."""
+        """Release meshes."""
         with self.context:
             for name in names:
                 uploaded = self._meshes.pop(name, None)
@@ -113,18 +114,21 @@ class Drawing:
                     uploaded.release()
 
     def draw(self, scene: Scene, camera: Camera) -> Picture:
-        """A picture of the scene: (height, width, 3) uint8 RGB, valid until the next is drawn."""
-        # Another drawing's context may be the thread's current one.
+        """Return a picture of the scene: (height, width, 3) uint8 RGB, valid until the next call."""
+        # The thread's current context may be another drawing's.
         with self.context:
             return self._draw(scene, camera)
 
     def corners(self, scene: Scene) -> FloatArray | None:
-        """(n, 3) corners of boxes around what moves, in the site's frame [m]; None: nothing does."""
+        """Return the (n, 3) corners of the boxes around the scene's parts, in the site's frame [m].
+
+        None if there are no parts.
+        """
         known = self._known(scene.parts)
         return _corners(known) if known else None
 
     def inside(self, scene: Scene, camera: Camera) -> str:
-        """Name of the body that a perspective camera's eye is in; empty where it is in none."""
+        """Return the name of the body that contains a perspective camera's eye; empty if there is none."""
         if camera.orthographic:
             return ""
         for part, uploaded in self._known(scene.parts + scene.others + scene.fixtures):
@@ -137,7 +141,7 @@ class Drawing:
         return ""
 
     def close(self) -> None:
-        """Release everything; the context too."""
+        """Release all meshes and the context."""
         self.forget(list(self._meshes))
         self.context.release()
 
@@ -145,7 +149,7 @@ class Drawing:
         aspect = self.size[0] / self.size[1]
         fixtures = self._known(scene.fixtures)
         moving = self._known(scene.parts + scene.others)
-        center, radius = _room(scene, fixtures)
+        center, radius = _scene_bounds(scene, fixtures)
         matrix = site_to_clip(camera, aspect, center=center, radius=4.0 * radius)
         backdrop = self._backdrops.of(
             camera, matrix, center=scene.center, radius=scene.radius, floor=scene.floor
@@ -199,9 +203,9 @@ class Drawing:
         self._bodies.scissor = rectangle
         self._bodies.clear(depth=1.0)
         context.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
-        # The layer holds colours times their opacity, and is laid over the rest later.
+        # The layer has premultiplied colours and is blended over the rest later.
         context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
-        # The projection turns the picture over, and with it which way round a face goes.
+        # The projection flips the picture, and with it the winding of faces.
         context.front_face = "cw"
         solid, glass, ghosts = [], [], []
         for pair in sorted(bodies, key=lambda pair: _depth(pair, camera)):
@@ -212,7 +216,7 @@ class Drawing:
                 glass.append(pair)
             else:
                 solid.append(pair)
-        # The nearest first, and unblended: what is hidden, or covers all, costs least so.
+        # The nearest first and without blending, so that hidden faces cost least.
         context.disable(moderngl.BLEND)
         for pair in solid:
             self._draw_faces(pair)
@@ -220,11 +224,11 @@ class Drawing:
         for pair in solid:
             self._draw_edges(pair)
         self._draw_lines(scene.lines, matrix)
-        # What lets light through comes last, the farthest first; over all of it what is nowhere.
+        # Transparent bodies last, the farthest first; then the ghost over everything.
         for pair in reversed(glass):
             self._draw_faces(pair, opacity=_SEEN_THROUGH if pair[0].mesh in through else 1.0)
             self._draw_edges(pair)
-        # Its nearest faces only: first their depth, then what has it.
+        # Only a ghost's nearest faces: draw depth first, then the faces with that depth.
         self._bodies.color_mask = False, False, False, False
         for pair in ghosts:
             self._draw_faces(pair)
@@ -240,7 +244,7 @@ class Drawing:
         if uploaded.body is None:
             return
         tint, own_opacity = _FINISHES[part.finish]
-        # A little back, so that the edges drawn over them are whole.
+        # Slightly farther away, so that the edges drawn on the faces are not hidden.
         self.context.polygon_offset = _BACK[part.finish is Finish.GHOST]
         set_uniforms(
             self._programs.body,
@@ -283,8 +287,11 @@ class Drawing:
         self._compose.render(moderngl.TRIANGLE_STRIP, vertices=4)
 
 
-def _room(scene: Scene, fixtures: Bodies) -> tuple[FloatArray, float]:
-    """Middle and radius of what the floor's shadow and the depths must hold, fixtures that are near too."""
+def _scene_bounds(scene: Scene, fixtures: Bodies) -> tuple[FloatArray, float]:
+    """Return centre and radius of the space that the shadow and the depth range must include.
+
+    It contains the arm's workspace and the fixtures, unless they are too far away.
+    """
     if not fixtures:
         return scene.center, scene.radius
     corners = _corners(fixtures)
@@ -301,7 +308,7 @@ def _depth(pair: tuple[Part, Uploaded], camera: Camera) -> float:
 
 
 def _corners(bodies: Bodies) -> FloatArray:
-    """(8n, 3) of the boxes about bodies, in the site's frame [m]."""
+    """Return the (8n, 3) corners of the boxes around bodies, in the site's frame [m]."""
     boxes = [
         uploaded.corners @ part.part_to_site[:3, :3].T + part.part_to_site[:3, 3] for part, uploaded in bodies
     ]
@@ -311,13 +318,13 @@ def _corners(bodies: Bodies) -> FloatArray:
 def _rectangle(
     bodies: Bodies, lines: Sequence[Line], matrix: FloatArray, size: tuple[int, int]
 ) -> tuple[int, int, int, int] | None:
-    """(x, y, width, height) of the picture that bodies and lines can fill [px]; None: nothing of it."""
+    """Return the rectangle (x, y, width, height) that bodies and lines can fill [px]; None if it is empty."""
     points = np.concatenate([_corners(bodies), *(line.points for line in lines)])
     if not len(points):
         return None
     clip = np.c_[points, np.ones(len(points))] @ matrix.T
     if (clip[:, 3] <= 1e-6).any():
-        return 0, 0, *size  # something stands beside or behind the eye
+        return 0, 0, *size  # a point is next to the eye or behind it
     places = (clip[:, :2] / clip[:, 3:] + 1.0) / 2.0 * np.array(size)
     edge = 2 + (size[1] // 180 if lines else 0)
     low = np.clip(np.floor(places.min(axis=0)) - edge, 0, size).astype(int)

@@ -1,7 +1,7 @@
-"""Pictures to bytes: H.264 for who watches, JPEG for who wants one.
+"""Encoders: H.264 for video, JPEG for still pictures.
 
-H.264 as Foxglove's CompressedVideo and WebCodecs take it: Annex B, one packet a picture, no
-B-frames, SPS and PPS with each key frame.
+H.264 is in the form that Foxglove's CompressedVideo and WebCodecs require: Annex B, one packet per picture,
+no B-frames, SPS and PPS with each key frame.
 """
 
 import logging
@@ -23,15 +23,15 @@ log = logging.getLogger(__name__)
 
 Picture = NDArray[np.uint8]
 
-# The clock of key frames is ours: the encoder's own would count pictures, which come unevenly.
+# Key frames are requested by time: the encoder would count pictures, which have no fixed rate.
 _NEVER = 1_000_000
 _ITU601, _LIMITED_RANGE = 6, 1
 
-# Of a stream that may have few bits: this much of a second may come at once, so key frames stay small.
+# Rate buffer of a stream with a limited bit rate, in seconds: keeps key frames small.
 _BURST_S = 0.5
 _FEW_BITS_QUALITY = "28"
 
-# The first that opens is used: a GPU's if there is one, then x264.
+# The first that works is used: the GPU's, then x264.
 _CODECS: dict[str, dict[str, str]] = {
     "h264_nvenc": {
         "preset": "p3",
@@ -61,16 +61,16 @@ class Packet:
 
 
 class VideoEncoder(Protocol):
-    """Encodes one stream's pictures, in their order."""
+    """An encoder of one stream's pictures in order."""
 
     name: str
 
     def encode(self, picture: Picture, *, key_frame: bool) -> Packet:
-        """The packet of an RGB picture (height, width, 3); as a key frame if asked."""
+        """Return the packet of an RGB picture (height, width, 3), optionally as a key frame."""
 
 
 class H264Encoder:
-    """H.264 by one of FFmpeg's encoders."""
+    """An H.264 encoder of FFmpeg."""
 
     def __init__(
         self, size: tuple[int, int], fps: float, *, codec: str, most_bits_per_s: float = 0.0
@@ -78,11 +78,11 @@ class H264Encoder:
         """Open the encoder.
 
         Args:
-            fps: Highest rate; the bits of a slower stream are fewer.
-            most_bits_per_s: Highest; 0: as many as the quality needs.
+            fps: Highest rate; a slower stream has a lower bit rate.
+            most_bits_per_s: Highest bit rate; 0: no limit, constant quality.
 
         Raises:
-            NoEncoderError: If this machine cannot.
+            NoEncoderError: If the encoder does not work on this machine.
         """
         self.name = codec
         self._number = 0
@@ -94,11 +94,11 @@ class H264Encoder:
             context.framerate = Fraction(round(fps))
             context.time_base = Fraction(1, round(fps))
             context.gop_size, context.max_b_frames = _NEVER, 0
-            # Said in the stream, or a player guesses by the picture's height.
+            # Declared in the stream; otherwise players guess it from the picture's height.
             context.colorspace = context.color_primaries = context.color_trc = _ITU601
             context.color_range = _LIMITED_RANGE
             context.options = _CODECS[codec] | _limit(codec, most_bits_per_s)
-            # One slice a picture, and no core taken from the drawing.
+            # One thread: one slice per picture, and the other cores stay free for drawing.
             context.thread_count = 1
             context.open()
         except (FFmpegError, ValueError) as error:
@@ -107,12 +107,12 @@ class H264Encoder:
         self._context = context
 
     def encode(self, picture: Picture, *, key_frame: bool) -> Packet:
-        """The packet of an RGB picture (height, width, 3); as a key frame if asked.
+        """Return the packet of an RGB picture (height, width, 3), optionally as a key frame.
 
         Raises:
-            NoEncoderError: If the encoder failed; it is of no more use.
+            NoEncoderError: If the encoder failed; it must not be used again.
         """
-        # OpenCV's conversion: FFmpeg's takes 1 to 2.5 ms more.
+        # Converted by OpenCV: FFmpeg takes 1 to 2.5 ms longer.
         planes = np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGB2YUV_I420), dtype=np.uint8)
         frame = av.VideoFrame.from_ndarray(planes, format="yuv420p")
         frame.pts = self._number
@@ -123,7 +123,7 @@ class H264Encoder:
         except FFmpegError as error:
             raise NoEncoderError(f"{self.name} failed: {error}") from None
         if len(packets) != 1:
-            raise NoEncoderError(f"{self.name} gave {len(packets)} packets for a picture: one is right")
+            raise NoEncoderError(f"{self.name} returned {len(packets)} packets for a picture instead of one")
         return Packet(bytes(packets[0]), bool(packets[0].is_keyframe))
 
 
@@ -139,10 +139,10 @@ def _limit(codec: str, most_bits_per_s: float) -> dict[str, str]:
 
 
 def best_codec(size: tuple[int, int], fps: float) -> str:
-    """The best H.264 encoder of this machine, tried on a picture.
+    """Return the name of this machine's best H.264 encoder, after a trial with a picture.
 
     Raises:
-        NoEncoderError: If none works; the text tells why of each.
+        NoEncoderError: If none works; the text has each encoder's reason.
     """
     reasons = []
     for codec in _CODECS:
@@ -155,19 +155,19 @@ def best_codec(size: tuple[int, int], fps: float) -> str:
         for reason in reasons:
             log.info("%s: %s is used instead", reason, codec)
         return codec
-    raise NoEncoderError("no H.264 encoder here: " + "; ".join(reasons))
+    raise NoEncoderError("no H.264 encoder works: " + "; ".join(reasons))
 
 
 def open_encoder(
     size: tuple[int, int], fps: float, *, codec: str | None = None, most_bits_per_s: float = 0.0
 ) -> VideoEncoder:
-    """An encoder for a stream.
+    """Return an encoder for a stream.
 
     Args:
-        codec: The one that was found best; None: it is looked for.
+        codec: The preferred encoder; None: the best one.
 
     Raises:
-        NoEncoderError: If none works; the text tells why of each.
+        NoEncoderError: If none works; the text has each encoder's reason.
     """
     try:
         found = codec or best_codec(size, fps)
@@ -175,12 +175,12 @@ def open_encoder(
     except NoEncoderError:
         if codec is None:
             raise
-    # A GPU has no room for another stream, or takes no picture as small.
+    # The GPU may have reached its number of streams, or not support the picture's size.
     return open_encoder(size, fps, most_bits_per_s=most_bits_per_s)
 
 
 def jpeg(picture: Picture, *, quality: int = 88) -> bytes:
-    """An RGB picture (height, width, 3) as JPEG."""
+    """Encode an RGB picture (height, width, 3) as JPEG."""
     _, data = cv2.imencode(
         ".jpg", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, quality]
     )

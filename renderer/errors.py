@@ -1,22 +1,22 @@
 """Errors of the renderer.
 
 RendererError
-├── NoOpenGLError           no OpenGL here: the text names what to install
+├── NoOpenGLError           OpenGL cannot be used: the text names what to install
 ├── NoEncoderError          no H.264 encoder could be opened, or one failed
-├── GlbError                bytes that are not the GLB that a mesh should be
-├── ChainError              a URDF that is not a serial chain
-├── Mp4Error                packets that cannot be put into an MP4 file
-├── ViewRequestError        a view of one's own that is not possible
-│   └── NoRoomError         as it is possible, but too much is drawn already
-├── CameraError             a camera that hangs on nothing, or looks nowhere
-└── UnknownViewError        a view that neither the description nor the renderer has
+├── GlbError                a mesh is not valid GLB
+├── ChainError              a URDF is not a tree of joints
+├── Mp4Error                packets cannot be put into an MP4 file
+├── ViewRequestError        a requested view is not possible
+│   └── NoRoomError         a requested view exceeds what can be drawn now
+├── CameraError             a camera has no mount, no direction, or invalid numbers
+└── UnknownViewError        neither the description nor the renderer has the view
 """
 
 from collections.abc import Iterable
 
 
 class RendererError(Exception):
-    """Base of the renderer's errors; its text is one line for people."""
+    """Base of the renderer's errors; the text is one line for the operator."""
 
 
 class NoOpenGLError(RendererError):
@@ -24,13 +24,13 @@ class NoOpenGLError(RendererError):
 
     def __init__(self, reason: str, *, device: int | None = None) -> None:
         text = (
-            f"no OpenGL here ({reason}): install it with 'apt-get install libegl1 libgl1'; "
-            "everything but the renderer runs without it"
+            f"OpenGL is not available ({reason}): install it with 'apt-get install libegl1 libgl1'; "
+            "all other services run without it"
         )
         if device is not None:
             text = (
-                f"EGL device {device} cannot be used ({reason}): name another (they count from 0), or none "
-                "for EGL's own choice; libegl1 and libgl1 must be installed"
+                f"EGL device {device} cannot be used ({reason}): choose another (they count from 0), or none "
+                "for EGL's default; libegl1 and libgl1 must be installed"
             )
         super().__init__(text)
 
@@ -40,31 +40,31 @@ class NoEncoderError(RendererError):
 
 
 class GlbError(RendererError):
-    """A mesh that is not GLB, or of a kind that is not drawn."""
+    """A mesh is not GLB, or of an unsupported kind."""
 
 
 class ChainError(RendererError):
-    """A URDF that is not a serial chain."""
+    """A URDF is not a tree of joints."""
 
 
 class Mp4Error(RendererError):
-    """Packets that cannot be put into an MP4 file."""
+    """Packets cannot be put into an MP4 file."""
 
 
 class ViewRequestError(RendererError):
-    """A view of one's own that is not possible."""
+    """A requested view is not possible."""
 
 
 class NoRoomError(ViewRequestError):
-    """A requested view that exceeds what the renderer can draw now."""
+    """A requested view exceeds what the renderer can draw now."""
 
 
 class CameraError(RendererError):
-    """A camera that hangs on nothing, looks nowhere, or has numbers that are not possible."""
+    """A camera has no mount, no direction, or invalid numbers."""
 
 
 class UnknownViewError(RendererError):
-    """A view that there is none of."""
+    """The robot has no view of that name."""
 
     def __init__(self, view: str, known: Iterable[str]) -> None:
         super().__init__(f"no view {view!r}; there are {', '.join(sorted(known))}")

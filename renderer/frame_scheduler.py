@@ -1,8 +1,8 @@
-"""Which view is drawn next, and how well, on a machine that may not keep up with all that is watched.
+"""Choice of the next view to draw, and of anti-aliasing, on a machine that may be too slow for all views.
 
-Nothing is queued: who waits longest is drawn next, from what is so then. When the machine cannot keep
-up, first the rate falls, fairly; then anti-aliasing goes, and comes back when there is time for it.
-All times on one monotonic clock [s].
+There is no queue: the view that has waited longest is drawn next, from the robot's current state. On a slow
+machine all rates fall evenly at first; then anti-aliasing is turned off until there is time for it again.
+All times are on one monotonic clock [s].
 """
 
 import math
@@ -12,26 +12,26 @@ from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
 _WINDOW_S = 2.0
-# Of the time there is, so much would be needed.
+# Loads, as shares of the available time.
 _TOO_MUCH, _ENOUGH_ROOM, _FINE_AGAIN = 1.15, 0.8, 1.05
-_COARSE_AFTER_S, _FINE_AFTER_S, _TOLD_AFTER_S = 2.0, 5.0, 5.0
-# How much longer a picture takes with anti-aliasing, as long as nobody measured it.
+_COARSE_AFTER_S, _FINE_AFTER_S, _REPORT_AFTER_S = 2.0, 5.0, 5.0
+# Time of a picture with anti-aliasing over time without, until it is measured.
 _USUAL_COST = 2.0
 
 
 class Due(Protocol):
-    """Something that is drawn now and then."""
+    """A view that is drawn repeatedly."""
 
     @property
     def due_at(self) -> float:
-        """From when on it is to be drawn."""
+        """Time at which it is due."""
 
 
 AnyDue = TypeVar("AnyDue", bound=Due)
 
 
-def next_of(views: Iterable[AnyDue], now: float) -> tuple[AnyDue | None, float]:
-    """The view that has waited longest, or none yet; and when the next is due."""
+def next_view(views: Iterable[AnyDue], now: float) -> tuple[AnyDue | None, float]:
+    """Return the view that has waited longest, None if none is due yet, and when the next is due."""
     soonest = min(views, key=lambda view: view.due_at, default=None)
     if soonest is None:
         return None, math.inf
@@ -39,13 +39,13 @@ def next_of(views: Iterable[AnyDue], now: float) -> tuple[AnyDue | None, float]:
 
 
 def next_due(due_at: float, now: float, interval_s: float) -> float:
-    """When a view that is drawn now is due again: it keeps its beat, but makes up for nothing."""
+    """Return when a view that is drawn now is due again; missed pictures are not made up for."""
     return max(due_at + interval_s, now) if now - due_at < interval_s else now + interval_s
 
 
 @dataclass
-class _Lasting:
-    """How long something has been so."""
+class _ConditionTimer:
+    """A timer of how long a condition has held."""
 
     since: float | None = None
 
@@ -58,12 +58,13 @@ class _Lasting:
 
 
 @dataclass
-class Pace:
-    """What the machine does and should do.
+class FrameScheduler:
+    """Measurements of the drawing rate, and the decisions that follow.
 
     Attributes:
-        coarse: Pictures are drawn without anti-aliasing.
-        slow: For a while now, fewer pictures are drawn than are watched.
+        coarse: Draw without anti-aliasing.
+        slow: The machine has drawn fewer pictures than wanted for some time.
+        cost: Time of a picture with anti-aliasing over time without.
     """
 
     coarse: bool = False
@@ -71,17 +72,17 @@ class Pace:
     cost: float = _USUAL_COST
     _drawn: deque[tuple[float, float]] = field(default_factory=deque)
     _fine_took: float | None = None
-    _overloaded: _Lasting = field(default_factory=_Lasting)
-    _roomy: _Lasting = field(default_factory=_Lasting)
-    _behind: _Lasting = field(default_factory=_Lasting)
-    _caught_up: _Lasting = field(default_factory=_Lasting)
+    _overloaded: _ConditionTimer = field(default_factory=_ConditionTimer)
+    _roomy: _ConditionTimer = field(default_factory=_ConditionTimer)
+    _behind: _ConditionTimer = field(default_factory=_ConditionTimer)
+    _caught_up: _ConditionTimer = field(default_factory=_ConditionTimer)
 
-    def drew(self, now: float, took_s: float, *, wanted_hz: float) -> None:
-        """A picture was made.
+    def record(self, now: float, took_s: float, *, wanted_hz: float) -> None:
+        """Record a drawn picture, and update `coarse` and `slow`.
 
         Args:
-            took_s: Until the next one could be begun.
-            wanted_hz: Pictures that are to be made a second, of all views.
+            took_s: Time until the next picture could begin.
+            wanted_hz: Wanted rate of pictures, of all views together.
         """
         self._drawn.append((now, took_s))
         while self._drawn[0][0] < now - _WINDOW_S:
@@ -95,33 +96,33 @@ class Pace:
         elif self._overloaded.seconds(load > _TOO_MUCH, now) >= _COARSE_AFTER_S:
             self._fine_took = mean
             self._become(coarse=True)
-        if self._behind.seconds(load > _TOO_MUCH, now) >= _TOLD_AFTER_S:
+        if self._behind.seconds(load > _TOO_MUCH, now) >= _REPORT_AFTER_S:
             self.slow = True
-        if self._caught_up.seconds(load < _FINE_AGAIN, now) >= _TOLD_AFTER_S:
+        if self._caught_up.seconds(load < _FINE_AGAIN, now) >= _REPORT_AFTER_S:
             self.slow = False
 
     def rate_hz(self, now: float) -> float:
-        """Pictures a second that are made now."""
+        """Return the current rate of drawn pictures [1/s]."""
         recent = sum(at >= now - _WINDOW_S for at, _ in self._drawn)
         return recent / _WINDOW_S
 
-    def rested(self) -> None:
-        """Nobody watches."""
+    def reset(self) -> None:
+        """Reset, because no view has subscribers."""
         self._drawn.clear()
         self._become(coarse=False)
         self.slow = False
-        self._behind, self._caught_up = _Lasting(), _Lasting()
+        self._behind, self._caught_up = _ConditionTimer(), _ConditionTimer()
 
     def _become(self, *, coarse: bool) -> None:
         self.coarse = coarse
         self._drawn.clear()
-        self._overloaded, self._roomy = _Lasting(), _Lasting()
+        self._overloaded, self._roomy = _ConditionTimer(), _ConditionTimer()
 
     def _mean(self) -> float:
         return sum(took for _, took in self._drawn) / max(len(self._drawn), 1)
 
     def _learn_cost(self, mean: float) -> None:
-        # Once, when there are enough pictures of the new kind to compare.
+        # Once, when there are enough pictures without anti-aliasing to compare.
         if self._fine_took is not None and len(self._drawn) >= 20:
             self.cost = min(max(self._fine_took / mean, 1.2), 4.0)
             self._fine_took = None

@@ -1,6 +1,6 @@
-"""Reading GLB: a link's mesh as it comes over the mesh, to arrays.
+"""Reader of GLB, the format of published meshes, to arrays.
 
-Triangles, node placements, base colours, roughness and metalness. No textures, skins or
+Reads triangles, node placements, base colours, roughness and metalness, but no textures, skins or
 animations: a link is one rigid, painted body. Source: glTF 2.0, Khronos Group.
 """
 
@@ -30,9 +30,9 @@ class Surface:
 
     Attributes:
         positions: (v, 3) float64 [m].
-        normals: (v, 3) unit vectors, or None where the file has none.
+        normals: (v, 3) unit vectors, or None if the file has none.
         triangles: (t, 3) vertex numbers.
-        color: (4,) sRGB and opacity, 0 to 1; None where the file gives none.
+        color: (4,) sRGB and opacity, 0 to 1; None if the file has none.
         colors: (v, 4) the same for each vertex, or None.
     """
 
@@ -46,25 +46,26 @@ class Surface:
 
 
 def read_glb(data: bytes) -> tuple[Surface, ...]:
-    """The surfaces of a GLB file.
+    """Return the surfaces of a GLB file.
 
     Raises:
-        GlbError: If it is no GLB, is cut short, or holds what is not drawn here.
+        GlbError: If it is not GLB, is truncated, or has invalid content.
     """
     document, binary = _chunks(data)
     try:
         return tuple(_surfaces(document, binary))
     except (KeyError, IndexError, TypeError, ValueError) as error:
-        raise GlbError(f"a GLB whose content does not fit together: {error!r}") from None
+        raise GlbError(f"the GLB's content is inconsistent: {error!r}") from None
 
 
 def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
     if len(data) < 20 or struct.unpack_from("<I", data)[0] != _MAGIC:
-        raise GlbError(f"{len(data)} bytes that are not GLB: it begins with 'glTF'")
+        raise GlbError(f"{len(data)} bytes are not GLB, which begins with 'glTF'")
     _, version, length = struct.unpack_from("<III", data)
     if version != 2 or length > len(data):
         raise GlbError(
-            f"GLB version {version} of {length} bytes, {len(data)} came: version 2, whole, is read"
+            f"GLB version {version} declares {length} bytes and has {len(data)}: "
+            "version 2, complete, is needed"
         )
     document: dict[str, Any] | None = None
     binary = b""
@@ -76,12 +77,12 @@ def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
             try:
                 document = json.loads(body)
             except ValueError as error:
-                raise GlbError(f"a GLB with a broken JSON chunk: {error}") from None
+                raise GlbError(f"the GLB's JSON chunk is invalid: {error}") from None
         elif kind == _BINARY_CHUNK:
             binary = body
         at += 8 + size
     if document is None:
-        raise GlbError("a GLB without its JSON chunk")
+        raise GlbError("the GLB has no JSON chunk")
     return document, binary
 
 
@@ -93,7 +94,7 @@ def _surfaces(document: dict[str, Any], binary: bytes) -> Iterator[Surface]:
 
 
 def _meshes(document: dict[str, Any]) -> Iterator[tuple[int, NDArray[np.float64]]]:
-    """(mesh number, node_to_file) of every node that has one."""
+    """Yield (mesh number, node_to_file) of every node with a mesh."""
     nodes, scenes = document.get("nodes", []), document.get("scenes", [])
     children = {child for node in nodes for child in node.get("children", [])}
     roots = [number for number in range(len(nodes)) if number not in children]
@@ -104,7 +105,7 @@ def _meshes(document: dict[str, Any]) -> Iterator[tuple[int, NDArray[np.float64]
     while waiting:
         visits += 1
         if visits > len(nodes):
-            raise GlbError("a GLB whose nodes go round in a circle")
+            raise GlbError("the GLB's nodes form a cycle")
         number, parent_to_file = waiting.pop()
         node = nodes[number]
         node_to_file = parent_to_file @ _placement(node)
@@ -136,16 +137,16 @@ def _surface(
     attributes = primitive["attributes"]
     positions = _accessor(document, binary, attributes["POSITION"])
     if not np.isfinite(positions).all():
-        raise GlbError("a GLB with positions that are not finite")
+        raise GlbError("the GLB has positions that are not finite")
     if "indices" in primitive:
         triangles = _accessor(document, binary, primitive["indices"]).astype(np.int64).reshape(-1, 3)
     else:
         triangles = np.arange(len(positions), dtype=np.int64).reshape(-1, 3)
     if len(triangles) and not 0 <= triangles.min() <= triangles.max() < len(positions):
-        raise GlbError(f"a GLB whose triangles name vertex {triangles.max()} of {len(positions)}")
+        raise GlbError(f"the GLB's triangles use vertex {triangles.max()} of {len(positions)}")
     normals = None
     if "NORMAL" in attributes:
-        # Normals go by the inverse transposed: a scaled node tilts them otherwise.
+        # Normals need the inverse transpose: otherwise a scaled node would tilt them.
         normals = _accessor(document, binary, attributes["NORMAL"]) @ np.linalg.inv(node_to_file[:3, :3])
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     if np.linalg.det(node_to_file[:3, :3]) < 0:
@@ -156,7 +157,7 @@ def _surface(
         colors = np.ones((len(positions), 4))
         given = _accessor(document, binary, attributes["COLOR_0"])
         colors[:, : given.shape[1]] = given
-        # As the factors of materials: linear light in the file.
+        # Linear light in the file, like the materials' factors.
         low = colors[:, :3] <= 0.0031308
         colors[:, :3] = np.where(low, 12.92 * colors[:, :3], 1.055 * colors[:, :3] ** (1 / 2.4) - 0.055)
     return Surface(
@@ -171,7 +172,7 @@ def _surface(
 
 
 def _accessor(document: dict[str, Any], binary: bytes, number: int) -> NDArray[np.float64]:
-    """(n, width) values; normalised integers become 0 to 1."""
+    """Return (n, width) values; normalised integers become 0 to 1."""
     accessor = document["accessors"][number]
     view = document["bufferViews"][accessor["bufferView"]]
     component = np.dtype(_COMPONENTS[accessor["componentType"]])
@@ -192,9 +193,9 @@ def _accessor(document: dict[str, Any], binary: bytes, number: int) -> NDArray[n
 def _material(
     document: dict[str, Any], number: int | None
 ) -> tuple[tuple[float, float, float, float] | None, float, float]:
-    """Colour, roughness and metalness.
+    """Return colour, roughness and metalness.
 
-    glTF's defaults are 1 for both; exporters that leave them out mean paint, not rough iron.
+    glTF's defaults are 1 for the last two; exporters that leave them out mean paint, not rough iron.
     """
     if number is None:
         return None, 0.5, 0.0

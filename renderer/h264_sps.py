@@ -1,11 +1,11 @@
-"""The size that an H.264 sequence parameter set tells (ITU-T H.264, 7.3.2.1.1)."""
+"""Parser of the picture size in an H.264 sequence parameter set (ITU-T H.264, 7.3.2.1.1)."""
 
 from renderer.errors import Mp4Error
 
-# Of these profiles the set tells colours and depths too.
+# Profiles with colour format and bit depths in the set.
 _HIGH = (100, 110, 122, 244, 44, 83, 86, 118, 128, 138, 139, 134, 135)
 
-# What a level of H.264 can have, and more.
+# More than any level of H.264 allows.
 _MOST_PX = 16384
 
 
@@ -17,12 +17,12 @@ class _Bits:
     def take(self, count: int) -> int:
         bits = self._bits[self._at : self._at + count]
         if len(bits) < count:
-            raise Mp4Error("a sequence parameter set that ends too early")
+            raise Mp4Error("the sequence parameter set is truncated")
         self._at += count
         return int(bits, 2) if bits else 0
 
     def golomb(self) -> int:
-        """An unsigned Exp-Golomb number, ue(v)."""
+        """Return an unsigned Exp-Golomb number, ue(v)."""
         zeros = 0
         while not self.take(1):
             zeros += 1
@@ -30,12 +30,12 @@ class _Bits:
 
 
 def picture_size(sps: bytes) -> tuple[int, int]:
-    """Width and height [px] of a sequence parameter set, given as its NAL unit.
+    """Return width and height [px] of a sequence parameter set, given as a NAL unit.
 
     Raises:
-        Mp4Error: If it is none, or of a kind that is not read: interlaced, or not 4:2:0 in 8 bits.
+        Mp4Error: If it is invalid or unsupported: interlaced, or not 4:2:0 in 8 bits.
     """
-    # What keeps start codes out of the bytes (emulation prevention) comes off.
+    # Remove emulation prevention bytes.
     bits = _Bits(sps[1:].replace(b"\0\0\3", b"\0\0"))
     profile = bits.take(8)
     bits.take(16)
@@ -46,22 +46,22 @@ def picture_size(sps: bytes) -> tuple[int, int]:
     else:
         colours = 1, 0, 0, 0, 0
     if colours != (1, 0, 0, 0, 0):
-        raise Mp4Error(f"H.264 of profile {profile} that is not 4:2:0 in 8 bits")
+        raise Mp4Error(f"H.264 of profile {profile} is not 4:2:0 in 8 bits, which is not supported")
     bits.golomb()
     order = bits.golomb()
     if order == 0:
         bits.golomb()
     elif order == 1:
-        raise Mp4Error("H.264 with a picture order of type 1 is not read")
+        raise Mp4Error("H.264 with a picture order of type 1 is not supported")
     bits.golomb()
     bits.take(1)
     width, height = 16 * (bits.golomb() + 1), 16 * (bits.golomb() + 1)
     if not bits.take(1):
-        raise Mp4Error("interlaced H.264 is not read")
+        raise Mp4Error("interlaced H.264 is not supported")
     bits.take(1)
     if bits.take(1):
         left, right, top, bottom = (bits.golomb() for _ in range(4))
         width, height = width - 2 * (left + right), height - 2 * (top + bottom)
     if not (0 < width <= _MOST_PX and 0 < height <= _MOST_PX):
-        raise Mp4Error(f"H.264 of {width} x {height} pixels is not read")
+        raise Mp4Error(f"H.264 of {width} x {height} pixels is not supported")
     return width, height

@@ -1,4 +1,4 @@
-"""What the lamp sees: the map by which its shadow falls on bodies, where shading is full."""
+"""Shadow map of the lamp, for shadows on bodies with full shading."""
 
 from collections.abc import Sequence
 
@@ -13,12 +13,12 @@ from renderer.scene import Part
 FloatArray = NDArray[np.float64]
 
 _TEXELS = 640
-# What moves less leaves the map as it is, over the room's radius.
+# Smaller movements do not update the map; as a share of the scene's radius.
 _NOTICEABLE = 5e-4
 
 
-class Lamp:
-    """A map of depths towards the lamp, drawn anew only when something has moved."""
+class LampShadow:
+    """A map of depths seen from the lamp, redrawn only when something has moved."""
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self._context, self._programs = context, programs
@@ -30,7 +30,7 @@ class Lamp:
         self._placements = np.empty((0, 4, 4))
 
     def light(self, parts: Sequence[tuple[Part, Uploaded]], *, center: FloatArray, radius: float) -> None:
-        """See that the body program has the shadow of these bodies."""
+        """Give the body program the shadow of these bodies; redraw the map if they have moved."""
         placements = np.array([part.part_to_site for part, _ in parts]).reshape(-1, 4, 4)
         key = (tuple(part.mesh for part, _ in parts), center.tobytes(), radius)
         moved = np.abs(placements - self._placements).max(initial=0.0) if key == self._of else np.inf
@@ -56,7 +56,7 @@ class Lamp:
 
 
 def _site_to_lamp(center: FloatArray, radius: float) -> FloatArray:
-    """(4, 4) to the lamp's clip coordinates: a sphere, seen along the light."""
+    """Return (4, 4) to the lamp's clip coordinates, which hold a sphere seen along the light."""
     toward = np.array(KEY) / np.linalg.norm(KEY)
     right = np.cross([0.0, 1.0, 0.0], toward)
     right /= np.linalg.norm(right)

@@ -1,4 +1,4 @@
-"""A link's mesh made ready to draw: few triangles, smooth where it is round, sharp where it is not."""
+"""Preparation of a link's mesh for drawing: fewer triangles, smooth curved surfaces, sharp edges."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,20 +11,20 @@ from renderer.creases import CREASE, FloatArray, IntArray, crease_normals, sharp
 from renderer.glb import Surface, read_glb
 from renderer.occlusion import open_sky
 
-# More than this adds time to each picture and hardly changes it (96,000 against 20,000 for a
-# whole arm: 37 against 18 ms at 720p).
+# More triangles take time for each picture and hardly change it (96,000 instead of 20,000 for a
+# whole arm: 37 instead of 18 ms at 720p).
 MOST_TRIANGLES = 4_000
 _SHADOW_TRIANGLES = 300
-# How fast the simplifier's steps grow (its own default: 7).
+# How fast the simplifier's steps grow (its default: 7).
 _GENTLE = 3.0
-# 1: every material loses the same share of its triangles; 0: each keeps as many.
+# 1: every material loses the same share of its triangles; 0: all keep the same number.
 _EVENNESS = 0.55
-# Simplified, a round surface bends more from face to face.
+# A simplified round surface has larger angles between faces.
 _COARSE_CREASE = float(np.deg2rad(48.0))
 _PLAIN_COLOR = (0.62, 0.64, 0.66, 1.0)
 
 
-# A vertex as OpenGL takes it.
+# A vertex in the layout of the OpenGL buffer.
 VERTEX = np.dtype([("position", "f4", 3), ("normal", "f4", 3), ("color", "u1", 4), ("surface", "u1", 4)])
 
 
@@ -37,7 +37,7 @@ class Mesh:
         normals: (v, 3) float32, unit.
         colors: (v, 4) uint8, sRGB and opacity.
         surface: (v, 4) uint8: the share of the sky that the vertex sees past its own link,
-            roughness, metalness, and nothing.
+            roughness, metalness, unused.
         triangles: (t, 3) uint32, vertex numbers.
         edges: (2e, 3) float32, ends of the sharp edges.
         shadow: (3s, 3) float32, a coarse copy that casts the shadow.
@@ -53,16 +53,16 @@ class Mesh:
 
     @property
     def transparent(self) -> bool:
-        """Whether any of it lets light through."""
+        """Whether any vertex is transparent."""
         return bool((self.colors[:, 3] < 255).any())
 
 
 def prepared(glb: bytes, *, color: str = "", most_triangles: int = MOST_TRIANGLES) -> Mesh:
-    """A mesh from GLB.
+    """Return a mesh prepared from GLB.
 
     Args:
-        color: "#rrggbb" for what has no colour of its own in the file.
-        most_triangles: A heavier mesh is simplified to about so many.
+        color: "#rrggbb" for surfaces without a colour in the file.
+        most_triangles: A mesh with more triangles is simplified to about this number.
 
     Raises:
         GlbError: If it is not GLB.
@@ -71,7 +71,7 @@ def prepared(glb: bytes, *, color: str = "", most_triangles: int = MOST_TRIANGLE
     counts = np.array([len(surface.triangles) for surface in surfaces], dtype=np.float64)
     kept = np.ones(len(counts))
     if counts.sum() > most_triangles:
-        # A small part keeps more of its triangles: few of few make a round cap a polygon.
+        # A small part keeps a larger share of its triangles, or a round cap would become a polygon.
         shares = counts**_EVENNESS
         kept = np.minimum(1.0, most_triangles * shares / shares.sum() / counts)
     plain = srgb(color) if color else _PLAIN_COLOR
@@ -82,7 +82,7 @@ def prepared(glb: bytes, *, color: str = "", most_triangles: int = MOST_TRIANGLE
     vertices["normal"] = np.round(_joined([body.normals.reshape(-1, 3) for body in bodies], 3), 4)
     vertices["color"] = _bytes(_joined([body.colors.reshape(-1, 4) for body in bodies], 4))
     vertices["surface"] = _bytes(_joined([body.surface() for body in bodies], 4))
-    # Each vertex is shaded once: on software OpenGL that is a third of the drawing.
+    # Merged vertices are shaded once, which saves a third of the time in software OpenGL.
     unique, numbers = _unique(vertices)
     points, normals = (unique[name].astype(np.float64) for name in ("position", "normal"))
     unique["surface"][:, 0] = np.round(open_sky(points, normals, numbers.reshape(-1, 3)) * 255.0)
@@ -98,14 +98,14 @@ def prepared(glb: bytes, *, color: str = "", most_triangles: int = MOST_TRIANGLE
 
 
 def srgb(color: str) -> tuple[float, float, float, float]:
-    """Red, green, blue, opacity of "#rrggbb", 0 to 1."""
+    """Return red, green, blue, opacity of "#rrggbb", 0 to 1."""
     red, green, blue = (int(color[at : at + 2], 16) / 255.0 for at in (1, 3, 5))
     return red, green, blue, 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class _Body:
-    """One material's triangles: welded positions, and normals (t, 3, 3) and colours (t, 3, 4) by corner."""
+    """Triangles of one material: welded positions, and normals (t, 3, 3) and colours (t, 3, 4) by corner."""
 
     positions: FloatArray
     triangles: IntArray
@@ -128,7 +128,7 @@ class _Body:
         if untouched and surface.colors is not None:
             colors = surface.colors[surface.triangles] * (color if surface.color else 1.0)
         elif surface.colors is not None:
-            # Simplified, its vertices are others: their mean is nearer than plain white.
+            # Simplification loses the vertices' colours: their mean is a better substitute than white.
             colors = colors * surface.colors.mean(axis=0)
         if untouched and surface.normals is not None:
             normals = surface.normals[surface.triangles]
@@ -154,7 +154,7 @@ class _Body:
 def _simplified(positions: FloatArray, triangles: IntArray, kept: float) -> tuple[FloatArray, IntArray]:
     if len(triangles) < 32 or kept >= 1.0:
         return positions, triangles
-    # Its steps are in the mesh's own unit: in metres, the first would already take a round cap's shape.
+    # The simplifier's steps are absolute: in metres, the first step would already flatten a round cap.
     size = float(np.ptp(positions, axis=0).max())
     points, faces = fast_simplification.simplify(
         (positions / size).astype(np.float32),
@@ -174,7 +174,7 @@ def _coarse(corners: FloatArray) -> FloatArray:
 
 
 def _unique(vertices: NDArray[np.void]) -> tuple[NDArray[np.void], NDArray[np.uint32]]:
-    """Vertices without repetition, in the order of their first use, and their numbers."""
+    """Return the distinct vertices in the order of first use, and each vertex's number among them."""
     rows = vertices.view(f"V{VERTEX.itemsize}")
     _, first, numbers = np.unique(rows, return_index=True, return_inverse=True)
     order = np.argsort(first)

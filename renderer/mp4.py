@@ -1,7 +1,7 @@
-"""H.264 packets as fragmented MP4, without a second encode: a fragment a picture, playable while written.
+"""Fragmented MP4 from H.264 packets without re-encoding: one fragment per picture, playable while written.
 
-Written from ISO/IEC 14496-12 (boxes) and 14496-15 (H.264 in them). It needs no library, so that a
-service that only passes pictures on can serve MP4 too.
+Source: ISO/IEC 14496-12 (boxes) and 14496-15 (H.264 in them). It needs no library, so that a service that
+only forwards pictures can serve MP4 too.
 """
 
 import struct
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from renderer.errors import Mp4Error
 from renderer.h264_sps import picture_size
 
-# Ticks a second of every time in the file: as video has it everywhere.
+# Ticks per second of all times in the file, the usual value for video.
 TIMESCALE = 90_000
 _IDR, _SPS, _PPS, _DELIMITER = 5, 7, 8, 9
 _MATRIX = struct.pack(">9I", 0x10000, 0, 0, 0, 0x10000, 0, 0, 0, 0x40000000)
@@ -21,7 +21,7 @@ _KEY_FLAGS, _OTHER_FLAGS = 0x02000000, 0x01010000
 
 @dataclass(frozen=True)
 class _Unpacked:
-    """A packet: its picture as MP4 holds it, and what a key frame brings."""
+    """A packet's picture in MP4's format, and the parameter sets of a key frame."""
 
     picture: bytes
     sps: bytes
@@ -30,10 +30,10 @@ class _Unpacked:
 
 
 class FragmentedMp4:
-    """One video track; nothing is held back, so a file that ends anywhere plays up to there.
+    """One video track; nothing is buffered, so a truncated file plays up to its end.
 
     Attributes:
-        pictures: How many were written.
+        pictures: Number of pictures written.
     """
 
     def __init__(self) -> None:
@@ -44,19 +44,19 @@ class FragmentedMp4:
 
     @property
     def duration_s(self) -> float:
-        """From the first picture to the end of the last [s]."""
+        """Time from the first picture to the end of the last [s]."""
         return self._end / TIMESCALE
 
     def add(self, packet: bytes, time_ns: int, *, usual_s: float = 1 / 30) -> bytes:
-        """The bytes that a packet adds to the file; none until the first key frame came.
+        """Return the bytes that a packet adds to the file; empty until the first key frame.
 
         Args:
-            packet: One picture, Annex B, with SPS and PPS where it is a key frame.
-            time_ns: When it is shown, on any clock; the first one is the file's beginning.
-            usual_s: How long a picture is shown as long as nobody knows the next one's time [s].
+            packet: One picture in Annex B, with SPS and PPS if it is a key frame.
+            time_ns: When it is shown, on any clock; the file begins at the first picture.
+            usual_s: Duration of a picture, as the next one's time is unknown [s].
 
         Raises:
-            Mp4Error: If it is no such packet, or the stream has become another.
+            Mp4Error: If it is not a valid packet, or the stream's parameters have changed.
         """
         unpacked = _unpack(packet)
         head = b""
@@ -64,12 +64,12 @@ class FragmentedMp4:
             if not unpacked.key_frame:
                 return b""
             if not (unpacked.sps and unpacked.pps):
-                raise Mp4Error("a key frame without its parameter sets (SPS and PPS)")
+                raise Mp4Error("a key frame has no parameter sets (SPS and PPS)")
             self._parameters, self._start_ns = (unpacked.sps, unpacked.pps), time_ns
             head = _head(unpacked.sps, unpacked.pps)
         elif unpacked.key_frame and unpacked.sps and (unpacked.sps, unpacked.pps) != self._parameters:
-            raise Mp4Error("the video has become another (its size, or its encoder): begin a new file")
-        # A clock that stood still, or went back: pictures keep their order.
+            raise Mp4Error("the video's size or encoder has changed: begin a new file")
+        # Times increase even if the clock stops or goes back.
         at = max((time_ns - self._start_ns) * TIMESCALE // 10**9, self._at + 1 if self.pictures else 0)
         duration = max(round(usual_s * TIMESCALE), 1)
         self.pictures += 1
@@ -85,20 +85,20 @@ def _unpack(packet: bytes) -> _Unpacked:
             sps = unit
         elif kind == _PPS:
             pps = unit
-        elif kind != _DELIMITER:  # where a picture ends, the sample tells
+        elif kind != _DELIMITER:  # MP4's samples already delimit pictures
             key_frame |= kind == _IDR
             picture += struct.pack(">I", len(unit)) + unit
     if not picture:
-        raise Mp4Error(f"{len(packet)} bytes that are no picture of H.264 (Annex B)")
+        raise Mp4Error(f"a packet of {len(packet)} bytes contains no H.264 picture (Annex B)")
     return _Unpacked(picture, sps, pps, key_frame)
 
 
 def nal_units(packet: bytes) -> Iterator[bytes]:
-    """The NAL units of Annex B bytes."""
+    """Yield the NAL units of Annex B bytes."""
     at = packet.find(b"\0\0\1")
     while at >= 0:
         start, at = at + 3, packet.find(b"\0\0\1", at + 3)
-        # Zeros before a start code belong to it; a unit never ends with one.
+        # Zeros before a start code belong to it; a unit never ends with a zero.
         unit = (packet[start:at] if at >= 0 else packet[start:]).rstrip(b"\0")
         if unit:
             yield unit
@@ -114,7 +114,7 @@ def _full(kind: bytes, *content: bytes, version: int = 0, flags: int = 0) -> byt
 
 
 def _head(sps: bytes, pps: bytes) -> bytes:
-    """File type and movie: one track, all of its samples in fragments."""
+    """Return the boxes of file type and movie: one track with all samples in fragments."""
     width, height = picture_size(sps)
     movie = _full(
         b"mvhd",
@@ -184,10 +184,10 @@ def _fragment(number: int, at: int, duration: int, unpacked: _Unpacked) -> bytes
             _full(b"mfhd", struct.pack(">I", number)),
             _box(
                 b"traf",
-                # Places count from the fragment's own beginning.
+                # Offsets count from the fragment's beginning.
                 _full(b"tfhd", struct.pack(">I", 1), flags=0x020000),
                 _full(b"tfdt", struct.pack(">Q", at), version=1),
-                # One sample, with its place, duration, size and flags.
+                # One sample with offset, duration, size and flags.
                 _full(
                     b"trun",
                     struct.pack(">IiIII", 1, offset, duration, len(unpacked.picture), flags),

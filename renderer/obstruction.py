@@ -1,4 +1,4 @@
-"""What a camera must see through or stands in: fixtures before the arm, a body about the eye."""
+"""Detection of fixtures that hide the arm, and of a body that contains the camera."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,19 +7,21 @@ from renderer.cameras import Camera, pixels, site_to_camera
 
 FloatArray = NDArray[np.float64]
 
-# A fixture that covers so much of the arm's room, and stands wholly before its middle, is in the way.
+# A fixture hides the arm if it covers more than this share of the workspace and is in front of its centre.
 _MUCH = 0.22
 _BEFORE_EYE_M = 0.02
 
 
 def hides(camera: Camera, aspect: float, corners: FloatArray, *, center: FloatArray, radius: float) -> bool:
-    """Whether a fixture stands between a camera and the room of the arm.
+    """Return whether a fixture is between a camera and the arm's workspace.
 
-    Judged by the room, not by where the arm is now: a fence that came and went would be looked at.
+    The workspace is used instead of the arm's current place: a fence that appears and disappears would
+    distract the operator.
 
     Args:
-        corners: (8, 3) of the box about the fixture, in the site's frame [m].
-        center: (3,) of the arm's room [m].
+        corners: (8, 3) corners of the box around the fixture, in the site's frame [m].
+        center: (3,) centre of the workspace [m].
+        radius: Radius of the workspace [m].
     """
     to_camera = site_to_camera(camera)
     depths = -((corners @ to_camera[:3, :3].T)[:, 2] + to_camera[2, 3])
@@ -27,18 +29,18 @@ def hides(camera: Camera, aspect: float, corners: FloatArray, *, center: FloatAr
     if depths.mean() > middle - 0.2 * radius or depths.max() < _BEFORE_EYE_M:
         return False
     if depths.min() < _BEFORE_EYE_M and not camera.orthographic:
-        return True  # the camera stands beside it, or in it
+        return True  # the camera is next to it or inside it
     right, up = to_camera[0, :3], to_camera[1, :3]
     sides = np.array([center + 0.6 * radius * (x * right + y * up) for x in (-1, 1) for y in (-1, 1)])
-    room, fixture = (pixels(camera, (1, 1), points, aspect=aspect) for points in (sides, corners))
-    low = np.maximum(room.min(axis=0), fixture.min(axis=0))
-    high = np.minimum(room.max(axis=0), fixture.max(axis=0))
-    covered = np.prod(np.maximum(high - low, 0.0)) / np.prod(np.ptp(room, axis=0))
+    workspace, fixture = (pixels(camera, (1, 1), points, aspect=aspect) for points in (sides, corners))
+    low = np.maximum(workspace.min(axis=0), fixture.min(axis=0))
+    high = np.minimum(workspace.max(axis=0), fixture.max(axis=0))
+    covered = np.prod(np.maximum(high - low, 0.0)) / np.prod(np.ptp(workspace, axis=0))
     return bool(covered > _MUCH)
 
 
 def contains(positions: FloatArray, triangles: NDArray[np.uint32], point: FloatArray) -> bool:
-    """Whether a point is inside a body, holes and gaps allowed: by how far around it its faces are.
+    """Return whether a point is inside a body, which may have holes and gaps.
 
     Source: generalised winding number (Jacobson et al. 2013); solid angle of a triangle (van Oosterom,
     Strackee 1983).

@@ -1,4 +1,4 @@
-"""How much of the sky each vertex of a body sees past the body itself: corners and hollows are dim."""
+"""Ambient occlusion: the share of the sky that each vertex sees; corners and hollows are darker."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,18 +6,18 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.integer]
 
-# Cells along the longest side, ways looked along, and steps of one cell each.
-_CELLS, _WAYS, _STEPS = 40, 48, 10
-# Empty cells about it.
+# Cells along the longest side, number of directions, and steps of one cell in each direction.
+_CELLS, _DIRECTIONS, _STEPS = 40, 48, 10
+# Empty cells around the body.
 _PAD = 4
-# How often a triangle is sampled per cell's area, and at most in all.
+# Samples of a triangle per cell area, and largest total number.
 _DENSITY, _MOST_SAMPLES = 6.0, 400_000
-# What a vertex that sees nothing keeps: light comes through gaps that cells close.
+# Share of a vertex that sees no sky: the cells close gaps that let light through.
 _LEAST = 0.35
 
 
 def open_sky(positions: FloatArray, normals: FloatArray, triangles: IntArray) -> FloatArray:
-    """(v,) share of its own half-space that each vertex sees, 1 where nothing is near.
+    """Return the (v,) share of its half-space that each vertex sees; 1 if nothing is close.
 
     Args:
         positions: (v, 3) [m].
@@ -29,26 +29,26 @@ def open_sky(positions: FloatArray, normals: FloatArray, triangles: IntArray) ->
     low = positions.min(axis=0)
     cell = max(float(np.ptp(positions, axis=0).max()), 1e-9) / _CELLS
     filled = _filled((positions - low) / cell, triangles)
-    open_ways, weights = np.zeros((2, len(positions)))
-    # From two cells off, so that a surface does not hide itself.
+    open_directions, weights = np.zeros((2, len(positions)))
+    # Begin two cells above the surface, so that it does not hide itself.
     start = (positions - low) / cell + 2.0 * normals + _PAD
-    for way in _ways(_WAYS):
-        facing = np.maximum(normals @ way, 0.0)
+    for direction in _directions(_DIRECTIONS):
+        facing = np.maximum(normals @ direction, 0.0)
         seen = facing > 0.15
         free = np.ones(int(seen.sum()), dtype=bool)
         at = start[seen]
         for _ in range(_STEPS):
             inside = np.clip(at.astype(np.int64), 0, _CELLS + 2 * _PAD - 1)
             free &= ~filled[inside[:, 0], inside[:, 1], inside[:, 2]]
-            at = at + way
+            at = at + direction
         weights[seen] += facing[seen]
-        open_ways[seen] += facing[seen] * free
-    share: FloatArray = open_ways / np.maximum(weights, 1e-9)
+        open_directions[seen] += facing[seen] * free
+    share: FloatArray = open_directions / np.maximum(weights, 1e-9)
     return _LEAST + (1.0 - _LEAST) * np.where(weights > 0.0, share, 1.0)
 
 
 def _filled(places: FloatArray, triangles: IntArray) -> NDArray[np.bool_]:
-    """Which cells the triangles go through, found by points on them; vertices are placed in cells."""
+    """Return a mask of the cells that contain sample points of the triangles; positions are in cells."""
     a, b, c = (places[triangles[:, corner]] for corner in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0
     count = np.ceil(area * _DENSITY).astype(np.int64) + 1
@@ -67,8 +67,8 @@ def _filled(places: FloatArray, triangles: IntArray) -> NDArray[np.bool_]:
     return filled
 
 
-def _ways(count: int) -> FloatArray:
-    """(count, 3) unit vectors spread evenly over the sphere (a Fibonacci lattice)."""
+def _directions(count: int) -> FloatArray:
+    """Return (count, 3) unit vectors spread evenly over the sphere (a Fibonacci lattice)."""
     index = np.arange(count) + 0.5
     z = 1.0 - 2.0 * index / count
     turn = np.pi * (1.0 + np.sqrt(5.0)) * index

@@ -1,4 +1,4 @@
-"""OpenGL without a screen, and what a mesh becomes on it."""
+"""Off-screen OpenGL contexts, shader programs, and meshes on the GPU."""
 
 import ctypes
 from dataclasses import dataclass, field
@@ -16,10 +16,10 @@ _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 
 
 def open_context(device: int | None = None) -> moderngl.Context:
-    """An OpenGL context without a screen, through EGL; it belongs to the thread that made it.
+    """Return an off-screen OpenGL context through EGL; it belongs to the thread that made it.
 
     Args:
-        device: Number of the EGL device, on a machine with several GPUs; None: EGL's own choice.
+        device: Number of the EGL device, on a machine with several GPUs; None: EGL's default.
 
     Raises:
         NoOpenGLError: If there is no EGL or OpenGL library, or no such device.
@@ -36,13 +36,13 @@ def open_context(device: int | None = None) -> moderngl.Context:
 
 
 def _keep_freed_memory() -> None:
-    """Software OpenGL frees its scene each frame; glibc must not give it back (16.7 -> 11.4 ms)."""
+    """Make glibc keep freed memory: software OpenGL frees its scene in each frame (16.7 -> 11.4 ms)."""
     try:
         libc = ctypes.CDLL(None)
         libc.mallopt(_M_MMAP_THRESHOLD, 32 << 20)
         libc.mallopt(_M_TRIM_THRESHOLD, 2_000_000_000)
     except (OSError, AttributeError):
-        return  # another C library, which has no such habit
+        return  # another C library, without this problem
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class Programs:
 
 
 def compile_programs(context: moderngl.Context, *, samples: int, full: bool) -> Programs:
-    """The shaders, compiled for so many samples a pixel; `full`: with the lamp's shadow on bodies."""
+    """Compile the shaders for a number of samples per pixel; `full`: with the lamp's shadow on bodies."""
     body, compose = body_shaders.BODY_FRAGMENT, f"#define SAMPLES {samples}\n{shaders.COMPOSE_FRAGMENT}"
     if full:
         body = f"#define FULL\n{body}"
@@ -83,8 +83,8 @@ class Uploaded:
     """A mesh on the GPU.
 
     Attributes:
-        mesh: What was brought.
-        corners: (8, 3) of the box around it, in its own frame [m].
+        mesh: The source.
+        corners: (8, 3) corners of the box around it, in the mesh's frame [m].
     """
 
     mesh: Mesh
@@ -97,7 +97,7 @@ class Uploaded:
     _buffers: list[moderngl.Buffer] = field(default_factory=list)
 
     def release(self) -> None:
-        """Let it go."""
+        """Release the GPU memory."""
         for array in (self.body, self.edges, self.shadow, self.lamp):
             if array is not None:
                 array.release()
@@ -106,7 +106,7 @@ class Uploaded:
 
 
 def upload(context: moderngl.Context, programs: Programs, mesh: Mesh) -> Uploaded:
-    """A mesh, brought to the GPU."""
+    """Upload a mesh to the GPU."""
     buffers: list[moderngl.Buffer] = []
 
     def buffer(data: bytes) -> moderngl.Buffer:
@@ -135,12 +135,12 @@ def upload(context: moderngl.Context, programs: Programs, mesh: Mesh) -> Uploade
 
 
 def columns(matrix: NDArray[np.float64]) -> bytes:
-    """A matrix as OpenGL takes it: float32, by columns."""
+    """Return a matrix in OpenGL's format: float32, by columns."""
     return np.ascontiguousarray(matrix.T, dtype=np.float32).tobytes()
 
 
 def set_uniforms(program: moderngl.Program, **values: bytes | float | tuple[float, ...]) -> None:
-    """Give a program its uniforms; those that its compiler found no use for are left out."""
+    """Set a program's uniforms; those that the compiler removed as unused are skipped."""
     for name, value in values.items():
         uniform = program.get(name, None)
         if isinstance(uniform, moderngl.Uniform):

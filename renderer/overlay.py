@@ -1,6 +1,6 @@
-"""What is written over a picture: robot, view, time, joint values, and STALE when it is.
+"""The texts over a picture: robot, view, time, joint values, and STALE.
 
-Figures have one width, so that columns stand still while values run.
+Digits have one width, so that columns do not move while values change.
 """
 
 from dataclasses import dataclass, replace
@@ -26,7 +26,7 @@ _REGULAR, _BOLD = 420, 650
 
 @dataclass(frozen=True)
 class Row:
-    """A joint's line: its name, its value and unit, and where it stands between its limits (0 to 1)."""
+    """A joint's line: name, value, unit, and position between the limits (0 to 1)."""
 
     name: str
     value: str
@@ -36,12 +36,12 @@ class Row:
 
 @dataclass(frozen=True)
 class Overlay:
-    """All that is written.
+    """The texts of a picture.
 
     Attributes:
-        marks: Words that must not be missed ("simulated", "replay", "inside forearm").
-        scale: What a square of the floor is ("100 mm"), or nothing.
-        stale: "STALE 3 s", or nothing while the picture shows what is so.
+        marks: Highlighted words ("simulated", "replay", "inside forearm").
+        scale: Width of a square of the floor ("100 mm"), or empty.
+        stale: "STALE 3 s", or empty while the picture is current.
     """
 
     title: str
@@ -55,14 +55,14 @@ class Overlay:
 
 
 def inside(overlay: Overlay, body: str) -> Overlay:
-    """An overlay that tells that the camera stands in a body; as it is where it stands in none."""
+    """Return an overlay with a mark for the body that contains the camera; unchanged if `body` is empty."""
     return replace(overlay, marks=(*overlay.marks, f"inside {body}")) if body else overlay
 
 
 def write_over(picture: Picture, overlay: Overlay) -> None:
     """Write an overlay on an RGB picture (height, width, 3), in place."""
     height, width = picture.shape[:2]
-    # Readable at 480p, and not larger than it must be at 1080p.
+    # Legible at 480p, and not too large at 1080p.
     size = max(13, round(height / 34))
     margin = round(size * 0.9)
     baseline = margin + size
@@ -84,7 +84,7 @@ def write_over(picture: Picture, overlay: Overlay) -> None:
 
 
 def write_label(picture: Picture, text: str, at: tuple[int, int], *, color: Color) -> None:
-    """Write a word on paper with its left end at a place in a picture, moved to where all of it shows."""
+    """Write a text on a light background, left-aligned at a position, or moved to fit in the picture."""
     height, width = picture.shape[:2]
     size = max(13, round(height / 34))
     pad = size // 3
@@ -130,7 +130,7 @@ def _write_rows(picture: Picture, overlay: Overlay, *, size: int, margin: int) -
 
 
 def _write_scale(picture: Picture, text: str, *, size: int, margin: int) -> None:
-    """What a square of the floor is: a square, and its width."""
+    """Draw the scale: a square, and the width of a square of the floor."""
     height, width = picture.shape[:2]
     small, gap = round(0.85 * size), round(0.4 * size)
     side = round(0.62 * size)
@@ -153,7 +153,7 @@ def _write_badge(picture: Picture, text: str, *, size: int, y: int) -> None:
 
 
 def _wash(picture: Picture, at: tuple[int, int], size: tuple[int, int]) -> None:
-    """A veil of paper, so that what is written on it reads over anything."""
+    """Lighten an area, so that a text on it is legible over anything."""
     x, y = at
     area = picture[max(y, 0) : max(y + size[1], 0), max(x, 0) : max(x + size[0], 0)]
     if not area.size:
@@ -162,14 +162,14 @@ def _wash(picture: Picture, at: tuple[int, int], size: tuple[int, int]) -> None:
 
 
 def text_width(text: str, size: int, weight: int = _REGULAR) -> int:
-    """Width of a text [px]."""
+    """Return the width of a text [px]."""
     return sum(advance for _, advance in _pieces(text, size, weight))
 
 
 def _text(
     picture: Picture, text: str, at: tuple[int, int], *, size: int, weight: int = _REGULAR, color: Color = INK
 ) -> int:
-    """Write a text with its baseline's left end at a place; how wide it came out [px]."""
+    """Write a text with its baseline's left end at a position; return its width [px]."""
     x, baseline = at
     start = x
     for mask, advance in _pieces(text, size, weight):
@@ -179,7 +179,7 @@ def _text(
 
 
 def _lay(picture: Picture, mask: Mask, x: int, y: int, color: Color) -> None:
-    """Lay a colour over a picture through a mask, cut at the picture's edges."""
+    """Blend a colour into a picture through a mask, clipped at the picture's edges."""
     top, left = max(y, 0), max(x, 0)
     area = picture[top : max(y + mask.shape[0], 0), left : max(x + mask.shape[1], 0)]
     if area.size:
@@ -188,7 +188,7 @@ def _lay(picture: Picture, mask: Mask, x: int, y: int, color: Color) -> None:
 
 
 def _pieces(text: str, size: int, weight: int) -> list[tuple[Mask, int]]:
-    """(mask, advance) of runs of text; each figure is its own run, all of one width."""
+    """Return (mask, advance) of runs of text; each digit is a separate run with a fixed width."""
     pieces: list[tuple[Mask, int]] = []
     run = ""
     for character in text:
@@ -211,7 +211,7 @@ def _figure_width(size: int, weight: int) -> int:
 
 @lru_cache(maxsize=1024)
 def _drawn(text: str, size: int, weight: int) -> tuple[Mask, int]:
-    """A run of text as a mask, 0 to 1, and how far the next one stands from it [px]."""
+    """Return a run of text as a mask, 0 to 1, and the distance to the next run [px]."""
     face = _font()
     canvas = np.zeros((round(size * 1.7), (len(text) + 2) * size * 2, 3), dtype=np.uint8)
     (end, _), _ = cv2.putText(canvas, text, (1, size + size // 4), (255, 255, 255), face, size, weight)

@@ -1,25 +1,25 @@
-"""Views as they are drawn: the renderer's own, and those that somebody asks for.
+"""Specifications of views: the renderer's own, and requested ones.
 
-Who asks for the same gets the same one: its name is made of what was asked.
+A requested view's name is a hash of the request, so equal requests share one view.
 """
 
 import hashlib
 import math
 from dataclasses import dataclass
 
-from renderer.appearance import Look
+from renderer.appearance import Appearance
 from renderer.errors import UnknownViewError, ViewRequestError
 from renderer.views import camera_from, camera_of, view_names
 from robomesh.schemas.robomesh_pb2 import View, ViewRequest
 
-# A standing view for slow links.
+# Name of the view for slow links.
 FAR = "far"
 IMAGE_HZ = 5.0
 _FAR_SIZE, _FAR_FPS, _FAR_BITS_PER_S = (640, 360), 15.0, 250e3
 
 _LEAST_PX, _MOST_PX, _MOST_PIXELS = 64, 1920, 1920 * 1080
 _LEAST_FPS, _MOST_FPS = 1.0, 60.0
-# Of 1920 x 1080 a drawing and an encoder hold 150 MB, however slow it is.
+# Lowest rate for which a view counts: at any rate, surface and encoder of 1920 x 1080 take 150 MB.
 _LEAST_COUNTED_FPS = 10.0
 _LEAST_BITS_PER_S, _MOST_BITS_PER_S = 50e3, 100e6
 _MOST_POINTS = 5000
@@ -27,18 +27,19 @@ _NAME_LENGTH = 10
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shot:
-    """One view of a robot, as it is drawn.
+class ViewSpec:
+    """The specification of one view of a robot.
 
     Attributes:
-        name: Of its topics, video/<name> and image/<name>.
-        of: The robot's view whose camera it is; empty: `view` is.
+        name: The name in its topics, video/<name> and image/<name>.
+        of: The robot's view that has the camera; empty if `view` has it.
         size: Width and height [px].
         fps: Highest rate of its video [1/s].
+        view: A requested camera.
         image_hz: Highest rate of its pictures [1/s].
-        most_bits_per_s: Of its video; 0: no limit.
-        show: What is drawn beside robots and fixtures.
-        requested: It ends when nobody watches it.
+        most_bits_per_s: Highest bit rate of its video; 0: no limit.
+        show: Additions to robots and fixtures, for example a trail.
+        requested: It was requested, and ends when it has no subscribers.
     """
 
     name: str
@@ -53,7 +54,7 @@ class Shot:
 
     @property
     def pixels_per_s(self) -> float:
-        """What it costs, at its full rate; a slow one holds as much memory as another."""
+        """Cost at the full rate; a slow view counts as 10 pictures a second because of its memory."""
         return self.size[0] * self.size[1] * max(self.fps, _LEAST_COUNTED_FPS)
 
     @property
@@ -62,19 +63,19 @@ class Shot:
         return self.size[0] / self.size[1]
 
 
-def standing(name: str, *, size: tuple[int, int], fps: float) -> Shot:
-    """One of the renderer's own views."""
-    return Shot(name=name, of=name, size=size, fps=fps)
+def standard_view(name: str, *, size: tuple[int, int], fps: float) -> ViewSpec:
+    """Return the specification of one of the renderer's own views."""
+    return ViewSpec(name=name, of=name, size=size, fps=fps)
 
 
-def far(of: str, *, size: tuple[int, int], fps: float) -> Shot:
-    """The view for slow links: small, slow, and of few bits.
+def low_rate_view(of: str, *, size: tuple[int, int], fps: float) -> ViewSpec:
+    """Return the specification of the view for slow links: small, slow, with a low bit rate.
 
     Args:
-        of: The view whose camera it is.
-        size: Of the renderer's other views, which is not exceeded.
+        of: The view whose camera it uses.
+        size: Size of the renderer's other views, which is not exceeded.
     """
-    return Shot(
+    return ViewSpec(
         name=FAR,
         of=of,
         size=min(size, _FAR_SIZE),
@@ -83,43 +84,45 @@ def far(of: str, *, size: tuple[int, int], fps: float) -> Shot:
     )
 
 
-def requested(request: ViewRequest, look: Look, *, first: str, size: tuple[int, int], fps: float) -> Shot:
-    """What somebody asks for, looked at.
+def requested_view(
+    request: ViewRequest, appearance: Appearance, *, first: str, size: tuple[int, int], fps: float
+) -> ViewSpec:
+    """Check a request and return the specification of its view.
 
     Args:
-        first: The view that `far` is of.
-        size: Where the request names none.
-        fps: Where the request names none.
+        first: The view whose camera `far` uses.
+        size: Default size.
+        fps: Default rate.
 
     Raises:
-        RendererError: With what is wrong, and what would be right.
+        RendererError: If the request is invalid; the text says what is wrong and what is possible.
     """
     own = request.HasField("view")
     if own == bool(request.of):
-        raise ViewRequestError("a view of one's own needs one of `view`, a camera, and `of`, a view's name")
+        raise ViewRequestError("a view request needs either `view`, a camera, or `of`, a view's name")
     width, height = _size(request, size)
     rate = _between("fps", request.fps, _LEAST_FPS, _MOST_FPS) if request.fps else min(fps, _MOST_FPS)
     bits = request.most_bits_per_s
     if bits:
         bits = _between("most_bits_per_s", bits, _LEAST_BITS_PER_S, _MOST_BITS_PER_S)
-    _check_show(request.show, look)
+    _check_show(request.show, appearance)
     view: View | None = None
     of = first if request.of == FAR else request.of
     if own:
         view = View()
         view.CopyFrom(request.view)
         view.ClearField("name")
-        camera_from(look, view, aspect=width / height)
+        camera_from(appearance, view, aspect=width / height)
     else:
-        known = view_names(look)
+        known = view_names(appearance)
         if of not in known:
             raise UnknownViewError(of, (*known, FAR))
-        camera_of(look, of, aspect=width / height)
+        camera_of(appearance, of, aspect=width / height)
     same = ViewRequest(
         view=view, width=width, height=height, fps=rate, of=of, most_bits_per_s=bits, show=request.show
     )
     digest = hashlib.sha256(same.SerializeToString(deterministic=True)).hexdigest()
-    return Shot(
+    return ViewSpec(
         name=f"free-{digest[:_NAME_LENGTH]}",
         of=of,
         view=view,
@@ -148,24 +151,26 @@ def _size(request: ViewRequest, own: tuple[int, int]) -> tuple[int, int]:
     )
     if not possible and (width, height) != own:
         raise ViewRequestError(
-            f"a view of {width} x {height} pixels: even numbers from {_LEAST_PX} to {_MOST_PX} are possible, "
-            "and as many pixels as 1920 x 1080 has"
+            f"size {width} x {height}: must be even numbers from {_LEAST_PX} to {_MOST_PX}, "
+            "with at most as many pixels as 1920 x 1080"
         )
     return width, height
 
 
 def _between(name: str, value: float, least: float, most: float) -> float:
     if not least <= value <= most:
-        raise ViewRequestError(f"{name} {value:g}: {least:g} to {most:g} is possible, or 0: as it comes")
+        raise ViewRequestError(f"{name} {value:g}: must be from {least:g} to {most:g}, or 0 for the default")
     return value
 
 
-def _check_show(show: ViewRequest.Show, look: Look) -> None:
-    joints = len(look.description.joints)
+def _check_show(show: ViewRequest.Show, appearance: Appearance) -> None:
+    joints = len(appearance.description.joints)
     if show.ghost and len(show.ghost) != joints:
-        raise ViewRequestError(f"a ghost of {len(show.ghost)} joint positions: the robot has {joints} joints")
+        raise ViewRequestError(
+            f"the ghost has {len(show.ghost)} joint positions: the robot has {joints} joints"
+        )
     if len(show.path) > _MOST_POINTS:
-        raise ViewRequestError(f"a path of {len(show.path)} points: {_MOST_POINTS} at most are drawn")
+        raise ViewRequestError(f"the path has {len(show.path)} points: at most {_MOST_POINTS} are drawn")
     numbers = [*show.ghost, *(value for point in show.path for value in (point.x, point.y, point.z))]
     if not all(map(math.isfinite, numbers)):
-        raise ViewRequestError("a ghost or path with a number that is not finite")
+        raise ViewRequestError("the ghost or path has a number that is not finite")

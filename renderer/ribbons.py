@@ -1,4 +1,4 @@
-"""Lines of a width in pixels, as triangles in clip coordinates: OpenGL's own lines are one pixel wide."""
+"""Lines with a width in pixels, as triangles in clip coordinates: OpenGL's lines are one pixel wide."""
 
 from collections.abc import Sequence
 
@@ -10,16 +10,16 @@ from renderer.scene import Line
 FloatArray = NDArray[np.float64]
 
 _NEAREST = 1e-3
-# Over the surface that it lies on, of the depth.
+# Offset of a line in front of the surface that it is on, as a share of the depth.
 _LIFT = 2e-4
 
 
 def ribbons(lines: Sequence[Line], site_to_clip: FloatArray, size: tuple[int, int]) -> NDArray[np.float32]:
-    """(6k, 8) triangles' corners: place in clip coordinates, colour and opacity.
+    """Return the (6k, 8) corners of triangles: position in clip coordinates, colour and opacity.
 
     Args:
         site_to_clip: (4, 4).
-        size: Of the picture [px]; widths are told for one 720 px high.
+        size: Size of the picture [px]; line widths are for a picture 720 px high.
     """
     pieces = [_ribbon(line, site_to_clip, size) for line in lines if len(line.points) > 1]
     return np.concatenate([np.empty((0, 8)), *pieces]).astype(np.float32)
@@ -29,7 +29,7 @@ def _ribbon(line: Line, site_to_clip: FloatArray, size: tuple[int, int]) -> Floa
     clip = np.c_[line.points, np.ones(len(line.points))] @ site_to_clip.T
     start, end = clip[:-1], clip[1:]
     fade = np.stack([line.opacity[:-1], line.opacity[1:]], axis=1)
-    # What goes behind the eye is left out: it has no place in the picture.
+    # Segments that reach behind the eye cannot be projected and are left out.
     kept = (start[:, 3] > _NEAREST) & (end[:, 3] > _NEAREST)
     start, end, fade = start[kept], end[kept], fade[kept]
     half_px = line.width * size[1] / 720.0 / 2.0

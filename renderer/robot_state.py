@@ -1,4 +1,4 @@
-"""What is known of a robot now, and what a picture says of it."""
+"""The latest state of a robot, and the texts of its pictures."""
 
 import math
 from collections import deque
@@ -12,46 +12,46 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from numpy.typing import NDArray
 
-from renderer.appearance import Look, home_placements
-from renderer.clearance_line import Span, same_span, span_of
+from renderer.appearance import Appearance, home_placements
+from renderer.clearance_line import ClearanceLine, line_of, same_line
 from renderer.overlay import Overlay, Row
 from robomesh.schemas.robomesh_pb2 import ControllerState, Description, KinematicState
 from robomesh.topics import topic
 
 FloatArray = NDArray[np.float64]
 
-# Metres, or the rotation's entries: less is below a pixel.
+# Smaller movements are below a pixel (metres, or rotation matrix entries).
 _NOTICEABLE = 3e-5
 
 _STALE_AFTER_S = topic("frames").stale_after_s or 1.0
 _TOOL = "tool"
-# Of the trail: how long ago, and how many points of it are kept.
+# Duration of the trail, and its largest number of points.
 _TRAIL_S, _TRAIL_POINTS = 6.0, 240
 
 
 @dataclass
 class RobotState:
-    """The newest of each topic of one robot.
+    """The latest message of each topic of one robot.
 
     Attributes:
-        look: None until its description and meshes came.
-        link_placements: (4, 4) link to site by link; empty until frames came.
-        positions: By joint [rad] or [m]; empty until joint states came.
-        span: Between it and what is nearest; None: nothing is, or nobody tells.
-        touching: Links that touch something.
-        trail: Where the tool was, and when [ns]; oldest first.
-        source_time_ns: Of what the placements show.
-        dated_by: The publisher of that time.
-        version: Counts what came and would change a picture.
+        appearance: None until the description and the meshes were received.
+        link_placements: (4, 4) link to site by link; empty until frames were received.
+        positions: By joint [rad] or [m]; empty until joint states were received.
+        clearance_line: Line to the nearest body; None if there is none, or no clearance is published.
+        touching: Links in contact.
+        trail: Past positions of the tool with their times [ns], oldest first.
+        source_time_ns: Source time of the placements.
+        dated_by: Id of the publisher of that time.
+        version: Incremented by each message that changes the picture.
     """
 
     site: str
     name: str
-    look: Look | None = None
+    appearance: Appearance | None = None
     link_placements: dict[str, FloatArray] = field(default_factory=dict)
     positions: dict[str, float] = field(default_factory=dict)
     controller: ControllerState | None = None
-    span: Span | None = None
+    clearance_line: ClearanceLine | None = None
     touching: frozenset[str] = frozenset()
     trail: deque[tuple[int, FloatArray]] = field(default_factory=lambda: deque(maxlen=_TRAIL_POINTS))
     source_time_ns: int = 0
@@ -61,18 +61,22 @@ class RobotState:
 
     @property
     def stale_after_s(self) -> float:
-        """Older than this, what is known of where it is must not look live [s]."""
-        told = self.look is not None and self.look.description.HasField("stale_after_s")
-        return self.look.description.stale_after_s if self.look is not None and told else _STALE_AFTER_S
+        """Age from which the robot's placements are stale and must not look live [s]."""
+        given = self.appearance is not None and self.appearance.description.HasField("stale_after_s")
+        return (
+            self.appearance.description.stale_after_s
+            if self.appearance is not None and given
+            else _STALE_AFTER_S
+        )
 
     @property
     def cell(self) -> str:
-        """That it shares with other robots; empty: it is drawn alone, as all that is played back."""
-        alone = self.look is None or self.look.description.HasField("replay")
-        return "" if self.look is None or alone else self.look.description.cell
+        """The cell that it shares with other robots; empty if it is drawn alone, like every replay."""
+        drawn_alone = self.appearance is None or self.appearance.description.HasField("replay")
+        return "" if self.appearance is None or drawn_alone else self.appearance.description.cell
 
-    def take_frames(self, message: FrameTransforms, source_time_ns: int, dated_by: int) -> None:
-        """Take newer placements of the links; `dated_by`: the publisher who dates them."""
+    def update_frames(self, message: FrameTransforms, source_time_ns: int, dated_by: int) -> None:
+        """Store newer placements of the links; `dated_by` is the id of their publisher."""
         prefix = f"{self.site}/{self.name}/"
         placements = {
             transform.child_frame_id.removeprefix(prefix): _placement(transform)
@@ -80,51 +84,54 @@ class RobotState:
             if transform.child_frame_id.startswith(prefix)
         }
         if source_time_ns < self.source_time_ns:
-            self.trail.clear()  # a replay that was turned back
+            self.trail.clear()  # a replay jumped back
         self.link_placements, self.source_time_ns = placements, source_time_ns
         self.dated_by = dated_by
         if _TOOL in placements:
-            self._leave_trail(placements[_TOOL][:3, 3], source_time_ns)
-        # Frames come all the time; a picture is only worth drawing when they differ, by creeping too.
+            self._extend_trail(placements[_TOOL][:3, 3], source_time_ns)
+        # Compared with the placements of the last version, so that slow movement is noticed too.
         if not _same(placements, self._noticed):
             self._noticed = placements
             self.version += 1
 
-    def _leave_trail(self, tool: FloatArray, now_ns: int) -> None:
+    def _extend_trail(self, tool: FloatArray, now_ns: int) -> None:
         trail = self.trail
         while trail and now_ns - trail[0][0] > _TRAIL_S * 1e9:
             trail.popleft()
         if not trail or now_ns - trail[-1][0] >= _TRAIL_S * 1e9 / _TRAIL_POINTS:
             trail.append((now_ns, tool))
 
-    def take_joints(self, message: JointStates) -> None:
-        """Take newer joint positions; a picture waits for the frames that belong to them."""
+    def update_joints(self, message: JointStates) -> None:
+        """Store newer joint positions; only the frames that belong to them change the picture."""
         self.positions = {joint.name: joint.position for joint in message.joints}
 
-    def take_controller(self, message: ControllerState) -> None:
-        """Take a newer state of the controller."""
+    def update_controller(self, message: ControllerState) -> None:
+        """Store a newer controller state."""
         if _state_words(message) != _state_words(self.controller):
             self.version += 1
         self.controller = message
 
-    def take_kinematics(self, message: KinematicState, robots: Mapping[str, "RobotState"]) -> None:
-        """Take newer kinematics.
+    def update_kinematics(self, message: KinematicState, robots: Mapping[str, "RobotState"]) -> None:
+        """Store newer kinematics.
 
         Args:
-            robots: Of the site, by name: how near this one may come to them they tell.
+            robots: The site's robots by name; their descriptions have the warning and stop distances.
         """
-        span = None
+        clearance_line = None
         if message.HasField("clearance"):
             # <site>/<robot>/<link>, or a fixture's <site>/<fixture>.
             frames = (message.clearance.first, message.clearance.second)
             ends = {frame.partition("/")[2].partition("/")[0] for frame in frames}
-            looks = [robot.look for name, robot in robots.items() if name in ends]
-            span = span_of(message.clearance, [look.description for look in looks if look is not None])
+            appearances = [robot.appearance for name, robot in robots.items() if name in ends]
+            clearance_line = line_of(
+                message.clearance,
+                [appearance.description for appearance in appearances if appearance is not None],
+            )
         touching = self._touching(message)
-        # The arm may stand, and the other come.
-        if not same_span(span, self.span) or touching != self.touching:
+        # The other body may move while the arm does not.
+        if not same_line(clearance_line, self.clearance_line) or touching != self.touching:
             self.version += 1
-        self.span, self.touching = span, touching
+        self.clearance_line, self.touching = clearance_line, touching
 
     def _touching(self, message: KinematicState) -> frozenset[str]:
         prefix = f"{self.site}/{self.name}/"
@@ -139,7 +146,7 @@ class RobotState:
 
 @dataclass(frozen=True, kw_only=True)
 class Ages:
-    """Time since each topic's last new value came [s]; None: none came while we listened."""
+    """Time since each topic's last new value was received [s]; None: none was received live."""
 
     frames: float | None
     joints: float | None
@@ -148,43 +155,43 @@ class Ages:
 
 
 def age_s(state: RobotState, ages: Ages) -> float:
-    """How old what a picture shows is [s]; infinite where nobody knows.
+    """Return the age of the robot state that a picture shows [s]; infinite if unknown.
 
-    The gateway's own word counts too: what it received last may be older than the message that
-    tells of it.
+    The age reported by the gateway counts too: the gateway's last unit may be older than the message that
+    reports it.
     """
     if ages.frames is None or ages.joints is None:
-        told = _told_age(state, ages)
-        return math.inf if told is None else max(told, state.stale_after_s * 1.001)
-    return max(ages.frames, ages.joints, _told_age(state, ages) or 0.0)
+        reported = _reported_age(state, ages)
+        return math.inf if reported is None else max(reported, state.stale_after_s * 1.001)
+    return max(ages.frames, ages.joints, _reported_age(state, ages) or 0.0)
 
 
-def _told_age(state: RobotState, ages: Ages) -> float | None:
+def _reported_age(state: RobotState, ages: Ages) -> float | None:
     controller = state.controller
     if controller is None or not controller.HasField("last_unit_age_s") or ages.controller is None:
         return None
     if controller.link == ControllerState.UP:
-        # Its next word is up to a second away, and units come meanwhile: joints tell their age.
+        # This message is up to a second old while units keep arriving: the age of the joints counts instead.
         return controller.last_unit_age_s
     return controller.last_unit_age_s + ages.controller
 
 
-def span_now(state: RobotState, ages: Ages) -> Span | None:
-    """What is drawn between the arm and what is nearest; None: nobody tells what it is now."""
-    return state.span if _near_known(state, ages) else None
+def current_clearance_line(state: RobotState, ages: Ages) -> ClearanceLine | None:
+    """Return the line to the nearest body; None if the clearance is unknown or out of date."""
+    return state.clearance_line if _clearance_is_current(state, ages) else None
 
 
-def touching_now(state: RobotState, ages: Ages) -> frozenset[str]:
-    """Links that touch something; none where nobody tells it now."""
-    return state.touching if _near_known(state, ages) else frozenset()
+def current_contacts(state: RobotState, ages: Ages) -> frozenset[str]:
+    """Return the links in contact; empty if the clearance is out of date."""
+    return state.touching if _clearance_is_current(state, ages) else frozenset()
 
 
 def is_stale(state: RobotState, ages: Ages) -> bool:
-    """Whether nobody knows where it is now."""
+    """Return whether the robot's placements are stale."""
     return age_s(state, ages) > state.stale_after_s
 
 
-def _near_known(state: RobotState, ages: Ages) -> bool:
+def _clearance_is_current(state: RobotState, ages: Ages) -> bool:
     known = ages.kinematics is not None and ages.kinematics <= state.stale_after_s
     return known and not is_stale(state, ages)
 
@@ -195,36 +202,38 @@ def _same(some: dict[str, FloatArray], others: dict[str, FloatArray]) -> bool:
     )
 
 
-def placements_now(state: RobotState, look: Look) -> dict[str, FloatArray]:
-    """(4, 4) link to site of every link; at home as long as nobody told."""
-    return state.link_placements or home_placements(look)
+def current_placements(state: RobotState, appearance: Appearance) -> dict[str, FloatArray]:
+    """Return (4, 4) link to site of every link; at home until frames are received."""
+    return state.link_placements or home_placements(appearance)
 
 
-def overlay_of(state: RobotState, look: Look, view: str, *, age: float) -> Overlay:
-    """What is written over a picture of a robot.
+def overlay_of(state: RobotState, appearance: Appearance, view: str, *, age: float) -> Overlay:
+    """Return the texts over a picture of a robot.
 
     Args:
-        age: Of what it shows [s].
+        age: Age of the state that it shows [s].
     """
-    description = look.description
+    description = appearance.description
     return Overlay(
         title=state.name,
         view=view,
         time=_time(state.source_time_ns, dated=description.HasField("replay")),
         state=_state_words(state.controller),
-        rows=tuple(_row(joint, state.positions[joint.name]) for joint in _told(description, state)),
+        rows=tuple(
+            _row(joint, state.positions[joint.name]) for joint in _joints_with_positions(description, state)
+        ),
         marks=_marks(description),
-        scale="" if look.floor is None else f"{look.square_m * 1e3:g} mm",
+        scale="" if appearance.floor is None else f"{appearance.square_m * 1e3:g} mm",
         stale=_stale_words(state, age),
     )
 
 
-def warning_of(state: RobotState, *, age: float) -> Overlay:
-    """What even a small picture must say; no number, for it is looked at long after it was drawn."""
+def warning_overlay(state: RobotState, *, age: float) -> Overlay:
+    """Return the texts that even a small picture must show; no numbers, as it may be viewed much later."""
     stale = "STALE" if age > state.stale_after_s else ""
     if not state.link_placements:
         stale = "NO DATA"
-    replay = state.look is not None and state.look.description.HasField("replay")
+    replay = state.appearance is not None and state.appearance.description.HasField("replay")
     marks = ("replay",) if replay else ()
     return Overlay(title="", view="", time="", state="", rows=(), marks=marks, stale=stale)
 
@@ -234,7 +243,7 @@ def _marks(description: Description) -> tuple[str, ...]:
     return tuple(mark for mark, holds in marks.items() if holds)
 
 
-def _told(description: Description, state: RobotState) -> list[Description.Joint]:
+def _joints_with_positions(description: Description, state: RobotState) -> list[Description.Joint]:
     return [joint for joint in description.joints if joint.name in state.positions]
 
 

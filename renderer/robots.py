@@ -1,4 +1,4 @@
-"""The robots that the renderer knows: what is told of them, their meshes, and when they are forgotten."""
+"""The robots known to the renderer: their topics, their meshes, and when they are removed."""
 
 import asyncio
 import logging
@@ -10,7 +10,7 @@ from typing import Protocol
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from renderer.appearance import look_of, mesh_name
+from renderer.appearance import appearance_of, mesh_name
 from renderer.cache import store_glb, stored_glb
 from renderer.errors import RendererError
 from renderer.robot_state import Ages, RobotState
@@ -24,53 +24,60 @@ log = logging.getLogger(__name__)
 
 _MESH_TIMEOUT_S = 10.0
 _ASK_AGAIN_S = 2.0
-# For a site of many robots; each robot's newest counts, and the rest is skipped when read.
+# Queue length for a site with many robots. Only each robot's newest sample is used.
 _RING = 512
 _TOPICS = ("description", "frames", "joints", "controller", "kinematics")
-# Who makes a robot be there. A service that begins anew is back sooner than its robot is forgotten.
-_MAKERS = ("gateway", "kinematics", "player")
+# Services whose presence means that a robot exists. The delay lets such a service restart without the robot
+# being removed.
+_PROVIDERS = ("gateway", "kinematics", "player")
 _DESCRIBERS = ("kinematics", "player")
 _FORGET_AFTER_S, _FORGET_REPLAY_AFTER_S = 15.0, 1.0
 
 
-class Follower(Protocol):
-    """Who is told of robots."""
+class RobotObserver(Protocol):
+    """The receiver of meshes and of changes of robots."""
 
     async def has_mesh(self, name: str) -> bool:
-        """Whether a mesh is there."""
+        """Return whether a mesh has been added."""
 
-    async def take_mesh(self, name: str, glb: bytes, color: str) -> None:
-        """Take a mesh."""
+    async def add_mesh(self, name: str, glb: bytes, color: str) -> None:
+        """Add a mesh."""
 
-    def appeared(self, state: RobotState) -> None:
-        """A robot can be drawn, or can be drawn anew."""
+    def on_ready(self, state: RobotState) -> None:
+        """React to a robot that can be drawn, or to its new description."""
 
-    def moved(self, state: RobotState) -> None:
-        """Something that a picture shows is another."""
+    def on_changed(self, state: RobotState) -> None:
+        """React to a change that pictures show."""
 
-    def gone(self, state: RobotState) -> None:
-        """A robot is there no more."""
+    def on_removed(self, state: RobotState) -> None:
+        """React to the removal of a robot."""
 
 
 class Robots:
-    """What is known of the robots of a site.
+    """The known robots of a site.
 
     Attributes:
         states: By name.
     """
 
     def __init__(
-        self, session: Session, site: str, follower: Follower, *, wanted: Callable[[str], bool], folder: Path
+        self,
+        session: Session,
+        site: str,
+        observer: RobotObserver,
+        *,
+        wanted: Callable[[str], bool],
+        folder: Path,
     ) -> None:
         self.states: dict[str, RobotState] = {}
-        self._session, self._site, self._follower = session, site, follower
+        self._session, self._site, self._observer = session, site, observer
         self._wanted, self._folder = wanted, folder
         self._subscriptions: dict[str, Subscription] = {}
         self._meshes: dict[str, set[str]] = {}
         self._loading: dict[str, asyncio.Task[None]] = {}
-        self._makers: defaultdict[str, set[tuple[str, str]]] = defaultdict(set)
+        self._providers: defaultdict[str, set[tuple[str, str]]] = defaultdict(set)
         self._forgetting: dict[str, asyncio.TimerHandle] = {}
-        # They may come again, be what they were, and then nobody tells it again.
+        # Removed robots: if one returns with the same description, the subscription does not report it.
         self._forgotten: set[str] = set()
 
     async def follow(self) -> None:
@@ -80,10 +87,10 @@ class Robots:
                 subscription = self._session.subscribe(f"{ROOT}/{self._site}/*/{name}", newest=_RING)
                 self._subscriptions[name] = subscription
                 group.create_task(self._take_all(subscription, group))
-            group.create_task(self._watch_makers(group))
+            group.create_task(self._watch_providers(group))
 
     def ages(self, state: RobotState) -> Ages:
-        """How old what is known of a robot is, now."""
+        """Return the current ages of a robot's topics."""
         age = {
             name: subscription.age_s(robot_key(state.site, state.name, name))
             for name, subscription in self._subscriptions.items()
@@ -92,7 +99,7 @@ class Robots:
         return Ages(**age)
 
     def neighbours(self, state: RobotState) -> list[RobotState]:
-        """The other robots of its cell; what is played back stands alone."""
+        """Return the other robots of a robot's cell; a replay has none."""
         cell = state.cell
         if not cell:
             return []
@@ -100,7 +107,7 @@ class Robots:
 
     @property
     def meshes(self) -> set[str]:
-        """Names of all that their bodies need."""
+        """Names of the meshes of all robots."""
         return set().union(*self._meshes.values())
 
     async def _take_all(self, subscription: Subscription, group: asyncio.TaskGroup) -> None:
@@ -115,21 +122,21 @@ class Robots:
             except MessageError as error:
                 log.warning("%s: %s", sample.key, error)
             except Exception:
-                # Whoever published it: the other robots are drawn on.
-                log.exception("%s could not be taken", sample.key)
+                # A publisher's invalid message must not stop the drawing of other robots.
+                log.exception("%s could not be processed", sample.key)
             if state.version != before:
-                self._follower.moved(state)
+                self._observer.on_changed(state)
 
     def _take(self, state: RobotState, sample: Sample, group: asyncio.TaskGroup) -> None:
         message = sample.message()
         if isinstance(message, FrameTransforms):
-            state.take_frames(message, sample.header.source_time_ns, sample.header.publisher)
+            state.update_frames(message, sample.header.source_time_ns, sample.header.publisher)
         elif isinstance(message, JointStates):
-            state.take_joints(message)
+            state.update_joints(message)
         elif isinstance(message, ControllerState):
-            state.take_controller(message)
+            state.update_controller(message)
         elif isinstance(message, KinematicState):
-            state.take_kinematics(message, self.states)
+            state.update_kinematics(message, self.states)
         elif isinstance(message, Description):
             self._describe(state, message, group)
 
@@ -141,25 +148,26 @@ class Robots:
         self._loading[state.name] = group.create_task(self._load(state, description))
 
     async def _describe_again(self, robot: str, group: asyncio.TaskGroup) -> None:
-        """Ask what a robot is that was forgotten: told once, it is nothing new to the subscription."""
+        """Query the description of a robot that has returned: the subscription reports changes only."""
         key = robot_key(self._site, robot, "description")
-        while robot in self._forgotten and robot in self._makers:
+        while robot in self._forgotten and robot in self._providers:
             try:
-                told = await self._session.last(key)
+                description = await self._session.last(key)
             except BusError as error:
                 log.warning("%s: %s", key, error)
                 return
-            if isinstance(told, Description) and robot in self._forgotten:
-                self._describe(self.states.setdefault(robot, RobotState(self._site, robot)), told, group)
+            if isinstance(description, Description) and robot in self._forgotten:
+                state = self.states.setdefault(robot, RobotState(self._site, robot))
+                self._describe(state, description, group)
 
     async def _load(self, state: RobotState, description: Description) -> None:
-        """Make a robot's pictures possible: its look, its meshes."""
+        """Load a robot's meshes and make it ready to draw."""
         where = f"{state.site}/{state.name}"
         try:
-            look = await asyncio.to_thread(look_of, description)
-            told: list[Description.Link | Description.Fixture] = [*description.links, *description.fixtures]
-            bodies = [body for body in told if body.mesh]
-            # Those of before are drawn until then.
+            appearance = await asyncio.to_thread(appearance_of, description)
+            links: list[Description.Link | Description.Fixture] = [*description.links, *description.fixtures]
+            bodies = [body for body in links if body.mesh]
+            # The old meshes are drawn until the new ones are loaded.
             names = {mesh_name(body) for body in bodies}
             self._meshes[state.name] = self._meshes.get(state.name, set()) | names
             for body in bodies:
@@ -171,45 +179,45 @@ class Robots:
             log.exception("%s cannot be drawn", where)
             return
         self._meshes[state.name] = names
-        state.look = look
+        state.appearance = appearance
         state.version += 1
-        self._follower.appeared(state)
+        self._observer.on_ready(state)
 
     async def _load_mesh(self, state: RobotState, body: Description.Link | Description.Fixture) -> None:
         name = mesh_name(body)
-        if await self._follower.has_mesh(name):
+        if await self._observer.has_mesh(name):
             return
         glb = await asyncio.to_thread(stored_glb, body.mesh_sha256, self._folder)
         key = robot_key(state.site, state.name, f"mesh/{body.mesh}")
-        told = False
+        warned = False
         while glb is None:
             try:
                 glb = await self._session.ask_bytes(key, timeout_s=_MESH_TIMEOUT_S)
             except BusError as error:
-                if not told:
-                    log.warning("mesh of %s: %s; asking until it comes", body.name, error)
-                    told = True
+                if not warned:
+                    log.warning("mesh of %s: %s; requests are repeated", body.name, error)
+                    warned = True
                 await asyncio.sleep(_ASK_AGAIN_S)
                 continue
             await asyncio.to_thread(store_glb, glb, self._folder)
         try:
-            await self._follower.take_mesh(name, glb, body.color)
+            await self._observer.add_mesh(name, glb, body.color)
         except RendererError as error:
             log.error("%s of %s/%s is not drawn: %s", body.name, state.site, state.name, error)
 
-    async def _watch_makers(self, group: asyncio.TaskGroup) -> None:
+    async def _watch_providers(self, group: asyncio.TaskGroup) -> None:
         async for who, alive in self._session.watch_presence(f"{ROOT}/{self._site}/*/alive/*/*"):
-            if who.service not in _MAKERS:
+            if who.service not in _PROVIDERS:
                 continue
-            makers = self._makers[who.robot]
-            (makers.add if alive else makers.discard)((who.service, who.id))
+            providers = self._providers[who.robot]
+            (providers.add if alive else providers.discard)((who.service, who.id))
             waiting = self._forgetting.pop(who.robot, None)
             if waiting is not None:
                 waiting.cancel()
             if alive and who.robot in self._forgotten and who.service in _DESCRIBERS:
                 group.create_task(self._describe_again(who.robot, group))
-            if not makers:
-                del self._makers[who.robot]
+            if not providers:
+                del self._providers[who.robot]
                 after_s = _FORGET_REPLAY_AFTER_S if is_replay(who.robot) else _FORGET_AFTER_S
                 loop = asyncio.get_running_loop()
                 self._forgetting[who.robot] = loop.call_later(after_s, self._forget, who.robot)
@@ -222,6 +230,6 @@ class Robots:
         self._meshes.pop(robot, None)
         state = self.states.pop(robot, None)
         if state is not None:
-            log.info("%s/%s is there no more", state.site, state.name)
+            log.info("%s/%s is removed", state.site, state.name)
             self._forgotten.add(robot)
-            self._follower.gone(state)
+            self._observer.on_removed(state)

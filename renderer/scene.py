@@ -1,4 +1,4 @@
-"""What stands where: pure data that a drawing takes."""
+"""Data of a scene, the input of a drawing."""
 
 from dataclasses import dataclass
 from enum import Enum, auto
@@ -10,12 +10,12 @@ FloatArray = NDArray[np.float64]
 
 
 class Finish(Enum):
-    """How a body is painted."""
+    """The appearance of a body."""
 
     PLAIN = auto()
-    STALE = auto()  # grey: it was so once, and nobody knows whether it is
-    RED = auto()  # it touches something
-    GHOST = auto()  # blue and translucent: it is not there, but may be
+    STALE = auto()  # grey: its placement is out of date
+    RED = auto()  # in contact
+    GHOST = auto()  # blue and translucent: a target placement
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,9 +23,9 @@ class Part:
     """A body of the scene.
 
     Attributes:
-        mesh: Name under which its mesh was given to the drawing.
+        mesh: Name of its mesh in the drawing.
         part_to_site: (4, 4).
-        name: What it is called: a link, a fixture.
+        name: Name of the link or fixture.
     """
 
     mesh: str
@@ -36,13 +36,13 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A line through points, hidden by what stands before it.
+    """A line through points; bodies in front of it hide it.
 
     Attributes:
         points: (n, 3) in the site's frame [m].
         color: Red, green, blue, 0 to 1 (sRGB).
         opacity: (n,) at each point, 0 to 1.
-        width: In a picture 720 px high [px].
+        width: Width in a picture 720 px high [px].
     """
 
     points: FloatArray
@@ -53,15 +53,15 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """All that one picture shows, in the site's frame [m].
+    """The content of one picture, in the site's frame [m].
 
     Attributes:
-        parts: What moves, and what a close-up is of.
-        center: (3,) of the sphere that holds the arm's room.
-        radius: Its radius.
-        others: What moves too, and no close-up is of: other robots of the cell, a ghost.
-        fixtures: What stands around.
-        floor: Height of the floor; None: there is none.
+        parts: The robot's bodies, which a close-up shows.
+        center: (3,) centre of the sphere around the arm's workspace.
+        radius: Radius of that sphere.
+        others: Moving bodies that a close-up ignores: other robots of the cell, a ghost.
+        fixtures: Static bodies around the robot.
+        floor: Height of the floor; None: no floor.
         lines: Trails, paths, axes.
     """
 
@@ -75,8 +75,8 @@ class Scene:
 
 
 def square_m(radius: float) -> float:
-    """Width of the floor's small squares around a room of that radius [m]: 0.1, or ten times more or less.
+    """Return the width of the floor's small squares [m] for a workspace radius [m]: a power of ten.
 
-    Five of them are a large square.
+    Five small squares make a large one.
     """
     return float(10.0 ** np.round(np.log10(max(radius, 1e-3) / 8.0)))

@@ -1,4 +1,4 @@
-"""Robots, as they stand now, put on one stage: the scene of a picture."""
+"""Assembly of a picture's scene from robots at their current placements."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.appearance import Look, frame_placements
+from renderer.appearance import Appearance, frame_placements
 from renderer.scene import Finish, Line, Part, Scene
 
 FloatArray = NDArray[np.float64]
@@ -14,23 +14,23 @@ FloatArray = NDArray[np.float64]
 _TRAIL_COLOR = (0.02, 0.47, 0.62)
 _PATH_COLOR = (0.10, 0.30, 0.85)
 _AXES = ((0.85, 0.13, 0.13), (0.13, 0.60, 0.20), (0.15, 0.32, 0.90))
-# Of an axis, over the radius of the robot's room.
+# Length of an axis over the radius of the robot's workspace.
 _AXIS_LENGTH = 0.09
-# Metres, or a rotation's entries: nearer than that a ghost is in the body's own place.
+# A ghost is drawn only if its placement differs by more than this (metres, or rotation matrix entries).
 _SAME = 4e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A robot where it stands.
+    """A robot with its placements.
 
     Attributes:
-        link_placements: (4, 4) link to site by link; a link that is not there is not drawn.
-        stale: Nobody knows whether it still stands so.
-        touching: Links that touch something, drawn red.
+        link_placements: (4, 4) link to site by link; other links are not drawn.
+        stale: The placements are out of date.
+        touching: Links in contact, drawn red.
     """
 
-    look: Look
+    appearance: Appearance
     link_placements: Mapping[str, FloatArray]
     stale: bool = False
     touching: Collection[str] = ()
@@ -44,35 +44,35 @@ def scene_of(
     ghost: Mapping[str, FloatArray] | None = None,
     path: FloatArray | None = None,
 ) -> Scene:
-    """A scene of a robot, what stands around it, and the other robots of its cell.
+    """Return the scene of a robot, its fixtures, and the other robots of its cell.
 
     Args:
-        trail: (n, 3) where its tool was, oldest first, in the site's frame [m].
-        frames: Show the axes of its tool and named frames.
-        ghost: (4, 4) link to site by link of the same robot where it may go.
-        path: (n, 3) that its tool is to follow, in the site's frame [m].
+        trail: (n, 3) past positions of the tool, oldest first, in the site's frame [m].
+        frames: Show the axes of the tool and of named frames.
+        ghost: (4, 4) link to site by link of the same robot at a target.
+        path: (n, 3) planned path of the tool, in the site's frame [m].
     """
-    look = robot.look
+    appearance = robot.appearance
     lines: list[Line] = []
     if path is not None and len(path) > 1:
         lines.append(Line(path, _PATH_COLOR, np.full(len(path), 0.9), 2.2))
     if trail is not None and len(trail) > 1:
         lines.append(Line(trail, _TRAIL_COLOR, np.linspace(0.0, 0.95, len(trail)), 2.6))
     if frames:
-        for placement in frame_placements(look, robot.link_placements).values():
-            lines += _axes(placement, _AXIS_LENGTH * look.radius)
+        for placement in frame_placements(appearance, robot.link_placements).values():
+            lines += _axes(placement, _AXIS_LENGTH * appearance.radius)
     moving = [part for other in others for part in _parts(other)]
     if ghost is not None:
-        # What stays where it is has no ghost.
+        # Links that do not move have no ghost.
         moves = {link: placed for link, placed in ghost.items() if _differs(robot, link, placed)}
-        moving += _bodies(look, moves, lambda _: Finish.GHOST)
+        moving += _bodies(appearance, moves, lambda _: Finish.GHOST)
     return Scene(
         parts=tuple(_parts(robot)),
         others=tuple(moving),
-        fixtures=_grey(look.fixtures) if robot.stale else look.fixtures,
-        center=look.center,
-        radius=look.radius,
-        floor=look.floor,
+        fixtures=_grey(appearance.fixtures) if robot.stale else appearance.fixtures,
+        center=appearance.center,
+        radius=appearance.radius,
+        floor=appearance.floor,
         lines=tuple(lines),
     )
 
@@ -88,17 +88,21 @@ def _parts(robot: Placed) -> list[Part]:
             return Finish.STALE
         return Finish.RED if link in robot.touching else Finish.PLAIN
 
-    return _bodies(robot.look, robot.link_placements, finish)
+    return _bodies(robot.appearance, robot.link_placements, finish)
 
 
-def _bodies(look: Look, placed: Mapping[str, FloatArray], finish: Callable[[str], Finish]) -> list[Part]:
+def _bodies(
+    appearance: Appearance, placed: Mapping[str, FloatArray], finish: Callable[[str], Finish]
+) -> list[Part]:
     return [
-        Part(mesh, placed[link], finish(link), link) for link, mesh in look.meshes.items() if link in placed
+        Part(mesh, placed[link], finish(link), link)
+        for link, mesh in appearance.meshes.items()
+        if link in placed
     ]
 
 
 def _grey(fixtures: tuple[Part, ...]) -> tuple[Part, ...]:
-    """A picture of which nothing is sure has no colour that looks alive."""
+    """Return fixtures in grey, so that a stale picture has no colour that looks live."""
     return tuple(replace(fixture, finish=Finish.STALE) for fixture in fixtures)
 
 

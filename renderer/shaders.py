@@ -1,4 +1,4 @@
-"""The shaders of what does not move: a calm backdrop, a floor with its grid, the shadow on it."""
+"""Shaders of the static background: a gradient, the floor with its grid, the shadow on it."""
 
 VERSION = "#version 330\n"
 
@@ -39,7 +39,7 @@ void main() { color = vec4(backdrop(mix(0.35, place.y, level)), 1.0); }
 """
 )
 
-# One texture as it is, or several samples a pixel laid over what is there.
+# Blends a layer, with one or several samples per pixel, over the picture.
 COMPOSE_FRAGMENT = """
 out vec4 color;
 #if SAMPLES > 0
@@ -68,7 +68,7 @@ void main() {
 }
 """
 
-# A plane through `origin`, spanned by `u` and `v`, with lines each `fine` and `coarse` metres.
+# A plane through `origin`, spanned by `u` and `v`, with lines every `fine` and `coarse` metres.
 PLANE_VERTEX = (
     COMMON
     + """
@@ -123,7 +123,7 @@ void main() {
 }
 """
 
-# Seen from below against the light: the height of the lowest thing above each place of the floor.
+# Seen from below against the light: the height of the lowest body above each position of the floor.
 SHADOW_VERTEX = """#version 330
 uniform mat4 part_to_site;
 uniform vec2 center;

@@ -1,4 +1,4 @@
-"""The soft shadow on the floor: sharp where a body touches it, wide and faint below what is high."""
+"""The soft shadow on the floor: sharp below low bodies, wide and faint below high ones."""
 
 from collections.abc import Sequence
 
@@ -14,13 +14,13 @@ from renderer.scene import Part
 FloatArray = NDArray[np.float32]
 
 _TEXELS = 160
-# What the shadow map holds where nothing is above the floor [m], and what is surely less.
+# Value of the shadow map where no body is above the floor [m], and a height above every body.
 NOTHING = 1e6
 _ANY_HEIGHT = 1e3
-# How far it reaches, and what moves less than that leaves it as it is: over the room's radius.
+# Extent of the map, and the smallest movement that updates it, over the scene's radius.
 _EXTENT, _NOTICEABLE = 1.6, 0.002
 
-# (up to this height, blurred by this much, this dark), heights and widths over the room's radius.
+# (upper height, blur width, darkness) of each layer; heights and widths over the scene's radius.
 _LAYERS = (
     (0.035, 0.018, 0.62),
     (0.16, 0.030, 0.50),
@@ -30,7 +30,7 @@ _LAYERS = (
 
 
 class FloorShadow:
-    """The shadow of a scene's bodies, computed anew only when they have moved noticeably."""
+    """The shadow of a scene's bodies, recomputed only after a noticeable movement."""
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self._context, self._programs = context, programs
@@ -46,7 +46,7 @@ class FloorShadow:
         self._drawn = (-1.0, -1.0, 1.0, 1.0)
 
     def forget(self) -> None:
-        """Compute it anew next time."""
+        """Recompute the shadow next time."""
         self._of = None
 
     def cast(
@@ -57,11 +57,12 @@ class FloorShadow:
         radius: float,
         floor: float,
     ) -> None:
-        """See that it is the shadow of these bodies.
+        """Compute the shadow of these bodies, unless it is up to date.
 
         Args:
-            center: (3,) of the room [m]; the shadow is about it.
-            floor: Its height [m].
+            center: (3,) centre of the scene and of the shadow map [m].
+            radius: Radius of the scene [m].
+            floor: Height of the floor [m].
         """
         placements = np.array([part.part_to_site for part, _ in parts]).reshape(-1, 4, 4)
         key = (tuple(part.mesh for part, _ in parts), center.tobytes(), radius, floor)
@@ -89,7 +90,7 @@ class FloorShadow:
         dark = soft_shadow(heights / radius, texel=2.0 * extent / n / radius)
         levels = (np.clip(dark, 0.0, 1.0) * 255.0).astype(np.uint8)
         self._shadow.write(levels.tobytes())
-        # Only where there is some is it laid: most of the floor has none.
+        # Only the part with shadow is drawn: most of the floor has none.
         places = np.argwhere(levels > 0)
         low, high = (
             (places.min(axis=0), places.max(axis=0) + 1) if len(places) else (np.zeros(2), np.zeros(2))
@@ -118,15 +119,15 @@ class FloorShadow:
 
 
 def soft_shadow(heights: FloatArray, *, texel: float) -> FloatArray:
-    """How much light each place of the floor lacks, 0 to 1.
+    """Return the (n, n) darkness of the floor, 0 to 1.
 
-    A large lamp's shadow is the wider and the fainter the higher its caster is, so each slice of
-    height is blurred by its own width, and the slices are laid over each other.
+    A large lamp's shadow gets wider and fainter with the height of the body, so each layer of heights is
+    blurred with its width, and the layers are combined.
 
     Args:
-        heights: (n, n) height of the lowest body above the place, over the scene's radius;
+        heights: (n, n) height of the lowest body above each texel, over the scene's radius;
             `NOTHING` where there is none.
-        texel: Width of a place, over the scene's radius.
+        texel: Width of a texel, over the scene's radius.
     """
     light = np.ones_like(heights)
     bottom = 0.0

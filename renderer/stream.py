@@ -1,4 +1,4 @@
-"""One view of one robot: when it is drawn, and what is published of it."""
+"""One view of one robot: scheduling, drawing and publishing of its video and pictures."""
 
 import asyncio
 import logging
@@ -10,211 +10,211 @@ from typing import Any, Protocol
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-from renderer.composition import Composition, Known, composed
+from renderer.composition import Composition, RobotSnapshot, compose
 from renderer.errors import RendererError
 from renderer.frame_scheduler import next_due
 from renderer.key_frames import KeyFrameClock
 from renderer.overlay import inside
-from renderer.post_processing import Finished, Order
-from renderer.requested_views import IMAGE_HZ, Shot
+from renderer.post_processing import EncodedPicture, PictureJob
+from renderer.requested_views import IMAGE_HZ, ViewSpec
 from renderer.robot_state import Ages, RobotState
 from renderer.studio import Drawn
 from robomesh.session import Session
 
 log = logging.getLogger(__name__)
 
-# A picture in which nothing moves still tells that it is alive, and its age.
+# Rate of a picture in which nothing moves: subscribers see that the stream is alive, and its age.
 _IDLE_HZ = 2.0
 _TRY_AGAIN_S = 5.0
 _MOST_ASKERS = 64
 
 
-class Workshop(Protocol):
-    """What a stream needs of the renderer that it is one of."""
+class StreamHost(Protocol):
+    """The renderer's functions that a stream uses."""
 
     def ages(self, state: RobotState) -> Ages:
-        """How old what is known of a robot is, now."""
+        """Return the current ages of a robot's topics."""
 
     def neighbours(self, state: RobotState) -> Sequence[RobotState]:
-        """The other robots of its cell."""
+        """Return the other robots of the robot's cell."""
 
-    def watched(self, stream: "Stream") -> None:
-        """Somebody came to the stream, or went."""
+    def watchers_changed(self, stream: "Stream") -> None:
+        """React to a stream that has gained or lost subscribers."""
 
-    async def draw(self, stream: str, shot: Shot, composition: Composition) -> Drawn:
-        """The picture, before anything is written over it."""
+    async def draw(self, stream: str, spec: ViewSpec, composition: Composition) -> Drawn:
+        """Return the picture without its overlay."""
 
-    async def finish(self, drawn: Drawn, order: Order) -> Finished:
-        """What becomes of a picture."""
+    async def process(self, drawn: Drawn, job: PictureJob) -> EncodedPicture:
+        """Write the overlay on a picture and encode it."""
 
 
 class Stream:
-    """A view's video and still pictures, drawn only while somebody watches or asks.
+    """A view's video and still pictures, drawn only while they have subscribers or are requested.
 
     Attributes:
-        name: Of the robot and the view.
-        quiet_since: When the last watcher left, or somebody asked for it [s]; None: it is watched.
-        awaited: Nobody has watched since it was asked for.
-        askers: In whose names it was asked for; it counts for the first one.
+        name: `<robot>/<view>`.
+        unwatched_since: When the last subscriber left, or the view was requested [s]; None: it is watched.
+        awaited: It has had no subscriber since it was requested.
+        askers: The operators who requested it; it counts for the first one.
     """
 
-    def __init__(self, session: Session, state: RobotState, shot: Shot, workshop: Workshop) -> None:
+    def __init__(self, session: Session, state: RobotState, spec: ViewSpec, host: StreamHost) -> None:
         """Declare the view's topics."""
-        self.state, self.shot = state, shot
+        self.state, self.spec = state, spec
         self.askers: list[str] = []
-        self.name = f"{state.name}/{shot.name}"
-        self.quiet_since: float | None = time.monotonic()
+        self.name = f"{state.name}/{spec.name}"
+        self.unwatched_since: float | None = time.monotonic()
         self.awaited = True
-        self._workshop = workshop
+        self._host = host
         self._closed = False
-        self._video = session.declare_publisher(state.site, state.name, f"video/{shot.name}")
+        self._video = session.declare_publisher(state.site, state.name, f"video/{spec.name}")
         self._image = session.declare_publisher(
-            state.site, state.name, f"image/{shot.name}", on_get=self._answer_get
+            state.site, state.name, f"image/{spec.name}", on_get=self._answer_get
         )
-        self._frame_id = f"{state.site}/{state.name}/camera/{shot.name}"
+        self._frame_id = f"{state.site}/{state.name}/camera/{spec.name}"
         self._key_frames = KeyFrameClock()
         self._video_watched = self._image_watched = False
         self._drawn_version: tuple[int, ...] = ()
-        self._beat_at = self._drawn_at = self._image_at = self._not_before = -math.inf
+        self._next_frame_at = self._drawn_at = self._image_at = self._not_before = -math.inf
         self._last_image: CompressedImage | None = None
         self._still: asyncio.Task[None] | None = None
         for publisher in (self._video, self._image):
-            publisher.on_watched(self.look_for_watchers)
+            publisher.on_watched(self.update_watchers)
 
     @property
     def watched(self) -> bool:
-        """Whether anybody watches."""
+        """Whether the video or the pictures have subscribers."""
         return self._video_watched or self._image_watched
 
     @property
     def due_at(self) -> float:
-        """From when on it is to be drawn, as things stand [s]."""
+        """Time at which the next picture is due [s]."""
         if self._video_watched and self._key_frames.asked:
             return self._not_before
         if self._changed():
-            return max(self._beat_at, self._not_before)
+            return max(self._next_frame_at, self._not_before)
         return max(self._drawn_at + 1.0 / _IDLE_HZ, self._not_before)
 
     @property
     def wanted_hz(self) -> float:
-        """Pictures that are to be drawn a second, as things stand."""
+        """Current rate of pictures to draw [1/s]."""
         return self._rate_hz if self._changed() else _IDLE_HZ
 
-    def look_for_watchers(self) -> None:
-        """See who watches: called when somebody comes or goes."""
+    def update_watchers(self) -> None:
+        """Check for subscribers; called when their number changes."""
         video, image = self._video.watched, self._image.watched
         if (video, image) == (self._video_watched, self._image_watched):
             return
         now = time.monotonic()
         if video and not self._video_watched:
-            # Who comes to a stream that stood still would see where the robot was long ago.
+            # Otherwise a new subscriber's first picture would be one from before the stream paused.
             self._key_frames.ask(now)
         if (video or image) and not self.watched:
-            self._beat_at = self._drawn_at = -math.inf
+            self._next_frame_at = self._drawn_at = -math.inf
         self._video_watched, self._image_watched = video, image
-        self.quiet_since = None if self.watched else now
+        self.unwatched_since = None if self.watched else now
         self.awaited = False
-        self._workshop.watched(self)
+        self._host.watchers_changed(self)
 
-    def ask_key_frame(self) -> bool:
-        """Make the next picture a key frame; False: the last one is younger than a second."""
+    def request_key_frame(self) -> bool:
+        """Make the next picture a key frame; return False if the last one is younger than a second."""
         return self._key_frames.ask(time.monotonic())
 
-    def stay(self, asker: str = "") -> None:
-        """Somebody asked for it: who is about to watch has as long as who comes first.
+    def restart_timeout(self, asker: str = "") -> None:
+        """Restart the time for a subscriber to appear; called for each request of the view.
 
         Args:
-            asker: In whose name; empty: nobody's, a picture alone was asked for.
+            asker: The operator who requested it; empty for a request of a single picture.
         """
         if asker and asker not in self.askers and len(self.askers) < _MOST_ASKERS:
             self.askers.append(asker)
-        if self.quiet_since is not None:
-            self.quiet_since, self.awaited = time.monotonic(), True
+        if self.unwatched_since is not None:
+            self.unwatched_since, self.awaited = time.monotonic(), True
 
     def close(self) -> None:
-        """Publish and answer no more."""
+        """Stop publishing and answering."""
         self._closed = True
         self._video.close()
         self._image.close()
 
     async def draw(self, now: float) -> Coroutine[Any, Any, None]:
-        """Draw the picture that is due; what is then still to be done for it."""
-        self._beat_at = next_due(self._beat_at, now, 1.0 / self._rate_hz)
+        """Draw the picture that is due; return a coroutine that encodes and publishes it."""
+        self._next_frame_at = next_due(self._next_frame_at, now, 1.0 / self._rate_hz)
         self._drawn_at = now
         self._drawn_version = self._version()
         video = self._video_watched
-        image = self._image_watched and now - self._image_at >= 0.9 / self.shot.image_hz
+        image = self._image_watched and now - self._image_at >= 0.9 / self.spec.image_hz
         return await self._drawn(now, video=video, image=image) if video or image else _nothing()
 
     @property
     def _rate_hz(self) -> float:
-        return self.shot.fps if self._video_watched else self.shot.image_hz
+        return self.spec.fps if self._video_watched else self.spec.image_hz
 
     def _changed(self) -> bool:
         return self._version() != self._drawn_version
 
     def _version(self) -> tuple[int, ...]:
-        return (self.state.version, *(other.version for other in self._workshop.neighbours(self.state)))
+        return (self.state.version, *(other.version for other in self._host.neighbours(self.state)))
 
     async def _drawn(self, now: float, *, video: bool, image: bool) -> Coroutine[Any, Any, None]:
-        """Draw; a fault is this view's alone, which is tried again later."""
-        state, look = self.state, self.state.look
-        if look is None:
+        """Draw; after an error only this view pauses, and is retried later."""
+        state, appearance = self.state, self.state.appearance
+        if appearance is None:
             return _nothing()
         try:
-            neighbours = [self._as_known(each) for each in self._workshop.neighbours(state)]
-            composition = composed(self.shot, look, self._as_known(state), neighbours)
+            neighbours = [self._snapshot(each) for each in self._host.neighbours(state)]
+            composition = compose(self.spec, appearance, self._snapshot(state), neighbours)
             source_time_ns, dated_by = state.source_time_ns or time.time_ns(), state.dated_by
-            drawn = await self._workshop.draw(self.name, self.shot, composition)
+            drawn = await self._host.draw(self.name, self.spec, composition)
         except Exception as error:
             self._failed(now, error)
             return _nothing()
         key_frame = video and self._key_frames.due(now)
         if key_frame:
             self._key_frames.made(now)
-        order = Order(
+        job = PictureJob(
             stream=self.name,
-            shot=self.shot,
+            spec=self.spec,
             overlay=inside(composition.overlay, drawn.inside),
-            span=composition.span,
-            # A close-up is too small to be read.
+            clearance_line=composition.clearance_line,
+            # A close-up is too small for a legible label.
             labelled=not composition.follow,
             video=video,
             key_frame=key_frame,
             image=image,
         )
-        return self._publish(now, drawn, order, source_time_ns, dated_by)
+        return self._publish(now, drawn, job, source_time_ns, dated_by)
 
-    def _as_known(self, state: RobotState) -> Known:
-        return Known(state, self._workshop.ages(state))
+    def _snapshot(self, state: RobotState) -> RobotSnapshot:
+        return RobotSnapshot(state, self._host.ages(state))
 
     async def _publish(
-        self, now: float, drawn: Drawn, order: Order, source_time_ns: int, dated_by: int | None
+        self, now: float, drawn: Drawn, job: PictureJob, source_time_ns: int, dated_by: int | None
     ) -> None:
-        # Of a stream that is closed the encoder is released, and a new one would be nobody's.
-        finished = None if self._closed else await self._finished(now, drawn, order)
-        if finished is None or self._closed:
+        # The encoder of a closed stream has been released; a new one would never be released.
+        encoded = None if self._closed else await self._encoded(now, drawn, job)
+        if encoded is None or self._closed:
             return
-        if finished.packet is not None:
-            message = CompressedVideo(frame_id=self._frame_id, data=finished.packet.data, format="h264")
+        if encoded.packet is not None:
+            message = CompressedVideo(frame_id=self._frame_id, data=encoded.packet.data, format="h264")
             message.timestamp.FromNanoseconds(source_time_ns)
             self._video.put(
                 message,
                 source_time_ns=source_time_ns,
                 dated_by=dated_by,
-                key_frame=finished.packet.key_frame,
+                key_frame=encoded.packet.key_frame,
             )
-        if finished.jpeg is not None:
+        if encoded.jpeg is not None:
             self._image_at = now
-            picture = CompressedImage(frame_id=self._frame_id, data=finished.jpeg, format="jpeg")
+            picture = CompressedImage(frame_id=self._frame_id, data=encoded.jpeg, format="jpeg")
             picture.timestamp.FromNanoseconds(source_time_ns)
             self._last_image = picture
             if self._image_watched:
                 self._image.put(picture, source_time_ns=source_time_ns, dated_by=dated_by)
 
-    async def _finished(self, now: float, drawn: Drawn, order: Order) -> Finished | None:
+    async def _encoded(self, now: float, drawn: Drawn, job: PictureJob) -> EncodedPicture | None:
         try:
-            return await self._workshop.finish(drawn, order)
+            return await self._host.process(drawn, job)
         except Exception as error:
             self._failed(now, error)
             return None
@@ -222,18 +222,18 @@ class Stream:
     def _failed(self, now: float, error: Exception) -> None:
         where = f"{self.state.site}/{self.name}"
         if isinstance(error, RendererError):
-            log.error("%s: %s; tried again in %g s", where, error, _TRY_AGAIN_S)
+            log.error("%s: %s; retry in %g s", where, error, _TRY_AGAIN_S)
         else:
-            log.exception("%s could not be drawn; tried again in %g s", where, _TRY_AGAIN_S)
+            log.exception("%s could not be drawn; retry in %g s", where, _TRY_AGAIN_S)
         # A new encoder begins with a key frame.
         self._key_frames = KeyFrameClock()
-        # What was drawn before is not how it is now.
+        # The last picture is out of date.
         self._last_image = None
         self._not_before = now + _TRY_AGAIN_S
 
     async def _answer_get(self) -> CompressedImage | None:
-        """A picture of now; many askers share one."""
-        self.stay()
+        """Return a current picture; concurrent requests share one."""
+        self.restart_timeout()
         now = time.monotonic()
         if self._last_image is None or now - self._image_at >= 1.0 / IMAGE_HZ:
             if self._still is None or self._still.done():

@@ -1,6 +1,6 @@
-"""Where pictures are drawn: a drawing for each size that is watched, all in one thread.
+"""The drawing surfaces, one for each watched size, all in one thread.
 
-An OpenGL context belongs to the thread that made it, and drawing must not hold up the event loop.
+An OpenGL context belongs to the thread that made it, and drawing must not block the event loop.
 """
 
 import contextlib
@@ -21,14 +21,20 @@ from renderer.overlay import Picture
 from renderer.scene import Scene
 
 _NICE = 5
-# A size that nobody watches any more is let go: 1920 x 1080 holds a hundred megabytes. The next who watches
-# it pays for opening it.
+# A surface that is not used for this time is released: 1920 x 1080 takes a hundred megabytes. The next
+# picture of that size has to open it again.
 _UNUSED_S = 6.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Drawn:
-    """A picture (height, width, 3), its own, the camera that it was drawn by, and what that stands in."""
+    """A drawn picture.
+
+    Attributes:
+        picture: (height, width, 3), a copy.
+        camera: The camera that drew it.
+        inside: Name of the body that contains the camera; empty if there is none.
+    """
 
     picture: Picture
     camera: Camera
@@ -42,7 +48,7 @@ class _Open:
 
 
 class Studio:
-    """Draws pictures; every method runs in the studio's own thread."""
+    """The drawing surfaces and meshes; every method runs in the drawing thread."""
 
     def __init__(
         self, size: tuple[int, int], *, samples: int, shading: str, device: int | None, folder: Path
@@ -50,22 +56,22 @@ class Studio:
         """Open OpenGL.
 
         Args:
-            size: Most pictures' [px].
-            samples: Of anti-aliasing; 0: none.
+            size: Size of most pictures [px].
+            samples: Samples per pixel for anti-aliasing; 0: none.
 
         Raises:
-            NoOpenGLError: If there is none.
+            NoOpenGLError: If OpenGL cannot be used.
         """
         self._size, self._samples, self._folder = size, samples, folder
         self._shading, self._device = shading, device
         self._meshes: dict[str, Mesh] = {}
         self._close_ups: dict[str, Camera] = {}
         self._drawings: dict[tuple[tuple[int, int], int], _Open] = {}
-        # At once: a machine without OpenGL must say so at its start.
+        # Opened here, so that a machine without OpenGL fails at the start.
         self.renderer_name = self._drawing(size, samples).renderer_name
 
-    def take_mesh(self, name: str, glb: bytes, color: str) -> None:
-        """Take a link's mesh, unless it is there.
+    def add_mesh(self, name: str, glb: bytes, color: str) -> None:
+        """Add a link's mesh, unless it exists already.
 
         Raises:
             GlbError: If it is not GLB.
@@ -74,7 +80,7 @@ class Studio:
             self._meshes[name] = cache.prepared_once(glb, color=color, folder=self._folder)
 
     def has_mesh(self, name: str) -> bool:
-        """Whether a link's mesh is there."""
+        """Return whether a link's mesh has been added."""
         return name in self._meshes
 
     def draw(
@@ -89,8 +95,8 @@ class Studio:
         """Draw a scene.
 
         Args:
-            coarse: Without anti-aliasing.
-            close_up_of: The camera moves so that the bodies fill this stream's pictures.
+            coarse: Draw without anti-aliasing.
+            close_up_of: Name of a stream with a camera that moves so that the bodies fill its pictures.
         """
         drawing = self._drawing(size, 0 if coarse else self._samples)
         for part in (*scene.parts, *scene.others, *scene.fixtures):
@@ -98,16 +104,16 @@ class Studio:
                 drawing.add(part.mesh, self._meshes[part.mesh])
         if close_up_of is not None:
             camera = self._close_up(drawing, close_up_of, scene, camera)
-        # The drawing's own is drawn over next, while this one is still encoded.
+        # A copy, because the next picture overwrites the surface while this one is being encoded.
         picture = drawing.draw(scene, camera).copy()
         return Drawn(picture=picture, camera=camera, inside=drawing.inside(scene, camera))
 
     def tidy(self, *, meshes: Collection[str], streams: Collection[str]) -> None:
-        """Let go what nobody needs: sizes that were not drawn for a while, meshes, cameras.
+        """Release unused surfaces, meshes and cameras.
 
         Args:
-            meshes: That robots still have.
-            streams: That are still there.
+            meshes: Names of the meshes that robots have.
+            streams: Names of the existing streams.
         """
         now = time.monotonic()
         for key, opened in list(self._drawings.items()):
@@ -147,14 +153,14 @@ class Studio:
 
 
 def open_thread(name: str) -> ThreadPoolExecutor:
-    """A thread for drawing, or for what comes after."""
-    return ThreadPoolExecutor(max_workers=1, thread_name_prefix=name, initializer=_step_back)
+    """Return an executor with one low-priority thread, for drawing or encoding."""
+    return ThreadPoolExecutor(max_workers=1, thread_name_prefix=name, initializer=_lower_priority)
 
 
-def _step_back() -> None:
-    """Let everything else on the machine go first: a late picture harms nobody, a late state may.
+def _lower_priority() -> None:
+    """Lower the thread's priority: a late picture is harmless, a late robot state may not be.
 
-    The threads that software OpenGL starts from here take it over.
+    The threads that software OpenGL starts from here inherit the priority.
     """
     with contextlib.suppress(AttributeError, OSError):
         os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)

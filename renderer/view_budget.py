@@ -1,4 +1,4 @@
-"""Room for views that are asked for: what all of them may cost together, and each name's share."""
+"""Limits of requested views: for all of them together, and for each operator."""
 
 import math
 from collections.abc import Collection
@@ -6,35 +6,36 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from renderer.errors import NoRoomError, ViewRequestError
-from renderer.requested_views import Shot
+from renderer.requested_views import ViewSpec
 from robomesh import reason_codes as codes
 from robomesh.errors import QuotaError
 
-# Of as many views as may be asked for, so many may be as large and fast as the renderer's own, or as this.
+# Share of the `most_views` views that may have the size and rate of the renderer's own views, or at least
+# this cost.
 _FULL_VIEWS = 0.125
 _FULL_PIXELS_PER_S = 1280 * 720 * 30.0
 
 
-class AskedFor(Protocol):
-    """A view that somebody asked for.
+class RequestedView(Protocol):
+    """A requested view.
 
     Attributes:
-        askers: In whose names; it counts for the first one.
+        askers: The operators who requested it; it counts for the first one.
     """
 
-    shot: Shot
+    spec: ViewSpec
     askers: list[str]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Room:
-    """What may be drawn of what is asked for.
+class ViewBudget:
+    """Limits of the number and cost of requested views.
 
     Attributes:
-        most_views: Of all askers together.
-        quota: Of those, of each asker.
-        own_pixels_per_s: What one of the renderer's own views costs.
-        again_s: How long a view stays after its last watcher left.
+        most_views: Largest number of views of all askers together.
+        quota: Largest number of views of each asker.
+        own_pixels_per_s: Cost of one of the renderer's own views.
+        again_s: Time for which an unwatched view is kept [s].
     """
 
     most_views: int
@@ -42,41 +43,41 @@ class Room:
     own_pixels_per_s: float
     again_s: float
 
-    def check(self, views: Collection[AskedFor], shot: Shot, asker: str) -> None:
-        """Whether one more may be drawn.
+    def check(self, views: Collection[RequestedView], spec: ViewSpec, asker: str) -> None:
+        """Check that one more view may be drawn.
 
-        Who watches is known to nobody, who asked is. So a view counts for who asked first, as long as it
-        is there; one that others asked for too is passed on to them before its asker is refused.
+        Watchers are anonymous, askers are not. So a view counts for its first asker while it exists. If it
+        has other askers too, it is reassigned to one of them before a request of its first asker is rejected.
 
         Args:
-            views: Those that are drawn because somebody asked.
+            views: The requested views that exist.
 
         Raises:
-            ViewRequestError: If there never is room for it here.
-            NoRoomError: If there is no place for it, whoever asks.
-            QuotaError: If this asker has its share.
+            ViewRequestError: If the view alone exceeds the limit.
+            NoRoomError: If it exceeds what the existing views leave.
+            QuotaError: If it exceeds the asker's quota.
         """
         if len(views) >= self.most_views:
             raise NoRoomError(
-                f"{len(views)} views were asked for already, and {self.most_views} are possible "
-                "(most_views of the site file's [renderer]): ask again when some of them end"
+                f"{len(views)} requested views exist, and {self.most_views} are possible "
+                "(most_views in the site file's [renderer]): retry when some of them have ended"
             )
         most = self._most_pixels_per_s
-        if shot.pixels_per_s > most:
+        if spec.pixels_per_s > most:
             raise ViewRequestError(
-                f"{_cost(shot)}: {most / 1e6:.1f} million is all that there is for views that are asked for; "
-                f"{math.floor(most / (shot.size[0] * shot.size[1]))} a second is possible, more with a "
+                f"{_cost(spec)}: requested views may have {most / 1e6:.1f} million together; "
+                f"{math.floor(most / (spec.size[0] * spec.size[1]))} a second is possible, more with a "
                 "larger size, fps or most_views in the site file's [renderer]"
             )
         left = most - _pixels_per_s(views)
-        if shot.pixels_per_s > left:
+        if spec.pixels_per_s > left:
             raise NoRoomError(
-                f"{_cost(shot)}: {max(left, 0.0) / 1e6:.1f} of {most / 1e6:.1f} million are left "
-                "for views that are asked for; ask for a smaller or slower one"
+                f"{_cost(spec)}: {max(left, 0.0) / 1e6:.1f} of {most / 1e6:.1f} million are left "
+                "for requested views; request a smaller or slower one"
             )
-        while not self._fits(views, shot, asker):
-            if not self._passed_on(views, asker):
-                had = len(_had(views, asker))
+        while not self._fits(views, spec, asker):
+            if not self._reassign(views, asker):
+                had = len(_views_of(views, asker))
                 reason = codes.QUOTA_VIEWS(
                     asker=asker,
                     count=had,
@@ -86,16 +87,16 @@ class Room:
                 )
                 raise QuotaError(reason, again_s=self.again_s)
 
-    def _fits(self, views: Collection[AskedFor], shot: Shot, asker: str) -> bool:
-        """Whether a view is within somebody's share; one alone always is, whatever its size."""
-        had = _had(views, asker)
-        return len(had) < self.quota and (not had or _pixels_per_s(had) + shot.pixels_per_s <= self._share)
+    def _fits(self, views: Collection[RequestedView], spec: ViewSpec, asker: str) -> bool:
+        """Return whether a view is within the asker's share; a single view always is, whatever its size."""
+        had = _views_of(views, asker)
+        return len(had) < self.quota and (not had or _pixels_per_s(had) + spec.pixels_per_s <= self._share)
 
-    def _passed_on(self, views: Collection[AskedFor], asker: str) -> bool:
-        """Let one of somebody's views count for another who asked for it; False: there is none."""
-        for view in _had(views, asker):
+    def _reassign(self, views: Collection[RequestedView], asker: str) -> bool:
+        """Let one of the asker's views count for another of its askers; return whether that was possible."""
+        for view in _views_of(views, asker):
             for other in view.askers[1:]:
-                if self._fits(views, view.shot, other):
+                if self._fits(views, view.spec, other):
                     view.askers.remove(other)
                     view.askers.insert(0, other)
                     return True
@@ -107,7 +108,7 @@ class Room:
 
     @property
     def _share(self) -> float:
-        """Each asker's, of the pixels a second."""
+        """Each asker's share of the pixels per second."""
         return max(self._most_pixels_per_s * self.quota / self.most_views, self._full_pixels_per_s)
 
     @property
@@ -115,14 +116,14 @@ class Room:
         return max(self.own_pixels_per_s, _FULL_PIXELS_PER_S)
 
 
-def _had(views: Collection[AskedFor], asker: str) -> list[AskedFor]:
+def _views_of(views: Collection[RequestedView], asker: str) -> list[RequestedView]:
     return [view for view in views if view.askers[:1] == [asker]]
 
 
-def _cost(shot: Shot) -> str:
-    size = f"{shot.size[0]} x {shot.size[1]}"
-    return f"{size} at {shot.fps:g} a second counts for {shot.pixels_per_s / 1e6:.1f} million pixels a second"
+def _cost(spec: ViewSpec) -> str:
+    size = f"{spec.size[0]} x {spec.size[1]}"
+    return f"{size} at {spec.fps:g} a second counts for {spec.pixels_per_s / 1e6:.1f} million pixels a second"
 
 
-def _pixels_per_s(views: Collection[AskedFor]) -> float:
-    return sum(view.shot.pixels_per_s for view in views)
+def _pixels_per_s(views: Collection[RequestedView]) -> float:
+    return sum(view.spec.pixels_per_s for view in views)

@@ -1,4 +1,4 @@
-"""The cameras of a robot's views: named ones of its description, and any that somebody asks for."""
+"""The cameras of a robot's views: those named in its description, and requested ones."""
 
 import math
 from collections.abc import Mapping
@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.appearance import Look, frame_placements, home_placements
+from renderer.appearance import Appearance, frame_placements, home_placements
 from renderer.cameras import FIELD_OF_VIEW, Camera, fitted
 from renderer.errors import CameraError, UnknownViewError
 from robomesh.schemas.robomesh_pb2 import Vector3, View
@@ -16,13 +16,13 @@ from robomesh.schemas.robomesh_pb2 import Vector3, View
 FloatArray = NDArray[np.float64]
 
 FREE = "free"
-# Follows the arm and has nothing written on it: for the small pictures of a list.
+# A view that follows the arm and has no texts, for the small pictures of a list.
 CLOSE = "close"
 ASPECT = 16.0 / 9.0
 
-# From the front right and a little above: waist, shoulder and elbow all show.
+# From the front right and a little above: waist, shoulder and elbow are visible.
 _FREE_DIRECTION = np.array([1.5, -1.5, 0.7])
-# A long lens: what comes nearer does not take the picture's room from the rest.
+# A long focal length: parts close to the camera do not appear much larger than others.
 _FREE_FIELD_OF_VIEW = float(np.deg2rad(24.0))
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -32,78 +32,86 @@ _FIELDS_OF_VIEW_DEG = (1.0, 150.0)
 _LEAST_HEIGHT_M = 1e-3
 
 
-def view_names(look: Look) -> tuple[str, ...]:
-    """Every view that the robot has."""
-    return tuple(dict.fromkeys((*(view.name for view in look.description.views), FREE, CLOSE)))
+def view_names(appearance: Appearance) -> tuple[str, ...]:
+    """Return the names of all views of a robot."""
+    return tuple(dict.fromkeys((*(view.name for view in appearance.description.views), FREE, CLOSE)))
 
 
 def camera_of(
-    look: Look, name: str, placements: Mapping[str, FloatArray] | None = None, *, aspect: float = ASPECT
+    appearance: Appearance,
+    name: str,
+    placements: Mapping[str, FloatArray] | None = None,
+    *,
+    aspect: float = ASPECT,
 ) -> Camera:
-    """A view's camera.
+    """Return a view's camera.
 
     Args:
-        placements: (4, 4) link to site by link, for a camera on a link; none: at home.
+        placements: (4, 4) link to site by link, for a camera on a link; None: at home.
         aspect: The picture's width over its height.
 
     Raises:
         UnknownViewError: If the robot has no such view.
-        CameraError: If the description's camera is not possible.
+        CameraError: If the description's camera is invalid.
     """
-    view = next((view for view in look.description.views if view.name == name), None)
+    view = next((view for view in appearance.description.views if view.name == name), None)
     if view is not None and view.mount:
-        return camera_from(look, view, placements, aspect=aspect)
-    return _standing(look, name, aspect)
+        return camera_from(appearance, view, placements, aspect=aspect)
+    return _fixed_camera(appearance, name, aspect)
 
 
 def camera_from(
-    look: Look, view: View, placements: Mapping[str, FloatArray] | None = None, *, aspect: float = ASPECT
+    appearance: Appearance,
+    view: View,
+    placements: Mapping[str, FloatArray] | None = None,
+    *,
+    aspect: float = ASPECT,
 ) -> Camera:
-    """The camera of a view that somebody asks for.
+    """Return the camera that a view specifies.
 
-    An orthographic one that names no height shows all of the robot's room.
+    An orthographic camera without a height shows the robot's whole workspace.
 
     Args:
-        placements: (4, 4) link to site by link, for a camera on a link; none: at home.
+        placements: (4, 4) link to site by link, for a camera on a link; None: at home.
         aspect: The picture's width over its height.
 
     Raises:
-        CameraError: If it hangs on nothing, looks nowhere, or has numbers that are not possible.
+        CameraError: If its mount is unknown, eye and target coincide, or a number is out of range.
     """
     eye, target = _vector(view.eye, "eye"), _vector(view.target, "target")
     up = _vector(view.up, "up")
     if np.linalg.norm(target - eye) < _LEAST_LOOK_M:
         where = ", ".join(f"{value:g}" for value in eye)
-        raise CameraError(f"eye and target are both at ({where}) m: a camera looks from one to the other")
-    mount_to_site = _mount(look, view.mount, placements)
+        raise CameraError(f"eye and target are both at ({where}) m: they must be different points")
+    mount_to_site = _mount(appearance, view.mount, placements)
     camera = Camera(eye, target, up if up.any() else _UP, field_of_view=_field_of_view(view))
     if view.projection == View.ORTHOGRAPHIC:
-        camera = _scaled(look, replace(camera, half_height=1.0), view, aspect)
+        camera = _scaled(appearance, replace(camera, half_height=1.0), view, aspect)
     return _placed(camera, mount_to_site)
 
 
 @lru_cache(maxsize=256)
-def _standing(look: Look, name: str, aspect: float) -> Camera:
-    """A camera that stands in the site; it is asked for with each picture, and fitting it takes time."""
-    for view in look.description.views:
+def _fixed_camera(appearance: Appearance, name: str, aspect: float) -> Camera:
+    """Return a camera that is fixed in the site; cached, because fitting takes time for each picture."""
+    for view in appearance.description.views:
         if view.name == name:
-            return camera_from(look, view, aspect=aspect)
+            return camera_from(appearance, view, aspect=aspect)
     if name not in (FREE, CLOSE):
-        raise UnknownViewError(name, view_names(look))
-    base_to_site = look.base_to_site
-    middle = base_to_site[:3, :3].T @ (look.center - base_to_site[:3, 3])
+        raise UnknownViewError(name, view_names(appearance))
+    base_to_site = appearance.base_to_site
+    middle = base_to_site[:3, :3].T @ (appearance.center - base_to_site[:3, 3])
     camera = Camera(middle + _FREE_DIRECTION, middle, _UP, field_of_view=_FREE_FIELD_OF_VIEW)
-    return _placed(fitted(camera, aspect, look.room), base_to_site)
+    return _placed(fitted(camera, aspect, appearance.workspace), base_to_site)
 
 
-def _scaled(look: Look, camera: Camera, view: View, aspect: float) -> Camera:
+def _scaled(appearance: Appearance, camera: Camera, view: View, aspect: float) -> Camera:
     if view.HasField("height"):
         if not _LEAST_HEIGHT_M <= view.height <= _MOST_M:
-            raise CameraError(f"height {view.height:g} m: {_LEAST_HEIGHT_M:g} to {_MOST_M:g} is possible")
+            raise CameraError(f"height {view.height:g} m: must be from {_LEAST_HEIGHT_M:g} to {_MOST_M:g}")
         return replace(camera, half_height=view.height / 2.0)
     if view.mount:
-        return replace(camera, half_height=look.radius)
-    return fitted(camera, aspect, look.room)
+        return replace(camera, half_height=appearance.radius)
+    return fitted(camera, aspect, appearance.workspace)
 
 
 def _field_of_view(view: View) -> float:
@@ -113,29 +121,29 @@ def _field_of_view(view: View) -> float:
     degrees = math.degrees(view.field_of_view)
     if not least <= degrees <= most:
         raise CameraError(
-            f"field_of_view {view.field_of_view:g} rad: {math.radians(least):.3f} to "
-            f"{math.radians(most):.3f} ({least:g}° to {most:g}°) is possible"
+            f"field_of_view {view.field_of_view:g} rad: must be from {math.radians(least):.3f} to "
+            f"{math.radians(most):.3f} ({least:g}° to {most:g}°)"
         )
     return view.field_of_view
 
 
-def _mount(look: Look, mount: str, placements: Mapping[str, FloatArray] | None) -> FloatArray:
+def _mount(appearance: Appearance, mount: str, placements: Mapping[str, FloatArray] | None) -> FloatArray:
     if not mount:
-        return look.base_to_site
-    placed = placements or home_placements(look)
-    known = {**placed, **frame_placements(look, placed)}
+        return appearance.base_to_site
+    placed = placements or home_placements(appearance)
+    known = {**placed, **frame_placements(appearance, placed)}
     try:
         return known[mount]
     except KeyError:
         names = ", ".join(sorted(known))
-        raise CameraError(f"mount {mount!r} is no link or frame of the robot; there are {names}") from None
+        raise CameraError(f"mount {mount!r} is not a link or frame of the robot; use {names}") from None
 
 
 def _vector(vector: Vector3, what: str) -> FloatArray:
     values = np.array([vector.x, vector.y, vector.z])
     if not np.isfinite(values).all() or np.abs(values).max() > _MOST_M:
         numbers = ", ".join(f"{value:g}" for value in values)
-        raise CameraError(f"{what} ({numbers}): numbers from {-_MOST_M:g} to {_MOST_M:g} are possible")
+        raise CameraError(f"{what} ({numbers}): numbers must be from {-_MOST_M:g} to {_MOST_M:g}")
     return values
 
 

@@ -1,4 +1,4 @@
-"""Small GLB bodies and the scenes that the renderer's tests draw."""
+"""Small GLB bodies for the renderer's tests."""
 
 import json
 import struct
@@ -13,14 +13,14 @@ _FACES = np.array([[0, 2, 6, 4], [1, 5, 7, 3], [0, 4, 5, 1], [2, 3, 7, 6], [0, 1
 
 
 def cube(half, *, color=None, node=None):
-    """GLB of a cube about the origin; `color` is linear, as glTF has it."""
+    """Return the GLB of a cube centred on the origin; `color` is linear, as in glTF."""
     corners = np.array([[x, y, z] for x in (-half, half) for y in (-half, half) for z in (-half, half)])
     triangles = np.concatenate([_FACES[:, [0, 1, 2]], _FACES[:, [0, 2, 3]]])
     return glb(corners, triangles, color=color, node=node)
 
 
 def ball(radius, *, rings=24, sectors=48, color=None):
-    """GLB of a sphere about the origin, without normals."""
+    """Return the GLB of a sphere centred on the origin, without normals."""
     points = [
         (
             radius * np.sin(np.pi * ring / rings) * np.cos(2 * np.pi * sector / sectors),
@@ -39,7 +39,7 @@ def ball(radius, *, rings=24, sectors=48, color=None):
 
 
 def glb(positions, triangles, *, color=None, node=None):
-    """GLB of one primitive."""
+    """Return a GLB with one primitive."""
     points = positions.astype("<f4").tobytes()
     indices = triangles.astype("<u4").tobytes()
     primitive = {"attributes": {"POSITION": 0}, "indices": 1}
@@ -72,7 +72,7 @@ def glb(positions, triangles, *, color=None, node=None):
 
 
 def context_or_skip():
-    """An OpenGL context; the test is skipped in words where there is none."""
+    """Return an OpenGL context; skip the test with the reason if there is none."""
     try:
         return open_context()
     except NoOpenGLError as error:

@@ -1,4 +1,4 @@
-"""The pictures that the tests compare with, and those of the documents, made anew.
+"""Generator of the tests' reference pictures, and of the pictures in the documents.
 
 ./dev run python tests/renderer/make_pictures.py            # tests/renderer/pictures/
 ./dev run python tests/renderer/make_pictures.py --docs     # docs/rendered-*.png
@@ -22,7 +22,7 @@ from renderer.overlay import Overlay, Row, _write_badge, write_over
 from renderer.scene_assembly import Placed, scene_of
 from renderer.views import camera_from, camera_of
 from robomesh.schemas.robomesh_pb2 import Vector3, View
-from tests.renderer.stage import cell, drawing_of, posed, robot
+from tests.renderer.library_scenes import cell, drawing_of, posed, robot
 
 ROOT = Path(__file__).parents[2]
 PICTURES = Path(__file__).with_name("pictures")
@@ -33,33 +33,33 @@ Picture = np.ndarray
 
 
 def free(folder, *, shading="fast", size=SMALL, near=False, change=lambda scene: scene):
-    """A Puma 560 from the front right."""
-    look, meshes = robot("puma560", folder)
-    scene = change(scene_of(Placed(look, placements_at(look, posed(look)))))
-    return _drawn(meshes, scene, camera_of(look, "free"), size, shading, near=near)
+    """Draw a Puma 560 from the front right."""
+    appearance, meshes = robot("puma560", folder)
+    scene = change(scene_of(Placed(appearance, placements_at(appearance, posed(appearance)))))
+    return _drawn(meshes, scene, camera_of(appearance, "free"), size, shading, near=near)
 
 
 def front(folder, *, size=SMALL):
-    """A Pt600 from the front, in true proportions."""
-    look, meshes = robot("pt600", folder)
-    scene = scene_of(Placed(look, placements_at(look, posed(look))))
-    return _drawn(meshes, scene, camera_of(look, "front"), size, "fast")
+    """Draw a Pt600 from the front with an orthographic camera."""
+    appearance, meshes = robot("pt600", folder)
+    scene = scene_of(Placed(appearance, placements_at(appearance, posed(appearance))))
+    return _drawn(meshes, scene, camera_of(appearance, "front"), size, "fast")
 
 
 def full(folder, *, size=SMALL):
-    """A cell with the lamp's shadow on everything; of the right arm nobody knows where it is."""
+    """Draw a cell with the lamp's shadow on all bodies; the right arm is stale."""
     return _cell(folder, size, shading="full")
 
 
 def program(folder, *, size=SMALL):
-    """A checked program's ghost and path, the tool's trail and axes, a link that touches."""
-    looks, _ = cell(CELL, folder)
-    look = looks["left"]
-    now = posed(look)
+    """Draw a checked program's ghost and path, the tool's trail and axes, and a link in contact."""
+    appearances, _ = cell(CELL, folder)
+    appearance = appearances["left"]
+    now = posed(appearance)
     reached = {**now, "waist": now["waist"] - 0.9}
 
     def tool_at(positions):
-        return frame_placements(look, placements_at(look, positions))["tool"][:3, 3]
+        return frame_placements(appearance, placements_at(appearance, positions))["tool"][:3, 3]
 
     steps = np.linspace(0.0, 1.0, 40)
     swing = [{**now, "waist": now["waist"] + 0.8 * s, "elbow": now["elbow"] + 0.3 * s} for s in steps[::-1]]
@@ -70,13 +70,13 @@ def program(folder, *, size=SMALL):
         touching={"wrist"},
         trail=np.array([tool_at(each) for each in swing]),
         frames=True,
-        ghost=placements_at(look, reached),
+        ghost=placements_at(appearance, reached),
         path=np.array([tool_at({**now, "waist": now["waist"] - 0.9 * s}) for s in steps]),
     )
 
 
 def fence(folder, *, size=SMALL):
-    """From behind the fence, which is seen through."""
+    """Draw a cell from behind the fence, which is transparent."""
     view = View(eye=Vector3(x=-2.7, y=-1.7, z=1.3), target=Vector3(x=0.1, y=-0.4, z=0.4))
     return _cell(folder, size, view=view)
 
@@ -91,8 +91,8 @@ STORED: dict[str, Callable[..., Picture]] = {
 
 
 def _cell(folder, size, *, shading="fast", touching=(), view=None, **shown):
-    looks, meshes = cell(CELL, folder)
-    left, right = looks["left"], looks["right"]
+    appearances, meshes = cell(CELL, folder)
+    left, right = appearances["left"], appearances["right"]
     placed = placements_at(left, posed(left))
     scene = scene_of(
         Placed(left, placed, touching=touching),
@@ -117,8 +117,8 @@ def _drawn(meshes, scene, camera, size, shading, *, near=False):
 
 
 def legend(picture: Picture, view: str, marks: tuple[str, ...] = ("simulated",)) -> Picture:
-    """What a renderer's picture tells beside the arm."""
-    look, _ = robot("pt600", cache_folder())
+    """Write the texts of a renderer's picture."""
+    appearance, _ = robot("pt600", cache_folder())
     rows = tuple(
         Row(
             joint.name,
@@ -126,9 +126,9 @@ def legend(picture: Picture, view: str, marks: tuple[str, ...] = ("simulated",))
             "°",
             (q - joint.lower) / (joint.upper - joint.lower),
         )
-        for joint, q in zip(look.description.joints, posed(look).values(), strict=True)
+        for joint, q in zip(appearance.description.joints, posed(appearance).values(), strict=True)
     )
-    scale = f"{look.square_m * 1e3:g} mm"
+    scale = f"{appearance.square_m * 1e3:g} mm"
     write_over(
         picture,
         Overlay("left", view, "14:02:11.3 CST", "moving, auto", rows, marks=marks, scale=scale),
@@ -137,7 +137,7 @@ def legend(picture: Picture, view: str, marks: tuple[str, ...] = ("simulated",))
 
 
 def stale() -> Picture:
-    """What a console's MJPEG shows in a picture's place while none comes."""
+    """Return the picture that a console's MJPEG shows while it receives no pictures."""
     picture = np.full((360, 640, 3), 120, dtype=np.uint8)
     for y, text, size in ((62, "STALE", 72), (216, "no picture comes", 44)):
         _write_badge(picture, text, size=size, y=y)

@@ -1,4 +1,4 @@
-"""Cameras: where a point lands, and what is in the picture."""
+"""Cameras: projection of points, and fitting."""
 
 import numpy as np
 import pytest
@@ -11,11 +11,11 @@ TOP = Camera(np.array([0, 0, 3.0]), np.zeros(3), np.array([0, 1.0, 0]), half_hei
 
 def test_a_top_view_shows_x_to_the_right_and_y_upwards_to_scale():
     points = np.array([[0.0, 0.0, 0.5], [0.4, 0.0, 0.1], [0.0, 0.45, 0.9]])
-    # 180 px for 0.9 m, whatever the height.
+    # 180 px for 0.9 m, independent of the height.
     assert pixels(TOP, SIZE, points) == pytest.approx(np.array([[320, 180], [400, 180], [320, 90]]))
 
 
-def test_a_perspective_target_lands_in_the_middle_and_the_nearer_looks_larger():
+def test_a_perspective_target_is_in_the_centre_and_closer_bodies_are_larger():
     camera = Camera(np.array([2.0, -1.0, 1.5]), np.array([0.1, 0.2, 0.3]), np.array([0, 0, 1.0]))
     assert pixels(camera, SIZE, camera.target[None]) == pytest.approx(np.array([[320.0, 180.0]]))
     up = np.array([0.0, 0.0, 0.1])
@@ -33,12 +33,12 @@ def test_a_fitted_camera_shows_every_point_and_wastes_little(half_height):
     assert camera.forward == pytest.approx(start.forward)
     shares = pixels(camera, SIZE, points) / SIZE * 2 - 1
     assert 0.9 < np.abs(shares).max() < 1.0
-    # As much room above as below, in the direction that decides.
+    # Equal margins on both sides, in the direction that determines the scale.
     tight = np.abs(shares).max(axis=0).argmax()
     assert shares[:, tight].min() == pytest.approx(-shares[:, tight].max(), abs=1e-6)
 
 
-def test_a_close_up_stays_while_its_object_fills_it_and_moves_when_it_does_not():
+def test_a_close_up_moves_only_when_its_object_no_longer_fills_it():
     random = np.random.default_rng(1)
     points = random.uniform(-0.5, 0.5, (200, 3)) + np.array([3.0, 0.0, 0.5])
     far = Camera(np.array([9.0, -6, 3.5]), np.array([3.0, 0, 0.2]), np.array([0, 0, 1.0]))
@@ -55,7 +55,7 @@ def test_a_close_up_stays_while_its_object_fills_it_and_moves_when_it_does_not()
         assert (shares < 1).all()
 
 
-def test_looking_along_up_still_gives_a_picture():
+def test_a_view_direction_along_up_is_possible():
     camera = Camera(np.array([0, 0, 3.0]), np.zeros(3), np.array([0, 0, 1.0]), half_height=1.0)
     rotation = site_to_camera(camera)[:3, :3]
     assert rotation @ rotation.T == pytest.approx(np.eye(3))

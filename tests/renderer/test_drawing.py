@@ -1,4 +1,4 @@
-"""Pictures: real pixels from a real OpenGL."""
+"""Drawing with real OpenGL: colours, occlusion, shadows, transparency."""
 
 from dataclasses import replace
 
@@ -77,7 +77,7 @@ def test_the_nearer_body_hides_the_farther(drawing):
         assert is_red(drawing.draw(scene(*order), FRONT)[90, 160])
 
 
-def test_glass_lets_what_is_behind_it_through(drawing):
+def test_bodies_behind_glass_are_visible(drawing):
     behind = drawing.draw(scene(Part("red", at(0, 0, 0.2))), FRONT)[90, 160].astype(int)
     through = drawing.draw(scene(Part("glass", at(0.4, 0, 0.2)), Part("red", at(0, 0, 0.2))), FRONT)
     red, _, blue = through[90, 160].astype(int) - behind
@@ -97,20 +97,20 @@ def test_a_body_casts_its_shadow_on_the_floor_below_it(drawing):
     empty = drawing.draw(scene(), TOP).astype(int)
     hovering = drawing.draw(scene(Part("red", at(0, 0, 0.1))), TOP).astype(int)
     dark = (empty - hovering).min(axis=2)
-    # The cube fills 15 px to each side of the middle.
+    # The cube extends 15 px to each side of the centre.
     assert dark[85:95, 160 - 22 : 160 - 16].max() > 15
     assert dark[90, 4] == 0
 
 
-def test_the_floor_is_drawn_at_its_height_and_not_at_all_where_there_is_none(drawing):
+def test_the_floor_is_drawn_at_its_height_or_not_at_all(drawing):
     def seen(floor):
         return drawing.draw(replace(scene(), floor=floor), FREE).astype(int)
 
     none = seen(None)
-    # Without a floor only the backdrop is there: the same from left to right.
+    # Without a floor there is only the backdrop, which is constant from left to right.
     assert np.ptp(none, axis=1).max() <= 3
     assert np.ptp(seen(0.0), axis=1).max() > 10
-    # Seen from 1 m up, a floor that is lower begins lower in the picture, from one horizon on.
+    # Seen from a height of 1 m, a lower floor looks different.
     assert np.abs(seen(-0.25) - seen(0.0)).max() > 10
     body = scene(Part("red", at(0, 0, 0.2)))
     assert is_red(drawing.draw(replace(body, floor=None), FREE)[90, 160])
@@ -129,14 +129,14 @@ def test_edges_are_smooth_with_samples_and_stepped_without(drawing):
     assert shades[0] > shades[1]
 
 
-def test_a_body_beside_the_camera_and_one_out_of_sight_do_no_harm(drawing):
+def test_bodies_next_to_the_camera_or_out_of_sight_are_harmless(drawing):
     parts = Part("red", at(0, 0, 0.2)), Part("green", at(1.2, -1.5, 1.0)), Part("green", at(9, 9, 9))
     drawing.draw(scene(*parts), FREE)
     picture = drawing.draw(scene(Part("green", at(9, 9, 9))), TOP)
     assert not is_red(picture[90, 160])
 
 
-def test_a_mesh_that_was_forgotten_or_never_came_is_not_drawn(drawing):
+def test_a_released_or_unknown_mesh_is_not_drawn(drawing):
     drawing.add("passing", prepared(cube(0.1, color=RED)))
     drawing.forget(["passing"])
     picture = drawing.draw(scene(Part("passing", at(0, 0, 0.2)), Part("never", at(0, 0, 0.2))), FRONT)
@@ -144,14 +144,14 @@ def test_a_mesh_that_was_forgotten_or_never_came_is_not_drawn(drawing):
 
 
 @pytest.mark.slow
-def test_a_device_that_there_is_none_of_is_refused_in_one_line():
+def test_an_unknown_device_is_rejected_in_one_line():
     context_or_skip().release()
     with pytest.raises(NoOpenGLError, match=r"EGL device 99 cannot be used .*count from 0") as caught:
         open_context(device=99)
     assert "\n" not in str(caught.value)
 
 
-def test_a_ghost_is_blue_and_lets_through_what_is_behind_it(drawing):
+def test_a_ghost_is_blue_and_transparent(drawing):
     red = Part("red", at(0, 0, 0.2))
     ghost = replace(red, part_to_site=at(0.4, 0, 0.2), finish=Finish.GHOST)
     alone = drawing.draw(scene(red), FRONT)[90, 160].astype(int)
@@ -160,7 +160,7 @@ def test_a_ghost_is_blue_and_lets_through_what_is_behind_it(drawing):
     assert seen[0] > 60
 
 
-def test_a_line_is_drawn_before_what_is_behind_it_and_not_through_what_is_before_it(drawing):
+def test_a_line_is_hidden_by_bodies_in_front_of_it_only(drawing):
     cube_there = scene(Part("red", at(0, 0, 0.2)))
     for x, shown in ((0.3, True), (-0.3, False)):
         points = np.array([[x, -0.05, 0.2], [x, 0.05, 0.2]])
@@ -169,7 +169,7 @@ def test_a_line_is_drawn_before_what_is_behind_it_and_not_through_what_is_before
         assert bool(pixel[2] > pixel[0]) is shown
 
 
-def test_a_fence_before_the_camera_is_seen_through_and_one_behind_the_arm_is_not(drawing):
+def test_a_fence_is_transparent_in_front_of_the_arm_and_opaque_behind_it(drawing):
     drawing.add("fence", prepared(cube(0.45, color=GREEN)))
     arm = scene(Part("red", at(0, 0, 0.2)))
     before = replace(arm, fixtures=(Part("fence", at(1.2, 0, 0.2)),))
@@ -180,7 +180,7 @@ def test_a_fence_before_the_camera_is_seen_through_and_one_behind_the_arm_is_not
     assert red < 40
 
 
-def test_a_camera_inside_a_body_draws_without_harm_and_says_where_it_is(drawing):
+def test_a_camera_inside_a_body_draws_and_names_the_body(drawing):
     inside = replace(FREE, eye=np.array([0.02, 0.0, 0.2]), target=np.array([1.0, 0.0, 0.2]))
     there = scene(Part("ball", at(0, 0, 0.2), name="forearm"))
     assert drawing.inside(there, inside) == "forearm"
@@ -199,7 +199,7 @@ def test_full_shading_casts_a_body_shadow_on_another():
         alone = lit.draw(scene(table), TOP).astype(int)
         below = lit.draw(scene(table, Part("ball", at(0.0, 0.0, 0.6))), TOP).astype(int)
         darker = (alone - below).min(axis=2)
-        # The lamp stands to positive x and y: the shadow falls beside the ball, on the table.
+        # The lamp is at positive x and y: the ball's shadow is next to it, on the table.
         assert darker[95:150, 85:155].max() > 30
         assert darker[50:80, 180:230].max() < 8
     finally:
@@ -207,6 +207,6 @@ def test_full_shading_casts_a_body_shadow_on_another():
 
 
 @pytest.mark.slow
-def test_a_shading_that_there_is_none_of_is_refused():
+def test_an_unknown_shading_is_rejected():
     with pytest.raises(ValueError, match="'dim' is not a valid Shading"):
         Drawing(context_or_skip(), SIZE, shading="dim")

@@ -1,4 +1,4 @@
-"""Encoders: what comes out is decoded again by FFmpeg, as a browser would."""
+"""Encoders: their output is decoded by FFmpeg, as a browser would."""
 
 import av
 import cv2
@@ -15,7 +15,7 @@ IDR, SPS, PPS = 5, 7, 8
 
 
 def pictures(count):
-    """A red square that wanders over grey."""
+    """Yield pictures of a red square that moves over grey."""
     for number in range(count):
         picture = np.full((SIZE[1], SIZE[0], 3), 128, dtype=np.uint8)
         picture[60:120, 10 + 4 * number : 70 + 4 * number] = (200, 30, 30)
@@ -23,7 +23,7 @@ def pictures(count):
 
 
 def units(data):
-    """The types of the NAL units of an Annex B packet."""
+    """Return the types of the NAL units of an Annex B packet."""
     assert data.startswith((b"\0\0\0\1", b"\0\0\1"))
     starts = [at + 3 for at in range(len(data) - 3) if data[at : at + 3] == b"\0\0\1"]
     return [data[at] & 31 for at in starts]
@@ -31,7 +31,7 @@ def units(data):
 
 def decoded(packets):
     decoder = av.CodecContext.create("h264", "r")
-    # One thread: frame threads hold pictures back.
+    # One thread: several threads would delay pictures.
     decoder.thread_count = 1
     frames = [frame for data in packets for frame in decoder.decode(av.Packet(data))]
     return frames + decoder.decode(None)
@@ -50,7 +50,7 @@ def test_each_picture_is_one_packet_and_all_are_decoded():
         assert np.abs(seen.astype(int) - picture).mean() < 4
 
 
-def test_only_key_frames_are_intra_and_each_brings_its_parameter_sets():
+def test_only_key_frames_are_intra_and_have_parameter_sets():
     encoder = open_encoder(SIZE, 30)
     for number, picture in enumerate(pictures(30)):
         kinds = units(encoder.encode(picture, key_frame=number in (0, 7)).data)
@@ -66,13 +66,13 @@ def test_a_stream_can_be_joined_at_any_key_frame():
     assert len(decoded(packets[12:])) == 8
 
 
-def test_the_stream_tells_its_colours():
+def test_the_stream_declares_its_colour_space():
     encoder = H264Encoder(SIZE, 30, codec="libx264")
     frame = decoded([encoder.encode(picture, key_frame=True).data for picture in pictures(1)])[0]
     assert (frame.colorspace, frame.color_range) == (6, 1)
 
 
-def test_an_encoder_that_cannot_be_opened_says_so():
+def test_an_encoder_that_cannot_be_opened_is_an_error():
     with pytest.raises(NoEncoderError, match="libx264 cannot be opened"):
         H264Encoder((0, 0), 30, codec="libx264")
 
@@ -83,7 +83,7 @@ def test_a_jpeg_shows_the_picture():
     assert np.abs(seen.astype(int) - picture).mean() < 4
 
 
-def test_a_key_frame_comes_first_then_each_two_seconds():
+def test_a_key_frame_is_first_and_then_every_two_seconds():
     clock = KeyFrameClock()
     made = []
     for tick in range(150):
@@ -94,7 +94,7 @@ def test_a_key_frame_comes_first_then_each_two_seconds():
     assert made == [0, 60, 120]
 
 
-def test_however_many_join_one_key_frame_a_second_is_forced():
+def test_at_most_one_key_frame_a_second_is_forced():
     clock = KeyFrameClock()
     made = []
     for tick in range(90):
@@ -106,33 +106,33 @@ def test_however_many_join_one_key_frame_a_second_is_forced():
     assert made == [0, 30, 60]
 
 
-def test_a_stream_of_few_bits_keeps_to_them_whatever_it_shows():
+def test_a_limited_bit_rate_is_kept_for_any_content():
     size, fps, most = (640, 360), 15, 250e3
     noise = np.random.default_rng(0)
     encoder = open_encoder(size, fps, most_bits_per_s=most)
     bits = []
     for number in range(10 * fps):
-        # A picture that changes all over, all the time.
+        # Every pixel changes in every picture.
         picture = cv2.resize(noise.integers(0, 256, (18, 32, 3), dtype=np.uint8), size)
         bits.append(8 * len(encoder.encode(picture, key_frame=number % (2 * fps) == 0).data))
     seconds = [sum(bits[at : at + fps]) for at in range(fps, len(bits), fps)]
     assert sum(seconds) / len(seconds) < 1.1 * most
     assert max(seconds) < 1.6 * most
-    # A key frame fills the line for half a second at most.
+    # A key frame takes at most half a second to send.
     assert max(bits) < 0.5 * most
 
 
-def test_an_encoder_that_has_gone_since_is_replaced():
+def test_a_preferred_encoder_that_does_not_work_is_replaced():
     encoder = open_encoder(SIZE, 30, codec="h264_that_there_is_not")
     assert encoder.name in ("h264_nvenc", "libx264")
 
 
-def test_why_the_better_encoder_is_not_used_is_told(monkeypatch, caplog):
+def test_the_reason_for_a_worse_encoder_is_logged(monkeypatch, caplog):
     monkeypatch.setattr(encoders, "_CODECS", {"h264_none": {}, "libx264": encoders._CODECS["libx264"]})
     with caplog.at_level("INFO"):
         assert encoders.best_codec(SIZE, 30) == "libx264"
     assert "h264_none cannot be opened" in caplog.text
     assert "libx264 is used instead" in caplog.text
     monkeypatch.setattr(encoders, "_CODECS", {"h264_none": {}})
-    with pytest.raises(NoEncoderError, match=r"no H\.264 encoder here: h264_none cannot be opened"):
+    with pytest.raises(NoEncoderError, match=r"no H\.264 encoder works: h264_none cannot be opened"):
         encoders.best_codec(SIZE, 30)

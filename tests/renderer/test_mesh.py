@@ -1,4 +1,4 @@
-"""Meshes: read from GLB, made ready, kept."""
+"""Meshes: reading from GLB, preparation, cache."""
 
 import math
 import struct
@@ -23,7 +23,7 @@ def area(mesh):
 def test_a_cube_keeps_its_flat_faces_and_its_twelve_edges():
     mesh = prepared(cube(0.5))
     assert len(mesh.triangles) == 12
-    # Each of the 8 corners once a face that meets there.
+    # Each of the 8 corners once for each adjacent face.
     assert len(mesh.positions) == 24
     assert np.isclose(np.abs(mesh.normals).max(axis=1), 1.0).all()
     assert len(mesh.edges) == 2 * 12
@@ -67,7 +67,7 @@ def test_a_mirrored_node_still_shows_its_outside():
         ((1.0, 0.0, 0.0, 0.5), "", (255, 0, 0, 128)),
     ],
 )
-def test_the_files_own_colour_counts_before_the_descriptions(color, said, painted):
+def test_the_files_colour_takes_precedence_over_the_descriptions(color, said, painted):
     mesh = prepared(cube(0.5, color=color), color=said)
     assert tuple(mesh.colors[0]) == painted
     assert mesh.transparent == (painted[3] < 255)
@@ -81,37 +81,37 @@ def test_an_empty_mesh_is_empty():
 @pytest.mark.parametrize(
     ("data", "says"),
     [
-        (b"", "0 bytes that are not GLB"),
+        (b"", "0 bytes are not GLB"),
         (b"#VRML V2.0 utf8 Shape {}", "not GLB"),
         (b"glTF" + struct.pack("<II", 1, 24) + bytes(12), "version 1"),
-        (cube(0.5)[:-8], "whole"),
-        (cube(0.5).replace(b'"POSITION": 0', b'"POSITION": 7'), "does not fit together"),
-        (cube(0.5).replace(b'"count": 8', b'"count": 3'), "name vertex 7 of 3"),
+        (cube(0.5)[:-8], "complete"),
+        (cube(0.5).replace(b'"POSITION": 0', b'"POSITION": 7'), "is inconsistent"),
+        (cube(0.5).replace(b'"count": 8', b'"count": 3'), "use vertex 7 of 3"),
     ],
 )
-def test_what_is_not_a_mesh_is_refused_in_words(data, says):
+def test_invalid_glb_is_rejected(data, says):
     with pytest.raises(GlbError, match=says):
         prepared(data)
 
 
-def test_positions_that_are_no_numbers_are_refused():
+def test_positions_that_are_not_finite_are_rejected():
     with pytest.raises(GlbError, match="not finite"):
         prepared(cube(math.nan))
 
 
-def test_nodes_that_go_round_in_a_circle_are_refused():
-    with pytest.raises(GlbError, match="circle"):
+def test_nodes_that_form_a_cycle_are_rejected():
+    with pytest.raises(GlbError, match="cycle"):
         prepared(cube(0.5, node={"children": [0]}))
 
 
-def test_bytes_cut_anywhere_are_an_error_and_no_crash():
+def test_a_file_truncated_anywhere_is_an_error():
     whole = cube(0.5)
     for length in range(len(whole)):
         with pytest.raises(GlbError):
             read_glb(whole[:length])
 
 
-def test_a_mesh_is_made_ready_once(tmp_path, monkeypatch):
+def test_a_mesh_is_prepared_once(tmp_path, monkeypatch):
     glb = ball(0.3)
     first = cache.prepared_once(glb, color="#102030", folder=tmp_path)
     monkeypatch.setattr(cache, "prepared", None)
@@ -120,7 +120,7 @@ def test_a_mesh_is_made_ready_once(tmp_path, monkeypatch):
     assert np.array_equal(first.triangles, again.triangles)
 
 
-def test_a_cache_that_was_damaged_or_cannot_be_written_costs_time_only(tmp_path):
+def test_a_damaged_or_unwritable_cache_is_harmless(tmp_path):
     glb = cube(0.5)
     whole = cache.prepared_once(glb, color="", folder=tmp_path)
     (path,) = tmp_path.iterdir()
@@ -134,7 +134,7 @@ def test_a_cache_that_was_damaged_or_cannot_be_written_costs_time_only(tmp_path)
     cache.store_glb(glb, no_folder)
 
 
-def test_a_stored_mesh_that_was_damaged_is_not_taken(tmp_path):
+def test_a_damaged_stored_mesh_is_not_used(tmp_path):
     cache.store_glb(b"some mesh", tmp_path)
     (path,) = tmp_path.iterdir()
     assert cache.stored_glb(path.stem, tmp_path) == b"some mesh"

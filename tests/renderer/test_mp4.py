@@ -1,4 +1,4 @@
-"""MP4 made of a stream's packets: FFmpeg reads it back, whole or cut off anywhere."""
+"""MP4 from a stream's packets, read back by FFmpeg, complete or truncated."""
 
 import io
 
@@ -12,13 +12,13 @@ from renderer.h264_sps import picture_size
 from renderer.mp4 import FragmentedMp4
 from robomesh.h264 import is_key_frame
 
-# Not a multiple of 16: the parameter set cuts it.
+# Not a multiple of 16: the parameter set has a cropping rectangle.
 SIZE = (334, 190)
 START_NS = 1_700_000_000_000_000_000
 
 
 def packets(count, *, size=SIZE, key_frames=10):
-    """A red square that wanders over grey."""
+    """Yield packets of a red square that moves over grey."""
     encoder = H264Encoder(size, 30, codec="libx264")
     for number in range(count):
         picture = np.full((size[1], size[0], 3), 128, dtype=np.uint8)
@@ -49,7 +49,7 @@ def test_every_picture_is_read_back_at_its_time():
     assert mp4.duration_s == pytest.approx(29 * 0.04 + 1 / 30, abs=1e-4)
 
 
-def test_a_file_that_is_still_written_plays_up_to_where_it_is():
+def test_an_unfinished_file_plays_up_to_its_end():
     _, data = written(30)
     whole = b"".join(data[:17])
     assert len(read(whole)) == 17
@@ -63,7 +63,7 @@ def test_a_reader_finds_the_key_frames():
     assert key_frames == [number % 10 == 0 for number in range(30)]
 
 
-def test_a_file_begins_with_a_key_frame_whenever_one_joins():
+def test_a_file_begins_with_the_first_key_frame():
     mp4 = FragmentedMp4()
     stream = list(packets(15))
     assert [is_key_frame(packet) for packet in stream] == [number % 10 == 0 for number in range(15)]
@@ -72,7 +72,7 @@ def test_a_file_begins_with_a_key_frame_whenever_one_joins():
     assert len(read(b"".join(data))) == 5
 
 
-def test_times_that_stand_still_or_go_back_keep_the_order():
+def test_repeated_or_decreasing_times_keep_the_order():
     times = [START_NS + at * 10**6 for at in (0, 40, 40, 30, 200)]
     frames = read(b"".join(written(5, times_ns=times)[1]))
     at = [frame.time for frame in frames]
@@ -80,38 +80,38 @@ def test_times_that_stand_still_or_go_back_keep_the_order():
     assert at[-1] == pytest.approx(0.2, abs=1e-4)
 
 
-def test_pictures_may_stand_for_long():
+def test_long_gaps_between_pictures_are_kept():
     times = [START_NS + at * 10**9 for at in (0, 1, 3600, 3601)]
     frames = read(b"".join(written(4, times_ns=times)[1]))
     assert [frame.time for frame in frames] == pytest.approx([0, 1, 3600, 3601])
 
 
-def test_a_stream_that_becomes_another_is_refused_in_words():
+def test_a_stream_with_changed_parameters_is_rejected():
     mp4, _ = written(5)
     (other,) = packets(1, size=(640, 360))
-    with pytest.raises(Mp4Error, match="has become another"):
+    with pytest.raises(Mp4Error, match="has changed"):
         mp4.add(other, START_NS + 10**9)
 
 
 @pytest.mark.parametrize("packet", [b"", b"no video", b"\0\0\0\1", b"\0\0\1\x09\xf0"])
-def test_what_is_no_picture_is_refused_in_words(packet):
-    with pytest.raises(Mp4Error, match=r"no picture of H\.264"):
+def test_a_packet_without_a_picture_is_rejected(packet):
+    with pytest.raises(Mp4Error, match=r"no H\.264 picture"):
         FragmentedMp4().add(packet, START_NS)
 
 
-def test_a_key_frame_without_parameter_sets_is_refused_in_words():
+def test_a_key_frame_without_parameter_sets_is_rejected():
     with pytest.raises(Mp4Error, match="SPS and PPS"):
         FragmentedMp4().add(b"\0\0\1\x65abc", START_NS)
 
 
 @pytest.mark.parametrize("size", [(64, 64), (320, 180), (640, 360), (854, 480), (1280, 720), (1920, 1080)])
-def test_a_parameter_set_tells_the_size(size):
+def test_the_size_is_read_from_the_parameter_set(size):
     (packet,) = packets(1, size=size)
     sps = next(unit for unit in packet.split(b"\0\0\1") if unit and unit[0] & 31 == 7)
     assert picture_size(sps.rstrip(b"\0")) == size
 
 
 @pytest.mark.parametrize("sps", [b"\x67", b"\x67\x42", b"\x67" + b"\0" * 9, b"\x67\x64\x00\x1f\x00"])
-def test_a_parameter_set_that_is_none_is_refused_in_words(sps):
-    with pytest.raises(Mp4Error, match=r"ends too early|not read|not 4:2:0"):
+def test_an_invalid_parameter_set_is_rejected(sps):
+    with pytest.raises(Mp4Error, match=r"truncated|not supported|not 4:2:0"):
         picture_size(sps)

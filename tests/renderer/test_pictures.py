@@ -1,6 +1,6 @@
-"""Pictures beside stored ones: another driver's are as good, a missing link or a lamp that is off are not.
+"""Comparison with stored pictures, with tolerance for other drivers, but not for visible differences.
 
-`make_pictures.py` makes the stored ones anew.
+`make_pictures.py` makes the stored pictures.
 """
 
 from dataclasses import replace
@@ -15,7 +15,7 @@ from renderer.shadow import FloorShadow
 from tests.renderer.bodies import context_or_skip
 from tests.renderer.make_pictures import PICTURES, STORED, free
 
-# Levels of 255, after a blur over which edges that another rasteriser puts a little aside are gone.
+# Levels of 255, after a blur that removes small differences of edges between rasterisers.
 _BLUR_PX = 5
 _MOST, _MOST_ON_AVERAGE = 20.0, 0.8
 
@@ -35,7 +35,7 @@ def like_stored(picture, name):
 
 @pytest.mark.parametrize("name", STORED)
 @pytest.mark.slow
-def test_a_picture_is_as_the_stored_one(name, folder):
+def test_a_picture_matches_the_stored_one(name, folder):
     assert like_stored(STORED[name](folder), name)
 
 
@@ -50,17 +50,17 @@ def with_a_red_forearm(scene):
 
 @pytest.mark.parametrize("change", [without_its_flange, with_a_red_forearm])
 @pytest.mark.slow
-def test_a_picture_without_a_link_or_with_another_colour_is_told_from_it(change, folder):
+def test_a_missing_link_or_another_colour_is_detected(change, folder):
     assert not like_stored(free(folder, change=change), "free")
 
 
 @pytest.mark.slow
-def test_a_lamp_that_is_off_is_told_from_it(folder, monkeypatch):
+def test_another_lamp_is_detected(folder, monkeypatch):
     monkeypatch.setattr(drawing, "KEY", (0.0, 0.0, -1.0))
     assert not like_stored(free(folder), "free")
 
 
 @pytest.mark.slow
-def test_a_shadow_that_is_missing_is_told_from_it(folder, monkeypatch):
+def test_a_missing_shadow_is_detected(folder, monkeypatch):
     monkeypatch.setattr(FloorShadow, "lay", lambda *_, **__: None)
     assert not like_stored(free(folder), "free")

@@ -1,4 +1,4 @@
-"""The service: a described robot on a real mesh, watched, joined late, gone stale."""
+"""The renderer service with a robot on a real mesh: subscribers, late joiners, stale states."""
 
 import asyncio
 import math
@@ -22,12 +22,22 @@ from services.site_file.fixtures import Fixture as FixtureRow
 from services.site_file.fixtures import fixture_shape
 from tests.cells import single_arm
 from tests.conftest import last_value, run
-from tests.renderer.hall import HOME, SIZE, amber, frames, hall, joints, moving, orange, picture
+from tests.renderer.renderer_site import (
+    HOME,
+    SIZE,
+    amber,
+    frames,
+    joints,
+    moving,
+    orange,
+    picture,
+    renderer_site,
+)
 
 
 def test_a_watched_view_is_video_that_decodes_and_moves(mesh, tmp_path):
     async def main():
-        async with hall(mesh, tmp_path) as (robot, monitor), moving(robot):
+        async with renderer_site(mesh, tmp_path) as (robot, monitor), moving(robot):
             video = monitor.subscribe("robomesh/hall/arm/video/front", newest=100, history=False)
             messages = await frames(video, 45)
             decoder = av.CodecContext.create("h264", "r")
@@ -40,7 +50,7 @@ def test_a_watched_view_is_video_that_decodes_and_moves(mesh, tmp_path):
             assert seen[0].shape == (180, 320, 3)
             assert orange(seen[-1]) > 40
             assert (np.abs(seen[5].astype(int) - seen[25]) > 40).any()
-            # Each tells the joint states that it shows, in their order.
+            # Each picture has the time of the joint states that it shows, in order.
             times = [sample.header.source_time_ns for sample, _ in messages]
             assert times == sorted(times)
             assert len(set(times)) > 40
@@ -51,7 +61,7 @@ def test_a_watched_view_is_video_that_decodes_and_moves(mesh, tmp_path):
 
 def test_a_joiner_gets_the_frames_since_the_last_key_frame(mesh, tmp_path):
     async def main():
-        async with hall(mesh, tmp_path) as (robot, monitor), moving(robot):
+        async with renderer_site(mesh, tmp_path) as (robot, monitor), moving(robot):
             await frames(monitor.subscribe("robomesh/hall/arm/video/front", newest=100, history=False), 10)
             # The last key frame may have been a moment ago.
             while len((since := await last_value(monitor, "robomesh/hall/arm/video/front")).frames) < 5:
@@ -67,14 +77,14 @@ def test_a_joiner_gets_the_frames_since_the_last_key_frame(mesh, tmp_path):
 
 def test_key_frames_are_forced_at_most_once_a_second(mesh, tmp_path):
     async def main():
-        async with hall(mesh, tmp_path) as (robot, monitor), moving(robot):
+        async with renderer_site(mesh, tmp_path) as (robot, monitor), moving(robot):
             await frames(monitor.subscribe("robomesh/hall/arm/video/front", newest=100, history=False), 3)
             key = "robomesh/hall/arm/video/front/keyframe/li"
             forced = False
             while not forced:
                 asked_s = time.monotonic()
                 forced = (await monitor.ask(key, KeyFrameRequest())).forced
-            while forced:  # it comes next, for all who ask until then
+            while forced:  # the next picture answers all requests until then
                 not_before_s, asked_s = asked_s, time.monotonic()
                 forced = (await monitor.ask(key, KeyFrameRequest())).forced
             for _ in range(5):
@@ -88,8 +98,8 @@ def test_key_frames_are_forced_at_most_once_a_second(mesh, tmp_path):
     run(main())
 
 
-def test_a_stream_whose_encoder_fails_comes_back(mesh, tmp_path, monkeypatch):
-    """The encoder is closed under it, as when a GPU is lost."""
+def test_a_stream_recovers_from_a_failed_encoder(mesh, tmp_path, monkeypatch):
+    """The encoder fails during the stream, as after the loss of a GPU."""
 
     class Failing(H264Encoder):
         def encode(self, picture, *, key_frame):
@@ -105,7 +115,7 @@ def test_a_stream_whose_encoder_fails_comes_back(mesh, tmp_path, monkeypatch):
     monkeypatch.setattr(stream, "_TRY_AGAIN_S", 0.2)
 
     async def main():
-        async with hall(mesh, tmp_path) as (robot, monitor), moving(robot):
+        async with renderer_site(mesh, tmp_path) as (robot, monitor), moving(robot):
             await picture(monitor)
             monkeypatch.setattr(post_processing, "open_encoder", open_failing)
             video = monitor.subscribe("robomesh/hall/arm/video/front", newest=100, history=False)
@@ -118,9 +128,9 @@ def test_a_stream_whose_encoder_fails_comes_back(mesh, tmp_path, monkeypatch):
     run(main())
 
 
-def test_nothing_is_drawn_while_nobody_watches(mesh, tmp_path):
+def test_nothing_is_drawn_without_subscribers(mesh, tmp_path):
     async def main():
-        async with hall(mesh, tmp_path) as (robot, monitor), moving(robot):
+        async with renderer_site(mesh, tmp_path) as (robot, monitor), moving(robot):
             await picture(monitor)
             await asyncio.sleep(0.5)
             assert await monitor.last("robomesh/hall/arm/video/front", timeout_s=0.5) is None
@@ -128,33 +138,33 @@ def test_nothing_is_drawn_while_nobody_watches(mesh, tmp_path):
     run(main())
 
 
-def test_a_still_robot_is_drawn_about_twice_a_second(mesh, tmp_path):
+def test_a_robot_at_rest_is_drawn_about_twice_a_second(mesh, tmp_path):
     async def main():
-        async with hall(mesh, tmp_path) as (robot, monitor):
+        async with renderer_site(mesh, tmp_path) as (robot, monitor):
             await picture(monitor)
             publisher = robot.declare_publisher("hall", "arm", "joints")
 
-            async def stand_still():
+            async def publish_home():
                 while True:
                     publisher.put(joints(HOME))
                     await asyncio.sleep(0.02)
 
-            task = asyncio.create_task(stand_still())
+            task = asyncio.create_task(publish_home())
             video = monitor.subscribe("robomesh/hall/arm/video/front", newest=100, history=False)
             messages = await frames(video, 6)
             task.cancel()
             took = messages[-1][0].received - messages[2][0].received
-            assert took > 1.2  # four pictures, and no moving arm's fifty
+            assert took > 1.2  # four pictures; a moving arm would have fifty
 
     run(main())
 
 
-def test_a_robot_whose_states_stop_turns_grey_and_says_how_old_it_is(mesh, tmp_path):
+def test_a_robot_without_new_states_turns_grey_and_shows_their_age(mesh, tmp_path):
     async def main():
-        async with hall(mesh, tmp_path) as (robot, monitor):
+        async with renderer_site(mesh, tmp_path) as (robot, monitor):
             publisher = robot.declare_publisher("hall", "arm", "joints")
             before = await picture(monitor)
-            assert orange(before) < 20, "nobody told where it is"
+            assert orange(before) < 20, "no state was published yet"
             assert amber(before) > 100
             async with asyncio.timeout(40):
                 while not orange(live := await picture(monitor)):
@@ -168,7 +178,7 @@ def test_a_robot_whose_states_stop_turns_grey_and_says_how_old_it_is(mesh, tmp_p
     run(main())
 
 
-def test_what_stands_around_is_drawn_and_the_line_to_the_nearest_while_it_is_known(mesh, tmp_path):
+def test_fixtures_and_a_current_clearance_line_are_drawn(mesh, tmp_path):
     color = "#00d040"
     box = fixture_shape(FixtureRow(cell="a", name="box", box=(200.0, 200.0, 200.0), color=color))
     box_to_site = np.eye(4)
@@ -184,7 +194,7 @@ def test_what_stands_around_is_drawn_and_the_line_to_the_nearest_while_it_is_kno
         return ((red > 130) & (red > 1.8 * green) & (red > 1.8 * blue)).sum()
 
     async def main():
-        async with hall(mesh, tmp_path, arm=arm) as (robot, monitor):
+        async with renderer_site(mesh, tmp_path, arm=arm) as (robot, monitor):
             publisher = robot.declare_publisher("hall", "arm", "joints")
             async with asyncio.timeout(40):
                 while not orange(live := await picture(monitor)) or not red(live):
@@ -193,15 +203,15 @@ def test_what_stands_around_is_drawn_and_the_line_to_the_nearest_while_it_is_kno
             async with asyncio.timeout(40):
                 while orange(stale := await picture(monitor)):
                     await asyncio.sleep(0.1)
-            # Grey, as the arm is, and the line is gone.
+            # The fixture is grey like the arm, and there is no line.
             assert (green(stale), red(stale)) == (0, 0)
 
     run(main())
 
 
-def test_old_states_under_a_living_gateway_are_stale(mesh, tmp_path):
+def test_old_states_are_stale_while_the_gateway_is_alive(mesh, tmp_path):
     async def main():
-        async with hall(mesh, tmp_path) as (robot, monitor), moving(robot):
+        async with renderer_site(mesh, tmp_path) as (robot, monitor), moving(robot):
             async with asyncio.timeout(40):
                 while not orange(await picture(monitor)):
                     pass
@@ -214,12 +224,12 @@ def test_old_states_under_a_living_gateway_are_stale(mesh, tmp_path):
     run(main())
 
 
-def test_a_close_up_follows_the_arm_and_only_says_when_it_is_old(mesh, tmp_path):
+def test_a_close_up_follows_the_arm(mesh, tmp_path):
     async def main():
-        async with hall(mesh, tmp_path) as (robot, monitor):
+        async with renderer_site(mesh, tmp_path) as (robot, monitor):
             publisher = robot.declare_publisher("hall", "arm", "joints")
             async with asyncio.timeout(40):
-                # Bent down, it fills little of a picture that has room for all that it can reach.
+                # Folded, the arm fills little of a picture that shows its whole workspace.
                 while orange(far := await picture(monitor, "free")) < 40:
                     publisher.put(joints((0.0, math.pi / 2, 1.9, 0.0, 0.0)))
                 close = await picture(monitor, "close")
@@ -228,11 +238,11 @@ def test_a_close_up_follows_the_arm_and_only_says_when_it_is_old(mesh, tmp_path)
     run(main())
 
 
-def test_a_renderer_that_comes_late_shows_the_last_state_as_stale(mesh, tmp_path):
+def test_a_renderer_started_late_shows_the_last_state_as_stale(mesh, tmp_path):
     async def main():
-        # The first renderer is there for another robot only.
-        nobody = hall(mesh, tmp_path, robots=("nobody",))
-        async with nobody as (robot, monitor), open_session(mesh) as late:
+        # The first renderer draws another robot only.
+        other = renderer_site(mesh, tmp_path, robots=("other",))
+        async with other as (robot, monitor), open_session(mesh) as late:
             robot.declare_publisher("hall", "arm", "joints").put(joints((0.0, 0.3, *HOME[2:])))
             while await monitor.last("robomesh/hall/arm/frames") is None:
                 pass
@@ -252,7 +262,7 @@ def test_a_renderer_that_comes_late_shows_the_last_state_as_stale(mesh, tmp_path
     ("settings", "says"),
     [({"size": (321, 180)}, "321 x 180"), ({"size": (32, 32)}, "64 to 4096"), ({"fps": 0.0}, "fps 0")],
 )
-def test_impossible_settings_are_refused_in_words(mesh, tmp_path, settings, says):
+def test_invalid_settings_are_rejected(mesh, tmp_path, settings, says):
     async def main():
         async with open_session(mesh) as session:
             await service.serve(session, Settings(site="hall", folder=tmp_path, **settings))
@@ -261,10 +271,8 @@ def test_impossible_settings_are_refused_in_words(mesh, tmp_path, settings, says
         run(main())
 
 
-def test_a_machine_that_cannot_keep_up_draws_without_anti_aliasing_and_says_so_once(
-    mesh, tmp_path, monkeypatch
-):
-    """Drawing takes long here, as on a machine that has other things to do."""
+def test_a_slow_machine_draws_without_anti_aliasing_and_reports_it_once(mesh, tmp_path, monkeypatch):
+    """Drawing is slowed down, as on a busy machine."""
     sizes = []
 
     class Slow(service.Studio):
@@ -274,11 +282,11 @@ def test_a_machine_that_cannot_keep_up_draws_without_anti_aliasing_and_says_so_o
             return super().draw(*args, coarse=coarse, **options)
 
     monkeypatch.setattr(service, "Studio", Slow)
-    monkeypatch.setattr(frame_scheduler, "_TOLD_AFTER_S", 0.8)
+    monkeypatch.setattr(frame_scheduler, "_REPORT_AFTER_S", 0.8)
     monkeypatch.setattr(frame_scheduler, "_COARSE_AFTER_S", 0.3)
 
     async def main():
-        async with hall(mesh, tmp_path) as (robot, monitor), moving(robot):
+        async with renderer_site(mesh, tmp_path) as (robot, monitor), moving(robot):
             await picture(monitor)
             events = monitor.subscribe("robomesh/hall/-/events/renderer", newest=10)
             videos = [
@@ -288,12 +296,12 @@ def test_a_machine_that_cannot_keep_up_draws_without_anti_aliasing_and_says_so_o
             event = (await anext(events)).message()
             assert isinstance(event, Event)
             assert (event.severity, event.code, event.source) == (Event.WARNING, "renderer.slow", "renderer")
-            assert "pictures a second that are watched: this machine can do no more" in event.text
+            assert "watched pictures a second: this machine is too slow" in event.text
             assert True in sizes
-            # Both views get their turns.
+            # Both views are drawn.
             for video in videos:
                 await anext(video)
-            # It is over as well when nobody watches any more.
+            # The condition also ends with the last subscriber.
             for video in videos:
                 video.close()
             event = (await anext(events)).message()
@@ -303,7 +311,7 @@ def test_a_machine_that_cannot_keep_up_draws_without_anti_aliasing_and_says_so_o
     run(main())
 
 
-def test_what_can_be_drawn_no_more_is_no_picture_of_now(mesh, tmp_path, monkeypatch):
+def test_no_old_picture_is_sent_after_drawing_has_failed(mesh, tmp_path, monkeypatch):
     broken = threading.Event()
 
     class Breaking(service.Studio):
@@ -315,7 +323,7 @@ def test_what_can_be_drawn_no_more_is_no_picture_of_now(mesh, tmp_path, monkeypa
     monkeypatch.setattr(service, "Studio", Breaking)
 
     async def main():
-        async with hall(mesh, tmp_path) as (_, monitor):
+        async with renderer_site(mesh, tmp_path) as (_, monitor):
             await picture(monitor)
             broken.set()
             async with asyncio.timeout(40):
@@ -325,12 +333,12 @@ def test_what_can_be_drawn_no_more_is_no_picture_of_now(mesh, tmp_path, monkeypa
     run(main())
 
 
-def test_a_robot_that_was_away_for_long_is_drawn_again(mesh, tmp_path, monkeypatch):
-    """As when the router was away: its kinematics was there all the time, and has nothing new to tell."""
+def test_a_robot_that_returns_after_a_long_time_is_drawn_again(mesh, tmp_path, monkeypatch):
+    """As after an outage of the router: the kinematics service kept running and has no new description."""
     monkeypatch.setattr(robots, "_FORGET_AFTER_S", 0.2)
 
     async def main():
-        async with hall(mesh, tmp_path) as (robot, monitor):
+        async with renderer_site(mesh, tmp_path) as (robot, monitor):
             token = robot.declare_presence_of("hall", "arm", "kinematics", "1")
             await picture(monitor)
             token.undeclare()
@@ -344,7 +352,7 @@ def test_a_robot_that_was_away_for_long_is_drawn_again(mesh, tmp_path, monkeypat
     run(main())
 
 
-def test_a_robot_that_goes_while_it_is_drawn_leaves_no_encoder_behind(mesh, tmp_path, monkeypatch):
+def test_a_robot_removed_while_it_is_drawn_leaves_no_encoder(mesh, tmp_path, monkeypatch):
     made, may_draw, draws = [], threading.Event(), threading.Event()
     may_draw.set()
 
@@ -354,16 +362,16 @@ def test_a_robot_that_goes_while_it_is_drawn_leaves_no_encoder_behind(mesh, tmp_
             may_draw.wait(40)
             return super().draw(*args, **options)
 
-    class Finishing(service.Finishing):
+    class PostProcessor(service.PostProcessor):
         def __init__(self, *args):
             super().__init__(*args)
             made.append(self)
 
     monkeypatch.setattr(service, "Studio", Held)
-    monkeypatch.setattr(service, "Finishing", Finishing)
+    monkeypatch.setattr(service, "PostProcessor", PostProcessor)
 
     async def main():
-        async with hall(mesh, tmp_path) as (_, monitor), open_session(mesh) as player:
+        async with renderer_site(mesh, tmp_path) as (_, monitor), open_session(mesh) as player:
             await picture(monitor)
             replayed = await last_value(monitor, "robomesh/hall/arm/description")
             replayed.replay.id = "x"
@@ -384,7 +392,7 @@ def test_a_robot_that_goes_while_it_is_drawn_leaves_no_encoder_behind(mesh, tmp_
                         await asyncio.sleep(0.3)  # within the quota of key frames
             finally:
                 may_draw.set()
-            # Drawn and finished behind the other.
+            # This picture is drawn and encoded after the other.
             await picture(monitor)
             video.close()
             assert not [stream for stream in made[0]._encoders if stream.startswith("replay-x/")]
@@ -393,7 +401,7 @@ def test_a_robot_that_goes_while_it_is_drawn_leaves_no_encoder_behind(mesh, tmp_
 
 
 async def asked(monitor, key):
-    """Whether somebody answers."""
+    """Return whether the request is answered."""
     try:
         await monitor.ask(key, KeyFrameRequest(), timeout_s=1.0)
         return True

@@ -29,7 +29,9 @@ def test_file_outside_of_the_folder_counts_as_missing(folder, address, capsys):
     mesh.info(path, True)
     said = json.loads(capsys.readouterr().out)
     assert said["triangles"] == 24
-    assert "no such file in the folder 'open', and no other is read; it is left out" in said["warnings"][0]
+    assert (
+        "no such file in the folder 'open'; other folders are not read; it is left out" in said["warnings"][0]
+    )
     mesh.convert(path, folder / "a.glb", None, None)
     capsys.readouterr()
     mesh.info(folder / "a.glb", True)

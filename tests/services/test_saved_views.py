@@ -9,7 +9,7 @@ import av
 import cv2
 
 from tests.conftest import run
-from tests.renderer.hall import hall, moving, picture
+from tests.renderer.renderer_site import moving, picture, renderer_site
 
 
 async def command(mesh, *arguments):
@@ -40,7 +40,7 @@ def test_a_view_is_saved_as_video_and_picture_and_one_that_there_is_not_says_so(
     video, half, still = tmp_path / "arm.mp4", tmp_path / "half.mp4", tmp_path / "arm.png"
 
     async def main():
-        async with hall(mesh, tmp_path) as (robot, monitor), moving(robot):
+        async with renderer_site(mesh, tmp_path) as (robot, monitor), moving(robot):
             robot.declare_presence("hall", "arm", "kinematics")
             await picture(monitor)
             saving = await command(mesh, "video", "arm", "front", video, "--json")

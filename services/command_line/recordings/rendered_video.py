@@ -10,14 +10,14 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from mcap_files.errors import RecordingError
 from mcap_files.publisher_time import PublisherTimes
 from mcap_files.reading import RecordedMessage, RecordingFile
-from renderer.appearance import look_of, mesh_name, placements_at
+from renderer.appearance import appearance_of, mesh_name, placements_at
 from renderer.cache import cache_folder, stored_glb
-from renderer.clearance_line import draw_span
-from renderer.composition import Known, composed
+from renderer.clearance_line import draw_clearance_line
+from renderer.composition import RobotSnapshot, compose
 from renderer.encoder import open_encoder
 from renderer.mp4 import FragmentedMp4
 from renderer.overlay import write_over
-from renderer.requested_views import Shot
+from renderer.requested_views import ViewSpec
 from renderer.robot_state import Ages, RobotState
 from renderer.studio import Studio
 from robomesh.schemas import robomesh_pb2 as schema
@@ -53,26 +53,28 @@ def write_rendered(file: RecordingFile, span: Span, target: Path, rendering: Ren
     """
     _check(rendering)
     state = _robot(file)
-    assert state.look is not None
-    shot = Shot(name=rendering.view, of=rendering.view, size=rendering.size, fps=rendering.fps)
+    assert state.appearance is not None
+    spec = ViewSpec(name=rendering.view, of=rendering.view, size=rendering.size, fps=rendering.fps)
     studio = Studio(
         rendering.size, samples=rendering.samples, shading="full", device=None, folder=cache_folder()
     )
     mp4, key_each = FragmentedMp4(), max(round(_KEY_FRAME_EACH_S * rendering.fps), 1)
     try:
-        _take_meshes(file, state.look.description, studio)
+        _take_meshes(file, state.appearance.description, studio)
         encoder = open_encoder(rendering.size, rendering.fps)
         with target.open("wb") as stream, progress("video") as report:
             for number, (time_ns, ages) in enumerate(_pictures(file, span, state, rendering.fps)):
-                composition = composed(shot, state.look, Known(state, ages), ())
+                composition = compose(spec, state.appearance, RobotSnapshot(state, ages), ())
                 drawn = studio.draw(
                     composition.scene,
                     composition.camera,
                     size=rendering.size,
                     close_up_of=rendering.view if composition.follow else None,
                 )
-                if composition.span is not None:
-                    draw_span(drawn.picture, drawn.camera, composition.span, labelled=True)
+                if composition.clearance_line is not None:
+                    draw_clearance_line(
+                        drawn.picture, drawn.camera, composition.clearance_line, labelled=True
+                    )
                 write_over(drawn.picture, composition.overlay)
                 packet = encoder.encode(drawn.picture, key_frame=number % key_each == 0)
                 stream.write(mp4.add(packet.data, time_ns, usual_s=1 / rendering.fps))
@@ -99,7 +101,7 @@ def _robot(file: RecordingFile) -> RobotState:
     _, site, robot, _ = needed(file, "joints").split("/", 3)
     # Mark the pictures as a replay, not as live.
     description.replay.SetInParent()
-    return RobotState(site, robot, look=look_of(description))
+    return RobotState(site, robot, appearance=appearance_of(description))
 
 
 def _take_meshes(file: RecordingFile, description: schema.Description, studio: Studio) -> None:
@@ -118,7 +120,7 @@ def _take_meshes(file: RecordingFile, description: schema.Description, studio: S
             raise ExportError(
                 f"{file.path.name}: it holds no mesh of {body.name}, and none is in the cache of this machine"
             )
-        studio.take_mesh(mesh_name(body), glb, body.color)
+        studio.add_mesh(mesh_name(body), glb, body.color)
 
 
 def _pictures(file: RecordingFile, span: Span, state: RobotState, fps: float) -> Iterator[tuple[int, Ages]]:
@@ -133,18 +135,18 @@ def _pictures(file: RecordingFile, span: Span, state: RobotState, fps: float) ->
         if name == "joints":
             if (joints := decoded(JointStates, message.data)) is None:
                 return
-            state.take_joints(joints)
-            assert state.look is not None
-            state.link_placements = placements_at(state.look, state.positions)
+            state.update_joints(joints)
+            assert state.appearance is not None
+            state.link_placements = placements_at(state.appearance, state.positions)
             state.source_time_ns = message.source_ns
         elif name == "controller":
             if (controller := decoded(schema.ControllerState, message.data)) is None:
                 return
-            state.take_controller(controller)
+            state.update_controller(controller)
         else:
             if (kinematics := decoded(schema.KinematicState, message.data)) is None:
                 return
-            state.take_kinematics(kinematics, {state.name: state})
+            state.update_kinematics(kinematics, {state.name: state})
         updated_ns[name] = at_ns
 
     for message in file.state_at([*names], span.start_ns).values():

@@ -24,7 +24,7 @@ def draw_four_views(description: RobotDescription, out: Path) -> None:
         RobotError: If a mesh cannot be read, or the picture cannot be written.
         RendererError: If OpenGL is missing.
     """
-    from renderer.appearance import home_placements, look_of, mesh_name
+    from renderer.appearance import appearance_of, home_placements, mesh_name
     from renderer.cache import cache_folder, prepared_once
     from renderer.cameras import fitted
     from renderer.drawing import Drawing
@@ -48,16 +48,16 @@ def draw_four_views(description: RobotDescription, out: Path) -> None:
             simulated=False,
         )
         aspect = _SIZE[0] / _SIZE[1]
-        look = look_of(message)
+        appearance = appearance_of(message)
         for link in message.links:
             if link.mesh and not drawing.has(mesh_name(link)):
                 glb = prepared_once(meshes[link.name], color=link.color, folder=cache_folder())
                 drawing.add(mesh_name(link), glb)
-        scene = scene_of(Placed(look, home_placements(look)))
+        scene = scene_of(Placed(appearance, home_placements(appearance)))
         pictures = []
         corners = drawing.corners(scene)
         for view in _VIEWS:
-            camera = camera_of(look, view, aspect=aspect)
+            camera = camera_of(appearance, view, aspect=aspect)
             if corners is not None:
                 # A site's views leave room for every pose; this picture shows one pose.
                 camera = fitted(camera, aspect, corners, margin=_MARGIN)

@@ -1,9 +1,9 @@
-"""What a description makes of pictures: the chain, the room, the cameras."""
+"""A robot's appearance from its description: chain, workspace, cameras."""
 
 import numpy as np
 import pytest
 
-from renderer.appearance import home_placements, look_of
+from renderer.appearance import appearance_of, home_placements
 from renderer.cameras import pixels
 from renderer.chain import placements, reach, read_chain
 from renderer.errors import ChainError, UnknownViewError
@@ -46,9 +46,9 @@ def test_the_chain_places_links_as_the_robot_model_does(robot):
 
 @pytest.mark.parametrize("robot", ROBOTS)
 @pytest.mark.parametrize("view", ["front", "top", "left", "free"])
-def test_a_view_shows_the_arm_wherever_it_may_go_and_not_much_more(robot, view):
+def test_a_view_shows_the_workspace_and_not_much_more(robot, view):
     message, model = described(robot)
-    camera = camera_of(look_of(message), view)
+    camera = camera_of(appearance_of(message), view)
     assert camera.orthographic == (view != "free")
     random = np.random.default_rng(4)
     tools = [
@@ -61,27 +61,27 @@ def test_a_view_shows_the_arm_wherever_it_may_go_and_not_much_more(robot, view):
     assert shares.max() > 0.75
 
 
-def test_a_robot_that_stands_elsewhere_takes_its_cameras_along():
+def test_cameras_move_with_the_robots_base():
     base_to_site = np.array([[0.0, -1, 0, 5], [1, 0, 0, -2], [0, 0, 1, 0.4], [0, 0, 0, 1]])
-    here, there = (look_of(described("pt600", at)[0]) for at in (None, base_to_site))
+    here, there = (appearance_of(described("pt600", at)[0]) for at in (None, base_to_site))
     home_here, home_there = home_placements(here), home_placements(there)
     for view in ("front", "top", "left", "free"):
         points = [
-            pixels(camera_of(look, view), SIZE, np.array([home["wrist"][:3, 3]]))
-            for look, home in ((here, home_here), (there, home_there))
+            pixels(camera_of(appearance, view), SIZE, np.array([home["wrist"][:3, 3]]))
+            for appearance, home in ((here, home_here), (there, home_there))
         ]
         assert points[0] == pytest.approx(points[1], abs=1e-6)
     assert there.center == pytest.approx(base_to_site[:3, :3] @ here.center + base_to_site[:3, 3])
 
 
-def test_a_view_of_the_description_keeps_its_eye_and_a_free_one_of_its_own_counts():
+def test_a_view_of_the_description_replaces_the_default_free_view():
     message, _ = described("pt600")
     eye, target = Vector3(x=1.0, y=2.0, z=1.5), Vector3(z=0.4)
     message.views.add(name="free", eye=eye, target=target, up=Vector3(z=1.0), projection=View.PERSPECTIVE)
-    camera = camera_of(look_of(message), "free")
+    camera = camera_of(appearance_of(message), "free")
     assert camera.eye == pytest.approx([1.0, 2.0, 1.5])
     with pytest.raises(UnknownViewError, match="no view 'behind'; there are close, free, front, left, top"):
-        camera_of(look_of(message), "behind")
+        camera_of(appearance_of(message), "behind")
 
 
 def test_a_moving_axis_reaches_to_its_limits():
@@ -102,20 +102,20 @@ def test_a_moving_axis_reaches_to_its_limits():
         ("<robot><link name='a'/><joint name='j' type='fixed'/></robot>", "has no parent"),
     ],
 )
-def test_a_urdf_that_is_no_chain_is_refused_in_words(urdf, says):
+def test_a_urdf_that_is_not_a_chain_is_rejected(urdf, says):
     with pytest.raises(ChainError, match=says):
-        look_of(Description(urdf=urdf))
+        appearance_of(Description(urdf=urdf))
 
 
-def test_a_robot_whose_rows_are_all_zero_has_room_in_every_picture(tmp_path):
-    """As Define begins: one such robot ended the renderer of them all."""
+def test_a_robot_with_rows_of_zeros_is_visible_in_every_view(tmp_path):
+    """The state of a new robot in Define; such a robot once crashed the renderer."""
     (tmp_path / "robot.toml").write_text(
         'name = "new"\n[[joint]]\nname = "j"\na = 0.0\nalpha = 0.0\nd = 0.0\nlimits = [-180.0, 180.0]\n'
         "max_speed = 90.0\nmax_acceleration = 360.0\nmax_jerk = 3600.0\n"
     )
     message, _ = described(tmp_path / "robot.toml")
-    look = look_of(message)
-    assert look.radius >= 0.1
+    appearance = appearance_of(message)
+    assert appearance.radius >= 0.1
     for name in ("front", "top", "left", "free"):
-        camera = camera_of(look, name)
+        camera = camera_of(appearance, name)
         assert np.linalg.norm(camera.eye - camera.target) >= 0.1

@@ -1,4 +1,4 @@
-"""Views that are asked for: drawn by the real renderer, shared, limited, and ended when nobody watches."""
+"""Requested views with the real renderer: shared, limited, and ended without subscribers."""
 
 import asyncio
 import io
@@ -15,7 +15,7 @@ from robomesh.quotas import Quotas
 from robomesh.schemas.robomesh_pb2 import Description, KeyFrameRequest, Vector3, View, ViewAnswer, ViewRequest
 from robomesh.session import open_session
 from tests.conftest import last_value, run
-from tests.renderer.hall import frames, hall, moving, picture
+from tests.renderer.renderer_site import frames, moving, picture, renderer_site
 
 ARM = "robomesh/hall/arm"
 BESIDE = View(
@@ -40,24 +40,24 @@ async def packets(subscription, count):
     raise AssertionError("the subscription ended")
 
 
-def test_a_view_of_one_s_own_is_drawn_shared_and_ends_when_nobody_watches(mesh, tmp_path, monkeypatch):
-    monkeypatch.setattr(service, "_COMES_BACK_WITHIN_S", 0.3)
-    monkeypatch.setattr(service, "_COMES_WITHIN_S", 8.0)
+def test_a_requested_view_is_drawn_shared_and_ends_without_subscribers(mesh, tmp_path, monkeypatch):
+    monkeypatch.setattr(service, "_NEXT_WATCHER_WITHIN_S", 0.3)
+    monkeypatch.setattr(service, "_FIRST_WATCHER_WITHIN_S", 8.0)
 
     async def main():
-        async with hall(mesh, tmp_path, most_views=1) as (robot, monitor), moving(robot):
+        async with renderer_site(mesh, tmp_path, most_views=1) as (robot, monitor), moving(robot):
             await picture(monitor)
             answer = await ask(monitor, view=BESIDE, width=240, height=200, fps=25.0)
             assert (answer.width, answer.height, answer.fps) == (240, 200, 25.0)
             assert answer.topic.startswith("video/free-")
-            # The name of a camera is nobody's business.
+            # The camera's name does not matter.
             named = View()
             named.CopyFrom(BESIDE)
             named.name = "mine"
             assert await ask(monitor, view=named, width=240, height=200, fps=25.0) == answer
-            with pytest.raises(RefusedError, match="no room: 1 views were asked for already"):
+            with pytest.raises(RefusedError, match="no room: 1 requested views exist"):
                 await ask(monitor, of="top", width=240, height=200)
-            # As they are anyhow, they take nobody's room.
+            # The renderer's own views do not count.
             for name in ("front", "top", "left", "free", "close", "far"):
                 answer_of_own = await ask(monitor, of=name)
                 assert (answer_of_own.topic, answer_of_own.image) == (f"video/{name}", f"image/{name}")
@@ -75,7 +75,7 @@ def test_a_view_of_one_s_own_is_drawn_shared_and_ends_when_nobody_watches(mesh, 
             assert (await picture(monitor, answer.image.removeprefix("image/"))).shape == (200, 240, 3)
 
             video.close()
-            # Now there is room for another: this one has ended.
+            # The view has ended, so another one is possible.
             async with asyncio.timeout(40):
                 while True:
                     try:
@@ -88,11 +88,11 @@ def test_a_view_of_one_s_own_is_drawn_shared_and_ends_when_nobody_watches(mesh, 
     run(main())
 
 
-def test_a_request_that_is_not_possible_is_refused_and_harms_nobody(mesh, tmp_path):
+def test_an_invalid_request_is_rejected_and_does_not_affect_others(mesh, tmp_path):
     async def main():
         quotas = Quotas(views=1, key_frames_a_minute=1.0)
-        hall_of_quotas = hall(mesh, tmp_path, most_views=4, quotas=quotas)
-        async with hall_of_quotas as (robot, monitor), moving(robot):
+        site = renderer_site(mesh, tmp_path, most_views=4, quotas=quotas)
+        async with site as (robot, monitor), moving(robot):
             await picture(monitor)
             video = monitor.subscribe(f"{ARM}/video/front", newest=100, history=False)
             await frames(video, 3)
@@ -107,7 +107,7 @@ def test_a_request_that_is_not_possible_is_refused_and_harms_nobody(mesh, tmp_pa
                 with pytest.raises(RefusedError) as caught:
                     await ask(monitor, **fields)
                 assert says in str(caught.value)
-            # What one has had is nothing to another.
+            # Quotas of operators are independent.
             mine = await ask(monitor, of="top", width=240, height=200)
             assert await ask(monitor, of="top", width=240, height=200) == mine
             with pytest.raises(QuotaError, match="no room: li has 1 views already: quota views = 1 a name"):
@@ -124,9 +124,9 @@ def test_a_request_that_is_not_possible_is_refused_and_harms_nobody(mesh, tmp_pa
     run(main())
 
 
-def test_a_robot_that_cannot_be_drawn_takes_no_other_robot_s_pictures(mesh, tmp_path):
+def test_a_robot_that_cannot_be_drawn_does_not_affect_others(mesh, tmp_path):
     async def main():
-        async with hall(mesh, tmp_path) as (robot, monitor), moving(robot):
+        async with renderer_site(mesh, tmp_path) as (robot, monitor), moving(robot):
             await picture(monitor)
             known = await last_value(monitor, f"{ARM}/description")
             assert isinstance(known, Description)
@@ -141,9 +141,13 @@ def test_a_robot_that_cannot_be_drawn_takes_no_other_robot_s_pictures(mesh, tmp_
     run(main())
 
 
-def test_a_replay_is_drawn_as_one_and_forgotten_with_its_player(mesh, tmp_path, monkeypatch):
+def test_a_replay_is_drawn_and_removed_with_its_player(mesh, tmp_path, monkeypatch):
     async def main():
-        async with hall(mesh, tmp_path) as (robot, monitor), moving(robot), open_session(mesh) as player:
+        async with (
+            renderer_site(mesh, tmp_path) as (robot, monitor),
+            moving(robot),
+            open_session(mesh) as player,
+        ):
             await picture(monitor)
             live = await last_value(monitor, f"{ARM}/description")
             assert isinstance(live, Description)
@@ -160,7 +164,7 @@ def test_a_replay_is_drawn_as_one_and_forgotten_with_its_player(mesh, tmp_path, 
             async with asyncio.timeout(40):
                 while await monitor.last(f"{replay}/image/front", timeout_s=0.5) is not None:
                     pass
-            # The live one, of the same meshes, stays.
+            # The live robot, which has the same meshes, remains.
             await picture(monitor)
 
     run(main())

@@ -1,11 +1,11 @@
-"""Library robots and cells as the mesh tells of them, ready to be drawn."""
+"""Library robots and cells with their published descriptions, ready to draw."""
 
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from renderer.appearance import Look, look_of, mesh_name
+from renderer.appearance import Appearance, appearance_of, mesh_name
 from renderer.cache import prepared_once
 from renderer.drawing import Drawing
 from renderer.mesh import Mesh
@@ -20,39 +20,39 @@ from services.site_file.cells import cells_of
 
 
 @cache
-def robot(name: str, folder: Path) -> tuple[Look, dict[str, Mesh]]:
-    """A library robot alone, and its meshes; `folder` keeps them."""
+def robot(name: str, folder: Path) -> tuple[Appearance, dict[str, Mesh]]:
+    """Return a single library robot and its meshes; `folder` is the cache."""
     return _robot(name, CellRobot(name=name, model=name, base_to_site=np.eye(4)), None, folder)
 
 
 @cache
-def cell(path: Path, folder: Path) -> tuple[dict[str, Look], dict[str, Mesh]]:
-    """The robots of a site file that has one cell, by name, and everybody's meshes."""
-    looks, meshes = {}, {}
+def cell(path: Path, folder: Path) -> tuple[dict[str, Appearance], dict[str, Mesh]]:
+    """Return the robots of a site file with one cell, by name, and the meshes of all."""
+    appearances, meshes = {}, {}
     for name, description in cells_of(site_file.load(path)).items():
         own = next(each for each in description.robots if each.name == name)
-        looks[name], more = _robot(str(own.model), own, description, folder)
+        appearances[name], more = _robot(str(own.model), own, description, folder)
         meshes |= more
-    return looks, meshes
+    return appearances, meshes
 
 
 def drawing_of(meshes: dict[str, Mesh], size: tuple[int, int], **options) -> Drawing:
-    """A drawing that has meshes."""
+    """Return a drawing with meshes added."""
     drawing = Drawing(open_context(), size, **options)
     for name, mesh in meshes.items():
         drawing.add(name, mesh)
     return drawing
 
 
-def posed(look: Look, off: float = 0.35) -> dict[str, float]:
-    """Joint positions about home, each a little elsewhere."""
-    joints = look.description.joints
+def posed(appearance: Appearance, off: float = 0.35) -> dict[str, float]:
+    """Return joint positions near home, each with a different offset."""
+    joints = appearance.description.joints
     return {joint.name: joint.home + off * np.sin(number + 1) for number, joint in enumerate(joints)}
 
 
 def _robot(
     model: str, own: CellRobot, around: CellDescription | None, folder: Path
-) -> tuple[Look, dict[str, Mesh]]:
+) -> tuple[Appearance, dict[str, Mesh]]:
     description = load(model)
     glbs = link_meshes(description)
     message = describe(
@@ -63,10 +63,10 @@ def _robot(
         cell="",
         simulated=True,
     )
-    told = [(link, glbs[link.mesh]) for link in message.links if link.mesh]
+    bodies = [(link, glbs[link.mesh]) for link in message.links if link.mesh]
     if around is not None:
         fixtures = fixture_meshes(around)
         add_surroundings(message, own, around, fixtures)
-        told += zip(message.fixtures, (each.glb for each in fixtures), strict=True)
-    meshes = {mesh_name(body): prepared_once(glb, color=body.color, folder=folder) for body, glb in told}
-    return look_of(message), meshes
+        bodies += zip(message.fixtures, (each.glb for each in fixtures), strict=True)
+    meshes = {mesh_name(body): prepared_once(glb, color=body.color, folder=folder) for body, glb in bodies}
+    return appearance_of(message), meshes

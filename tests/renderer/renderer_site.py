@@ -1,4 +1,4 @@
-"""A hall with one arm: its kinematics and a renderer on a real mesh, and who looks at what they publish."""
+"""A site with one arm: kinematics and renderer on a real mesh, and helpers for subscribers."""
 
 import asyncio
 import contextlib
@@ -24,8 +24,8 @@ NAMES = ("waist", "shoulder", "elbow", "wrist", "roll")
 
 
 @contextlib.asynccontextmanager
-async def hall(mesh, tmp_path, *, arm=None, **settings):
-    """A session, with the kinematics of a pt600 named `arm` and a renderer beside it."""
+async def renderer_site(mesh, tmp_path, *, arm=None, **settings):
+    """Run the kinematics of a pt600 named `arm` and a renderer; yield the robot's and a monitor's session."""
     context_or_skip().release()
     async with open_session(mesh) as robot, open_session(mesh) as drawing, open_session(mesh) as monitor:
         arm = arm or single_arm(simulated=True)
@@ -52,7 +52,7 @@ def joints(positions):
 
 
 async def move(robot):
-    """A controller's states at 50 Hz: the waist swings."""
+    """Publish a controller's joint states at 50 Hz; the waist swings."""
     publisher = robot.declare_publisher("hall", "arm", "joints")
     for tick in range(10_000):
         publisher.put(joints((0.8 * math.sin(tick / 20), *HOME[1:])))
@@ -69,7 +69,7 @@ async def moving(robot):
 
 
 async def picture(monitor, view="front"):
-    """A fresh picture; waits until the renderer knows the robot."""
+    """Return a current picture; wait until the renderer knows the robot."""
     while True:
         message = await monitor.last(f"robomesh/hall/arm/image/{view}", timeout_s=2.0)
         if message is not None:
@@ -80,7 +80,7 @@ async def picture(monitor, view="front"):
 
 
 def orange(image):
-    """How many pixels below the badge have the pt600's paint."""
+    """Return the number of pixels below the badge that have the pt600's colour."""
     red, green, blue = (image[60:, :, channel].astype(int) for channel in range(3))
     return ((red > 120) & (red > green + 30) & (green > blue + 20)).sum()
 
@@ -90,7 +90,7 @@ def amber(image):
 
 
 async def frames(subscription, count):
-    """The next live messages."""
+    """Return the next `count` live messages."""
     messages = []
     async for sample in subscription:
         if sample.live:

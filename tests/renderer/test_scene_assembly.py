@@ -1,9 +1,9 @@
-"""Scenes of several robots, and what is drawn beside them."""
+"""Scenes of several robots, with ghosts, trails, fixtures and floor."""
 
 import numpy as np
 import pytest
 
-from renderer.appearance import look_of, placements_at
+from renderer.appearance import appearance_of, placements_at
 from renderer.cameras import Camera, site_to_clip
 from renderer.mesh import prepared
 from renderer.obstruction import contains, hides
@@ -12,70 +12,70 @@ from renderer.ribbons import ribbons
 from renderer.scene import Finish, Line, square_m
 from renderer.scene_assembly import Placed, scene_of
 from tests.renderer.bodies import ball, cube
-from tests.renderer.test_look import described
+from tests.renderer.test_appearance import described
 
 FRONT = Camera(np.array([3.0, 0.0, 0.5]), np.array([0.0, 0.0, 0.5]), np.array([0.0, 0.0, 1.0]))
 
 
 @pytest.fixture(scope="module")
-def look():
+def appearance():
     message, _ = described("pt600")
     for link in message.links:
         link.mesh = link.name
     fixture = message.fixtures.add(name="table", mesh="fixture.table")
     fixture.fixture_to_site[:] = np.eye(4).ravel()
-    return look_of(message)
+    return appearance_of(message)
 
 
-def test_the_floor_of_a_picture_is_the_one_that_is_checked():
+def test_the_drawn_floor_is_the_floor_of_the_collision_check():
     message, _ = described("pt600")
     message.ClearField("floor")
     message.base_to_site[:] = np.eye(4).ravel()
     message.base_to_site[11] = 0.4
 
     def floor():
-        seen = look_of(message)
+        seen = appearance_of(message)
         return scene_of(Placed(seen, placements_at(seen, {}))).floor
 
-    assert floor() == 0.4  # an older sender's: where the robot stands
+    assert floor() == 0.4  # of an older publisher: at the robot's base
     message.floor.height = -0.25
     assert floor() == -0.25
     message.floor.ClearField("height")
     assert floor() is None
 
 
-def test_each_robot_is_stale_for_itself_and_fixtures_with_the_one_that_is_looked_at(look):
-    placed = placements_at(look, {})
-    scene = scene_of(Placed(look, placed), Placed(look, placed, stale=True))
+def test_robots_are_stale_independently_and_fixtures_with_the_viewed_robot(appearance):
+    placed = placements_at(appearance, {})
+    scene = scene_of(Placed(appearance, placed), Placed(appearance, placed, stale=True))
     assert {part.finish for part in scene.parts} == {Finish.PLAIN}
     assert {part.finish for part in scene.others} == {Finish.STALE}
     assert {part.finish for part in scene.fixtures} == {Finish.PLAIN}
-    scene = scene_of(Placed(look, placed, stale=True, touching={"wrist"}))
+    scene = scene_of(Placed(appearance, placed, stale=True, touching={"wrist"}))
     assert {part.finish for part in scene.parts + scene.fixtures} == {Finish.STALE}
 
 
-def test_a_link_that_touches_is_red_and_no_other(look):
-    scene = scene_of(Placed(look, placements_at(look, {}), touching={"wrist"}))
+def test_only_links_in_contact_are_red(appearance):
+    scene = scene_of(Placed(appearance, placements_at(appearance, {}), touching={"wrist"}))
     assert [part.name for part in scene.parts if part.finish is Finish.RED] == ["wrist"]
 
 
-def test_a_ghost_shows_only_what_moves(look):
-    now, then = placements_at(look, {}), placements_at(look, {"elbow": 0.5})
-    scene = scene_of(Placed(look, now), ghost=then)
+def test_a_ghost_has_only_the_links_that_move(appearance):
+    now, then = placements_at(appearance, {}), placements_at(appearance, {"elbow": 0.5})
+    scene = scene_of(Placed(appearance, now), ghost=then)
     assert {part.finish for part in scene.others} == {Finish.GHOST}
     names = {part.name for part in scene.others}
     assert "forearm" in names
     assert not names & {"base", "column", "upper_arm"}
 
 
-def test_a_trail_fades_and_axes_are_red_green_and_blue(look):
+def test_a_trail_fades_and_axes_are_red_green_and_blue(appearance):
     trail = np.linspace([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 5)
-    scene = scene_of(Placed(look, placements_at(look, {})), trail=trail, frames=True)
+    scene = scene_of(Placed(appearance, placements_at(appearance, {})), trail=trail, frames=True)
     first, *axes = scene.lines
     assert (first.opacity[0], np.diff(first.opacity).min() > 0) == (0.0, True)
-    assert len(axes) == 3 * len(look.description.frames)
+    assert len(axes) == 3 * len(appearance.description.frames)
     assert [int(np.argmax(axis.color)) for axis in axes[:3]] == [0, 1, 2]
-    one = scene_of(Placed(look, placements_at(look, {})), trail=trail[:1])
+    one = scene_of(Placed(appearance, placements_at(appearance, {})), trail=trail[:1])
     assert one.lines == ()
 
 
@@ -84,7 +84,7 @@ def test_a_square_of_the_floor_is_a_round_length(radius, expected):
     assert square_m(radius) == pytest.approx(expected)
 
 
-def test_a_ribbon_is_as_wide_as_it_says_and_what_is_behind_the_eye_is_left_out():
+def test_a_ribbon_has_its_width_and_ends_before_the_eye():
     size = (1280, 720)
     matrix = site_to_clip(FRONT, 16 / 9, center=FRONT.target, radius=4.0)
     points = np.array([[0.0, -0.2, 0.5], [0.0, 0.2, 0.5], [9.0, 0.2, 0.5]])
@@ -100,7 +100,7 @@ def test_a_point_is_inside_a_body_or_not():
     positions = mesh.positions.astype(np.float64)
     assert contains(positions, mesh.triangles, np.array([0.1, 0.2, -0.3]))
     assert not contains(positions, mesh.triangles, np.array([0.4, 0.4, 0.4]))
-    # A hole does not make the inside an outside.
+    # A body with a hole still has an inside.
     assert contains(positions, mesh.triangles[:-6], np.array([0.0, 0.0, 0.0]))
 
 
@@ -112,19 +112,19 @@ def box(middle, size):
 @pytest.mark.parametrize(
     ("corners", "expected"),
     [
-        (box([1.2, 0.0, 0.5], [0.02, 1.8, 1.0]), True),  # a fence before it
-        (box([-1.2, 0.0, 0.5], [0.02, 1.8, 1.0]), False),  # and behind
+        (box([1.2, 0.0, 0.5], [0.02, 1.8, 1.0]), True),  # a fence in front
+        (box([-1.2, 0.0, 0.5], [0.02, 1.8, 1.0]), False),  # behind
         (box([1.2, 0.0, 0.5], [0.08, 0.08, 1.2]), False),  # a post
-        (box([1.2, 2.5, 0.5], [0.02, 1.0, 1.0]), False),  # beside
+        (box([1.2, 2.5, 0.5], [0.02, 1.0, 1.0]), False),  # to the side
         (box([3.0, 0.0, 0.5], [0.5, 0.5, 0.5]), True),  # the camera is in it
         (box([5.0, 0.0, 0.5], [0.5, 5.0, 2.0]), False),  # behind the camera
     ],
 )
-def test_what_is_between_camera_and_arm_is_seen_through(corners, expected):
+def test_a_fixture_between_camera_and_arm_is_transparent(corners, expected):
     assert hides(FRONT, 16 / 9, corners, center=FRONT.target, radius=0.9) is expected
 
 
-def test_a_hollow_sees_less_sky_than_a_bulge():
+def test_a_hollow_vertex_sees_less_sky_than_an_exposed_one():
     mesh = prepared(cube(0.5))
     positions, normals = mesh.positions.astype(np.float64), mesh.normals.astype(np.float64)
     outside = open_sky(positions, normals, mesh.triangles)
