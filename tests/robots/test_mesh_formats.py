@@ -251,7 +251,7 @@ def test_gltf_reads_its_buffer_from_beside_it_and_misses_it_in_words(tmp_path: P
         ("a.stl", b"", "is empty"),
         ("a.stl", b"\0" * 50, "is not an STL"),
         ("a.stl", binary_stl(TRIANGLE, count=4_000_000_000), "byte 80: declares 4000000000 triangles"),
-        ("a.stl", binary_stl(((float("nan"), 0.0, 0.0), *TRIANGLE[1:])), "not finite"),
+        ("a.stl", binary_stl(((float("nan"), 0.0, 0.0), *TRIANGLE[1:])), "non-finite"),
         ("a.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0\n", "is not an STL"),
         ("a.obj", "v 0 0 0\nf 1 2 3\n", "cannot be read as OBJ"),
         (

@@ -328,7 +328,7 @@ def test_mesh_reads_no_file_outside_the_robots_folder(tmp_path, address):
     (shape,) = tree_of(load(robot)).links[0].shapes
     mesh = link_mesh([shape])
     assert mesh.triangle_count == 12
-    assert "no such file in the folder 'arm', and no other is read; it is left out" in mesh.warnings[0]
+    assert "no such file in the folder 'arm'; other folders are not read; it is left out" in mesh.warnings[0]
 
 
 @pytest.mark.parametrize("confined", [False, True])
@@ -342,7 +342,7 @@ def test_vrml_robot_reads_no_file_outside_its_folder(tmp_path, confined):
     robot.write_text("#VRML V2.0 utf8\n" + joint)
     description = load(robot, confined=confined)
     assert not any(link.shapes for link in tree_of(description).links)
-    note_text = "no such file in the folder 'arm', and no other is read"
+    note_text = "no such file in the folder 'arm'; other folders are not read"
     assert any(note_text in note for note in description.robot.notes)
 
 

@@ -184,8 +184,8 @@ def test_outermost_lengths_that_lie_are_read_over(tmp_path: Path) -> None:
     data[8:12] = struct.pack("<I", 0x7FFFFFFF)
     mesh = read(tmp_path, bytes(data))
     assert mesh.triangle_count == 4
-    assert mesh.warnings[0].startswith("byte 0: chunk 4D4D of 4294967295 bytes; ")
-    assert mesh.warnings[1].startswith("byte 6: chunk 3D3D of 2147483647 bytes; ")
+    assert mesh.warnings[0].startswith("byte 0: chunk 4D4D has 4294967295 bytes; ")
+    assert mesh.warnings[1].startswith("byte 6: chunk 3D3D has 2147483647 bytes; ")
 
 
 @pytest.mark.parametrize(
@@ -196,7 +196,7 @@ def test_outermost_lengths_that_lie_are_read_over(tmp_path: Path) -> None:
         (struct.pack("<HI", 0x4110, 0xFFFFFFFF), "chunk 4110 has 4294967295 bytes; 6 are left"),
         (struct.pack("<HI", 0x4110, 0), "chunk 4110 has 0 bytes"),
         (vertices() + faces(numbers=[(0, 1, 4)]), "object 'tetra': vertex 4; there are 4"),
-        (vertices([(0, 0, 0), (1, 0, 0), (float("nan"), 0, 0), (1, 1, 1)]) + faces(), "not finite"),
+        (vertices([(0, 0, 0), (1, 0, 0), (float("nan"), 0, 0), (1, 1, 1)]) + faces(), "non-finite"),
         (vertices() + faces(painted("m", 9)), "face 9; there are 4"),
         (vertices() + faces(chunk(0x4130, b"endless")), "a name does not end with a zero byte"),
     ],

@@ -46,7 +46,7 @@ def test_papers_sample_is_read_with_warnings(tmp_path: Path) -> None:
     assert mesh.parts[0].material.diffuse == (0.7, 0.7, 0.7)
     assert mesh.warnings == (
         "line 1, column 1: the header has a blank, '# VRML'; it should be '#VRML V2.0 utf8'",
-        "line 4, column 16: the name '1-FACES' begins with a digit; taken as it is",
+        "line 4, column 16: the name '1-FACES' begins with a digit; accepted",
         "line 8, column 17: a sign is separated from its digits by a blank; read as one number",
     )
 

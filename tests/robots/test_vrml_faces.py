@@ -328,7 +328,7 @@ def test_face_that_takes_too_much_work_is_cut_anyhow_and_told(
     )
     assert mesh.triangle_count == 4
     (warning,) = mesh.warnings
-    assert warning.startswith("line 2, column 18: IndexedFaceSet: concave faces take too much work")
+    assert warning.startswith("line 2, column 18: IndexedFaceSet: concave faces take too long")
 
 
 def test_many_slow_faces_of_one_file_share_one_allowance(draw: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -341,7 +341,7 @@ def test_many_slow_faces_of_one_file_share_one_allowance(draw: Draw, monkeypatch
     monkeypatch.setattr(polygons, "_BEYOND", int(1.5 * (polygons._BEYOND - effort.left)))
     mesh = draw(shape * 4)
     assert mesh.triangle_count == 4 * (len(outline) - 2)
-    assert len([warning for warning in mesh.warnings if "too much work" in warning]) == 3
+    assert len([warning for warning in mesh.warnings if "too long to triangulate" in warning]) == 3
 
 
 def test_work_that_is_spent_leaves_little_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
