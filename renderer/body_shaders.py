@@ -41,7 +41,7 @@ in vec3 at, facing;
 in vec4 body_paint, body_surface;
 out vec4 color;
 
-// The studio as a mirror sees it: a bright ceiling with a soft box, dim walls, the floor.
+// The reflected studio: a bright ceiling with a soft box, dim walls, the floor.
 vec3 studio(vec3 way, float roughness) {
     float soft = 0.10 + 0.75 * roughness;
     float ceiling = smoothstep(-soft, 0.55 + soft, way.z);
@@ -61,7 +61,7 @@ vec3 toned(vec3 light) {
 uniform sampler2DShadow lamp;
 uniform mat4 site_to_lamp;
 uniform float lamp_texel_m;
-// Five looks, each a mean of four: an edge as soft as a large lamp's.
+// Five samples, each a mean of four texels, for a soft edge like that of a large lamp.
 float lit(vec3 n) {
     vec3 from = (site_to_lamp * vec4(at + n * 1.5 * lamp_texel_m, 1.0)).xyz * 0.5 + 0.5;
     float step = 1.3 / float(textureSize(lamp, 0).x);
@@ -77,13 +77,13 @@ float lit(vec3 n) { return 1.0; }
 void main() {
     vec3 n = normalize(facing);
     vec3 to_eye = orthographic > 0.5 ? -forward : normalize(eye - at);
-    // Only faces that look at the camera are drawn: a smooth normal must not look away.
+    // Only faces towards the camera are drawn: a smooth normal must not point away.
     float facing_eye = clamp(dot(n, to_eye), 0.02, 1.0);
     float open = body_surface.r, roughness = clamp(body_surface.g, 0.15, 1.0), metallic = body_surface.b;
     vec3 albedo = body_paint.rgb * (1.0 - metallic);
     vec3 mirrored = mix(vec3(0.04), body_paint.rgb, metallic);
 
-    // What comes from everywhere: the ceiling, the floor's return, a little from where one stands.
+    // Ambient light: the ceiling, the floor's reflection, a little from the camera.
     float up = n.z * 0.5 + 0.5;
     float above = clamp((at.z - floor_height) / near_floor, 0.0, 1.0);
     float sky = open * mix(1.0, 0.55 + 0.45 * above, 1.0 - up);
@@ -102,7 +102,7 @@ void main() {
         direct = vec3(0.93, 0.90, 0.86) * lamp_light;
         gleam = a * a / (spread * spread * max(across * across, 0.1) * (4.0 * roughness + 2.0)) * lamp_light;
     }
-    // How much of the surroundings a surface mirrors, by its roughness and the angle.
+    // Share of the surroundings that a surface reflects, by roughness and angle.
     vec4 fit = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
     float aside = (1.0 - facing_eye) * (1.0 - facing_eye);
     float grazing = min(fit.x * fit.x, aside * aside * (1.0 - facing_eye)) * fit.x + fit.y;
@@ -110,7 +110,7 @@ void main() {
     vec3 mirror = studio(reflect(-to_eye, n), roughness) * share * sky;
 
     vec3 light = albedo * (around + direct) * 1.08 + mirror + mirrored * min(gleam, 6.0);
-    // The rim darkens a little, so that a body stands out against one of its own colour.
+    // The rim is a little darker, so that a body is visible in front of one with the same colour.
     light *= mix(0.72, 1.0, smoothstep(0.0, 0.32, facing_eye));
 
     vec3 seen = to_srgb(toned(light));

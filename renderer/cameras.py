@@ -37,7 +37,7 @@ class Camera:
 
     @property
     def orthographic(self) -> bool:
-        """Whether the projection is orthographic."""
+        """True if the projection is orthographic."""
         return self.half_height is not None
 
     @property

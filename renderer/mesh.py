@@ -53,7 +53,7 @@ class Mesh:
 
     @property
     def transparent(self) -> bool:
-        """Whether any vertex is transparent."""
+        """True if any vertex is transparent."""
         return bool((self.colors[:, 3] < 255).any())
 
 

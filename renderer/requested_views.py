@@ -72,7 +72,7 @@ def low_rate_view(of: str, *, size: tuple[int, int], fps: float) -> ViewSpec:
     """Return the specification of the view for slow links: small, slow, with a low bit rate.
 
     Args:
-        of: The view whose camera it uses.
+        of: The view that provides the camera.
         size: Size of the renderer's other views, which is not exceeded.
     """
     return ViewSpec(
@@ -90,7 +90,7 @@ def requested_view(
     """Check a request and return the specification of its view.
 
     Args:
-        first: The view whose camera `far` uses.
+        first: The view that provides the camera of `far`.
         size: Default size.
         fps: Default rate.
 

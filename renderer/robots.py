@@ -27,8 +27,8 @@ _ASK_AGAIN_S = 2.0
 # Queue length for a site with many robots. Only each robot's newest sample is used.
 _RING = 512
 _TOPICS = ("description", "frames", "joints", "controller", "kinematics")
-# Services whose presence means that a robot exists. The delay lets such a service restart without the robot
-# being removed.
+# The presence of one of these services means that a robot exists. The delay lets them restart without the
+# robot being removed.
 _PROVIDERS = ("gateway", "kinematics", "player")
 _DESCRIBERS = ("kinematics", "player")
 _FORGET_AFTER_S, _FORGET_REPLAY_AFTER_S = 15.0, 1.0

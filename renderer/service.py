@@ -233,7 +233,7 @@ class _Renderer:
         self._encoding.submit(self._post_processor.end, [stream.name])
 
     def _first_view(self, state: RobotState) -> str:
-        """Return the view whose camera the view for slow links uses."""
+        """Return the view that provides the camera of the view for slow links."""
         known = () if state.appearance is None else view_names(state.appearance)
         return next((view for view in self._settings.views if view in known), FREE)
 
@@ -355,7 +355,7 @@ class _Renderer:
             now = time.monotonic()
             silent = []
             for key, stream in list(self._streams.items()):
-                # Catches a change of watchers whose notification was missed.
+                # Catches missed notifications of a change of subscribers.
                 stream.update_watchers()
                 if stream.unwatched_since is None:
                     continue

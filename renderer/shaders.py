@@ -11,7 +11,7 @@ vec3 to_srgb(vec3 c) {
     return 0.585122 * root + 0.783140 * second - 0.368263 * sqrt(second);
 }
 vec3 backdrop(float height) {
-    // Neutral grey-blue, lighter towards the floor: eyes rest on it for hours.
+    // Neutral grey-blue, lighter towards the floor: operators look at it for hours.
     return mix(vec3(0.805, 0.825, 0.845), vec3(0.665, 0.700, 0.740), smoothstep(0.0, 1.0, height));
 }
 """
@@ -95,7 +95,7 @@ float line(float step_m, float width_px) {
     vec2 wide = fwidth(place) / step_m;
     vec2 off = abs(fract(place / step_m + 0.5) - 0.5);
     vec2 on = 1.0 - smoothstep(wide * (width_px - 0.5), wide * (width_px + 0.5), off);
-    // Lines nearer to each other than a few pixels become an even tone, then nothing.
+    // Lines closer together than a few pixels become an even tone, then fade out.
     on *= 1.0 - smoothstep(vec2(0.12), vec2(0.4), wide);
     return max(on.x, on.y);
 }
@@ -103,7 +103,7 @@ void main() {
     float out_there = length(place) / extent;
     float far = 1.0 - smoothstep(0.30, 1.0, out_there);
     float lines = max(0.15 * line(fine, 0.5), 0.40 * line(coarse, 0.65)) * strength * far;
-    // A pool of light about the arm, that the floor be one.
+    // Light around the arm, so that the plane looks like a floor.
     float pool = 0.55 * floor_light * (1.0 - smoothstep(0.05, 0.75, out_there));
     vec3 shade = mix(vec3(0.90, 0.91, 0.92), vec3(0.40, 0.45, 0.51), lines / max(lines + pool, 1e-4));
     color = vec4(shade, lines + pool - lines * pool);
@@ -117,7 +117,7 @@ uniform float extent, strength;
 in vec2 place;
 out vec4 color;
 void main() {
-    // Nothing at the map's edge, whatever lies there: a shadow has no corners.
+    // Fades out towards the map's edge, so that the shadow has no corners.
     float inside = 1.0 - smoothstep(0.8, 1.0, length(place) / extent);
     color = vec4(0.10, 0.12, 0.15, texture(shadow, place / (2.0 * extent) + 0.5).r * strength * inside);
 }
@@ -134,7 +134,7 @@ out float height;
 void main() {
     vec3 at = (part_to_site * vec4(position, 1.0)).xyz;
     height = max(at.z - floor_height, 0.0);
-    // Steeper than the lamp: a shadow that stays near its body tells where it stands.
+    // Steeper than the lamp: a shadow close to its body shows the body's position.
     vec2 falls = at.xy - key.xy / key.z * 0.75 * height - center;
     gl_Position = vec4(falls / extent, clamp(height / tallest, 0.0, 1.0) * 2.0 - 1.0, 1.0);
 }

@@ -83,7 +83,7 @@ class Stream:
 
     @property
     def watched(self) -> bool:
-        """Whether the video or the pictures have subscribers."""
+        """True if the video or the pictures have subscribers."""
         return self._video_watched or self._image_watched
 
     @property

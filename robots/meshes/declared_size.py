@@ -158,7 +158,7 @@ def _obj(path: Path, data: bytes) -> Declared:
 
 
 def _check_obj_numbers(path: Path, text: str) -> None:
-    """Reject a face whose vertex number far exceeds the count: trimesh would allocate up to that number.
+    """Reject a face with a vertex number far above the count: trimesh would allocate up to that number.
 
     Raises:
         MeshError: If there is one.
@@ -316,7 +316,7 @@ def _check_tree(path: Path, nodes: list[dict[str, Any]]) -> None:
 
 
 def _check_drawn(path: Path, document: dict[str, Any]) -> None:
-    """Reject a small file whose many nodes and primitives all draw the same values.
+    """Reject a small file with many nodes and primitives that all draw the same values.
 
     Raises:
         MeshError: If they draw more than MAX_DRAWN points and corners.

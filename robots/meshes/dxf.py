@@ -176,7 +176,7 @@ def _walk(path: Path, drawing: Any, entity: Any, above: _Appearance, found: _Fou
 
 def _draw(path: Path, drawing: Any, entity: Any, above: _Appearance, found: _Found, depth: int) -> None:
     kind = entity.dxftype()
-    # Before the layer is read: some entities, such as ACAD_TABLE, have none in ezdxf.
+    # Before the layer is read: some entities, for example ACAD_TABLE, have none in ezdxf.
     if kind not in _READ:
         found.left_out[kind] += 1
         return

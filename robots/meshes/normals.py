@@ -16,7 +16,7 @@ _Smooth = Callable[[IndexArray, IndexArray], _Flags]
 
 # Pairs of corners in one batch: some tens of MB.
 _PAIRS = 200_000
-# A vertex with more faces, such as the tip of a fine cone, stays faceted: it would have millions of pairs.
+# A vertex with more faces, like the tip of a fine cone, stays faceted: it would have millions of pairs.
 _MOST_AT_ONE_VERTEX = 700
 
 

@@ -31,7 +31,7 @@ class Effort:
 
     @property
     def spent(self) -> bool:
-        """Whether the budget is spent, so that triangles may overlap or leave their polygon."""
+        """True if the budget is spent: triangles may then overlap or leave their polygon."""
         return self.left < 0
 
 

@@ -82,7 +82,7 @@ def _corner(path: Path, line: int, word: str, counts: dict[str, int]) -> str:
 
 
 def check_instances(path: Path, data: bytes) -> None:
-    """Reject a COLLADA file whose nested instances add up to more than can be drawn.
+    """Reject a COLLADA file with nested instances that add up to more than can be drawn.
 
     Raises:
         MeshError: If it draws too much, a node contains itself, or it is not XML.

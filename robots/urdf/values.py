@@ -7,7 +7,7 @@ import numpy as np
 
 from robots.poses import FloatArray, rpy_rotation
 
-# No arm is this long: such a file is in millimetres.
+# No arm is this long: the file is in millimetres.
 _FARTHEST_M = 100.0
 
 

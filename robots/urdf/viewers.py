@@ -85,7 +85,7 @@ def prefixed(urdf: str, prefix: str, mesh_uri: MeshUri, *, joints: bool = False)
 def together(robots: Iterable[Viewed], *, plain_joints: bool) -> str:
     """Return one URDF of all robots at their places in their sites; invalid URDFs are left out.
 
-    The root is the site's frame. With several sites, whose relative placement is unknown, it is `WORLD`.
+    The root is the site's frame, or `WORLD` for several sites: their relative placement is unknown.
 
     Args:
         plain_joints: Joints keep their names without a prefix; only for a single robot.

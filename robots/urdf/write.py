@@ -1,6 +1,6 @@
 """Writer of descriptions as URDF.
 
-URDF puts a link's frame on its joint's axis, but a D-H link's frame is elsewhere. So each such joint moves
+URDF puts a link's frame on its joint's axis, but a D-H link's frame is elsewhere. So each D-H joint moves
 an empty link "<joint>_axis", to which a fixed joint attaches the actual link. Every link, the tool and the
 named frames keep the names and frames that they have everywhere else. A robot read from a URDF keeps its
 links and joints; links that were fixed together are attached to the first of them.

@@ -334,7 +334,7 @@ def test_no_old_picture_is_sent_after_drawing_has_failed(mesh, tmp_path, monkeyp
 
 
 def test_a_robot_that_returns_after_a_long_time_is_drawn_again(mesh, tmp_path, monkeypatch):
-    """As after an outage of the router: the kinematics service kept running and has no new description."""
+    """After an outage of the router, a kinematics service that kept running has no new description."""
     monkeypatch.setattr(robots, "_FORGET_AFTER_S", 0.2)
 
     async def main():

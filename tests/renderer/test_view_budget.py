@@ -60,7 +60,7 @@ def test_a_view_with_two_askers_is_reassigned_before_a_request_is_rejected():
     there += views(["li"])
     with pytest.raises(QuotaError, match="li has 2 views already: quota views = 2 a name"):
         small.check(there, spec(), "li")
-    # No view is reassigned to an operator whose share is used up.
+    # No view is reassigned to an operator with a used-up share.
     there = views(["li", "wang"], ["li"], ["wang"], ["wang"])
     with pytest.raises(QuotaError):
         small.check(there, spec(), "li")

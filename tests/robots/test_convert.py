@@ -59,7 +59,7 @@ def test_scale_and_up_are_taken(box: Path, capsys: pytest.CaptureFixture[str]) -
 def test_what_is_lost_is_said(box: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["mesh", "convert", str(box), str(box.with_name("out.stl"))]) == 0
     assert (
-        "out.stl: STL holds shape alone: colours, transparency and names are lost" in capsys.readouterr().err
+        "out.stl: STL holds shape only: colours, transparency and names are lost" in capsys.readouterr().err
     )
 
 
@@ -69,7 +69,7 @@ def test_what_is_lost_is_said(box: Path, capsys: pytest.CaptureFixture[str]) -> 
         (["out.dxf"], "ending '.dxf' is not written; .glb, .stl, .obj, .ply, .wrl, .3ds are"),
         (["out.stl", "--up", "x"], "--up x: y or z is right"),
         (["out.stl", "--scale", "-1"], "--scale -1.0: a number above 0 is right"),
-        (["box.wrl"], "box.wrl: is the file that is to be converted; name another"),
+        (["box.wrl"], "box.wrl: is the input file; name another"),
         (["none/out.stl"], "cannot be written: No such file or directory"),
     ],
 )
@@ -87,7 +87,7 @@ def test_mesh_of_nothing_is_not_written(box: Path, capsys: pytest.CaptureFixture
     nothing = box.with_name("nothing.wrl")
     nothing.write_text("#VRML V2.0 utf8\n")
     assert run(["mesh", "convert", str(nothing), str(box.with_name("out.glb"))]) == 2
-    assert "holds nothing that can be drawn" in capsys.readouterr().err
+    assert "holds no geometry" in capsys.readouterr().err
     assert not box.with_name("out.glb").exists()
 
 
