@@ -69,7 +69,7 @@ def test_what_is_lost_is_said(box: Path, capsys: pytest.CaptureFixture[str]) -> 
         (["out.dxf"], "ending '.dxf' is not written; .glb, .stl, .obj, .ply, .wrl, .3ds are"),
         (["out.stl", "--up", "x"], "--up x: y or z is right"),
         (["out.stl", "--scale", "-1"], "--scale -1.0: a number above 0 is right"),
-        (["box.wrl"], "box.wrl: is the input file; name another"),
+        (["box.wrl"], "box.wrl: is the input file; name another output"),
         (["none/out.stl"], "cannot be written: No such file or directory"),
     ],
 )

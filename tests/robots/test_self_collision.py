@@ -417,7 +417,7 @@ def test_robot_check_lists_unchecked_pairs_and_protruding_geometry(
     assert report["touch_at_home"][0]["links"] == ["base", "hand"]
     assert report["stands_out"] == {"hand": pytest.approx(0.009, abs=1e-6)}
     assert run(["robot", "check", str(model)]) == 0
-    assert "stands out of what is checked by 9.0 mm" in capsys.readouterr().out
+    assert "extends beyond checked geometry by 9.0 mm" in capsys.readouterr().out
 
 
 @needs_real_robots

@@ -1,4 +1,4 @@
-"""The bridges with certificates: each does what its role may, and no more."""
+"""Bridges with certificates: each has exactly the rights of its role."""
 
 import asyncio
 from contextlib import asynccontextmanager
@@ -24,7 +24,7 @@ from tests.services.test_foxglove import ARM, bridge, joints
 
 @pytest.fixture(scope="module")
 def secured(tmp_path_factory):
-    """The keys of a site that runs, and its router."""
+    """Return the keys and the router of a running site."""
     folder = Folder(tmp_path_factory.mktemp("site") / "keys")
     authority.prepare(folder, "hall", robots=["arm"], border="open", routers=[])
     authority.issue(folder, "mo", Role.MONITOR)
@@ -40,14 +40,14 @@ def mesh_of(endpoint, file):
 
 @asynccontextmanager
 async def hall(secured):
-    """The gateway of the site, by its certificate."""
+    """Run the site's gateway, with its certificate."""
     folder, endpoint = secured
     async with open_session(mesh_of(endpoint, folder.service("gateway"))) as session:
         session.declare_presence("hall", "arm", "gateway")
         yield session
 
 
-def test_a_monitors_certificate_shows_everything_and_commands_nothing(secured):
+def test_a_monitors_certificate_reads_everything_and_commands_nothing(secured):
     async def main():
         folder, endpoint = secured
         mo = mesh_of(endpoint, folder.person("mo"))
@@ -67,7 +67,7 @@ def test_a_monitors_certificate_shows_everything_and_commands_nothing(secured):
     run(main())
 
 
-def test_an_operators_certificate_asks_in_its_own_name_alone(secured):
+def test_an_operators_certificate_requests_only_in_its_own_name(secured):
     async def main():
         folder, endpoint = secured
         li = mesh_of(endpoint, folder.person("li"))
@@ -93,7 +93,7 @@ def test_an_operators_certificate_asks_in_its_own_name_alone(secured):
     run(main())
 
 
-def test_only_the_ros2_certificate_speaks_to_ros_nodes(secured, tmp_path):
+def test_only_the_ros2_certificate_publishes_to_ros_nodes(secured, tmp_path):
     async def main():
         folder, endpoint = secured
         got, forged = [], "0/joint_states/forged"

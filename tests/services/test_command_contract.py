@@ -1,4 +1,4 @@
-"""Every command of the contract's table takes what the table says."""
+"""The table of commands: lazy imports, and the options of the contract's table."""
 
 import json
 import re
@@ -17,7 +17,7 @@ from services.command_line.main import run
 from tests.conftest import SHARED, free_port
 
 ROOT = Path(__file__).resolve().parents[2]
-# Command: the options that the contract names, and whether it prints data.
+# Command -> the options that the contract names.
 CONTRACT = {
     "up": (),
     **dict.fromkeys(
@@ -83,7 +83,7 @@ def test_help_imports_no_command_and_nothing_heavy() -> None:
 
 
 @pytest.mark.parametrize("name", ["robot", "mesh", "program", "recordings", "audit", "keys"])
-def test_help_of_a_group_imports_that_group_alone(name: str) -> None:
+def test_help_of_a_group_imports_only_that_group(name: str) -> None:
     imported = imported_by(name, "--help")
     rows = {f"services.command_line.{row.module}" for row in COMMANDS.values()}
     assert imported & rows == {f"services.command_line.{COMMANDS[name].module}"}
@@ -91,9 +91,9 @@ def test_help_of_a_group_imports_that_group_alone(name: str) -> None:
 
 
 @pytest.mark.parametrize("words", CONTRACT)
-def test_command_takes_what_the_contract_says(words: str) -> None:
+def test_command_has_the_options_of_the_contract(words: str) -> None:
     options = {option for each in command(words).params for option in each.opts}
-    # A router attaches to nobody: it takes its links from the site file.
+    # A router has no --connect: it takes its links from the site file.
     missing = set(CONTRACT[words]) - options - ({"--connect"} if words == "router" else set())
     assert not missing
 
@@ -108,7 +108,7 @@ def test_table_names_every_command_of_the_contract() -> None:
     assert named - {words.split()[0] for words in CONTRACT} == set()
 
 
-def test_fk_and_ik_answer_json_lines_with_the_option_and_without(
+def test_fk_and_ik_print_json_with_and_without_the_option(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     import io
@@ -127,7 +127,7 @@ def test_fk_and_ik_answer_json_lines_with_the_option_and_without(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("example", ["check.py", "inverse.py"])
-def test_example_without_arguments_says_how_it_is_called(example: str) -> None:
+def test_example_without_arguments_prints_its_usage(example: str) -> None:
     done = subprocess.run(
         [sys.executable, str(ROOT / "examples" / example)],
         capture_output=True,
@@ -148,7 +148,7 @@ def test_simulator_beyond_loopback_names_its_own_option(capsys: pytest.CaptureFi
 
 
 @pytest.mark.slow
-def test_command_that_is_interrupted_while_it_loads_ends_with_130_and_no_traceback() -> None:
+def test_ctrl_c_during_imports_exits_with_130_and_no_traceback() -> None:
     script = (
         "import os, signal, sys\n"
         "class Finder:\n"
@@ -165,7 +165,7 @@ def test_command_that_is_interrupted_while_it_loads_ends_with_130_and_no_traceba
     assert (done.returncode, done.stderr, done.stdout) == (130, "", "")
 
 
-def test_entry_leaves_ctrl_c_to_the_command_that_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_entry_point_restores_the_handler_of_ctrl_c(monkeypatch: pytest.MonkeyPatch) -> None:
     from services.command_line import start
 
     before = signal.getsignal(signal.SIGINT)
@@ -174,7 +174,7 @@ def test_entry_leaves_ctrl_c_to_the_command_that_runs(monkeypatch: pytest.Monkey
     assert signal.getsignal(signal.SIGINT) is before
 
 
-def test_doctor_tells_a_running_site_from_another_program(router: str) -> None:
+def test_doctor_distinguishes_a_running_site_from_another_program(router: str) -> None:
     from services.command_line.doctor import machine
 
     assert machine._is_router(int(router.rpartition(":")[2]))

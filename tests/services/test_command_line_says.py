@@ -1,4 +1,4 @@
-"""What the command line says, and where nobody reads it: `robomesh ... | head`, a terminal that is held."""
+"""Output without a reader: `robomesh ... | head`, and a terminal that is paused."""
 
 import os
 import subprocess
@@ -23,7 +23,7 @@ ROBOMESH = (sys.executable, "-m", "services.command_line.main")
     ],
 )
 @pytest.mark.slow
-def test_a_command_ends_quietly_when_its_reader_has_gone(arguments, lines):
+def test_a_command_ends_quietly_when_the_reader_of_its_output_is_gone(arguments, lines):
     reader, writer = os.pipe()
     os.close(reader)
     try:
@@ -34,7 +34,7 @@ def test_a_command_ends_quietly_when_its_reader_has_gone(arguments, lines):
             stderr=subprocess.PIPE,
             text=True,
             timeout=60,
-            # As in a shell: what is said waits for the end.
+            # Buffered output, as in a shell.
             env={name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"},
         )
     finally:
@@ -43,7 +43,7 @@ def test_a_command_ends_quietly_when_its_reader_has_gone(arguments, lines):
 
 
 @pytest.mark.slow
-def test_a_site_goes_on_when_nobody_takes_its_log():
+def test_a_site_keeps_running_when_its_log_is_not_read():
     program = (
         "from services.command_line.site import up\n"
         "up._log_plain_lines()\n"
@@ -57,7 +57,7 @@ def test_a_site_goes_on_when_nobody_takes_its_log():
     deadline.start()
     try:
         assert held.stdout.readline() == "goes on\n"
-        # And what it said is there for who comes later, as it was said.
+        # The output is complete for a late reader.
         assert held.stderr.readline() == f"{0:<200}\n"
     finally:
         deadline.cancel()
@@ -65,7 +65,7 @@ def test_a_site_goes_on_when_nobody_takes_its_log():
         held.communicate()
 
 
-def test_list_watch_fills_a_pipe_and_ends_quietly_with_its_reader(router):
+def test_list_watch_writes_to_a_pipe_and_ends_quietly_with_its_reader(router):
     watching = subprocess.Popen(
         [*ROBOMESH, "list", "--watch", "--connect", router],
         stdout=subprocess.PIPE,
@@ -86,8 +86,8 @@ def test_list_watch_fills_a_pipe_and_ends_quietly_with_its_reader(router):
 
 
 @pytest.mark.parametrize(
-    ("listen", "told"),
+    ("listen", "address"),
     [("0.0.0.0:8443", "127.0.0.1:8443"), ("[::1]:8080", "[::1]:8080"), ("10.0.0.7:80", "10.0.0.7:80")],
 )
-def test_up_tells_where_a_browser_finds_the_page(listen, told):
-    assert _console_url(Site(site="hall", console=Console(listen=listen))) == f"http://{told}/"
+def test_up_prints_the_url_of_the_page(listen, address):
+    assert _console_url(Site(site="hall", console=Console(listen=listen))) == f"http://{address}/"

@@ -1,4 +1,4 @@
-"""`robomesh fault` against a real simulator on a real mesh, and the words of `monitor` for a link."""
+"""`robomesh fault` with a real simulator, and the link's text in `monitor`."""
 
 import asyncio
 import json
@@ -21,7 +21,7 @@ async def ask(*arguments):
     return await asyncio.to_thread(robomesh, *arguments)
 
 
-def test_faults_are_begun_ended_and_listed_from_the_command_line(mesh, router):
+def test_fault_begins_ends_and_lists_faults(mesh, router):
     async def main():
         own = Mesh(site="hall", robot="arm", session=mesh)
         ready = asyncio.get_running_loop().create_future()
@@ -34,8 +34,8 @@ def test_faults_are_begun_ended_and_listed_from_the_command_line(mesh, router):
             listed = await ask("fault", "arm", *to)
             assert [line[2:].split()[0] for line in listed.stdout.splitlines()] == list(FAULTS)
             assert "* garbage" in listed.stdout
-            told = json.loads((await ask("fault", "hall/arm", "garbage", "--off", "--json", *to)).stdout)
-            assert told == {"active": [], "known": list(FAULTS)}
+            printed = json.loads((await ask("fault", "hall/arm", "garbage", "--off", "--json", *to)).stdout)
+            assert printed == {"active": [], "known": list(FAULTS)}
             unknown = await ask("fault", "arm", "melt", *to)
             assert unknown.returncode == 2
             assert "'melt' is unknown; there are freeze, garbage" in unknown.stderr
@@ -56,7 +56,7 @@ def test_a_simulator_for_a_robot_without_a_site_is_refused_in_one_line():
     )
 
 
-def test_monitor_says_what_is_known_of_a_link_and_what_is_wrong():
+def test_monitor_prints_known_values_and_problems_of_a_link():
     state = STATE(link=STATE.UP, rate_hz=99.7, last_unit_age_s=0.01)
     assert link_words(state) == "100 units/s"
     state.health.jitter_s, state.health.answer_s = 0.0004, 0.012

@@ -30,7 +30,7 @@ def asked(
     return status, [json.loads(line) for line in capsys.readouterr().out.splitlines()]
 
 
-def test_each_line_is_answered_by_a_line(
+def test_each_request_line_gets_an_answer_line(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     near = POSITIONS.tolist()
@@ -53,7 +53,7 @@ POSE = TOOL.tolist()
 
 
 @pytest.mark.parametrize(
-    ("line", "said"),
+    ("line", "error"),
     [
         ("nonsense", "'nonsense' is no request"),
         ([1], "'[1]' is no request"),
@@ -68,16 +68,16 @@ POSE = TOOL.tolist()
         ({"pose": [1.0]}, "the pose has 1 numbers; 16 are right"),
     ],
 )
-def test_a_wrong_line_is_told_and_the_next_is_answered(
-    line: Any, said: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+def test_an_invalid_line_gets_an_error_and_the_next_an_answer(
+    line: Any, error: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     status, answers = asked([line, {"pose": POSE}], capsys, monkeypatch)
     assert status == 1
-    assert said in answers[0]["error"]
+    assert error in answers[0]["error"]
     assert len(answers[1]["solutions"]) == 1
 
 
-def test_a_line_without_a_solution_says_why_and_ends_with_1(
+def test_a_line_without_solution_has_the_reason_and_exit_status_1(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     far = [1, 0, 0, 9, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
@@ -88,22 +88,24 @@ def test_a_line_without_a_solution_says_why_and_ends_with_1(
     assert answer["residual_m"] > 8
 
 
-def test_people_ask_and_are_answered_in_degrees_and_millimetres(capsys: pytest.CaptureFixture[str]) -> None:
+def test_arguments_and_printed_solutions_are_in_degrees_and_millimetres(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     # Chen et al. 2001, section 4: the sample frame's tool.
     assert run(["ik", "--robot", "pt600", "-28.1", "159.4", "852.8"]) == 0
-    told = capsys.readouterr().out
-    assert told.startswith("1 solution found by search, the tool within 0.0000 mm")
+    printed = capsys.readouterr().out
+    assert printed.startswith("1 solution found by search, the tool within 0.0000 mm")
     assert run(["ik", "--robot", "puma560", "--all", "300", "100", "200", "180", "0", "30"]) == 0
-    told = capsys.readouterr().out.splitlines()
-    assert told[0] == "2 solutions in closed form, the tool within 0.0000 mm and 0.0000°"
-    assert told[1].split() == list(build_model(load("puma560")).joints.names)
-    assert told[2].split()[0] == "-5.66°"
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[0] == "2 solutions in closed form, the tool within 0.0000 mm and 0.0000°"
+    assert printed[1].split() == list(build_model(load("puma560")).joints.names)
+    assert printed[2].split()[0] == "-5.66°"
     assert run(["ik", "--robot", "pt600", "300", "0", "400", "90", "0", "0"]) == 1
     assert capsys.readouterr().out.startswith("no solution: not this orientation: ")
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "error"),
     [
         (["1", "2"], "2 numbers; 3 or 6 are right: X Y Z in mm"),
         (["1", "2", "up"], "'up' is no number"),
@@ -113,14 +115,14 @@ def test_people_ask_and_are_answered_in_degrees_and_millimetres(capsys: pytest.C
         (["1", "2", "3", "--robot", "pt60"], "did you mean 'pt600'"),
     ],
 )
-def test_unusable_arguments_end_with_2(
-    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+def test_invalid_arguments_end_with_2(
+    words: list[str], error: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["ik", *words]) == 2
-    assert said in capsys.readouterr().err
+    assert error in capsys.readouterr().err
 
 
-def test_the_mesh_is_answered_with_the_solutions_or_the_reason() -> None:
+def test_a_request_on_the_mesh_gets_solutions_or_the_reason() -> None:
     solver = build_solver(load("pt600"))
     request = schema.InverseRequest(pose=TOOL.ravel(), task=SIX_D, near=POSITIONS, all_solutions=True)
     answer = inverse_answer(solver, request)
@@ -135,7 +137,7 @@ def test_the_mesh_is_answered_with_the_solutions_or_the_reason() -> None:
 
 
 @pytest.mark.parametrize(
-    ("request_", "said"),
+    ("request_", "error"),
     [
         (schema.InverseRequest(pose=TOOL.ravel()), "task 0: POSE_6D or POSITION_AND_AXIS_5D is right"),
         (schema.InverseRequest(task=SIX_D), "the pose has 0 numbers"),
@@ -143,8 +145,6 @@ def test_the_mesh_is_answered_with_the_solutions_or_the_reason() -> None:
         (schema.InverseRequest(pose=TOOL.ravel(), task=SIX_D, near=[1.0]), "near: .* takes \\(5,\\)"),
     ],
 )
-def test_a_request_that_cannot_be_answered_is_refused_in_words(
-    request_: schema.InverseRequest, said: str
-) -> None:
-    with pytest.raises(RefusedError, match=said):
+def test_an_invalid_request_on_the_mesh_is_refused(request_: schema.InverseRequest, error: str) -> None:
+    with pytest.raises(RefusedError, match=error):
         inverse_answer(build_solver(load("pt600")), request_)

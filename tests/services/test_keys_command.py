@@ -1,4 +1,4 @@
-"""`robomesh keys` as people use it, and a whole site that runs by its keys."""
+"""`robomesh keys`, and a whole site that runs with its keys."""
 
 import json
 import logging
@@ -45,7 +45,7 @@ def site(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """A site with keys, for what changes nothing."""
+    """Return a site with keys, for tests that do not change it."""
     path = a_site(tmp_path_factory.mktemp("made"))
     assert keys("init", str(path)) == 0
     return path.parent
@@ -59,7 +59,7 @@ def records(capsys):
     return {row["name"]: row for row in map(json.loads, capsys.readouterr().out.splitlines())}
 
 
-def test_init_makes_a_certificate_for_each_service_switches_the_site_to_tls_and_does_it_once(site, capsys):
+def test_init_creates_a_certificate_for_each_service_and_enables_tls_once(site, capsys):
     before = site.read_text()
     assert keys("init", str(site)) == 0
     assert 'folder = "keys" is added' in capsys.readouterr().out
@@ -83,7 +83,7 @@ def test_init_makes_a_certificate_for_each_service_switches_the_site_to_tls_and_
     assert {file: file.read_bytes() for file in written} == written
 
 
-def test_a_robot_that_the_site_file_gains_is_the_gateways_after_the_next_init(site, capsys):
+def test_init_adds_a_new_robot_to_the_gateways_certificate(site, capsys):
     keys("init", str(site))
     site.write_text(site.read_text() + ONE_ARM.replace('"arm"', '"arm-2"'))
     capsys.readouterr()
@@ -92,11 +92,11 @@ def test_a_robot_that_the_site_file_gains_is_the_gateways_after_the_next_init(si
     keys("list", "--json")
     listed = records(capsys)
     assert listed["gateway.hall"]["robots"] == ["arm", "arm-2"]
-    # Whatever the page may start is named ahead, and no other robot of the site is.
+    # Robots that the page may start are added ahead; other robots of the site are not.
     assert set(listed["started.hall"]["robots"]) == set(library_names())
 
 
-def test_whoever_was_started_from_the_page_is_named_in_the_rules_without_the_authoritys_key(site, tmp_path):
+def test_started_robots_are_added_to_the_rules_without_the_authoritys_key(site, tmp_path):
     keys("init", str(site))
     folder = Folder(tmp_path / "keys")
     folder.authority_key.unlink()
@@ -120,19 +120,19 @@ def test_whoever_was_started_from_the_page_is_named_in_the_rules_without_the_aut
     assert rights() == stops("mine")
     assert keys("init", str(site)) == 0
     assert rights() == stops("mine")
-    # What it may speak for once it may until the next init: no routers open anew for a robot that ends.
+    # Rights stay until the next init, so that the end of a robot does not make routers reopen.
     file.unlink()
     assert rights() == stops("mine")
     assert keys("init", str(site)) == 0
     assert rights() == stops()
 
 
-def test_no_router_opens_anew_for_the_first_start_of_a_robot_that_was_there_before(site, tmp_path):
+def test_the_first_start_of_a_saved_robot_does_not_change_the_rules(site, tmp_path):
     keys("init", str(site))
     saved = tmp_path / "robots" / "mine" / "robot.toml"
     saved.parent.mkdir(parents=True)
     saved.write_text("")
-    # What a robot of the site file may not be called, one that is started may not either.
+    # Started robots cannot have names that the site file refuses.
     for other in ("replay-x", PROBE_ROBOT, "No"):
         (saved.parent.parent / other).mkdir()
         (saved.parent.parent / other / "robot.toml").write_text("")
@@ -148,9 +148,7 @@ def test_no_router_opens_anew_for_the_first_start_of_a_robot_that_was_there_befo
     assert Folder(tmp_path / "keys").access.stat() == rules
 
 
-def test_where_no_names_can_be_written_ahead_the_robots_that_were_started_run_on(
-    site, tmp_path, monkeypatch, caplog
-):
+def test_started_robots_keep_running_when_the_rules_cannot_be_written(site, tmp_path, monkeypatch, caplog):
     caplog.set_level(logging.INFO)
     keys("init", str(site))
     folder = Folder(tmp_path / "keys")
@@ -167,20 +165,20 @@ def test_where_no_names_can_be_written_ahead_the_robots_that_were_started_run_on
     assert [key[0] for key in following.wanted()] == ["mine"]
     assert "no space left on device; started robots run" in caplog.text
     caplog.clear()
-    # Nobody would let in a gateway of this one.
+    # The routers would refuse the gateway of this one.
     started.write_text(started.read_text() + ONE_ARM.replace('"arm"', '"new"'))
     assert [key[0] for key in following.wanted()] == ["mine"]
     assert "no space left on device; robots that were started before keep running" in caplog.text
 
 
-def test_an_empty_section_of_keys_is_not_written_a_second_time(site, capsys):
+def test_init_does_not_append_a_second_keys_section(site, capsys):
     site.write_text(text := site.read_text() + "\n[keys]\n")
     assert keys("init", str(site)) == 2
     assert '[keys] has no folder: write folder = "keys" below it' in capsys.readouterr().err
     assert site.read_text() == text
 
 
-def test_a_bundle_knows_where_the_routers_are(site):
+def test_a_bundle_has_the_routers_addresses(site):
     keys("init", str(site))
     keys("issue", "li", "--role", "operator")
     file = Folder(site.parent / "keys").person("li")
@@ -191,7 +189,7 @@ def test_a_bundle_knows_where_the_routers_are(site):
     assert read_identity(file).routers == ("tls/hall.example:7447",)
 
 
-def test_secrets_are_their_owners_only(site):
+def test_secrets_are_readable_by_their_owner_only(site):
     keys("init", str(site))
     keys("issue", "li", "--role", "operator")
     keys("issue", "--guest", "elsewhere")
@@ -200,7 +198,7 @@ def test_secrets_are_their_owners_only(site):
         assert stat.S_IMODE(path.stat().st_mode) == (0o700 if path.is_dir() else 0o600), path
 
 
-def test_issue_renew_revoke_and_list_tell_what_they_did(site, capsys):
+def test_issue_renew_revoke_and_list_print_their_result(site, capsys):
     keys("init", str(site))
     assert keys("issue", "li", "--role", "operator", "--days", "5") == 0
     assert keys("issue", "mo", "--role", "monitor") == 0
@@ -208,7 +206,7 @@ def test_issue_renew_revoke_and_list_tell_what_they_did(site, capsys):
     keys("list", "--json")
     first = records(capsys)
     assert keys("renew") == 0
-    # Who was let in for five days is not let in for ever by a timer.
+    # A timer does not renew a certificate of five days forever.
     assert "li.hall" not in capsys.readouterr().out
     assert keys("renew", "li") == 0
     assert capsys.readouterr().out.endswith("1 renewed\n")
@@ -228,7 +226,7 @@ def test_issue_renew_revoke_and_list_tell_what_they_did(site, capsys):
     assert "mo.hall                     monitor    revoked 20" in capsys.readouterr().out
 
 
-def test_a_name_that_has_a_certificate_is_told_so_and_nobodys_motion_is_spoken_of(site, capsys):
+def test_issue_for_an_existing_name_reports_the_earlier_certificate(site, capsys):
     keys("init", str(site))
     capsys.readouterr()
     keys("issue", "li", "--role", "operator")
@@ -242,9 +240,7 @@ def test_a_name_that_has_a_certificate_is_told_so_and_nobodys_motion_is_spoken_o
     assert "moves under a lease stops" not in again
 
 
-def test_keys_are_found_where_a_site_file_says_or_beside_or_around_ones_own_and_named(
-    tmp_path, monkeypatch, capsys
-):
+def test_keys_are_found_by_site_file_or_folder_or_own_bundle_and_printed(tmp_path, monkeypatch, capsys):
     for name in ("keys", "other", "third"):
         authority.prepare(Folder(tmp_path / name), name, robots=[], border="open", routers=[])
     work = tmp_path / "work"
@@ -289,7 +285,7 @@ def test_keys_are_found_where_a_site_file_says_or_beside_or_around_ones_own_and_
         (("list", "--folder", "elsewhere"), "elsewhere/principals.toml does not exist"),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_line(made, monkeypatch, capsys, arguments, text):
+def test_an_invalid_request_is_refused_in_one_line(made, monkeypatch, capsys, arguments, text):
     monkeypatch.chdir(made)
     assert keys(*arguments) == 2
     error = capsys.readouterr().err
@@ -297,7 +293,7 @@ def test_what_cannot_be_is_refused_in_one_line(made, monkeypatch, capsys, argume
     assert error.count("\n") == 1
 
 
-def test_without_the_authoritys_key_nothing_is_issued_and_rules_are_still_written(site, capsys):
+def test_without_the_authoritys_key_rules_are_written_but_nothing_is_issued(site, capsys):
     keys("init", str(site))
     keys("issue", "li", "--role", "operator")
     folder = Folder(site.parent / "keys")
@@ -308,7 +304,7 @@ def test_without_the_authoritys_key_nothing_is_issued_and_rules_are_still_writte
     assert authority.principals_of(folder).find("li").revoked is not None
 
 
-def test_a_list_that_somebody_spoiled_is_told_with_its_file_and_key(site, capsys):
+def test_an_invalid_list_is_reported_with_its_file_and_key(site, capsys):
     keys("init", str(site))
     listed = Folder(site.parent / "keys").principals
     listed.write_text(listed.read_text().replace('role = "watch"', 'role = "king"'))
@@ -318,7 +314,7 @@ def test_a_list_that_somebody_spoiled_is_told_with_its_file_and_key(site, capsys
     assert "'king'" in error
 
 
-def test_a_time_without_its_zone_is_told_too(site, capsys):
+def test_a_time_without_zone_is_reported(site, capsys):
     keys("init", str(site))
     listed = Folder(site.parent / "keys").principals
     listed.write_text(re.sub(r"(expires = \S+)Z", r"\1", listed.read_text(), count=1))
@@ -327,7 +323,7 @@ def test_a_time_without_its_zone_is_told_too(site, capsys):
     assert re.search(r"principals\.toml: principal\.0\.expires = .*timezone", capsys.readouterr().err)
 
 
-def test_an_init_that_was_killed_before_it_wrote_the_list_is_made_good_by_the_next(site):
+def test_init_repairs_an_init_that_was_killed_before_it_wrote_the_list(site):
     keys("init", str(site))
     folder = Folder(site.parent / "keys")
     whole = authority.principals_of(folder)
@@ -340,10 +336,10 @@ def test_an_init_that_was_killed_before_it_wrote_the_list_is_made_good_by_the_ne
     assert all(each.name in known and each.serial for each in again.entries)
 
 
-def test_a_revoked_name_is_given_to_nobody_while_a_certificate_of_it_is_good(made, monkeypatch, capsys):
+def test_a_revoked_name_is_not_issued_while_its_certificate_is_valid(made, monkeypatch, capsys):
     monkeypatch.chdir(made)
     assert keys("issue", "wang", "--role", "operator", "--days", "90") == 0
-    assert keys("issue", "wang", "--role", "operator", "--days", "1") == 0  # the first is good all the same
+    assert keys("issue", "wang", "--role", "operator", "--days", "1") == 0  # the first stays valid
     keys("revoke", "wang")
     capsys.readouterr()
     for role in ("operator", "monitor"):
@@ -356,14 +352,14 @@ def test_a_revoked_name_is_given_to_nobody_while_a_certificate_of_it_is_good(mad
     assert keys("issue", "wang-2", "--role", "operator") == 0
 
 
-def test_a_revoked_name_is_free_when_its_certificates_have_expired(made):
+def test_a_revoked_name_is_issued_after_its_certificates_have_expired(made):
     folder = Folder(made / "keys")
     authority.issue(folder, "zhou", Role.OPERATOR, lifetime=timedelta(seconds=-60))
     authority.revoke(folder, "zhou")
     assert authority.issue(folder, "zhou", Role.MONITOR).revoked is None
 
 
-def test_a_revoked_guest_comes_back_neither_by_a_new_file_nor_by_one_that_its_site_gives(tmp_path):
+def test_a_revoked_guest_is_refused_with_a_new_file_and_with_its_sites_file(tmp_path):
     here, there = Folder(tmp_path / "here"), Folder(tmp_path / "there")
     for folder in (here, there):
         authority.prepare(folder, folder.path.name, robots=[], border="open", routers=[])
@@ -377,7 +373,7 @@ def test_a_revoked_guest_comes_back_neither_by_a_new_file_nor_by_one_that_its_si
     assert "router.there" not in here.access.read_text()
 
 
-def test_deeds_at_the_same_time_lose_nothing_of_each_other(made):
+def test_concurrent_changes_of_the_authority_are_all_kept(made):
     folder = Folder(made / "keys")
     authority.issue(folder, "thief", Role.OPERATOR)
     several = [f"p{number}" for number in range(12)]
@@ -392,7 +388,7 @@ def test_deeds_at_the_same_time_lose_nothing_of_each_other(made):
 
 
 @pytest.mark.parametrize("connect", ["beijing", "beijing=tls/10.0.0.1:7447"])
-def test_a_link_to_a_site_that_did_not_let_us_in_says_how_to_get_there(site, connect):
+def test_a_link_to_a_site_that_did_not_admit_us_is_refused_with_advice(site, connect):
     keys("init", str(site))
     text = site.read_text().replace("[router]\n", f'[router]\nconnect = ["{connect}"]\n')
     site.write_text(text)
@@ -401,7 +397,7 @@ def test_a_link_to_a_site_that_did_not_let_us_in_says_how_to_get_there(site, con
 
 
 @pytest.mark.slow
-def test_doctor_tries_every_certificate_and_finds_what_a_router_does_otherwise(site, capsys):
+def test_doctor_tries_every_certificate_and_finds_deviations_of_a_router(site, capsys):
     keys("init", str(site))
     keys("issue", "mo", "--role", "monitor")
     folder, endpoint = Folder(site.parent / "keys"), load(site).listened[0]
@@ -455,8 +451,8 @@ def test_doctor_tries_every_certificate_and_finds_what_a_router_does_otherwise(s
         with zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access))):
             capsys.readouterr()
             assert main.run(["doctor", "--security", "--connect", endpoint]) == status
-            told = capsys.readouterr().out
-            assert [line for line in found if line not in told] == []
+            printed = capsys.readouterr().out
+            assert [line for line in found if line not in printed] == []
 
 
 @pytest.mark.processes

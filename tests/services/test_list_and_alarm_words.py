@@ -1,4 +1,4 @@
-"""What `robomesh list` and `robomesh alarms` make of what the watches tell; sites that are gone too."""
+"""`robomesh list` and `robomesh alarms`: alarms of the watches, and gone sites."""
 
 import asyncio
 
@@ -17,8 +17,8 @@ LONG = "service.silent:recorder.0123456789abcdef0123456789abcdef"
 
 
 def alarm(name="arm:link", code="link.down", *, robot="arm", state=Alarm.UNACKNOWLEDGED, at_s=1e9, **values):
-    told = {"source": "gateway", "text": "connecting to 10.0.0.7:5400", "priority": Alarm.HIGH}
-    made = Alarm(id=name, code=code, robot=robot, state=state, **(told | values))
+    defaults = {"source": "gateway", "text": "connecting to 10.0.0.7:5400", "priority": Alarm.HIGH}
+    made = Alarm(id=name, code=code, robot=robot, state=state, **(defaults | values))
     made.since.FromSeconds(round(at_s))
     return made
 
@@ -34,24 +34,24 @@ WUHAN = schema.AlarmList(site="wuhan", alarms=[gone(at_s=9e8), gone("hub", state
 ALIVE = [PresenceKey(site, "-", "watch", f"w-{site}") for site in ("shanghai", "wuhan")]
 
 
-def test_a_site_that_is_gone_stays_in_the_list_with_the_time_that_a_watch_tells_first():
+def test_a_gone_site_is_listed_with_the_earliest_time_of_the_watches():
     rows = {row["site"]: row for row in listing._sites(ALIVE, [SHANGHAI, WUHAN])}
     assert rows.keys() == {"beijing", "shanghai", "wuhan"}
     assert rows["beijing"]["gone_since"] == 9e8
     assert listing_text._site(rows["beijing"]).startswith("beijing — gone since 1998-07-")
     assert rows["shanghai"]["gone_since"] is None
-    # What is unacknowledged is said, and not only how much of it.
+    # The unacknowledged alarm is named, not only counted.
     assert "-:site.gone:beijing: site beijing is gone" in listing_text._site(rows["shanghai"])
 
 
-def test_a_site_that_is_back_is_not_gone():
+def test_a_returned_site_is_not_gone():
     alive = [*ALIVE, PresenceKey("beijing", "-", "router", "r")]
     (row,) = (row for row in listing._sites(alive, [SHANGHAI]) if row["site"] == "beijing")
     assert row["gone_since"] is None
     assert not gone_sites([schema.AlarmList(site="a", alarms=[gone(state=Alarm.RETURNED)])])
 
 
-def test_who_asks_for_a_robot_of_a_site_that_is_gone_is_told_so(mesh):
+def test_the_error_for_an_unknown_robot_names_gone_sites(mesh):
     async def main():
         async with open_session(mesh) as watch, open_session(mesh) as monitor:
             watch.declare_publisher("shanghai", "-", "alarms").put(SHANGHAI)
@@ -69,11 +69,11 @@ def test_who_asks_for_a_robot_of_a_site_that_is_gone_is_told_so(mesh):
     "name",
     ["arm:link", "shanghai/arm:link", "link.down", "gateway · link.down", "arm:link.down"],
 )
-def test_an_alarm_is_known_by_its_id_and_by_what_the_page_calls_it(name):
+def test_an_alarm_is_found_by_its_id_and_by_its_name_on_the_page(name):
     assert alarms._by_site([name], [SHANGHAI]) == {"shanghai": ["arm:link"]}
 
 
-def test_a_name_that_several_alarms_have_is_refused_with_theirs():
+def test_an_ambiguous_alarm_name_is_refused_with_the_candidates():
     both = schema.AlarmList(site="shanghai", alarms=[alarm(), alarm("arm-2:link", robot="arm-2")])
     with pytest.raises(alarms.NoSuchAlarmError, match=r"shanghai/arm:link, shanghai/arm-2:link"):
         alarms._by_site(["link.down"], [both])
@@ -81,11 +81,11 @@ def test_a_name_that_several_alarms_have_is_refused_with_theirs():
         alarms._by_site(["nothing"], [both])
 
 
-def test_an_alarms_name_is_never_broken_and_its_text_takes_the_whole_width(monkeypatch, capsys):
+def test_an_alarms_name_is_not_wrapped_and_its_text_uses_the_full_width(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "80")
     text = "word " * 30
-    told = alarm(f"-:{LONG}", "service.silent", text=text, advice="Look at it.", count=3, by="li")
-    alarms._print([schema.AlarmList(site="a-site-with-a-name-that-is-long", alarms=[told])])
+    long_alarm = alarm(f"-:{LONG}", "service.silent", text=text, advice="Look at it.", count=3, by="li")
+    alarms._print([schema.AlarmList(site="a-site-with-a-name-that-is-long", alarms=[long_alarm])])
     lines = capsys.readouterr().out.splitlines()
     assert f"  a-site-with-a-name-that-is-long/-:{LONG}" in lines
     assert lines[0].startswith("HIGH  unacknowledged  2001-09-")

@@ -1,4 +1,4 @@
-"""Mesh commands read a file and what lies in its folder, and no other file that it names."""
+"""Mesh commands read a file and others of its folder, and no other file that it names."""
 
 import json
 
@@ -11,7 +11,7 @@ BOX = "#VRML V2.0 utf8\nShape { geometry Box { } }\n"
 
 @pytest.fixture
 def folder(tmp_path):
-    """A folder with a link to a file outside of it."""
+    """Return a folder with a link to a file outside of it."""
     (tmp_path / "secret.wrl").write_text(BOX)
     (tmp_path / "open" / "parts").mkdir(parents=True)
     (tmp_path / "open" / "link.wrl").symlink_to(tmp_path / "secret.wrl")
@@ -27,10 +27,11 @@ def test_file_outside_of_the_folder_counts_as_missing(folder, address, capsys):
     path = folder / "a.wrl"
     path.write_text(f'{BOX}Inline {{ url "{named}" }}\nInline {{ url "parts/box.wrl" }}\n')
     mesh.info(path, True)
-    said = json.loads(capsys.readouterr().out)
-    assert said["triangles"] == 24
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["triangles"] == 24
     assert (
-        "no such file in the folder 'open'; other folders are not read; it is left out" in said["warnings"][0]
+        "no such file in the folder 'open'; other folders are not read; it is left out"
+        in printed["warnings"][0]
     )
     mesh.convert(path, folder / "a.glb", None, None)
     capsys.readouterr()

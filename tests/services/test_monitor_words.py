@@ -1,4 +1,4 @@
-"""What `robomesh monitor` says beside the joints."""
+"""Texts and JSON values of `robomesh monitor` besides the joints."""
 
 import pytest
 from google.protobuf.timestamp_pb2 import Timestamp
@@ -38,14 +38,14 @@ def near(distance):
         (0.0, "touching", "bold red"),
     ],
 )
-def test_how_near_things_are_is_told_with_what_and_coloured_by_the_robots_distances(distance, text, style):
+def test_clearances_are_printed_with_their_pair_and_a_style_by_distance(distance, text, style):
     clearance, own, missing = near_words(near(distance), ARM, "hall/arm")
     assert clearance == (f"clearance {text} (flange - mate wrist)", style)
     assert own == ("own links 100.0 mm (base - flange)", "")
     assert missing == ("not counted, at unknown positions: third", "bold yellow")
 
 
-def test_a_check_that_cannot_be_made_says_what_becomes_of_motions():
+def test_an_unavailable_check_is_printed_with_its_effect_on_motions():
     assert check_words(ControllerState()) is None
     assert check_words(ControllerState(check=ControllerState.REQUIRE)) == (
         "motions: checked, refused unless free",
@@ -57,7 +57,7 @@ def test_a_check_that_cannot_be_made_says_what_becomes_of_motions():
     assert check_words(cannot) == ("motions: not checked now: no collision meshes", "bold yellow")
 
 
-def test_a_program_is_told_with_its_step_its_line_and_its_time_and_how_it_ended():
+def test_a_program_is_printed_with_step_line_time_and_outcome():
     assert program_words(ProgramState()) is None
     state = ProgramState(
         outcome=ProgramState.RUNNING,
@@ -71,9 +71,9 @@ def test_a_program_is_told_with_its_step_its_line_and_its_time_and_how_it_ended(
         steps=40,
         duration_s=125.5,
     )
-    told = "program weld: step 12 of 40, line 7: move_line part; by li, 01:12 of 02:05"
-    assert program_words(state) == (told, "bold")
-    assert program_words(state, stale=True) == (told, "dim strike")
+    text = "program weld: step 12 of 40, line 7: move_line part; by li, 01:12 of 02:05"
+    assert program_words(state) == (text, "bold")
+    assert program_words(state, stale=True) == (text, "dim strike")
     state.outcome, state.text = ProgramState.ENDED, "stopped by wang"
     assert program_words(state) == (
         "program weld, by li: ended at line 7: move_line part: stopped by wang",
@@ -92,7 +92,7 @@ def test_a_program_is_told_with_its_step_its_line_and_its_time_and_how_it_ended(
     }
 
 
-def test_programs_are_told_what_is_near_and_what_runs_or_that_nobody_says():
+def test_json_has_clearance_and_program_or_null():
     assert clearance_record(near(0.25), "hall/arm") == {
         "distance_m": 0.25,
         "pair": ["arm/flange", "mate/wrist"],

@@ -44,7 +44,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_a_program_with_nothing_wrong_is_told_so_for_people(folder: Path, capsys) -> None:
+def test_a_valid_program_is_reported_as_text(folder: Path, capsys) -> None:
     assert run(["program", "check", "good", "--robot", "pt600"]) == 0
     out = capsys.readouterr().out.splitlines()
     assert out[0] == "note: only the floor around the arm: its cell has no fixture and no other robot"
@@ -53,7 +53,7 @@ def test_a_program_with_nothing_wrong_is_told_so_for_people(folder: Path, capsys
     assert out[2].startswith("assumed of the controller: joint moves: straight between the joint positions")
 
 
-def test_a_collision_in_a_sites_cell_is_a_line_with_time_pair_and_status_1(folder: Path, capsys) -> None:
+def test_a_collision_in_a_sites_cell_prints_time_and_pair_with_status_1(folder: Path, capsys) -> None:
     assert run(["program", "check", "bad", "--robot", "one", "--site", "site.toml"]) == 1
     out = capsys.readouterr().out.splitlines()
     assert any(
@@ -63,7 +63,7 @@ def test_a_collision_in_a_sites_cell_is_a_line_with_time_pair_and_status_1(folde
     assert "note: at home, for this check: two" in out
 
 
-def test_json_is_one_object_of_the_contract(folder: Path, capsys) -> None:
+def test_json_is_one_object_with_the_contracts_keys(folder: Path, capsys) -> None:
     assert run(["program", "check", "bad", "--robot", "one", "--site", "site.toml", "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
     assert set(found) == {"ok", "duration_s", "violations", "interpolation", "notes", "alone"}
@@ -73,7 +73,7 @@ def test_json_is_one_object_of_the_contract(folder: Path, capsys) -> None:
     assert (touch["line"], touch["distance_m"], len(touch["points"])) == (1, 0.0, 2)
 
 
-def test_a_program_that_cannot_be_read_gets_its_lines_and_status_1(folder: Path, capsys) -> None:
+def test_syntax_errors_are_listed_by_line_with_status_1(folder: Path, capsys) -> None:
     assert run(["program", "check", "wrong"]) == 1
     assert capsys.readouterr().out.splitlines() == [
         "wrong: line 2: 'speed' is 0; must be between 1 and 100 percent",
@@ -84,14 +84,16 @@ def test_a_program_that_cannot_be_read_gets_its_lines_and_status_1(folder: Path,
 
 
 @pytest.mark.parametrize("text", ["", "# nothing yet\n", "speed 50\ntool_speed 100\n", "repeat 9\nend\n"])
-def test_a_program_that_does_nothing_is_an_error_in_the_text(folder: Path, capsys, text: str) -> None:
+def test_an_empty_program_is_an_error(folder: Path, capsys, text: str) -> None:
     (folder / "idle").write_text(text)
     assert run(["program", "check", "idle"]) == 1
     first, _ = capsys.readouterr().out.splitlines()
     assert first == "idle: line 1: the program has no statement that does anything"
 
 
-def test_what_has_one_cause_is_one_line_and_what_is_wrong_at_the_start_says_so(folder: Path, capsys) -> None:
+def test_violations_with_one_cause_are_one_line_and_those_at_the_start_have_no_line_number(
+    folder: Path, capsys
+) -> None:
     (folder / "often").write_text(f"repeat 3\n{INTO_THE_POST}home\nend\n")
     given = ["program", "check", "often", "--robot", "one", "--site", "site.toml"]
     assert run([*given, "--start", "0 90 -90 0 400"]) == 1
@@ -107,7 +109,7 @@ def test_what_has_one_cause_is_one_line_and_what_is_wrong_at_the_start_says_so(f
     assert len(touches) >= 3
 
 
-def test_a_start_is_taken_in_degrees(folder: Path, capsys) -> None:
+def test_the_start_option_is_in_degrees(folder: Path, capsys) -> None:
     (folder / "stay").write_text("move_joints 20 80 -80 0 0\n")
     assert run(["program", "check", "stay", "--start", "20, 80 -80 0 0", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["duration_s"] == 0.0
@@ -155,7 +157,7 @@ def test_a_plan_is_a_program_of_joint_moves_that_plans_to_itself(folder: Path, c
         ),
     ],
 )
-def test_what_cannot_be_done_is_one_line_and_status_2(
+def test_an_invalid_request_prints_one_line_with_status_2(
     folder: Path, capsys, arguments: list[str], sentence: str
 ) -> None:
     (folder / "binary").write_bytes(b"\xff\xfe\x00")
@@ -164,7 +166,7 @@ def test_what_cannot_be_done_is_one_line_and_status_2(
     assert capsys.readouterr().err == f"robomesh: {sentence}\n"
 
 
-def test_a_plot_is_a_picture_of_either_kind(folder: Path, capsys) -> None:
+def test_a_plot_is_png_or_svg(folder: Path, capsys) -> None:
     for name in ("bad", "wrong"):
         assert (
             run(["program", "check", name, "--robot", "one", "--site", "site.toml", "--plot", "a.png"]) == 1
@@ -176,7 +178,7 @@ def test_a_plot_is_a_picture_of_either_kind(folder: Path, capsys) -> None:
     assert "<!-- good on pt600: " in drawn
 
 
-def test_a_drawing_becomes_a_program_that_checks(folder: Path, capsys) -> None:
+def test_a_drawing_becomes_a_valid_program(folder: Path, capsys) -> None:
     drawing = ezdxf.new()
     drawing.header["$INSUNITS"] = 4
     drawing.modelspace().add_lwpolyline([(0, 0), (60, 0), (60, 60)], dxfattribs={"layer": "cut"})

@@ -1,4 +1,4 @@
-"""Commands that read strangers' files end in one line at their limits of memory and time."""
+"""Commands that read strangers' files end with one line at their limits of memory and time."""
 
 import subprocess
 import sys
@@ -18,7 +18,7 @@ def ended(script: str) -> tuple[int, str]:
     return done.returncode, done.stderr
 
 
-def test_command_that_takes_too_long_is_ended_in_one_line() -> None:
+def test_a_command_that_takes_too_long_ends_with_one_line() -> None:
     script = (
         "import time; from services.command_line.reading_limits import limit\n"
         "limit('mesh', longest_s=0.2)\n"
@@ -27,7 +27,7 @@ def test_command_that_takes_too_long_is_ended_in_one_line() -> None:
     assert ended(script) == (2, "robomesh: this took more than 0.2 s and was ended\n")
 
 
-def test_command_that_takes_too_much_memory_says_so_in_one_line() -> None:
+def test_a_command_that_takes_too_much_memory_ends_with_one_line() -> None:
     script = (
         "import sys\n"
         "from services.command_line import main\n"
@@ -37,9 +37,9 @@ def test_command_that_takes_too_much_memory_says_so_in_one_line() -> None:
         "sys.argv = ['robomesh', 'mesh', 'info', 'x.stl']\n"
         "main.main()\n"
     )
-    status, said = ended(script)
-    assert (status, len(said.splitlines())) == (2, 1)
-    assert "memory" in said
+    status, error = ended(script)
+    assert (status, len(error.splitlines())) == (2, 1)
+    assert "memory" in error
 
 
 def test_other_commands_are_not_limited() -> None:

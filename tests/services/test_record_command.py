@@ -1,4 +1,4 @@
-"""`robomesh record`: how it ends, by Ctrl-C and without us, and what it says then."""
+"""`robomesh record`: its end by Ctrl-C, by another client and by a full disk."""
 
 import asyncio
 import os
@@ -15,7 +15,7 @@ from tests.services.test_recorder import fill_disk_under
 
 @asynccontextmanager
 async def arm_recorded(mesh, folder):
-    """A recorder that is ready, of an arm that is there."""
+    """Run a recorder, with a present arm."""
     async with recording_site(mesh, folder) as other:
         other.declare_presence("site", "arm", "gateway")
         while await other.last("robomesh/site/arm/recording") is None:
@@ -23,18 +23,18 @@ async def arm_recorded(mesh, folder):
         yield other
 
 
-async def until_told(capsys, words):
-    told = ""
-    while words not in told:
-        told += capsys.readouterr().err
+async def until_printed(capsys, text):
+    printed = ""
+    while text not in printed:
+        printed += capsys.readouterr().err
         await asyncio.sleep(0.02)
 
 
-def test_ctrl_c_ends_it_and_a_line_says_what_there_is(mesh, router, tmp_path, capsys):
+def test_ctrl_c_ends_a_recording_and_prints_a_summary(mesh, router, tmp_path, capsys):
     async def main():
         async with arm_recorded(mesh, tmp_path) as other:
             recording = asyncio.create_task(_record("arm", "trial", ["-"], router))
-            await until_told(capsys, "recording site/arm as trial; Ctrl-C ends it")
+            await until_printed(capsys, "recording site/arm as trial; Ctrl-C ends it")
             while not await joined(other, Robot("site", "arm")):
                 pass
             os.kill(os.getpid(), signal.SIGINT)
@@ -45,22 +45,22 @@ def test_ctrl_c_ends_it_and_a_line_says_what_there_is(mesh, router, tmp_path, ca
     assert (tmp_path / "arm" / done.recording.file).is_file()
 
 
-def test_what_another_ended_is_told_as_such(mesh, router, tmp_path, capsys):
+def test_a_recording_ended_by_another_client_is_reported(mesh, router, tmp_path, capsys):
     async def main():
         async with arm_recorded(mesh, tmp_path) as other:
             recording = asyncio.create_task(_record("arm", "trial", ["-"], router))
-            await until_told(capsys, "Ctrl-C ends it")
+            await until_printed(capsys, "Ctrl-C ends it")
             await trace_off(other)
             return await recording
 
     assert run(main()).problem == "recording trial was ended by another"
 
 
-def test_a_disk_that_takes_no_more_ends_it_with_its_own_words(mesh, router, tmp_path, capsys):
+def test_a_full_disk_ends_a_recording_with_its_error(mesh, router, tmp_path, capsys):
     async def main():
         async with arm_recorded(mesh, tmp_path) as other:
             recording = asyncio.create_task(_record("arm", "full", ["-"], router))
-            await until_told(capsys, "Ctrl-C ends it")
+            await until_printed(capsys, "Ctrl-C ends it")
             fill_disk_under(tmp_path / "arm")
             await put_states(other.declare_publisher("site", "arm", "joints"), range(20))
             return await recording

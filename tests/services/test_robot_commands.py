@@ -62,7 +62,7 @@ def placements(source: Path, positions: list[float]) -> tuple[dict[str, np.ndarr
 
 
 @pytest.mark.parametrize("dh", [False, True])
-def test_imported_urdf_is_a_folder_that_stands_alone(
+def test_an_imported_urdf_is_a_self_contained_folder(
     dh: bool, arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     before = placements(arm, [0.5, 0.1])
@@ -88,7 +88,7 @@ def test_imported_urdf_is_a_folder_that_stands_alone(
     assert run(["robot", "check", str(out)]) == 0
 
 
-def test_imported_vrml_robot_stands_where_it_stood(tmp_path: Path) -> None:
+def test_an_imported_vrml_robot_keeps_its_placement(tmp_path: Path) -> None:
     (tmp_path / "v.wrl").write_text(VRML)
     before = placements(tmp_path / "v.wrl", [0.3])
     assert run(["robot", "import", str(tmp_path / "v.wrl"), str(tmp_path / "vee")]) == 0
@@ -98,12 +98,12 @@ def test_imported_vrml_robot_stands_where_it_stood(tmp_path: Path) -> None:
     np.testing.assert_allclose(after[0]["L1"][:3, 3], [0, 0, 0.5], atol=1e-12)
 
 
-def test_imported_library_robot_brings_its_meshes_along(tmp_path: Path) -> None:
+def test_an_imported_library_robot_includes_its_meshes(tmp_path: Path) -> None:
     assert run(["robot", "import", "pt500", str(tmp_path / "mine")]) == 0
     assert load(tmp_path / "mine").model_dump() == load("pt500").model_dump()
 
 
-def test_import_leaves_what_is_there_alone(
+def test_import_does_not_overwrite_a_folder(
     arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
@@ -114,7 +114,7 @@ def test_import_leaves_what_is_there_alone(
     assert [path.name for path in out.iterdir()] == ["thesis.txt"]
 
 
-def test_import_of_what_is_wrong_writes_nothing(
+def test_import_of_an_invalid_file_writes_nothing(
     arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "packages" / "two" / "one.stl").write_bytes(b"solid a\nfacet normal x y z\n")
@@ -124,13 +124,13 @@ def test_import_of_what_is_wrong_writes_nothing(
     assert not out.exists()
 
 
-def test_check_of_what_is_not_there_could_not_check(capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_of_a_missing_file_ends_with_status_2(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["robot", "check", "nobody"]) == 2
     assert run(["robot", "check", "none/robot.toml"]) == 2
     assert "none/robot.toml: cannot be read" in capsys.readouterr().err
 
 
-def test_export_leaves_another_robots_meshes_alone(
+def test_export_does_not_overwrite_another_robots_meshes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["robot", "export", "pt600", str(tmp_path / "out")]) == 0
@@ -141,7 +141,7 @@ def test_export_leaves_another_robots_meshes_alone(
     assert run(["robot", "export", "pt600", str(tmp_path / "out")]) == 0
 
 
-def test_check_opens_every_mesh_and_tells_file_and_problem(
+def test_check_reads_every_mesh_and_prints_file_and_problem(
     arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     robot = tmp_path / "robot.toml"
@@ -160,7 +160,9 @@ def test_check_opens_every_mesh_and_tells_file_and_problem(
     assert "link 'hand': is 500 m large at 1 m per unit; check mesh_scale" in capsys.readouterr().out
 
 
-def test_check_tells_the_path_of_a_wrong_value(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_prints_the_path_of_an_invalid_value(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     robot = tmp_path / "robot.toml"
     robot.write_text(load("pt600").text.replace("limits = [-150.0, 150.0]", "limits = [150.0, -150.0]"))
     assert run(["robot", "check", str(robot), "--json"]) == 1
@@ -174,7 +176,7 @@ def test_check_tells_the_path_of_a_wrong_value(tmp_path: Path, capsys: pytest.Ca
     assert ["base", "mesh"] in [problem["path"] for problem in problems]
 
 
-def test_show_prints_the_rows_with_what_varies_marked(capsys: pytest.CaptureFixture[str]) -> None:
+def test_show_marks_the_variable_of_each_row(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["robot", "show", "pt600"]) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert ["waist", "0.000", "90.000", "350.000", "0.000*", "column"] in lines
@@ -193,7 +195,7 @@ def test_show_gives_the_rows_of_a_urdf_in_si(arm: Path, capsys: pytest.CaptureFi
     assert [frame["link"] for frame in shown["frames"]] == ["hand"]
 
 
-def test_show_says_where_the_rows_begin_if_not_in_the_base_frame(
+def test_show_prints_the_start_of_the_rows_if_not_the_base_frame(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     robot = tmp_path / "puma" / "robot.toml"
@@ -203,8 +205,8 @@ def test_show_says_where_the_rows_begin_if_not_in_the_base_frame(
     pose = "pose = { xyz = [0, 0, 400], rpy = [180, 0, 0] }"
     robot.write_text(text.replace("[base]\n", f"[base]\n{pose}\n"))
     assert run(["robot", "show", str(robot)]) == 0
-    said = "the first row begins at xyz [0, 0, 400] mm, rpy [180, 0, 0]° in the base frame"
-    assert said in capsys.readouterr().out
+    expected = "the first row begins at xyz [0, 0, 400] mm, rpy [180, 0, 0]° in the base frame"
+    assert expected in capsys.readouterr().out
 
 
 @pytest.mark.slow
@@ -222,7 +224,7 @@ def test_four_views_are_one_picture(tmp_path: Path) -> None:
             assert 0.003 < orange[rows, columns].mean() < 0.5
 
 
-def test_exported_urdf_names_meshes_that_are_there(arm: Path, tmp_path: Path) -> None:
+def test_an_exported_urdf_names_existing_meshes(arm: Path, tmp_path: Path) -> None:
     robot = tmp_path / "robot.toml"
     robot.write_text('name = "two"\nurdf = "two.urdf"\npackages = ["packages"]\n')
     assert run(["robot", "export", str(robot), str(tmp_path / "export")]) == 0
@@ -240,7 +242,7 @@ def test_exported_urdf_names_meshes_that_are_there(arm: Path, tmp_path: Path) ->
     "line",
     [b'{"joints": \xff}', b'{"joints": [1' + 400 * b"0" + b", 0, 0, 0, 0]}", b'{"joints": ' + 100_000 * b"["],
 )
-def test_a_line_that_fk_cannot_answer_is_told_and_the_next_is_answered(line, capsys, monkeypatch):
+def test_an_invalid_fk_line_gets_an_error_and_the_next_an_answer(line, capsys, monkeypatch):
     lines = line + b'\n{"joints": [0, 0, 0, 0, 0]}\n'
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(lines)))
     assert run(["fk", "-"]) == 1

@@ -1,4 +1,4 @@
-"""Every role against every key of the table, on a live router with TLS and the rules that were generated."""
+"""Every role against every key of the topic table, on a live router with TLS and the generated rules."""
 
 import json
 import threading
@@ -21,10 +21,10 @@ from tests.site import wait_until
 SITE, OTHER_SITE, HUB = "here", "there", "hub"
 OWN_ROBOT, STARTED_ROBOT, FOREIGN_ROBOT, REPLAY = "arm", "mine", "not-ours", "replay-1"
 ROBOTS = (OWN_ROBOT, STARTED_ROBOT, FOREIGN_ROBOT, REPLAY)
-# Whoever may use these speaks for every robot that they mean.
+# A principal that may use these may use the keys of every robot that they match.
 VAGUE = ("*", "ar$*")
 DEADLINE_S = 20.0
-# Who sees and answers everything: the site's second router.
+# The site's second router sees and answers everything.
 WITNESS = "router-2.here"
 IN_NAME = (
     "lease/request/*",
@@ -37,13 +37,13 @@ IN_NAME = (
     "recordings/series/*",
     "recordings/piece/*",
 )
-# As an operator's name: what is allowed on the request's key must not hold it.
+# An operator's name that contains a request's: rules for the request's key must not match it.
 REQUESTS_OF_ONE_WORD = ("stop",)
 
 
 @dataclass
 class Somebody:
-    """A plain client with a certificate, without this library's own caution."""
+    """A plain Zenoh client with a certificate, without the checks of this library."""
 
     name: str
     role: Role
@@ -51,7 +51,7 @@ class Somebody:
     heard: set[str] = field(default_factory=set)
 
     def settle(self) -> None:
-        """Until all that it sent has been judged: over one link, what follows does not overtake."""
+        """Wait until the router has processed everything sent: one link keeps the order."""
         list(self.session.get(f"robomesh/{SITE}/{OWN_ROBOT}/stop", timeout=DEADLINE_S))
 
 
@@ -69,7 +69,7 @@ def one_link(endpoint: str, tls: Tls) -> zenoh.Config:
 
 @pytest.fixture(scope="module")
 def mesh(tmp_path_factory):
-    """A router, everybody attached to it, and the witness, who answers every request of the table."""
+    """A router, a client for each principal, and the witness, which answers every request of the table."""
     folder = Folder(tmp_path_factory.mktemp("site") / "keys")
     authority.prepare(folder, SITE, robots=[OWN_ROBOT], border="open", routers=[], started=[STARTED_ROBOT])
     for name, role in people().items():
@@ -105,7 +105,7 @@ def mesh(tmp_path_factory):
             session.close()
 
 
-# ------------------------------------------------- what the table says, read once more by hand
+# ------------------------------------------------ expected rights, derived independently
 
 
 def speaks_for(name: str, role: Role, robot: str) -> bool:
@@ -116,7 +116,7 @@ def speaks_for(name: str, role: Role, robot: str) -> bool:
 
 def may_publish(name: str, role: Role, robot: str, row: str, topic: str) -> bool:
     if role is Role.ROUTER:
-        return True  # a router of the site brings what it let in
+        return True  # a router of the site forwards what it allowed
     if role not in TOPICS[row].publishers or not speaks_for(name, role, robot):
         return False
     if row == "events/*" and role is not Role.PLAYER:
@@ -140,7 +140,7 @@ def may_ask(name: str, role: Role, row: str, topic: str) -> bool:
 
 
 def topics_of(row: str) -> list[str]:
-    """A topic's or request's row as keys that somebody might use: own names, others' names."""
+    """Return the keys of a topic's or request's row, with the own and with other names."""
     chunks = {
         "events/*": [role.value for role in SERVICES],
         "health/*": [f"{role.value}.0a" for role in SERVICES],
@@ -158,7 +158,7 @@ def key(robot: str, topic: str, site: str = SITE) -> str:
 
 
 class Arrived:
-    """Waits for what must come."""
+    """Wait until the expected set has arrived."""
 
     def __init__(self) -> None:
         self._seen: set[tuple[str, str]] = set()
@@ -184,7 +184,7 @@ def answering(somebody: Somebody, keys: list[str]) -> list[zenoh.Queryable]:
 
 
 def asked(somebody: Somebody, keys: list[str]) -> dict[str, set[str]]:
-    """Who answered each key; all are asked at once."""
+    """Return the principals that answered each key; all keys are queried in parallel."""
     left, done = len(keys), threading.Condition()
     answers: dict[str, set[str]] = {each: set() for each in keys}
 
@@ -216,7 +216,7 @@ def asked(somebody: Somebody, keys: list[str]) -> dict[str, set[str]]:
 # --------------------------------------------------------------------- tests
 
 
-def test_everybody_publishes_what_the_table_gives_its_role_and_nothing_else(mesh):
+def test_each_role_publishes_only_its_topics(mesh):
     everybody, witness, gone, _ = mesh
     wanted = {
         (who.name, key(robot, topic))
@@ -236,7 +236,7 @@ def test_everybody_publishes_what_the_table_gives_its_role_and_nothing_else(mesh
         each.undeclare()
 
 
-def test_everybody_asks_what_the_table_gives_its_role_in_its_own_name_only(mesh):
+def test_each_role_makes_only_its_requests_in_its_own_name(mesh):
     everybody, witness, gone, _ = mesh
     keys = [key(OWN_ROBOT, topic) for _, topic in ASKED]
     answers = answering(witness, keys)
@@ -250,7 +250,7 @@ def test_everybody_asks_what_the_table_gives_its_role_in_its_own_name_only(mesh)
 
 
 @pytest.mark.slow
-def test_only_owners_of_a_request_and_publishers_of_a_topic_answer_for_it(mesh):
+def test_only_owners_of_a_request_and_publishers_of_a_topic_answer(mesh):
     everybody, witness, gone, _ = mesh
     declared, wanted = [], {}
     both = [*((row, topic, True) for row, topic in PUBLISHED), *((row, topic, False) for row, topic in ASKED)]
@@ -273,7 +273,7 @@ def test_only_owners_of_a_request_and_publishers_of_a_topic_answer_for_it(mesh):
         each.undeclare()
 
 
-def test_everybody_with_a_right_reads_topics_row_by_row_and_who_was_revoked_reads_none(mesh):
+def test_each_role_reads_its_topics_and_a_revoked_certificate_reads_none(mesh):
     everybody, witness, gone, _ = mesh
     keys = [key(OWN_ROBOT, topic) for _, topic in PUBLISHED]
     readers = (*everybody.values(), gone)
@@ -288,7 +288,7 @@ def test_everybody_with_a_right_reads_topics_row_by_row_and_who_was_revoked_read
     once_all_listen_to("robomesh/**")
     for each in keys:
         witness.session.put(each, "to all")
-    # Else one of them, still on its way, finds those who listen to rows.
+    # Otherwise a delayed message could reach the subscribers of the rows.
     to_all = {("to all", each) for each in keys}
     routers = [who for who in everybody.values() if who.role is Role.ROUTER]
     assert all(to_all <= arrived[who.name].once_there(to_all) for who in routers)
@@ -305,7 +305,7 @@ def test_everybody_with_a_right_reads_topics_row_by_row_and_who_was_revoked_read
         each.undeclare()
 
 
-def test_a_service_is_present_under_its_own_name_only_and_a_gateway_for_its_robots_only(mesh):
+def test_a_service_declares_presence_only_with_its_name_and_a_gateway_only_for_its_robots(mesh):
     everybody, witness, gone, _ = mesh
     tokens, wanted = [], set()
     for who in (*everybody.values(), gone):
@@ -314,7 +314,7 @@ def test_a_service_is_present_under_its_own_name_only_and_a_gateway_for_its_robo
             token = key(robot, f"alive/{service.value}/{of}.{by}")
             tokens.append(who.session.liveliness().declare_token(token))
             own = service is who.role and service not in PEOPLE and speaks_for(who.name, who.role, robot)
-            # A session's token is its operator's alone; a console holds those of the site's people.
+            # Only the operator declares its session's token; a console declares those of the site's people.
             owner = of == who.name or (who.role is Role.CONSOLE and of.endswith(f".{SITE}"))
             held = service is Role.OPERATOR and who.role in REQUESTS["command/*"].askers and owner
             if who is not gone and (who.role is Role.ROUTER or own or held or service is Role.MONITOR):
@@ -326,7 +326,7 @@ def test_a_service_is_present_under_its_own_name_only_and_a_gateway_for_its_robo
         each.undeclare()
 
 
-def test_another_sites_router_speaks_for_its_own_site_and_its_own_people_only(mesh):
+def test_a_linked_sites_router_forwards_only_its_own_site_and_people(mesh):
     _, witness, _, guests = mesh
     guest = guests[OTHER_SITE]
     sites = (SITE, OTHER_SITE, "third")
@@ -348,7 +348,7 @@ def test_another_sites_router_speaks_for_its_own_site_and_its_own_people_only(me
         key(OWN_ROBOT, each)
         for each in ("command/li.there", "lease/request/li.there", "views/li.there", "stop")
     }
-    by = asked(guests[HUB], [key(OWN_ROBOT, each) for each in names])  # of everybody, but of us
+    by = asked(guests[HUB], [key(OWN_ROBOT, each) for each in names])  # of every site but ours
     assert {each for each in names if not by[key(OWN_ROBOT, each)]} == {"command/li.here", "views/li.here"}
     for each in (subscriber, *answers):
         each.undeclare()
@@ -360,7 +360,7 @@ def test_another_sites_router_speaks_for_its_own_site_and_its_own_people_only(me
         each.undeclare()
 
 
-def test_a_hub_is_present_for_any_site_but_ours(mesh):
+def test_a_hub_declares_presence_for_any_site_but_ours(mesh):
     _, witness, _, guests = mesh
     sites, services = (SITE, OTHER_SITE), (Role.GATEWAY, Role.WATCH, Role.OPERATOR)
     named = [key(OWN_ROBOT, f"alive/{role.value}/0a", site) for site, role in product(sites, services)]
@@ -375,14 +375,14 @@ def test_a_hub_is_present_for_any_site_but_ours(mesh):
         key(OWN_ROBOT, f"alive/operator/li.{OTHER_SITE}.0a"),
         *(key(OWN_ROBOT, f"alive/{role.value}/0a", OTHER_SITE) for role in services),
     }
-    for each in vague:  # a router cannot tell that it means ours too; whoever is told of it can
+    for each in vague:  # a router cannot exclude ours from the match; receivers can
         with pytest.raises(KeyNameError, match="cannot be used"):
             parse_presence_key(each)
     for each in tokens:
         each.undeclare()
 
 
-def test_a_message_that_is_too_large_ends_at_the_router_on_every_key(mesh):
+def test_the_router_drops_a_message_above_the_limit_on_every_key(mesh):
     everybody, witness, _, _ = mesh
     arrived = []
     published = {
@@ -404,7 +404,7 @@ def test_a_message_that_is_too_large_ends_at_the_router_on_every_key(mesh):
             )
         everybody[name].settle()
     expected = sorted((each, 1 << 20) for each in chain(*published.values()))
-    # The larger message of each key would come first.
+    # The larger message of each key would arrive first.
     wait_until(lambda: len(arrived) >= len(expected), DEADLINE_S, "not every message arrived")
     assert sorted(arrived) == expected
     for each in (*subscribers, *answers):

@@ -1,4 +1,4 @@
-"""`doctor --security` on a running gateway: what a router lets through shows, and nothing is harmed."""
+"""`doctor --security` on a running gateway: it finds wrong rules, and does no harm."""
 
 import asyncio
 import contextlib
@@ -24,7 +24,7 @@ SITE, ARM = "hall", "robomesh/hall/arm"
 
 @pytest.fixture
 def folder(tmp_path):
-    """The keys of a site with one robot, an operator and a monitor."""
+    """Return the keys of a site with one robot, an operator and a monitor."""
     folder = Folder(tmp_path / "keys")
     authority.prepare(folder, SITE, robots=["arm"], border="open", routers=[], started=["lab"])
     authority.issue(folder, "li", Role.OPERATOR)
@@ -33,7 +33,7 @@ def folder(tmp_path):
 
 
 def by_hand(folder):
-    """The rules with one more: a monitor may be an operator, and read the router's own state."""
+    """Return rules with one wrong: a monitor may act as operator, and read the router's state."""
     sections = read_access(folder.access)
     rule = {
         "id": "by-hand",
@@ -53,7 +53,7 @@ def by_hand(folder):
 
 
 def router_of(folder, sections):
-    """A router with these rules, and a state of its own that can be asked for."""
+    """Run a router with these rules, whose own state can be queried."""
     endpoint = f"tls/127.0.0.1:{free_port()}"
     config = router_config((endpoint,), (), folder.tls_of("router"), sections)
     config.insert_json5("adminspace", json.dumps({"enabled": True, "permissions": {"read": True}}))
@@ -77,7 +77,7 @@ async def gateway_of(folder, endpoint, audit_folder):
 
 
 async def doctor_beside_control(folder, endpoint, audit_folder):
-    """The doctor's status while an operator has control, which it keeps."""
+    """Return the doctor's exit status while an operator has and keeps control."""
     async with gateway_of(folder, endpoint, audit_folder):
         mesh = SessionSettings(connect=(endpoint,), tls=bundle(folder.person("li")), wait_s=20.0)
         async with open_session(mesh) as session, control(session, SITE, "arm", "li.hall") as held:
@@ -88,15 +88,15 @@ async def doctor_beside_control(folder, endpoint, audit_folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("spoiled", [False, True], ids=["the rules", "a rule added by hand"])
-def test_leases_commands_tokens_and_routers_own_keys_are_tried_on_a_running_robot(
+def test_doctor_probes_leases_commands_tokens_and_router_keys_of_a_running_robot(
     folder, tmp_path, capsys, caplog, spoiled
 ):
     sections = by_hand(folder) if spoiled else read_access(folder.access)
     endpoint, router = router_of(folder, sections)
     with router:
         status = run(doctor_beside_control(folder, endpoint, tmp_path / "audit"), timeout_s=120.0)
-    said = capsys.readouterr().out
-    wrong = [line for line in said.splitlines() if line.startswith("WRONG")]
+    printed = capsys.readouterr().out
+    wrong = [line for line in printed.splitlines() if line.startswith("WRONG")]
     expected = [
         f"WRONG: mo.hall can be present as {ARM}/alive/operator/li.hall.doctor-probe-mo-hall, and should not",
         "WRONG: mo.hall can ask @/**, and should not",
@@ -105,7 +105,7 @@ def test_leases_commands_tokens_and_routers_own_keys_are_tried_on_a_running_robo
     ]
     assert sorted(wrong) == (sorted(expected) if spoiled else [])
     assert status == int(spoiled)
-    assert "without a running gateway: lab\n" in said
+    assert "without a running gateway: lab\n" in printed
     assert caplog.text == ""
     entries = find(tmp_path / "audit" / SITE / "arm.jsonl", Query(most=1000))
     assert {entry.request for entry in entries} == {"ACQUIRE", "RELEASE", "RENEW", "COMMAND"}

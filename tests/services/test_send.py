@@ -1,4 +1,4 @@
-"""`robomesh send` keeps its lease for as long as it is given, and stays with what it sent to the end."""
+"""`robomesh send`: it renews its lease, and waits for the end of its motion or program."""
 
 import asyncio
 import signal
@@ -18,7 +18,7 @@ KEY = "robomesh/hall/arm/lease/request/li"
 
 
 class Owner:
-    """A gateway's end: grants a lease, renews it for as long as it likes, and lets who asks for it wait."""
+    """A gateway that grants a lease, answers some renewals, and delays others."""
 
     def __init__(self, session):
         self.renewed = self.waiting = 0
@@ -37,7 +37,7 @@ class Owner:
         return schema.LeaseAnswer(lease="secret")
 
 
-def test_a_renewal_that_finds_no_place_is_asked_again_and_one_that_is_refused_ends_control_in_words(mesh):
+def test_a_busy_renewal_is_repeated_and_a_refused_one_ends_control(mesh):
     async def main():
         async with open_session(mesh) as gateway, open_session(mesh) as li, open_session(mesh) as eve:
             owner = Owner(gateway)
@@ -51,7 +51,7 @@ def test_a_renewal_that_finds_no_place_is_asked_again_and_one_that_is_refused_en
                         asked.append(asyncio.create_task(one))
                         await asyncio.sleep(0.01)
                 before = owner.renewed
-                # Two renewals, each asked again for half a second.
+                # Two renewals, each repeated for half a second.
                 await asyncio.wait((own.renewing,), timeout=2.2)
                 assert owner.renewed == before
                 assert not own.renewing.done()
@@ -65,7 +65,7 @@ def test_a_renewal_that_finds_no_place_is_asked_again_and_one_that_is_refused_en
 
 
 class Gateway(Owner):
-    """A gateway's end that takes commands too: a program is answered when `ready` is set."""
+    """A gateway that also accepts commands: it answers a program when `ready` is set."""
 
     def __init__(self, session, *states, text="RUN_PROGRAM: it runs"):
         super().__init__(session)
@@ -84,8 +84,8 @@ class Gateway(Owner):
         self.stops.append(request.message.reason)
         return schema.StopAnswer(sent=True, text="stop 1 is sent")
 
-    async def tell(self):
-        """Say its states, again and again."""
+    async def publish_states(self):
+        """Publish its states repeatedly."""
         while True:
             for state in self._states:
                 self._program.put(state)
@@ -93,7 +93,7 @@ class Gateway(Owner):
 
 
 def sent(li):
-    """What `robomesh send hall/arm run` says of a program, in a task of its own."""
+    """Start a task with `robomesh send hall/arm run`, and return it."""
     request = schema.CommandRequest(command=schema.CommandRequest.RUN_PROGRAM, program="home")
     robot = discovery.Robot("hall", "arm")
 
@@ -104,7 +104,7 @@ def sent(li):
     return asyncio.create_task(main())
 
 
-def test_ctrl_c_stops_a_program_that_is_still_being_checked(mesh):
+def test_ctrl_c_stops_a_program_during_its_check(mesh):
     async def main():
         async with open_session(mesh) as session, open_session(mesh) as li:
             gateway = Gateway(session)
@@ -123,16 +123,16 @@ RUNNING = schema.ProgramState(
 )
 
 
-def test_a_gateway_that_began_anew_is_told_with_what_to_do_and_warnings_come_before_all(mesh, capsys):
+def test_a_gateway_restart_is_reported_with_advice_and_warnings_are_printed_first(mesh, capsys):
     async def main():
         async with open_session(mesh) as session, open_session(mesh) as li:
             gateway = Gateway(
                 session, RUNNING, schema.ProgramState(), text="RUN_PROGRAM: it runs; mind: arm touches post"
             )
             gateway.ready.set()
-            telling = asyncio.create_task(gateway.tell())
+            publishing = asyncio.create_task(gateway.publish_states())
             accepted, text = await sent(li)
-            telling.cancel()
+            publishing.cancel()
             return accepted, text
 
     accepted, text = run(main())
@@ -145,19 +145,19 @@ def test_a_gateway_that_began_anew_is_told_with_what_to_do_and_warnings_come_bef
     assert all(line == "step 7 of 90, line 2: wait 1" for line in rest)
 
 
-def test_what_to_do_about_a_refusal_is_told_as_a_command_to_type():
-    def said(reason, text=""):
+def test_the_advice_of_a_refusal_is_a_command():
+    def sentence(reason, text=""):
         error = RefusedError(reason, text=text)
         return send.with_commands(error, discovery.Robot("hall", "arm"))
 
-    assert said(codes.STOP_LATCHED(id=3, by="li", reason="with another lease")) == (
+    assert sentence(codes.STOP_LATCHED(id=3, by="li", reason="with another lease")) == (
         "stop 3 is latched (li: with another lease): see to it, then `robomesh send hall/arm reset`"
     )
     other = codes.LEASE_OTHER(name="li")
-    assert said(other, f"{other}.") == (
+    assert sentence(other, f"{other}.") == (
         f"{other}. Only that window or program can hold what it moves; Ctrl-C there, or "
         "`robomesh send hall/arm stop`, ends it"
     )
-    assert said("link down") == "link down"
-    # An earlier gateway has no codes.
-    assert said(str(other)) == str(other)
+    assert sentence("link down") == "link down"
+    # An earlier gateway sends no codes.
+    assert sentence(str(other)) == str(other)

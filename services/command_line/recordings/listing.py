@@ -129,7 +129,7 @@ async def attached_for(what: str, router: str) -> AsyncIterator[Session]:
         async with discovery.attached(router) as session:
             yield session
     except SessionError as error:
-        raise ExportError(f"{what}: no such file on this machine, and no mesh to look on: {error}") from None
+        raise ExportError(f"{what}: no such file on this machine, and no mesh to search: {error}") from None
 
 
 def info(what: str, router: str, as_json: bool) -> None:

@@ -59,7 +59,7 @@ def check(robot: _Robot, as_json: Json = False) -> None:
         for warning in warnings:
             print(f"{warning['file']}: warning: {warning['text']}")
         for link, way in report.get("stands_out", {}).items():
-            print(f"{name}: {link}: its visual geometry stands out of what is checked by {way * 1000:.1f} mm")
+            print(f"{name}: {link}: visual geometry extends beyond checked geometry by {way * 1000:.1f} mm")
         for each in report.get("not_checked", []):
             print(f"{name}: {' and '.join(each['links'])} are not checked: {each['reason']}")
         for each in report.get("touch_at_home", []):
