@@ -29,18 +29,18 @@ def description_text(values: Mapping[str, Any], before: str = "") -> str:
         before: The text to replace; its comments and order are kept where they still apply.
     """
     wanted = as_saved(values)
-    fresh = _fresh(wanted)
+    new_text = _new_text(wanted)
     if not before:
-        return fresh
+        return new_text
     try:
         check_bounds(before)
         document = tomlkit.parse(before)
-        _merge(document, tomlkit.parse(fresh))
+        _merge(document, tomlkit.parse(new_text))
         merged = tomlkit.dumps(document)
         # If the merge with the old text changed a value, write the text without the old comments.
-        return merged if tomllib.loads(merged) == wanted else fresh
+        return merged if tomllib.loads(merged) == wanted else new_text
     except (TOMLKitError, tomllib.TOMLDecodeError):
-        return fresh
+        return new_text
 
 
 def as_saved(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -58,7 +58,7 @@ def _floats(value: Any) -> Any:
     return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
-def _fresh(values: Mapping[str, Any]) -> str:
+def _new_text(values: Mapping[str, Any]) -> str:
     blocks: list[list[str]] = [[]]
     for key, value in values.items():
         if key in _TABLES and isinstance(value, dict):

@@ -133,7 +133,7 @@ def _key(shapes: Sequence[Shape], files: Sequence[Sequence[Path]]) -> str:
     """Return a cache key for the GLB of shapes: a hash of everything that it depends on.
 
     Args:
-        files: For each shape, the files that its own file refers to, whether they exist or not.
+        files: For each shape, the files that its mesh file refers to, whether they exist or not.
     """
     digest = hashlib.sha256(str(_VERSION).encode())
     for shape, others in zip(shapes, files, strict=True):

@@ -153,7 +153,7 @@ def _copy_references(
 
 
 def _path_in_robot(mesh: str, taken: set[str]) -> str:
-    """Return an unused path for a mesh below the robot's folder; its own path if possible."""
+    """Return an unused path for a mesh below the robot's folder; unchanged if possible."""
     path = PurePosixPath(mesh)
     if path.is_absolute() or ".." in path.parts:
         path = PurePosixPath("meshes", path.name)

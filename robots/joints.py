@@ -88,7 +88,7 @@ def _row_joints(description: DhDescription) -> Joints:
     factors = np.array([position_factor(joint.type, description.units) for joint in rows])
 
     def column(values: list[float]) -> FloatArray:
-        return _fixed(np.array(values, dtype=np.float64) * factors)
+        return _readonly(np.array(values, dtype=np.float64) * factors)
 
     return Joints(
         names=tuple(joint.name for joint in rows),
@@ -109,20 +109,20 @@ def _urdf_joints(description: UrdfDescription) -> Joints:
     columns = []
     free = [tree.joints[number] for number in tree.free]
     for joint in free:
-        said = settings.get(joint.name) or JointSettings(name=joint.name)
+        given = settings.get(joint.name) or JointSettings(name=joint.name)
         factor = position_factor(joint.type, description.units)
 
         def value(number: float | None, otherwise: float, factor: float = factor) -> float:
             return otherwise if number is None else number * factor
 
-        lower = value(said.limits[0] if said.limits else None, joint.lower)
-        upper = value(said.limits[1] if said.limits else None, joint.upper)
-        speed = value(said.max_speed, joint.max_speed)
-        acceleration = value(said.max_acceleration, ACCELERATION_PER_SPEED * speed)
-        jerk = value(said.max_jerk, JERK_PER_ACCELERATION * acceleration)
-        home = value(said.home, 0.0 if lower <= 0.0 <= upper else (lower + upper) / 2)
+        lower = value(given.limits[0] if given.limits else None, joint.lower)
+        upper = value(given.limits[1] if given.limits else None, joint.upper)
+        speed = value(given.max_speed, joint.max_speed)
+        acceleration = value(given.max_acceleration, ACCELERATION_PER_SPEED * speed)
+        jerk = value(given.max_jerk, JERK_PER_ACCELERATION * acceleration)
+        home = value(given.home, 0.0 if lower <= 0.0 <= upper else (lower + upper) / 2)
         columns.append((lower, upper, speed, acceleration, jerk, home))
-    lower_, upper_, speeds, accelerations, jerks, homes = map(_fixed, np.array(columns).T)
+    lower_, upper_, speeds, accelerations, jerks, homes = map(_readonly, np.array(columns).T)
     return Joints(
         names=tuple(joint.name for joint in free),
         types=tuple(joint.type for joint in free),
@@ -135,7 +135,7 @@ def _urdf_joints(description: UrdfDescription) -> Joints:
     )
 
 
-def _fixed(array: FloatArray) -> FloatArray:
+def _readonly(array: FloatArray) -> FloatArray:
     array = np.ascontiguousarray(array)
     array.flags.writeable = False
     return array

@@ -20,7 +20,7 @@ class RobotModel:
         joints: The robot's joints, SI.
         link_names: Names of the links, base first.
         frame_names: Names of the other frames: "tool" first, then the description's named frames.
-        _followers: Factors and offsets from the robot's joint positions to those of all joints, including
+        _mimic: Factors and offsets from the robot's joint positions to those of all joints, including
             mimic joints; None without a mimic joint.
     """
 
@@ -31,7 +31,7 @@ class RobotModel:
     _workspace: Any
     _link_ids: tuple[int, ...]
     _frame_ids: tuple[int, ...]
-    _followers: tuple[FloatArray, FloatArray] | None
+    _mimic: tuple[FloatArray, FloatArray] | None
 
 
 def build_model(description: RobotDescription) -> RobotModel:
@@ -68,7 +68,7 @@ def build_model(description: RobotDescription) -> RobotModel:
         _workspace=model.createData(),
         _link_ids=tuple(link_ids),
         _frame_ids=tuple(frame_ids),
-        _followers=position_factors(tree) if len(tree.free) < len(tree.joints) else None,
+        _mimic=position_factors(tree) if len(tree.free) < len(tree.joints) else None,
     )
 
 
@@ -152,7 +152,7 @@ def tool_jacobian(model: RobotModel, joint_positions: ArrayLike) -> FloatArray:
     )
     # Pinocchio returns a 1-D array for a robot of one joint.
     each = np.array(jacobian, dtype=np.float64).reshape(6, len(positions))
-    return each if model._followers is None else each @ model._followers[0]
+    return each if model._mimic is None else each @ model._mimic[0]
 
 
 def manipulability(model: RobotModel, joint_positions: ArrayLike) -> float:
@@ -166,9 +166,9 @@ def manipulability(model: RobotModel, joint_positions: ArrayLike) -> float:
 def all_positions(model: RobotModel, joint_positions: ArrayLike) -> FloatArray:
     """Return the positions of all joints, including mimic joints."""
     positions = as_positions(model.joints, joint_positions)
-    if model._followers is None:
+    if model._mimic is None:
         return positions
-    factors, offsets = model._followers
+    factors, offsets = model._mimic
     return factors @ positions + offsets
 
 

@@ -267,13 +267,13 @@ class DhDescription(RobotDescription):
 
     def mesh_path(self, body: Body) -> Path | None:
         """Return the path of a body's mesh file; None without one."""
-        return self._beside(body.mesh)
+        return self._in_folder(body.mesh)
 
     def collision_path(self, body: Body) -> Path | None:
         """Return the path of a body's separate collision mesh; None without one."""
-        return self._beside(body.collision_mesh)
+        return self._in_folder(body.collision_mesh)
 
-    def _beside(self, name: str | None) -> Path | None:
+    def _in_folder(self, name: str | None) -> Path | None:
         return None if name is None else self._source.parent / name
 
 

@@ -218,9 +218,9 @@ def _joint_values(chain: _Chain, joints: Joints) -> Iterator[dict[str, Any]]:
             "name": joint.name,
             "type": str(joint.type),
             "a": _mm(row.a),
-            "alpha": _deg(row.alpha),
+            "alpha": _degrees(row.alpha),
             "d": _mm(row.d),
-            "theta": _deg(row.theta),
+            "theta": _degrees(row.theta),
             "limits": [_rounded(joints.lower[index] * factor), _rounded(joints.upper[index] * factor)],
             "max_speed": _rounded(joints.max_speed[index] * factor),
             "max_acceleration": _rounded(joints.max_acceleration[index] * factor),
@@ -302,14 +302,14 @@ def _deviation(chain: _Chain, joints: Joints, tool_to_last: FloatArray) -> tuple
 
 def _pose_values(placement: FloatArray) -> dict[str, list[float]]:
     xyz = [_mm(value) for value in placement[:3, 3]]
-    return {"xyz": xyz, "rpy": [_deg(angle) for angle in rotation_rpy(placement[:3, :3])]}
+    return {"xyz": xyz, "rpy": [_degrees(angle) for angle in rotation_rpy(placement[:3, :3])]}
 
 
 def _mm(metres: float) -> float:
     return _clean(metres * 1000.0)
 
 
-def _deg(radians: float) -> float:
+def _degrees(radians: float) -> float:
     return _clean(degrees(radians))
 
 

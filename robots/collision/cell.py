@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from robots.cells import FLOOR, CellDescription, CellRobot, Fixture, Floor
 from robots.collision.geometry import Body, exact_bodies, hull_bodies, piece_bodies
 from robots.collision.link_pairs import PairPlan, plan_pairs
-from robots.collision.obstacles import Balls, Obstacles, balls_of, joined
+from robots.collision.obstacles import Balls, Obstacles, balls_of, join_obstacles
 from robots.collision.self_collision import SelfPairs, self_pairs
 from robots.description import load
 from robots.errors import MeshError
@@ -89,7 +89,7 @@ def build_cell(description: CellDescription, *, exact: bool = False, wait: bool 
     links = {f"{arm.name}/{link}" for arm in arms.values() for link in arm.model.link_names}
     return Cell(
         arms,
-        joined([_fixture_obstacles(fixture, links) for fixture in description.fixtures]),
+        join_obstacles([_fixture_obstacles(fixture, links) for fixture in description.fixtures]),
         description.floor and replace(description.floor, height_m=description.floor_m),
         frozenset((link, fixture.name) for fixture in description.fixtures for link in fixture.ignore),
     )

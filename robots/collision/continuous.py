@@ -19,7 +19,7 @@ from robots.collision.distance import Gauge
 from robots.collision.floor import Heights, heights_on_path
 from robots.collision.geometry import TOUCH_M, Body
 from robots.collision.interpolated import Placed, touching_share
-from robots.collision.obstacles import joined_boxes, least_distances
+from robots.collision.obstacles import join_boxes, least_distances
 from robots.collision.path import placements_along, travelled
 from robots.collision.swept_volumes import Sweep, distance_to_sweep, sweeps_of, swept_region
 from robots.joints import FloatArray
@@ -180,7 +180,7 @@ class _OutsidePairs:
         self._bodies = np.array([one for one, _ in self._pairs], dtype=np.int64)
         self._known = np.empty(0)
         if self._pairs:
-            boxes = joined_boxes([sweep.box for sweep in sweeps])
+            boxes = join_boxes([sweep.box for sweep in sweeps])
             least = least_distances(arm.balls, first[None], boxes)[0]
             self._known = least[tuple(np.array(self._pairs).T)]
 

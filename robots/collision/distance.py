@@ -12,7 +12,7 @@ from robots.cells import FLOOR
 from robots.collision.cell import Arm, Cell
 from robots.collision.floor import heights_above
 from robots.collision.geometry import TOUCH_M, Body, transform
-from robots.collision.obstacles import Obstacles, boxes_of, joined, least_distances
+from robots.collision.obstacles import Obstacles, boxes_of, join_obstacles, least_distances
 from robots.collision.self_collision import nearest_pair, touching_pairs
 from robots.joints import FloatArray
 from robots.model import link_placements
@@ -215,7 +215,7 @@ def _distance_bounds(
 ) -> tuple[Obstacles, Obstacles, FloatArray]:
     """Return an arm, its obstacles and lower bounds of their distances (a, b): infinite if unchecked."""
     at = arm_obstacles(cell.arms[robot], positions)
-    around = joined(
+    around = join_obstacles(
         [
             cell.fixtures,
             *(arm_obstacles(cell.arms[name], there) for name, there in others.items() if name != robot),

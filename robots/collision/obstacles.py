@@ -29,7 +29,7 @@ class Obstacles:
         return len(self.names)
 
 
-def joined(parts: Sequence[Obstacles]) -> Obstacles:
+def join_obstacles(parts: Sequence[Obstacles]) -> Obstacles:
     """Concatenate obstacles."""
     return Obstacles(
         tuple(name for part in parts for name in part.names),
@@ -128,7 +128,7 @@ def least_distances(balls: Balls, placements: FloatArray, boxes: Boxes) -> Float
     return least
 
 
-def joined_boxes(parts: Sequence[Boxes]) -> Boxes:
+def join_boxes(parts: Sequence[Boxes]) -> Boxes:
     """Concatenate boxes."""
     return Boxes(
         np.concatenate([part.centers for part in parts]),

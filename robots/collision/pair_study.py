@@ -180,7 +180,7 @@ def study(case: Case) -> tuple[Found, ...]:
 
 
 def _touching_at_home(places: FloatArray, levels: Sequence[tuple[Surface, Surface]], touch: Touch) -> Kind:
-    """Decide how to check a pair whose hulls touch at home.
+    """Decide how to check a pair with hulls that touch at home.
 
     Args:
         places: (k, 4, 4) of the second link in the first's frame, home first.

@@ -107,16 +107,16 @@ def within_limits(found: Sequence[list[float]], within: Windows) -> Iterator[lis
     The nearest comes first, before the others are examined. The distance is the sum of squared differences,
     as shares of the joints' ranges.
     """
-    nearer = _inside(found, within, nearer_only=True)
+    nearer = _solutions_within(found, within, nearer_only=True)
     if nearer:
         yield nearer[-1][1]
-        others = sorted(_inside(found, within, nearer_only=False))
+        others = sorted(_solutions_within(found, within, nearer_only=False))
         others.remove(nearer[-1])
         for _, here in others:
             yield here
 
 
-def _inside(
+def _solutions_within(
     found: Sequence[list[float]], within: Windows, *, nearer_only: bool
 ) -> list[tuple[float, list[float]]]:
     """Return solutions within limits with their distance from the start.

@@ -108,7 +108,7 @@ def solve(
             for x in exact:
                 x[-1] = float(start[-1])
         within = closed.from_home if near is None else windows(chain, start)
-        found = list(islice(_verified(chain, within_limits(exact, within), target, task, around), wanted))
+        found = list(islice(_verify(chain, within_limits(exact, within), target, task, around), wanted))
         if found:
             return _answer(chain, found, around, analytic=True)
         guesses = list(within_limits(approximate, within))
@@ -164,7 +164,7 @@ def _clipped_start(chain: Chain, near: ArrayLike) -> FloatArray:
     return np.minimum(np.maximum(positions, chain.joints.lower), chain.joints.upper)
 
 
-def _verified(
+def _verify(
     chain: Chain, found: Iterable[list[float]], target: Any, task: Task, around: FloatArray
 ) -> Iterator[Found]:
     """Yield each solution that puts the tool at the target once, refined if rounding made it inexact."""

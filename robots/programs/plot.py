@@ -62,7 +62,7 @@ def _draw(result: CheckResult, joints: Joints, all_axes: Sequence[Any], title: s
     drawn = np.linspace(0, max(count - 1, 0), min(count, _DRAWN)).astype(np.int64)
     times = path.times_s[drawn]
     for axes in all_axes:
-        _dress(axes)
+        _style_axes(axes)
     _joints(
         all_axes[0], joints, times, path.joint_positions[drawn] if len(times) else np.zeros((0, len(joints)))
     )
@@ -90,7 +90,7 @@ def _draw(result: CheckResult, joints: Joints, all_axes: Sequence[Any], title: s
     )
 
 
-def _dress(axes: Any) -> None:
+def _style_axes(axes: Any) -> None:
     axes.set_facecolor("white")
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
@@ -149,7 +149,7 @@ def _violations(all_axes: Sequence[Any], violations: Sequence[Violation]) -> Non
     # Draw refusals last, over the warnings.
     for (panel, kind, refuses), spans in sorted(bands.items(), key=lambda item: item[0][2]):
         color = _ALARM if refuses else _WARNING
-        for begin, until in _united(spans)[:_MOST_BANDS]:
+        for begin, until in _merged(spans)[:_MOST_BANDS]:
             axes = all_axes[panel]
             axes.axvspan(begin, until, facecolor=color, alpha=0.16, linewidth=0)
             axes.axvline(begin, color=color, linewidth=0.9)
@@ -163,7 +163,7 @@ def _violations(all_axes: Sequence[Any], violations: Sequence[Violation]) -> Non
             )  # fmt: skip
 
 
-def _united(spans: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+def _merged(spans: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     """Merge overlapping spans."""
     united: list[tuple[float, float]] = []
     for begin, until in sorted(spans):

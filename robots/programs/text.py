@@ -221,7 +221,7 @@ class _Parser:
 
     def _close(self) -> None:
         if len(self._blocks) == 1:
-            raise _LineError("'end' ends nothing: there is no open 'repeat' above")
+            raise _LineError("'end' without an open 'repeat' above")
         block = self._blocks.pop()
         self._blocks[-1].body.append(Repeat(block.line, block.count, tuple(block.body)))
         self._count(self._blocks[-1], block.steps * block.count, block.line)

@@ -116,7 +116,7 @@ WRONG = (
     ("point above = joints 1 2 3 4 5", "point 'above' is already defined in line 1"),
     ("repeat 0", "'repeat' is 0; must be between 1 and 100000 times"),
     ("repeat 1.5", "'repeat' takes a whole number, not 1.5"),
-    ("end", "'end' ends nothing: there is no open 'repeat' above"),
+    ("end", "'end' without an open 'repeat' above"),
 )
 
 
