@@ -5,8 +5,8 @@ import gc
 import logging
 from contextlib import AsyncExitStack
 
-from protocol_gateway.checking.cell_occupancy import CellMates
-from protocol_gateway.checking.checker import checkers_of
+from protocol_gateway.checking.cell_occupancy import CellOccupancy
+from protocol_gateway.checking.checker import make_checkers
 from protocol_gateway.checking.policy import Policy
 from protocol_gateway.link.metrics import measure_links
 from protocol_gateway.robot import Robot
@@ -31,9 +31,9 @@ async def serve(session: Session, settings: Settings) -> None:
         surroundings = {robot.name: robot.surroundings for robot in settings.robots}
         # Processes of their own: whoever has a long program planned delays nobody's motion.
         checked = [robot.name for robot in settings.robots if robot.check != Policy.OFF]
-        checkers = checkers_of(surroundings, at_once=checked)
-        planners = checkers_of(surroundings)
-        cells: dict[frozenset[str], CellMates] = {}
+        checkers = make_checkers(surroundings, start_now=checked)
+        planners = make_checkers(surroundings)
+        cells: dict[frozenset[str], CellOccupancy] = {}
         for each in settings.robots:
             path = settings.audit_folder / settings.site / f"{each.name}.jsonl"
             names = frozenset(robot.name for robot in each.surroundings.robots)
@@ -45,7 +45,7 @@ async def serve(session: Session, settings: Settings) -> None:
                 rotate_bytes=settings.audit_rotate_bytes,
                 checker=checkers[each.name],
                 planner=planners[each.name],
-                mates=cells.setdefault(names, CellMates()),
+                cell_occupancy=cells.setdefault(names, CellOccupancy()),
             )
             stack.push_async_callback(robot.close)
             robots.append(robot)

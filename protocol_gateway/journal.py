@@ -15,8 +15,8 @@ log = logging.getLogger(__name__)
 
 # A controller that sends rubbish must fill neither logs nor the hundred events that a late joiner is told:
 # so many of a kind at once, then one in so long.
-_AT_ONCE = 5.0
-_THEN_EACH_S = 5.0
+_BURST = 5.0
+_REFILL_S = 5.0
 
 _LEVELS = {
     Event.Severity.DEBUG: logging.DEBUG,
@@ -29,11 +29,11 @@ _LEVELS = {
 
 @dataclass
 class _Kind:
-    """`may_say`: so many more at once, at the time `at_s`."""
+    """`tokens`: so many more at once, at the time `at_s`."""
 
     at_s: float
-    may_say: float = _AT_ONCE
-    left_out: int = 0
+    tokens: float = _BURST
+    suppressed: int = 0
 
 
 class Journal:
@@ -47,7 +47,7 @@ class Journal:
         self._monotonic_s = monotonic_s
         self._kinds: dict[str, _Kind] = {}
 
-    def say(
+    def report(
         self,
         severity: Event.Severity,
         code: str,
@@ -65,16 +65,16 @@ class Journal:
         """
         now_s = self._monotonic_s()
         kind = self._kinds.setdefault(code, _Kind(now_s))
-        kind.may_say = min(kind.may_say + (now_s - kind.at_s) / _THEN_EACH_S, _AT_ONCE)
+        kind.tokens = min(kind.tokens + (now_s - kind.at_s) / _REFILL_S, _BURST)
         kind.at_s = now_s
-        if kind.may_say < 1.0:
-            kind.left_out += 1
+        if kind.tokens < 1.0:
+            kind.suppressed += 1
             return
-        kind.may_say -= 1.0
-        if kind.left_out:
-            values["left_out"] = kind.left_out
-            text = f"{text} (and {kind.left_out} more like it before)"
-            kind.left_out = 0
+        kind.tokens -= 1.0
+        if kind.suppressed:
+            values["left_out"] = kind.suppressed
+            text = f"{text} (and {kind.suppressed} more like it before)"
+            kind.suppressed = 0
         text = one_line(text, LONGEST_SENTENCE)
         event = Event(severity=severity, code=code, text=text, source="gateway")
         event.timestamp.GetCurrentTime()

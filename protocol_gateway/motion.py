@@ -15,14 +15,14 @@ _STILL_ROTARY = 1e-3  # rad
 _STILL_PRISMATIC = 1e-4  # m
 
 
-class PositionWatch:
+class MotionDetector:
     """Sees motion in positions, for controllers that do not tell their activity."""
 
     def __init__(self, joint_types: Sequence[JointType]) -> None:
         self._still = _still(joint_types)
         self._samples: deque[tuple[float, tuple[float, ...]]] = deque()
 
-    def see(self, positions: tuple[float, ...], time_s: float) -> None:
+    def add(self, positions: tuple[float, ...], time_s: float) -> None:
         """Take note of positions [rad] or [m] at a monotonic time; more than ten a second are passed over."""
         if self._samples and time_s - self._samples[-1][0] < _SAMPLE_S:
             return
@@ -63,18 +63,20 @@ def has_arrived(
     )
 
 
-def is_moving(activity: Activity | None, watch: PositionWatch, said_for_s: float = 0.0) -> bool | None:
+def is_moving(
+    activity: Activity | None, detector: MotionDetector, reported_for_s: float = 0.0
+) -> bool | None:
     """Whether the robot moves: the controller's word where it gives one; None: not known.
 
     Args:
-        said_for_s: How long the controller has said so. An arm that has been at rest for a while by its
+        reported_for_s: How long the controller has said so. An arm that has been at rest for a while by its
             controller's word, and whose positions change, moves all the same.
     """
     if activity is None:
-        return watch.moving
+        return detector.moving
     if activity in (Activity.MOVING, Activity.HOMING):
         return True
-    return said_for_s >= _SETTLED_S and bool(watch.moving)
+    return reported_for_s >= _SETTLED_S and bool(detector.moving)
 
 
 def motion_may_be_held(activity: Activity | None) -> bool:

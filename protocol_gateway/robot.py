@@ -12,18 +12,18 @@ from pathlib import Path
 from protocol_gateway.audit.entry import audit_entry
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome
 from protocol_gateway.audit.persisted_state import ROTATE
-from protocol_gateway.audit.search import Query, Searches, find
+from protocol_gateway.audit.search import Query, SearchServer, find
 from protocol_gateway.authority.lease_rules import Authority, Now
 from protocol_gateway.authority.preconditions import Controller
-from protocol_gateway.checking.cell_occupancy import CellMates
+from protocol_gateway.checking.cell_occupancy import CellOccupancy
 from protocol_gateway.checking.checker import Checker
 from protocol_gateway.checking.policy import Policy
-from protocol_gateway.control.audit_trail import Ledger, entry_of
+from protocol_gateway.control.audit_trail import AuditTrail, entry_of
 from protocol_gateway.control.checks import Checks
 from protocol_gateway.control.control import Control
-from protocol_gateway.control.deadlines import date
+from protocol_gateway.control.deadlines import set_deadline
 from protocol_gateway.control.program import Programs
-from protocol_gateway.control.stop_handler import Guarded
+from protocol_gateway.control.stop_handler import ControlContext
 from protocol_gateway.core.codes import code_table
 from protocol_gateway.drivers.driver import Driver
 from protocol_gateway.drivers.registry import DRIVERS
@@ -32,7 +32,7 @@ from protocol_gateway.foreign_text import LONGEST, LONGEST_SENTENCE, one_line
 from protocol_gateway.journal import Journal
 from protocol_gateway.legacy.clients import LegacyClients
 from protocol_gateway.link.link import JOINT_COUNT, ControllerLink, LinkSettings, LinkState, LinkStatus
-from protocol_gateway.link.status import news
+from protocol_gateway.link.status import transition_events
 from protocol_gateway.settings import RobotSettings
 from protocol_gateway.state_messages import controller_state, lease_state, timestamp
 from protocol_gateway.telemetry import Telemetry
@@ -52,11 +52,11 @@ log = logging.getLogger(__name__)
 
 _S = schema.Event.Severity
 
-_LOOK_S = 0.1
+_POLL_S = 0.1
 # Of the stale time: that a controller is silent takes a moment to be with the monitors.
 _SHOWN_WITHIN = 0.95
 _HEARTBEAT_S = 1.0
-_MEND_S = 1.0
+_RETRY_S = 1.0
 MESH = "mesh"
 # In the audit log, where it cannot be read which one.
 _LEASE, _COMMAND = "LEASE", "COMMAND"
@@ -79,7 +79,7 @@ class Robot:
         rotate_bytes: int,
         checker: Checker,
         planner: Checker,
-        mates: CellMates,
+        cell_occupancy: CellOccupancy,
     ) -> None:
         joints = joints_of(load(settings.description))
         relay = None if settings.legacy_clients is None else self._relay
@@ -103,7 +103,7 @@ class Robot:
             raw=publisher("raw"),
             journal=self._journal,
             stale_after_s=settings.stale_after_s,
-            on_status=self._on_told,
+            on_status=self._on_controller_status,
             on_activity=lambda activity, dated_s: self._control.reported(activity, dated_s),
             on_refused=lambda: self._control.refused(),
         )
@@ -120,17 +120,17 @@ class Robot:
         )
         self._link_status = self._link.status
         self._audit = AuditLog(audit_path, on_written=self._on_written, rotate_bytes=rotate_bytes)
-        self._ledger = Ledger(self._audit, self._journal)
-        guarded = Guarded(
-            authority=self._remembered(),
+        self._audit_trail = AuditTrail(self._audit, self._journal)
+        context = ControlContext(
+            authority=self._persisted_authority(),
             driver=driver,
-            ledger=self._ledger,
+            audit_trail=self._audit_trail,
             latch=self._audit.latch,
             journal=self._journal,
             send=self._link.send,
             controller=self._controller,
             on_change=self._publish_state,
-            orphan=self._audit.memory.mover,
+            orphan=self._audit.state.mover,
         )
         self._checks = Checks(
             settings.name,
@@ -138,46 +138,46 @@ class Robot:
             cell=[robot.name for robot in settings.surroundings.robots],
             checker=checker,
             planner=planner,
-            mates=mates,
+            cell_occupancy=cell_occupancy,
             joints=joints,
-            guarded=guarded,
+            context=context,
         )
-        self._control = Control(joints, guarded, self._checks)
-        self._programs = Programs(self._control, guarded, self._checks)
+        self._control = Control(joints, context, self._checks)
+        self._programs = Programs(self._control, context, self._checks)
         if settings.legacy_clients is not None:
             table = code_table(settings.codes)
-            self._legacy = LegacyClients(settings.legacy_clients, table, joints, self._control, guarded)
+            self._legacy = LegacyClients(settings.legacy_clients, table, joints, self._control, context)
         self._operators = session.watch_presence(presence_key(site, settings.name, Role.OPERATOR.value, "*"))
         self._stops = session.answer(site, settings.name, "stop", self._answer_stop)
 
         def answer(name: str, handler: Handler, what: str) -> Answerer:
-            refused = partial(self._refused, what)
+            refused = partial(self._record_unreadable, what)
             return session.answer(site, settings.name, name, handler, on_refused=refused)
 
-        self._asked = (
+        self._answerers = (
             answer("lease/request/*", self._answer_lease, _LEASE),
             answer("command/*", self._answer_command, _COMMAND),
         )
         self._turned_away = 0
-        session.answer(site, settings.name, "audit/find", Searches(audit_path).answer)
-        self._say_how_it_starts()
+        session.answer(site, settings.name, "audit/find", SearchServer(audit_path).answer)
+        self._report_startup()
 
-    def _remembered(self) -> Authority:
+    def _persisted_authority(self) -> Authority:
         """The authority that the log leaves; of a read-only robot no stop, which nobody could reset."""
-        authority = self._audit.memory.authority
+        authority = self._audit.state.authority
         return replace(authority, stop=None) if self._read_only else authority
 
-    def _say_how_it_starts(self) -> None:
-        if self._audit.mended:
-            self._journal.say(
-                _S.ERROR, "audit.damaged", f"audit log {self._audit.path.name}: {self._audit.mended}"
+    def _report_startup(self) -> None:
+        if self._audit.damage:
+            self._journal.report(
+                _S.ERROR, "audit.damaged", f"audit log {self._audit.path.name}: {self._audit.damage}"
             )
         if self._read_only:
-            self._journal.say(_S.WARNING, "robot.read_only", f"the robot is read-only: {self._read_only}")
+            self._journal.report(_S.WARNING, "robot.read_only", f"the robot is read-only: {self._read_only}")
         stop = self._control.authority.stop
         if stop is not None:
             text = f"stop request {stop.id} ({stop.by}: {stop.reason}) is latched from the start"
-            self._journal.say(_S.WARNING, "stop.remembered", text, stop_id=stop.id)
+            self._journal.report(_S.WARNING, "stop.remembered", text, stop_id=stop.id)
         for entry in find(self._audit.path, Query(most=LIST_LENGTH)):
             with contextlib.suppress(ValueError, TypeError):  # somebody changed that line: `verify` tells
                 self._audit_topic.remember(audit_entry(entry), source_time_ns=entry.time_ns)
@@ -204,10 +204,10 @@ class Robot:
     async def run(self) -> None:
         """Keep the link and the heartbeats until cancelled; then stop what moves under a lease."""
         self._control.send_latched_stop()  # there is no link yet, but now it hurries
-        link = asyncio.create_task(self._go_on(self._link.run))
-        sessions = asyncio.create_task(self._go_on(self._watch_sessions))
+        link = asyncio.create_task(self._keep_running(self._link.run))
+        sessions = asyncio.create_task(self._keep_running(self._watch_sessions))
         try:
-            await self._go_on(self._beat)
+            await self._keep_running(self._poll)
         finally:
             try:
                 # While there is a link to stop it over.
@@ -224,11 +224,11 @@ class Robot:
         await self._programs.close()
         await self._control.close()
         # No stop or command is answered that can no longer be written down.
-        for each in (self._stops, *self._asked):
+        for each in (self._stops, *self._answerers):
             each.close()
         await self._audit.close()
 
-    async def _go_on(self, work: Callable[[], Awaitable[None]]) -> None:
+    async def _keep_running(self, work: Callable[[], Awaitable[None]]) -> None:
         """Do endless work; when it fails begin it anew, for the other robots know nothing of it."""
         while True:
             try:
@@ -237,34 +237,34 @@ class Robot:
                 log.exception("%s: the gateway failed at this robot and begins anew", self._settings.name)
                 text = "the gateway failed at this robot and begins anew: its log says why"
                 with contextlib.suppress(Exception):  # what failed may be the saying itself
-                    self._journal.say(_S.ERROR, "gateway.failed", text)
-                await asyncio.sleep(_MEND_S)
+                    self._journal.report(_S.ERROR, "gateway.failed", text)
+                await asyncio.sleep(_RETRY_S)
 
-    async def _beat(self) -> None:
+    async def _poll(self) -> None:
         next_s = 0.0
         while True:
-            await asyncio.sleep(_LOOK_S)
+            await asyncio.sleep(_POLL_S)
             self._control.leases.expire()
             now_s = time.monotonic()
             if self._link.status.state is LinkState.UP:
-                self._telemetry.look(now_s)
+                self._telemetry.check_timeouts(now_s)
             self._observe()
             if now_s >= next_s:
                 next_s = now_s + _HEARTBEAT_S
                 self._publish_state()
                 self._note_turned_away()
-                self._ledger.look()
+                self._audit_trail.write_pending()
 
     def _note_turned_away(self) -> None:
         """What was refused at the door, because too many requests waited, is in the audit log as a number."""
-        turned_away = sum(each.turned_away for each in self._asked)
+        turned_away = sum(each.turned_away for each in self._answerers)
         if more := turned_away - self._turned_away:
             self._turned_away = turned_away
             why = codes.TURNED_AWAY()
             entry = entry_of(
                 "REQUESTS", operator="", source=MESH, outcome=Outcome.REFUSED, text=why.text, why=why
             )
-            self._ledger.after_later(replace(entry, repeated=more - 1))
+            self._audit_trail.write_later(replace(entry, repeated=more - 1))
 
     async def _watch_sessions(self) -> None:
         """An operator's program or page that is gone holds no robot."""
@@ -291,7 +291,7 @@ class Robot:
         message = request.message
         assert isinstance(message, schema.CommandRequest)
         operator = self._operator(_COMMAND, request)
-        date(message, request)
+        set_deadline(message, request)
         if message.command == schema.CommandRequest.RUN_PROGRAM:
             return await self._programs.run(message, operator=operator, source=MESH)
         return await self._control.command(message, operator=operator, source=MESH)
@@ -308,14 +308,14 @@ class Robot:
                 raise KeyNameError(f"operator {one_line(name, 40)}: a name has at most {LONGEST} characters")
             return check_operator(name)
         except KeyNameError as error:
-            self._refused(what, name, str(error))
+            self._record_unreadable(what, name, str(error))
             raise RefusedError(codes.INVALID(detail=error)) from None
 
-    def _refused(self, what: str, name: str, text: str) -> None:
+    def _record_unreadable(self, what: str, name: str, text: str) -> None:
         """Write down what nobody judged, because it cannot be read, or its operator's name is none."""
         who, why = one_line(name, 40), one_line(text, LONGEST_SENTENCE)
         entry = entry_of(what, operator=who, source=MESH, outcome=Outcome.REFUSED, text=why)
-        self._ledger.after_later(entry)
+        self._audit_trail.write_later(entry)
 
     # ------------------------------------------------------------------ state
 
@@ -323,7 +323,7 @@ class Robot:
         if self._legacy is None:
             return
         relay = partial(self._legacy.relay, unit, answer)
-        if answer or not self._link.thins(("relay", kind), relay):
+        if answer or not self._link.defer_in_flood(("relay", kind), relay):
             relay()
 
     def _on_link(self, status: LinkStatus) -> None:
@@ -332,8 +332,8 @@ class Robot:
             self._telemetry.forget()
         elif status.code == JOINT_COUNT:
             self._telemetry.forget_positions()
-        for severity, code, text in news(before, status):
-            self._journal.say(severity, code, text)
+        for severity, code, text in transition_events(before, status):
+            self._journal.report(severity, code, text)
         if before.state is not status.state:
             if before.state is LinkState.UP:
                 self._control.link_lost(status.text)
@@ -343,8 +343,8 @@ class Robot:
                 self._control.send_latched_stop()
         self._publish_state()
 
-    def _on_told(self) -> None:
-        self._control.news()
+    def _on_controller_status(self) -> None:
+        self._control.status_changed()
         self._observe()
         self._publish_state()
 
@@ -352,7 +352,7 @@ class Robot:
         self._audit_topic.put(audit_entry(entry), source_time_ns=entry.time_ns)
         if entry.request == ROTATE:
             name = self._audit.path.name
-            self._journal.say(_S.INFO, "audit.rotated", f"audit log {name}: {entry.text}", file=name)
+            self._journal.report(_S.INFO, "audit.rotated", f"audit log {name}: {entry.text}", file=name)
 
     def _observe(self) -> None:
         if self._link.status.state is not LinkState.UP:
@@ -366,7 +366,7 @@ class Robot:
             status=self._telemetry.status(now_s),
             fault=self._telemetry.fault(now_s),
             positions=self._telemetry.positions(now_s),
-            positions_gone=self._telemetry.positions_gone(now_s),
+            positions_stale=self._telemetry.positions_stale(now_s),
             read_only=self._read_only,
             accept_unknown=self._settings.accept_unknown,
         )

@@ -46,7 +46,7 @@ class JointStatesMessage:
         self._message = JointStates(joints=[JointState(name=name) for name in names])
         self._rows = list(self._message.joints)
 
-    def of(self, joints: JointsReceived, wall_ns: int) -> JointStates:
+    def fill(self, joints: JointsReceived, wall_ns: int) -> JointStates:
         """Joint positions and velocities, dated when their unit was received; the same message each time."""
         date = self._message.timestamp
         date.seconds, date.nanos = divmod(wall_ns, 1_000_000_000)
@@ -150,8 +150,8 @@ def _health(health: LinkHealth, *, flooding: bool) -> schema.LinkHealth:
 def _link_reasons(controller: Controller) -> list[Reason]:
     reasons = [controller.link.reason]
     # Nothing is received over a link that is not up, so there it says no more.
-    if controller.positions_gone is not None and controller.link.state is LinkState.UP:
-        reasons.append(controller.positions_gone)
+    if controller.positions_stale is not None and controller.link.state is LinkState.UP:
+        reasons.append(controller.positions_stale)
     if controller.read_only is not None:
         reasons.append(codes.READ_ONLY(controller.read_only))
     return reasons

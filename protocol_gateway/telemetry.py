@@ -17,9 +17,9 @@ from protocol_gateway.drivers.driver import (
 )
 from protocol_gateway.journal import Journal
 from protocol_gateway.link.link import Received
-from protocol_gateway.motion import PositionWatch, is_moving
+from protocol_gateway.motion import MotionDetector, is_moving
 from protocol_gateway.state_messages import JointStatesMessage, raw_record
-from protocol_gateway.watchdog import STALE_S, Beat
+from protocol_gateway.watchdog import STALE_S, Watchdog
 from robomesh import reason_codes as codes
 from robomesh.publisher import Publisher
 from robomesh.reasons import Reason
@@ -34,22 +34,22 @@ _S = Event.Severity
 _BACK_AFTER_S = 6.0
 
 
-class _Absence:
+class _LossNotice:
     """Whether something is said to be gone; it is back when it has come for a while."""
 
     def __init__(self) -> None:
-        self._said = False
+        self._reported_lost = False
         self._back_s: float | None = None
 
-    def news(self, now_s: float, *, gone: bool) -> bool | None:
+    def update(self, now_s: float, *, gone: bool) -> bool | None:
         """True: say that it is gone; False: that it is back; None: nothing."""
         if gone:
             self._back_s = None
-            news = None if self._said else True
+            news = None if self._reported_lost else True
         else:
             self._back_s = now_s if self._back_s is None else self._back_s
-            news = False if self._said and now_s - self._back_s >= _BACK_AFTER_S else None
-        self._said = self._said if news is None else news
+            news = False if self._reported_lost and now_s - self._back_s >= _BACK_AFTER_S else None
+        self._reported_lost = self._reported_lost if news is None else news
         return news
 
 
@@ -59,7 +59,7 @@ class Telemetry:
     Each of both is known for a time of its own: a controller may go on with one and not with the other.
 
     Attributes:
-        watch: Sees motion in the positions.
+        motion_detector: Sees motion in the positions.
         controller_time_s: On the controller's own clock; None: it does not tell.
     """
 
@@ -86,32 +86,32 @@ class Telemetry:
         self._on_refusal = on_refused
         self._stale_after_s = stale_after_s
         self._next_slow_s = 0.0
-        self.watch = PositionWatch(joints.types)
+        self.motion_detector = MotionDetector(joints.types)
         self.forget()
 
     def forget(self) -> None:
         """The link was lost: nothing is known any more, for a controller may come back another."""
         self._status = StatusReceived()
-        self._beat = Beat()
+        self._status_watchdog = Watchdog()
         self._activity_since_s = 0.0
         self._positions: tuple[tuple[float, ...], float] | None = None  # and when they were so
         self._fault = ""
         self._gone = (False, False)
-        self._no_joints, self._no_status = _Absence(), _Absence()
+        self._joints_notice, self._status_notice = _LossNotice(), _LossNotice()
         self.controller_time_s: float | None = None
-        self.watch.forget()
+        self.motion_detector.forget()
 
     def forget_positions(self) -> None:
         """Count the positions as gone: the controller may be another robot's now."""
         if self._positions is not None:
             self._positions = self._positions[0], float("-inf")
-        self.watch.forget()
+        self.motion_detector.forget()
 
     def positions(self, now_s: float) -> tuple[float, ...] | None:
         """The newest [rad] or [m]; None: not told since the link came up, or not for the stale time."""
-        return None if self._positions is None or self.positions_gone(now_s) else self._positions[0]
+        return None if self._positions is None or self.positions_stale(now_s) else self._positions[0]
 
-    def positions_gone(self, now_s: float) -> Reason | None:
+    def positions_stale(self, now_s: float) -> Reason | None:
         """Return that positions are not received any more; None: they are, or never were."""
         if self._positions is None or now_s - self._positions[1] < self._stale_after_s:
             return None
@@ -119,34 +119,37 @@ class Telemetry:
 
     def status(self, now_s: float) -> StatusReceived:
         """The newest; all unknown when it beat and has ceased to."""
-        return StatusReceived() if self._beat.ceased(now_s) else self._status
+        return StatusReceived() if self._status_watchdog.expired(now_s) else self._status
 
     def moving(self, now_s: float) -> bool | None:
         """Whether the robot moves; None: not known."""
-        return is_moving(self.status(now_s).activity, self.watch, now_s - self._activity_since_s)
+        return is_moving(self.status(now_s).activity, self.motion_detector, now_s - self._activity_since_s)
 
     def fault(self, now_s: float) -> str:
         """Text of the fault, while there is one."""
-        return "" if self._beat.ceased(now_s) else self._fault
+        return "" if self._status_watchdog.expired(now_s) else self._fault
 
-    def look(self, now_s: float) -> None:
+    def check_timeouts(self, now_s: float) -> None:
         """Say when positions or status come no more; to be called now and then while the link is up."""
-        before, self._gone = self._gone, (bool(self.positions_gone(now_s)), self._beat.ceased(now_s))
+        before, self._gone = (
+            self._gone,
+            (bool(self.positions_stale(now_s)), self._status_watchdog.expired(now_s)),
+        )
         positions, status = self._gone
         if positions and not before[0]:
-            self.watch.forget()
-        news = self._no_joints.news(now_s, gone=positions)
+            self.motion_detector.forget()
+        news = self._joints_notice.update(now_s, gone=positions)
         if news is True:
-            text = f"{self.positions_gone(now_s)}: where the robot is is not known, motion is refused"
-            self._journal.say(_S.WARNING, "joints.gone", text)
+            text = f"{self.positions_stale(now_s)}: where the robot is is not known, motion is refused"
+            self._journal.report(_S.WARNING, "joints.gone", text)
         elif news is False:
-            self._journal.say(_S.INFO, "joints.back", "joint positions come again")
-        news = self._no_status.news(now_s, gone=status)
+            self._journal.report(_S.INFO, "joints.back", "joint positions come again")
+        news = self._status_notice.update(now_s, gone=status)
         if news is True:
             text = f"the controller's status has not come for {STALE_S:g} s: it is not known any more"
-            self._journal.say(_S.WARNING, "status.gone", text)
+            self._journal.report(_S.WARNING, "status.gone", text)
         elif news is False:
-            self._journal.say(_S.INFO, "status.back", "the controller's status comes again")
+            self._journal.report(_S.INFO, "status.back", "the controller's status comes again")
         if self._gone != before:
             self._on_status()
 
@@ -159,13 +162,13 @@ class Telemetry:
                 if event.controller_time_s is not None:
                     self.controller_time_s = event.controller_time_s
                 if any(each is not None for each in _told(event)):  # not the time alone
-                    self._beat.see(_told(event), received.monotonic_s)
-                    self._on_told(event, received.monotonic_s)
+                    self._status_watchdog.reset(_told(event), received.monotonic_s)
+                    self._on_controller_status(event, received.monotonic_s)
             case UnknownReceived():
                 record = raw_record(event, received.wall_ns)
                 self._raw.put(record, source_time_ns=received.wall_ns, dated_by=received.clock)
             case MalformedReceived(offset, text, reason):
-                self._journal.say(
+                self._journal.report(
                     _S.WARNING,
                     "unit.malformed",
                     f"a unit of the controller's is malformed and was left out: {reason}",
@@ -176,7 +179,7 @@ class Telemetry:
             case Refused(number, text):
                 self._on_refused(number, text)
 
-    def _on_told(self, status: StatusReceived, now_s: float) -> None:
+    def _on_controller_status(self, status: StatusReceived, now_s: float) -> None:
         changed = _told(status) != _told(self._status)
         if status.activity is not self._status.activity:
             self._activity_since_s = now_s
@@ -184,39 +187,39 @@ class Telemetry:
         if status.activity is not Activity.FAULT:
             self._fault = ""
         if changed:
-            self._say_what_changed(before, status)
+            self._report_changes(before, status)
             self._on_status()
         positions_s = float("-inf") if self._positions is None else self._positions[1]
         self._on_activity(status.activity, min(now_s, positions_s))
 
-    def _say_what_changed(self, before: StatusReceived, now: StatusReceived) -> None:
+    def _report_changes(self, before: StatusReceived, now: StatusReceived) -> None:
         if now.mode is Mode.LOCAL and before.mode is not Mode.LOCAL:
             text = "the controller is in local mode: people at it move the robot, and nobody from here"
-            self._journal.say(_S.WARNING, "controller.local", text)
+            self._journal.report(_S.WARNING, "controller.local", text)
         if now.mode is Mode.REMOTE and before.mode is Mode.LOCAL:
-            self._journal.say(_S.INFO, "controller.remote", "the controller is in remote mode again")
+            self._journal.report(_S.INFO, "controller.remote", "the controller is in remote mode again")
         if now.activity is Activity.FAULT and before.activity is not Activity.FAULT:
             text = f"the controller has a fault: {self._fault or 'it does not say which'}"
-            self._journal.say(_S.ERROR, "controller.fault", text)
+            self._journal.report(_S.ERROR, "controller.fault", text)
 
     def _on_joints(self, joints: JointsReceived, received: Received) -> None:
         self._positions = joints.positions, received.monotonic_s
         if joints.controller_time_s is not None:
             self.controller_time_s = joints.controller_time_s
-        message = self._message.of(joints, received.wall_ns)
+        message = self._message.fill(joints, received.wall_ns)
         self._fast.put(message, source_time_ns=received.wall_ns, dated_by=received.clock)
         if received.monotonic_s >= self._next_slow_s:
             # In step with the grid, so that 100 Hz gives 10 Hz and not 9; after a gap it begins anew.
             self._next_slow_s = max(self._next_slow_s + _SLOW_S, received.monotonic_s + _SLOW_S / 2)
             self._slow.put(message, source_time_ns=received.wall_ns, dated_by=received.clock)
-        self.watch.see(joints.positions, received.monotonic_s)
+        self.motion_detector.add(joints.positions, received.monotonic_s)
 
     def _on_refused(self, number: int, text: str) -> None:
         self._on_refusal()
         if number == _FAULT:
             self._fault = text
             self._on_status()
-        self._journal.say(
+        self._journal.report(
             _S.WARNING,
             "controller.refused",
             f"the controller refused a unit: {text or 'no reason given'} (error {number})",

@@ -6,7 +6,7 @@ STALE_S = 3.0
 _REPEATS = 3
 
 
-class Beat:
+class Watchdog:
     """Sees something that is told again and again, and whether that ends.
 
     A controller that tells its status on change only is silent for hours, and nothing is wrong with it:
@@ -14,17 +14,17 @@ class Beat:
     """
 
     def __init__(self) -> None:
-        self._told: object = None
+        self._last_value: object = None
         self._last_s = float("-inf")
         self._repeats = 0
 
-    def see(self, told: object, time_s: float) -> None:
-        """Something was told, at a monotonic time."""
+    def reset(self, value: object, time_s: float) -> None:
+        """Something was value, at a monotonic time."""
         if self._repeats < _REPEATS:
-            again = told == self._told and time_s - self._last_s < STALE_S
+            again = value == self._last_value and time_s - self._last_s < STALE_S
             self._repeats = self._repeats + 1 if again else 0
-        self._told, self._last_s = told, time_s
+        self._last_value, self._last_s = value, time_s
 
-    def ceased(self, now_s: float) -> bool:
+    def expired(self, now_s: float) -> bool:
         """Whether it beat once, and does no more."""
         return self._repeats >= _REPEATS and now_s - self._last_s >= STALE_S

@@ -23,7 +23,7 @@ from robomesh.messages import reason_message
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
 
-NOTHING_BEFORE = "0" * 64
+NO_PREVIOUS = "0" * 64
 # Reasons within reasons; a longer chain is not one that was written here.
 _DEEPEST = 10
 
@@ -63,20 +63,20 @@ class Entry:
     values: Mapping[str, str] = field(default_factory=dict)
     repeated: int = 0
     number: int = 0
-    previous: str = NOTHING_BEFORE
+    previous: str = NO_PREVIOUS
     hash: str = ""
 
 
-class Link(NamedTuple):
+class ChainLink(NamedTuple):
     """What a line says of its place in the chain; `whole`: its hash is that of its bytes."""
 
     number: int
     previous: str
     hash: str
-    whole: bool
+    intact: bool
 
 
-def chained(entry: Entry, *, number: int, previous: str) -> tuple[Entry, bytes]:
+def chain_entry(entry: Entry, *, number: int, previous: str) -> tuple[Entry, bytes]:
     """The entry in its place in the chain, and its line."""
     placed = replace(entry, number=number, previous=previous)
     row = {**vars(placed), "values": dict(entry.values)}
@@ -91,14 +91,14 @@ def chained(entry: Entry, *, number: int, previous: str) -> tuple[Entry, bytes]:
     return replace(placed, hash=own), b'{"hash":"%s",%s\n' % (own.encode(), body[1:])
 
 
-def link_of(line: bytes) -> Link | None:
+def chain_link(line: bytes) -> ChainLink | None:
     """A line's place in the chain, without reading the rest of it; None: it is no line of a log."""
     found = _CHAIN.fullmatch(line)
     if found is None:
         return None
-    told, body, number, previous = found.groups()
+    recorded, body, number, previous = found.groups()
     own = hashlib.sha256(b"{" + body).hexdigest()
-    return Link(int(number), previous.decode(), told.decode(), own == told.decode())
+    return ChainLink(int(number), previous.decode(), recorded.decode(), own == recorded.decode())
 
 
 def parse_line(line: bytes) -> Entry:

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from protocol_gateway.audit.entry import NOTHING_BEFORE, Entry, Link, link_of, parse_line
-from protocol_gateway.audit.persisted_state import begins_file
+from protocol_gateway.audit.entry import NO_PREVIOUS, ChainLink, Entry, chain_link, parse_line
+from protocol_gateway.audit.persisted_state import starts_file
 from protocol_gateway.errors import AuditError
 
 # No entry is nearly as long; whoever reads somebody's file must not fill the memory with its one line.
@@ -39,7 +39,7 @@ class Verification:
     first_break: int | None
     text: str
     first: int = 1
-    last_hash: str = NOTHING_BEFORE
+    last_hash: str = NO_PREVIOUS
 
 
 def part_name(live: Path, first: int) -> Path:
@@ -115,14 +115,14 @@ def verify(live: Path, head: str | None = None) -> Verification:
     Raises:
         OSError: If a file cannot be read.
     """
-    last: Link | None = None
+    last: ChainLink | None = None
     first, found = 1, head is None
     for file in open_files(live):
         for line in lines_of(file):
-            link = link_of(line)
-            if last is None and link is not None and link.number > 1 and begins_file(line):
-                first, last = link.number, Link(link.number - 1, link.previous, link.previous, True)
-            number, previous = (last.number + 1, last.hash) if last else (1, NOTHING_BEFORE)
+            link = chain_link(line)
+            if last is None and link is not None and link.number > 1 and starts_file(line):
+                first, last = link.number, ChainLink(link.number - 1, link.previous, link.previous, True)
+            number, previous = (last.number + 1, last.hash) if last else (1, NO_PREVIOUS)
             if link is None and not line.endswith(b"\n") and _is_being_written(file):
                 break
             problem = _problem(line, link, number, previous)
@@ -132,7 +132,7 @@ def verify(live: Path, head: str | None = None) -> Verification:
                 )
             last = link
             found = found or link.hash == head
-    number, last_hash = (last.number, last.hash) if last else (0, NOTHING_BEFORE)
+    number, last_hash = (last.number, last.hash) if last else (0, NO_PREVIOUS)
     entries = number - first + 1
     missing = f"; entries 1 to {first - 1} are not here" if first > 1 else ""
     if not found:
@@ -150,14 +150,14 @@ def verify(live: Path, head: str | None = None) -> Verification:
     )
 
 
-def _problem(line: bytes, link: Link | None, number: int, previous: str) -> str:
+def _problem(line: bytes, link: ChainLink | None, number: int, previous: str) -> str:
     """Why a line is not the one that belongs there; empty: it is."""
     if link is None:
         try:
             parse_line(line)
         except AuditError as error:
             return str(error)
-    if link is None or not link.whole:
+    if link is None or not link.intact:
         return f"entry {number} was changed: its hash does not fit its contents"
     if (link.number, link.previous) != (number, previous):
         return f"something before entry {number} was taken out, put in or changed"

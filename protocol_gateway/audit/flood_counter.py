@@ -32,7 +32,7 @@ class _Kind:
     last: Entry | None = None
 
 
-class Floods:
+class FloodCounter:
     """Which entries of one robot are written, and which are counted."""
 
     def __init__(self) -> None:

@@ -166,7 +166,7 @@ class LatchFile:
                 self._allocate(state)
         except OSError as error:
             code = codes.LATCH_NOT_WRITABLE if self._allocated else codes.LATCH_NOT_ALLOCATED
-            self._failure = code(name=self.path.name, detail=reason_of(error))
+            self._failure = code(name=self.path.name, detail=disk_problem(error))
             return
         self._written, self._failure = state, None
         with self._lock:
@@ -205,14 +205,14 @@ class LatchFile:
                 if self._file is not None:
                     os.fdatasync(self._file)
             except OSError as error:
-                self._failure = codes.LATCH_NOT_WRITABLE(name=self.path.name, detail=reason_of(error))
+                self._failure = codes.LATCH_NOT_WRITABLE(name=self.path.name, detail=disk_problem(error))
             with self._lock:
                 if self._sequence == synced or self._failure:
                     self._syncing = False
                     return
 
 
-def reason_of(error: Exception) -> str:
+def disk_problem(error: Exception) -> str:
     """Return why a disk took nothing, and what to do."""
     if not isinstance(error, OSError):
         return repr(error)

@@ -23,20 +23,20 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from protocol_gateway.audit.entry import Entry, Outcome, chained
+from protocol_gateway.audit.entry import Entry, Outcome, chain_entry
 from protocol_gateway.audit.files import Verification, older_parts, part_name, read_entries, verify
-from protocol_gateway.audit.latch import LatchFile, reason_of
+from protocol_gateway.audit.latch import LatchFile, disk_problem
 from protocol_gateway.audit.persisted_state import (
     LATCH_UNKNOWN,
     ROTATE,
     UNKNOWN,
-    Memory,
-    carried,
-    follow,
-    merged,
-    with_stop,
+    PersistedState,
+    apply_entry,
+    merge,
+    to_values,
+    with_latched_stop,
 )
-from protocol_gateway.audit.recovery import Start, find_end
+from protocol_gateway.audit.recovery import Recovery, find_end
 from protocol_gateway.errors import AuditError
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
@@ -48,15 +48,15 @@ log = logging.getLogger(__name__)
 ROTATE_BYTES = 16 << 20
 # What has happened is noted after the wire, also while the disk is full: so much waits for it to be mended,
 # the second half for all but refusals.
-MOST_KEPT = 1000
+MOST_PENDING = 1000
 GATEWAY = "gateway"
 
 
 @dataclass(frozen=True)
 class _Waiting:
     entry: Entry
-    told: asyncio.Future[Entry] | None
-    kept: bool
+    written: asyncio.Future[Entry] | None
+    retried: bool
 
 
 class AuditLog:
@@ -89,28 +89,28 @@ class AuditLog:
         self._on_written = on_written
         self._rotate_bytes = self._rotate_at = rotate_bytes
         self._queue: list[_Waiting] = []
-        self._left_out = 0
+        self._dropped = 0
         self._writer: asyncio.Task[None] | None = None
         self._writing_since_s: float | None = None
         # A thread of its own: a disk that hangs must not hold the threads of everything else.
         self._disk = ThreadPoolExecutor(1, thread_name_prefix=f"audit-{path.stem}")
         self._torn = False
-        self._untold: list[Entry] = []
-        self._named = False  # whether the folder is on disk with the file's name in it
+        self._unpublished: list[Entry] = []
+        self._name_synced = False  # whether the folder is on disk with the file's name in it
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = _open_locked(path)
             _finish_rotation(path)
-            start = find_end(path)
-            self._end, self.mended = start.end, start.mended
-            if start.in_doubt:
+            recovery = find_end(path)
+            self._end, self.damage = recovery.end, recovery.problem
+            if recovery.stop_may_be_lost:
                 # Until it is written behind a new beginning, the damage stays as it is.
                 self._torn, self._rotate_at = True, 1
             else:
                 os.ftruncate(self._file, self._end.length)
             os.fsync(self._file)
-            self.latch = LatchFile(path.with_suffix(".latch"), first=start.end.number == 0)
-            self._remember_stops(start)
+            self.latch = LatchFile(path.with_suffix(".latch"), first=recovery.end.number == 0)
+            self._remember_stops(recovery)
         except OSError as error:
             raise AuditError(
                 f"audit log {path} cannot be written ({error.strerror}): without it no robot is moved"
@@ -122,9 +122,9 @@ class AuditLog:
         return self._end.number, self._end.hash
 
     @property
-    def memory(self) -> Memory:
+    def state(self) -> PersistedState:
         """What the log's entries say must be remembered across a restart."""
-        return self._end.memory
+        return self._end.state
 
     @property
     def stuck_s(self) -> float:
@@ -138,25 +138,25 @@ class AuditLog:
         Raises (when awaited):
             AuditError: If it could not be written; then it is not in the log.
         """
-        return self._put(entry, kept=False)
+        return self._put(entry, retried=False)
 
-    def note(self, entry: Entry) -> asyncio.Future[Entry]:
+    def append_later(self, entry: Entry) -> asyncio.Future[Entry]:
         """As `append`, for what has happened already: what cannot be written now is kept, and written later.
 
         Raises (when awaited):
             AuditError: If it could not be written yet.
         """
-        most = MOST_KEPT // 2 if entry.outcome is Outcome.REFUSED else MOST_KEPT
+        most = MOST_PENDING // 2 if entry.outcome is Outcome.REFUSED else MOST_PENDING
         if len(self._queue) < most:
-            return self._put(entry, kept=True)
-        self._left_out += 1 + entry.repeated
-        told: asyncio.Future[Entry] = asyncio.get_running_loop().create_future()
-        told.set_exception(AuditError(self.problem or codes.AUDIT_QUEUE_FULL(count=len(self._queue))))
-        return told
+            return self._put(entry, retried=True)
+        self._dropped += 1 + entry.repeated
+        written: asyncio.Future[Entry] = asyncio.get_running_loop().create_future()
+        written.set_exception(AuditError(self.problem or codes.AUDIT_QUEUE_FULL(count=len(self._queue))))
+        return written
 
-    def pay(self) -> None:
+    def retry(self) -> None:
         """Try again to write what was kept; to be called now and then."""
-        if self._queue or self._left_out:
+        if self._queue or self._dropped:
             self._start_writer()
 
     async def settle(self) -> None:
@@ -166,48 +166,48 @@ class AuditLog:
 
     async def close(self) -> None:
         """Write what waits, then close the files."""
-        self.pay()
+        self.retry()
         await self.settle()
         await asyncio.to_thread(self.latch.close)
         self._disk.shutdown()
         os.close(self._file)
 
-    def _remember_stops(self, start: Start) -> None:
+    def _remember_stops(self, recovery: Recovery) -> None:
         """Take what log and latch file leave behind; where a stop may be lost, latch one."""
-        memory, stop, unsent = merged(start.end.memory, self.latch.found)
-        self.mended = ", and ".join(filter(None, (start.mended, self.latch.damage)))
+        state, stop, unsent = merge(recovery.end.state, self.latch.found)
+        self.damage = ", and ".join(filter(None, (recovery.problem, self.latch.damage)))
         text = (
             f"the gateway was killed before it wrote the entry of stop {stop.id}" if stop is not None else ""
         )
         # A torn line may have held a stop: the one that the latch file knows. Damage may have held any.
-        if start.damaged or self.latch.damage or (start.in_doubt and stop is None):
-            reason = UNKNOWN if start.in_doubt else LATCH_UNKNOWN
+        if recovery.damaged or self.latch.damage or (recovery.stop_may_be_lost and stop is None):
+            reason = UNKNOWN if recovery.stop_may_be_lost else LATCH_UNKNOWN
             now_ns = time.time_ns()
-            number = memory.last_stop_id + 1
+            number = state.last_stop_id + 1
             if self.latch.found is None:
                 # Which numbers were given out is not known. The time in microseconds is above all of them.
                 number = max(number, now_ns // 1000)
-            memory, stop = with_stop(memory, number=number, by=GATEWAY, since_ns=now_ns, reason=reason)
-            text = self.mended
+            state, stop = with_latched_stop(state, number=number, by=GATEWAY, since_ns=now_ns, reason=reason)
+            text = self.damage
         if stop is not None:
             values = {"stop_id": str(stop.id), "reason": stop.reason}
             entry = replace(_own_entry("STOP", Outcome.ACCEPTED, text, values), operator=stop.by)
-            self._queue.append(_Waiting(entry, None, kept=True))
+            self._queue.append(_Waiting(entry, None, retried=True))
         elif unsent is not None:
             text = "the gateway was killed before it wrote whether this was sent: the stop stays latched"
             entry = _own_entry("RESET", Outcome.FAILED, text, {"stop_id": str(unsent.id)})
-            self._queue.append(_Waiting(entry, None, kept=True))
-        self._end = replace(self._end, memory=memory)
+            self._queue.append(_Waiting(entry, None, retried=True))
+        self._end = replace(self._end, state=state)
         known = self.latch.found
-        newest = max(start.end.memory.last_stop_id, 0 if known is None else known.last_stop_id)
-        newest = newest if memory.stop is None else memory.stop.id
-        self.latch.begin(memory.stop, newest, given_out=memory.last_stop_id)
+        newest = max(recovery.end.state.last_stop_id, 0 if known is None else known.last_stop_id)
+        newest = newest if state.stop is None else state.stop.id
+        self.latch.begin(state.stop, newest, given_out=state.last_stop_id)
 
-    def _put(self, entry: Entry, *, kept: bool) -> asyncio.Future[Entry]:
-        told: asyncio.Future[Entry] = asyncio.get_running_loop().create_future()
-        self._queue.append(_Waiting(entry, told, kept))
+    def _put(self, entry: Entry, *, retried: bool) -> asyncio.Future[Entry]:
+        written: asyncio.Future[Entry] = asyncio.get_running_loop().create_future()
+        self._queue.append(_Waiting(entry, written, retried))
         self._start_writer()
-        return told
+        return written
 
     def _start_writer(self) -> None:
         if self._writer is None or self._writer.done():
@@ -218,39 +218,41 @@ class AuditLog:
         loop = asyncio.get_running_loop()
         while True:
             batch, self._queue = self._queue, []
-            if self._left_out:
-                batch.append(_Waiting(_left_out(self._left_out), None, kept=True))
-            left_out, self._left_out = self._left_out, 0
+            if self._dropped:
+                batch.append(_Waiting(_dropped_entry(self._dropped), None, retried=True))
+            dropped, self._dropped = self._dropped, 0
             self._writing_since_s = time.monotonic()
             try:
                 # An fsync takes milliseconds, seconds on a busy disk: the joint stream must not wait for it.
                 placed = await loop.run_in_executor(self._disk, self._write, [each.entry for each in batch])
             except Exception as error:
-                self.problem = codes.AUDIT_NOT_WRITABLE(file=self.path.name, detail=reason_of(error))
-                self._left_out += left_out
+                self.problem = codes.AUDIT_NOT_WRITABLE(file=self.path.name, detail=disk_problem(error))
+                self._dropped += dropped
                 new = bool(self._queue)
-                self._queue[:0] = self._refuse(batch[:-1] if left_out else batch)
+                self._queue[:0] = self._fail(batch[:-1] if dropped else batch)
             else:
                 self.problem = None
                 new = bool(self._queue)
                 # Before them may stand the entry that begins a new file.
                 for each, entry in zip(batch, placed[-len(batch) :], strict=True):
-                    if each.told is not None and not each.told.done():
-                        each.told.set_result(entry)
-                self._tell(placed)
+                    if each.written is not None and not each.written.done():
+                        each.written.set_result(entry)
+                self._publish(placed)
             finally:
                 self._writing_since_s = None
             if not new:
                 return
 
-    def _refuse(self, batch: list[_Waiting]) -> list[_Waiting]:
+    def _fail(self, batch: list[_Waiting]) -> list[_Waiting]:
         """Tell who waits that it was not written; those that are kept."""
         for each in batch:
-            if each.told is not None and not each.told.done():
-                each.told.set_exception(AuditError(self.problem or codes.AUDIT_QUEUE_FULL(count=len(batch))))
-        return [replace(each, told=None) for each in batch if each.kept]
+            if each.written is not None and not each.written.done():
+                each.written.set_exception(
+                    AuditError(self.problem or codes.AUDIT_QUEUE_FULL(count=len(batch)))
+                )
+        return [replace(each, written=None) for each in batch if each.retried]
 
-    def _tell(self, entries: list[Entry]) -> None:
+    def _publish(self, entries: list[Entry]) -> None:
         for entry in entries:
             try:
                 self._on_written(entry)
@@ -267,28 +269,28 @@ class AuditLog:
         end = self._end
         placed, lines = [], []
         for entry in entries:
-            each, line = chained(entry, number=end.number + 1, previous=end.hash)
+            each, line = chain_entry(entry, number=end.number + 1, previous=end.hash)
             placed.append(each)
             lines.append(line)
-            end = replace(end, number=each.number, hash=each.hash, memory=follow(end.memory, each))
+            end = replace(end, number=each.number, hash=each.hash, state=apply_entry(end.state, each))
         self._torn = True
         written = _write_all(self._file, b"".join(lines), end.length)
         os.fsync(self._file)
-        if not self._named:
+        if not self._name_synced:
             _sync_folder(self.path.parent)
-            self._named = True
+            self._name_synced = True
         self._torn = False
         self._end = replace(end, length=end.length + written)
-        told, self._untold = [*self._untold, *placed], []
-        return told
+        to_publish, self._unpublished = [*self._unpublished, *placed], []
+        return to_publish
 
     def _rotate(self) -> None:
         """Go on in a new file; where that fails, in this one, until it has grown by as much again."""
         end, fresh = self._end, self.path.with_suffix(".new")
         part = part_name(self.path, end.first)
         text = f"the log goes on from {part.name}"
-        beginning = _own_entry(ROTATE, Outcome.ACCEPTED, text, carried(end.memory))
-        entry, line = chained(beginning, number=end.number + 1, previous=end.hash)
+        beginning = _own_entry(ROTATE, Outcome.ACCEPTED, text, to_values(end.state))
+        entry, line = chain_entry(beginning, number=end.number + 1, previous=end.hash)
         try:
             file = os.open(fresh, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o640)
             try:
@@ -310,13 +312,13 @@ class AuditLog:
             self._rotate_at = end.length + self._rotate_bytes
             return
         os.close(self._file)
-        self._file, self._named = file, False
+        self._file, self._name_synced = file, False
         self._rotate_at = self._rotate_bytes
         self._end = replace(end, first=entry.number, number=entry.number, hash=entry.hash, length=len(line))
-        self._untold.append(entry)
+        self._unpublished.append(entry)
 
 
-def _left_out(number: int) -> Entry:
+def _dropped_entry(number: int) -> Entry:
     text = f"{number} requests have no entry here: the disk took none, and no more could be kept"
     return _own_entry("LOST", Outcome.FAILED, text, {"requests": str(number)})
 

@@ -25,7 +25,7 @@ _REQUESTS = tuple(f'"request":"{name}"'.encode() for name in (*_MOTIONS, *_LEASE
 
 
 @dataclass(frozen=True, kw_only=True)
-class Memory:
+class PersistedState:
     """What a log leaves behind.
 
     Attributes:
@@ -44,57 +44,57 @@ class Memory:
         return Authority(stop=self.stop, last_stop_id=self.last_stop_id)
 
 
-NOTHING = Memory()
+EMPTY = PersistedState()
 
 
-def concerns(line: bytes) -> bool:
+def may_change_state(line: bytes) -> bool:
     """Whether a log's line may change what is remembered; quicker than to parse it."""
-    return concerns_stop(line) or any(request in line for request in _REQUESTS)
+    return may_change_stop(line) or any(request in line for request in _REQUESTS)
 
 
-def concerns_stop(line: bytes) -> bool:
+def may_change_stop(line: bytes) -> bool:
     """Whether a log's line, or a part of one, may change whether a stop is latched."""
     return any(request in line for request in _STOPS)
 
 
-def begins_file(line: bytes) -> bool:
+def starts_file(line: bytes) -> bool:
     """Whether a log's line is one with which a new file begins."""
     return _STOPS[-1] in line
 
 
-def follow(memory: Memory, entry: Entry) -> Memory:
+def apply_entry(state: PersistedState, entry: Entry) -> PersistedState:
     """What is remembered after one more entry."""
     number = _number(entry.values.get("stop_id", ""))
     # Stops that were counted in a flood are written after newer ones.
-    if entry.request == "STOP" and number > memory.last_stop_id:
+    if entry.request == "STOP" and number > state.last_stop_id:
         reason = entry.values.get("reason", "")
         latched = Stop(id=number, by=entry.operator, reason=reason, since_ns=entry.time_ns)
-        return replace(memory, stop=latched, last_stop_id=number, mover="")
+        return replace(state, stop=latched, last_stop_id=number, mover="")
     if entry.request in _MOTIONS and entry.outcome is Outcome.ACCEPTED:
-        return replace(memory, mover=entry.operator)
+        return replace(state, mover=entry.operator)
     if entry.request in _LEASE_ENDS and entry.outcome is Outcome.ACCEPTED:
-        return replace(memory, mover="")
+        return replace(state, mover="")
     if entry.request == "RESET" and entry.outcome is Outcome.ACCEPTED:
-        if memory.stop is not None and memory.stop.id == number:
-            return replace(memory, stop=None, cleared=memory.stop)
-        return replace(memory, cleared=None)
+        if state.stop is not None and state.stop.id == number:
+            return replace(state, stop=None, cleared=state.stop)
+        return replace(state, cleared=None)
     if entry.request == "RESET" and entry.outcome is Outcome.FAILED:
         # It was written down before it was sent, and then it was not sent.
-        return replace(memory, stop=memory.stop or memory.cleared, cleared=None)
+        return replace(state, stop=state.stop or state.cleared, cleared=None)
     if entry.request == ROTATE:
-        return _carried_by(entry.values)
-    return memory
+        return _from_values(entry.values)
+    return state
 
 
-def with_stop(
-    memory: Memory, *, number: int, by: str, since_ns: int, reason: str = UNKNOWN
-) -> tuple[Memory, Stop]:
+def with_latched_stop(
+    state: PersistedState, *, number: int, by: str, since_ns: int, reason: str = UNKNOWN
+) -> tuple[PersistedState, Stop]:
     """What a damaged log leaves behind, with the stop that is latched because one may be lost."""
     stop = Stop(id=number, by=by, reason=reason, since_ns=since_ns)
-    return replace(memory, stop=stop, last_stop_id=stop.id), stop
+    return replace(state, stop=stop, last_stop_id=stop.id), stop
 
 
-class Merged(NamedTuple):
+class MergedState(NamedTuple):
     """What log and latch file leave behind together.
 
     Attributes:
@@ -103,41 +103,41 @@ class Merged(NamedTuple):
             it wrote either. It stays latched.
     """
 
-    memory: Memory
+    state: PersistedState
     unwritten: Stop | None = None
     unsent: Stop | None = None
 
 
-def merged(memory: Memory, kept: LatchState | None) -> Merged:
+def merge(state: PersistedState, latch: LatchState | None) -> MergedState:
     """Combine what the log's entries say with what the latch file holds."""
-    if kept is None:
-        return Merged(memory)
-    last = max(memory.last_stop_id, kept.reserved)
-    if kept.last_stop_id > memory.last_stop_id:
-        memory = replace(memory, stop=kept.stop, cleared=None, last_stop_id=last, mover="")
-        return Merged(memory, unwritten=kept.stop)
-    if kept.last_stop_id == memory.last_stop_id and kept.stop is not None and memory.stop is None:
-        memory = replace(memory, stop=kept.stop, cleared=None, last_stop_id=last)
-        return Merged(memory, unsent=kept.stop)
-    return Merged(replace(memory, last_stop_id=last))
+    if latch is None:
+        return MergedState(state)
+    last = max(state.last_stop_id, latch.reserved)
+    if latch.last_stop_id > state.last_stop_id:
+        state = replace(state, stop=latch.stop, cleared=None, last_stop_id=last, mover="")
+        return MergedState(state, unwritten=latch.stop)
+    if latch.last_stop_id == state.last_stop_id and latch.stop is not None and state.stop is None:
+        state = replace(state, stop=latch.stop, cleared=None, last_stop_id=last)
+        return MergedState(state, unsent=latch.stop)
+    return MergedState(replace(state, last_stop_id=last))
 
 
-def remembered(entries: Iterable[Entry]) -> Authority:
+def authority_after(entries: Iterable[Entry]) -> Authority:
     """The authority that a log leaves behind; oldest entry first."""
-    memory = NOTHING
+    state = EMPTY
     for entry in entries:
-        memory = follow(memory, entry)
-    return memory.authority
+        state = apply_entry(state, entry)
+    return state.authority
 
 
-def carried(memory: Memory) -> dict[str, str]:
-    """A memory as an entry's values."""
-    rows = {"stop": _text(memory.stop), "cleared": _text(memory.cleared), "mover": memory.mover}
-    return {name: row for name, row in rows.items() if row} | {"last_stop_id": str(memory.last_stop_id)}
+def to_values(state: PersistedState) -> dict[str, str]:
+    """A state as an entry's values."""
+    rows = {"stop": _text(state.stop), "cleared": _text(state.cleared), "mover": state.mover}
+    return {name: row for name, row in rows.items() if row} | {"last_stop_id": str(state.last_stop_id)}
 
 
-def _carried_by(values: Mapping[str, str]) -> Memory:
-    return Memory(
+def _from_values(values: Mapping[str, str]) -> PersistedState:
+    return PersistedState(
         stop=_stop(values.get("stop", "")),
         cleared=_stop(values.get("cleared", "")),
         last_stop_id=_number(values.get("last_stop_id", "")),

@@ -14,15 +14,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
-from protocol_gateway.audit.entry import NOTHING_BEFORE, link_of, parse_line
+from protocol_gateway.audit.entry import NO_PREVIOUS, chain_link, parse_line
 from protocol_gateway.audit.files import first_number, lines_of, older_parts
 from protocol_gateway.audit.persisted_state import (
-    NOTHING,
-    Memory,
-    begins_file,
-    concerns,
-    concerns_stop,
-    follow,
+    EMPTY,
+    PersistedState,
+    apply_entry,
+    may_change_state,
+    may_change_stop,
+    starts_file,
 )
 from protocol_gateway.errors import AuditError
 
@@ -31,38 +31,38 @@ _REQUEST = re.compile(rb'"request":"[A-Z_]+"')
 
 
 @dataclass(frozen=True, kw_only=True)
-class End:
+class LogEnd:
     """Where a log's live file ends; `first`: number of its first entry, `length`: bytes."""
 
     first: int = 1
     number: int = 0
-    hash: str = NOTHING_BEFORE
+    hash: str = NO_PREVIOUS
     length: int = 0
-    memory: Memory = NOTHING
+    state: PersistedState = EMPTY
 
 
-class Start(NamedTuple):
+class Recovery(NamedTuple):
     """What a start finds.
 
     Attributes:
-        mended: What is wrong, in words.
-        in_doubt: A stop may be lost with it.
+        problem: What is wrong, in words.
+        stop_may_be_lost: A stop may be lost with it.
         damaged: More is wrong than a torn last line.
     """
 
-    end: End
-    mended: str
-    in_doubt: bool
+    end: LogEnd
+    problem: str
+    stop_may_be_lost: bool
     damaged: bool
 
 
 class _Scan(NamedTuple):
-    end: End
+    end: LogEnd
     torn: bytes
     damage: str
 
 
-def find_end(live: Path) -> Start:
+def find_end(live: Path) -> Recovery:
     """The end of the live file; where that is damaged, older parts tell the last number."""
     end, torn, damage = _scan(live)
     parts = older_parts(live)
@@ -71,49 +71,49 @@ def find_end(live: Path) -> Start:
     elif parts and first_number(parts[-1]) >= end.first:
         damage = damage or f"its live file does not go on from {parts[-1].name}"
     if parts and damage:
-        end = _behind(end, parts[-1])
-    mended = damage
+        end = _continued_after(end, parts[-1])
+    problem = damage
     if torn:
-        mended = f"a torn last line was cut off after entry {end.number}{damage and ', and '}{damage}"
-    unknown = bool(torn) and (_REQUEST.search(torn) is None or concerns_stop(torn))
-    return Start(end, mended, bool(damage) or unknown, bool(damage))
+        problem = f"a torn last line was cut off after entry {end.number}{damage and ', and '}{damage}"
+    unknown = bool(torn) and (_REQUEST.search(torn) is None or may_change_stop(torn))
+    return Recovery(end, problem, bool(damage) or unknown, bool(damage))
 
 
-def _behind(end: End, newest: Path) -> End:
+def _continued_after(end: LogEnd, newest: Path) -> LogEnd:
     """The end of a damaged live file, put behind the newest part: numbers never go back."""
     before, named = _scan(newest).end, first_number(newest)
-    last_stop_id = max(end.memory.last_stop_id, before.memory.last_stop_id)
+    last_stop_id = max(end.state.last_stop_id, before.state.last_stop_id)
     return replace(
         end,
         first=max(end.first, named + 1) if end.length else named,
         number=max(end.number, before.number, named),
         hash=end.hash if end.length else before.hash,
-        memory=replace(end.memory, last_stop_id=last_stop_id),
+        state=replace(end.state, last_stop_id=last_stop_id),
     )
 
 
 def _scan(path: Path) -> _Scan:
     """The end of a file, the torn line after it, and what else is wrong with it in words."""
-    first, number, last, length, memory = 1, 0, NOTHING_BEFORE, 0, NOTHING
+    first, number, last, length, state = 1, 0, NO_PREVIOUS, 0, EMPTY
     torn, damage = b"", ""
     with path.open("rb") as file:
         for line in lines_of(file):
             if not line.endswith(b"\n"):
                 torn = line
                 break
-            link = link_of(line)
-            if not length and link is not None and link.whole and begins_file(line):
+            link = chain_link(line)
+            if not length and link is not None and link.intact and starts_file(line):
                 first, number, last = link.number, link.number - 1, link.previous
             number += 1
             length = file.tell()
             if link is None:
                 damage = damage or f"entry {number} cannot be read"
                 continue
-            if (link.number, link.previous, link.whole) != (number, last, True):
+            if (link.number, link.previous, link.intact) != (number, last, True):
                 damage = damage or f"the chain is broken at entry {number}"
-                number = max(number, link.number) if link.whole else number
+                number = max(number, link.number) if link.intact else number
             last = link.hash
-            if concerns(line):
+            if may_change_state(line):
                 with contextlib.suppress(AuditError):
-                    memory = follow(memory, parse_line(line))
-    return _Scan(End(first=first, number=number, hash=last, length=length, memory=memory), torn, damage)
+                    state = apply_entry(state, parse_line(line))
+    return _Scan(LogEnd(first=first, number=number, hash=last, length=length, state=state), torn, damage)

@@ -19,7 +19,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
 
 MOST = 10_000
-MOST_UNLESS_ASKED = 1000
+DEFAULT_MOST = 1000
 # Who asks more than so many questions at once is not listened to: each may read the whole log.
 _MOST_SEARCHES = 8
 
@@ -43,7 +43,7 @@ class Query:
     outcome: Outcome | None = None
     since_ns: int | None = None
     until_ns: int | None = None
-    most: int = MOST_UNLESS_ASKED
+    most: int = DEFAULT_MOST
 
 
 def matches(entry: Entry, query: Query) -> bool:
@@ -57,11 +57,11 @@ def matches(entry: Entry, query: Query) -> bool:
     )
 
 
-def find(live: Path, query: Query, *, gently: bool = False) -> list[Entry]:
+def find(live: Path, query: Query, *, in_background: bool = False) -> list[Entry]:
     """The newest entries of a log, with its older parts, that match; oldest first.
 
     Args:
-        gently: In a thread beside robots, which must not wait for it.
+        in_background: In a thread beside robots, which must not wait for it.
 
     Raises:
         OSError: If the log cannot be read.
@@ -73,7 +73,7 @@ def find(live: Path, query: Query, *, gently: bool = False) -> list[Entry]:
         for number, line in enumerate(lines_of(file)):
             if may_match(line):
                 here.append(line)
-            if gently and number % _LINES_AT_ONCE == 0:
+            if in_background and number % _LINES_AT_ONCE == 0:
                 time.sleep(_PAUSE_S)
         found.extendleft(reversed(here))
         if len(found) >= query.most:
@@ -102,22 +102,22 @@ def _filter(query: Query) -> Callable[[bytes], bool]:
     def may_match(line: bytes) -> bool:
         if not all(needle in line for needle in needles):
             return False
-        told = _TIME.search(line)
-        if told is None:
+        found_time = _TIME.search(line)
+        if found_time is None:
             return False
-        time_ns = int(told[1])
+        time_ns = int(found_time[1])
         return (since_ns is None or time_ns >= since_ns) and (until_ns is None or time_ns <= until_ns)
 
     return may_match
 
 
-class Searches:
+class SearchServer:
     """Answers `audit/find` from a robot's log: one search after the other, none on the event loop."""
 
     def __init__(self, live: Path) -> None:
         self._live = live
-        self._one_at_a_time = asyncio.Lock()
-        self._asked = 0
+        self._lock = asyncio.Lock()
+        self._pending = 0
 
     async def answer(self, request: Request) -> schema.AuditList:
         """The entries that match.
@@ -127,20 +127,20 @@ class Searches:
         """
         assert isinstance(request.message, schema.AuditQuery)
         query = query_of(request.message)
-        if self._asked >= _MOST_SEARCHES:
+        if self._pending >= _MOST_SEARCHES:
             raise RefusedError(codes.AUDIT_SEARCHES(count=_MOST_SEARCHES))
-        self._asked += 1
+        self._pending += 1
         try:
-            async with self._one_at_a_time:
+            async with self._lock:
                 return await asyncio.to_thread(self._list, query)
         except OSError as error:
             raise RefusedError(codes.AUDIT_UNREADABLE(file=self._live.name, detail=error.strerror)) from None
         finally:
-            self._asked -= 1
+            self._pending -= 1
 
     def _list(self, query: Query) -> schema.AuditList:
         return schema.AuditList(
-            entries=[audit_entry(entry) for entry in find(self._live, query, gently=True)]
+            entries=[audit_entry(entry) for entry in find(self._live, query, in_background=True)]
         )
 
 
@@ -159,5 +159,5 @@ def query_of(message: schema.AuditQuery) -> Query:
         outcome=Outcome(outcomes.Name(message.outcome)) if message.HasField("outcome") else None,
         since_ns=message.since.ToNanoseconds() if message.HasField("since") else None,
         until_ns=message.until.ToNanoseconds() if message.HasField("until") else None,
-        most=message.most or MOST_UNLESS_ASKED,
+        most=message.most or DEFAULT_MOST,
     )

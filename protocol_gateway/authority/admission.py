@@ -40,7 +40,7 @@ class Verdict(NamedTuple):
 
     answer: Answer
     repeat: bool = False
-    counted: bool = False  # its id is the holder's, so the answer is kept for a repeat
+    id_used: bool = False  # its id is the holder's, so the answer is kept for a repeat
 
 
 def admit(authority: Authority, request: CommandRequest, *, operator: str, now: Now) -> Verdict:
@@ -58,8 +58,8 @@ def admit(authority: Authority, request: CommandRequest, *, operator: str, now: 
         return Verdict(not_sent(used))
     if request.id <= lease.last_id:
         return Verdict(not_sent(codes.COMMAND_ID_OLD(id=request.id, last=lease.last_id)))
-    refusal = lateness(request, now) or stop_refusal(authority, request)
-    return Verdict(refusal or Answer(True, ""), counted=True)
+    refusal = deadline_refusal(request, now) or stop_refusal(authority, request)
+    return Verdict(refusal or Answer(True, ""), id_used=True)
 
 
 def content_of(request: CommandRequest) -> Content:
@@ -74,7 +74,7 @@ def content_of(request: CommandRequest) -> Content:
     )
 
 
-def lateness(request: CommandRequest, now: Now) -> Answer | None:
+def deadline_refusal(request: CommandRequest, now: Now) -> Answer | None:
     """Why a command comes too late; None: it does not."""
     if not request.HasField("not_after"):
         return None
@@ -84,7 +84,7 @@ def lateness(request: CommandRequest, now: Now) -> Answer | None:
     return not_sent(codes.COMMAND_LATE(seconds=late_s))
 
 
-def delay(arrived_s: float, now: Now) -> Answer | None:
+def wait_refusal(arrived_s: float, now: Now) -> Answer | None:
     """Why a command has waited for too long in the gateway; None: it has not.
 
     Args:
@@ -115,7 +115,7 @@ def _stopped(authority: Authority, request: CommandRequest) -> Reason | None:
     return None
 
 
-def remember(authority: Authority, request: CommandRequest, answer: Answer) -> Authority:
+def keep_answer(authority: Authority, request: CommandRequest, answer: Answer) -> Authority:
     """Keep a command's answer for its repeat; the id is used up from now on."""
     lease = authority.lease
     if lease is None or not hmac.compare_digest(lease.secret.encode(), request.lease.encode()):
@@ -128,8 +128,8 @@ def remember(authority: Authority, request: CommandRequest, answer: Answer) -> A
     )
 
 
-def used_up(authority: Authority, request: CommandRequest) -> Authority:
+def after_command(authority: Authority, request: CommandRequest) -> Authority:
     """The authority that a command leaves to the one behind it in the same unit: its id is used up."""
     if request.command == _RESET and authority.stop is not None and authority.stop.id == request.stop_id:
         authority = replace(authority, stop=None)
-    return remember(authority, request, Answer(True, ""))
+    return keep_answer(authority, request, Answer(True, ""))

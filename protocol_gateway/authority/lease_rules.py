@@ -68,8 +68,8 @@ class Motion:
         last_s: When it was last commanded, or seen to move (monotonic).
         seen: It was seen to move.
         held: HOLD was sent; it goes on with RESUME.
-        way: Everywhere that it goes, in order, its target last [rad] or [m]; empty: not known.
-        alone: No other unit was sent shortly before it, or since: a refusal is an answer to it.
+        waypoints: Everywhere that it goes, in order, its target last [rad] or [m]; empty: not known.
+        isolated: No other unit was sent shortly before it, or since: a refusal is an answer to it.
         conclusive: Rest at its target proves that it has ended: the robot does not rest there before.
         rests: Consecutive controller units that reported rest at its target, after it was seen to move.
     """
@@ -77,15 +77,15 @@ class Motion:
     last_s: float
     seen: bool = False
     held: bool = False
-    way: tuple[tuple[float, ...], ...] = ()
-    alone: bool = True
+    waypoints: tuple[tuple[float, ...], ...] = ()
+    isolated: bool = True
     conclusive: bool = False
     rests: int = 0
 
     @property
     def target(self) -> tuple[float, ...] | None:
         """Where it ends [rad] or [m]; None: not known."""
-        return self.way[-1] if self.way else None
+        return self.waypoints[-1] if self.waypoints else None
 
     @property
     def ended(self) -> bool:
@@ -260,7 +260,7 @@ def request_lease(
             )
         case action.ACQUIRE | action.RENEW if mine and lease is not None:
             renewed = replace(
-                _timed(lease, request.ttl_s, now),
+                _with_expiry(lease, request.ttl_s, now),
                 renewals=lease.renewals + 1,
                 session=request.session or lease.session,
             )
@@ -295,7 +295,7 @@ def request_lease(
             return granted._replace(ended=ended)
         case action.ASK if lease is not None and lease.holder != operator:
             return LeaseOutcome(
-                _asked(authority, operator, reason, now),
+                _add_asker(authority, operator, reason, now),
                 done(codes.LEASE_ASKED(holder=lease.holder, name=operator)),
             )
         case action.ASK:
@@ -323,7 +323,7 @@ def holds(authority: Authority, operator: str, secret: str) -> bool:
 def expire(authority: Authority, now: Now) -> tuple[Authority, LeaseEnd | None]:
     """End the lease when its time is over, and forget who asked for it too long ago."""
     if authority.asked_by and now.monotonic_s >= authority.asked_by[0].until_s:
-        authority = replace(authority, asked_by=_still_asking(authority, now))
+        authority = replace(authority, asked_by=_current_askers(authority, now))
     lease = authority.lease
     if lease is None or now.monotonic_s < lease.until_s:
         return authority, None
@@ -371,26 +371,26 @@ def _grant(
         session=request.session,
         tolerates_motion=moved_recently(authority, now),
     )
-    lease = _timed(lease, request.ttl_s, now)
+    lease = _with_expiry(lease, request.ttl_s, now)
     # Who waited for it and got it waits no more; the others still do.
-    asked_by = tuple(each for each in _still_asking(authority, now) if each.operator != operator)
+    asked_by = tuple(each for each in _current_askers(authority, now) if each.operator != operator)
     return LeaseOutcome(replace(authority, lease=lease, asked_by=asked_by), done(said), lease)
 
 
-def _asked(authority: Authority, operator: str, reason: str, now: Now) -> Authority:
+def _add_asker(authority: Authority, operator: str, reason: str, now: Now) -> Authority:
     """Somebody asks for control, for the first time or again."""
-    others = [each for each in _still_asking(authority, now) if each.operator != operator]
+    others = [each for each in _current_askers(authority, now) if each.operator != operator]
     asker = Asker(
         operator=operator, reason=reason, since_ns=now.wall_ns, until_s=now.monotonic_s + ASKED_FOR_S
     )
     return replace(authority, asked_by=(*others, asker)[-MOST_ASKERS:])
 
 
-def _still_asking(authority: Authority, now: Now) -> tuple[Asker, ...]:
+def _current_askers(authority: Authority, now: Now) -> tuple[Asker, ...]:
     return tuple(each for each in authority.asked_by if now.monotonic_s < each.until_s)
 
 
-def _timed(lease: Lease, ttl_s: float, now: Now) -> Lease:
+def _with_expiry(lease: Lease, ttl_s: float, now: Now) -> Lease:
     kept = min(max(ttl_s or DEFAULT_TTL_S, SHORTEST_TTL_S), LONGEST_TTL_S)
     return replace(
         lease,

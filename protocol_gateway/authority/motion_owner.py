@@ -26,7 +26,7 @@ ANSWERED_WITHIN_S = 2.0
 # A controller that goes from one motion to the next is idle for a moment in between.
 SETTLE_S = 0.5
 # Of motions told before the first of them was over.
-LONGEST_WAY = 64
+MOST_WAYPOINTS = 64
 # Places nearer to each other [rad] or [m] are not told apart: well above what counts as arrived.
 _APART = 0.01
 
@@ -38,16 +38,16 @@ def command_sent(
     request: CommandRequest,
     now: Now,
     *,
-    way: tuple[tuple[float, ...], ...] = (),
+    waypoints: tuple[tuple[float, ...], ...] = (),
     arrived: bool = False,
-    alone: bool = True,
+    isolated: bool = True,
 ) -> Authority:
     """The command's unit is on the controller's socket.
 
     Args:
-        way: Where a motion command goes [rad] or [m]; empty: not known.
+        waypoints: Where a motion command goes [rad] or [m]; empty: not known.
         arrived: The robot is where the motion before it went.
-        alone: No other unit was sent within `ANSWERED_WITHIN_S` before it.
+        isolated: No other unit was sent within `ANSWERED_WITHIN_S` before it.
     """
     lease = authority.lease
     if request.command == _C.RESET and authority.stop is not None and authority.stop.id == request.stop_id:
@@ -56,22 +56,24 @@ def command_sent(
         return authority
     motion = lease.motion
     if request.command in MOTION_COMMANDS:
-        conclusive = _is_conclusive(authority, request, way)
+        conclusive = _is_conclusive(authority, request, waypoints)
         if motion is not None and request.command == _C.RESUME:
-            way = motion.way
+            waypoints = motion.waypoints
         elif motion is not None and not arrived:
             # A controller may do one after the other: what was told before it is still its way.
-            way = _behind(motion.way, way)
+            waypoints = _appended(motion.waypoints, waypoints)
         # From its first motion on, whatever else moves the robot is a surprise.
         lease = replace(lease, commanded=True, tolerates_motion=False)
-        motion = Motion(last_s=now.monotonic_s, way=way, alone=alone, conclusive=conclusive)
+        motion = Motion(last_s=now.monotonic_s, waypoints=waypoints, isolated=isolated, conclusive=conclusive)
     elif motion is not None:
         held = motion.held or request.command == _C.HOLD
-        motion = replace(motion, held=held, alone=False, rests=0 if held else motion.rests)
+        motion = replace(motion, held=held, isolated=False, rests=0 if held else motion.rests)
     return replace(authority, lease=replace(lease, motion=motion))
 
 
-def _is_conclusive(authority: Authority, request: CommandRequest, way: tuple[tuple[float, ...], ...]) -> bool:
+def _is_conclusive(
+    authority: Authority, request: CommandRequest, waypoints: tuple[tuple[float, ...], ...]
+) -> bool:
     """Whether the robot cannot rest at a new motion's target before the motion has brought it there."""
     motion = None if authority.lease is None else authority.lease.motion
     if motion is None:
@@ -79,18 +81,18 @@ def _is_conclusive(authority: Authority, request: CommandRequest, way: tuple[tup
     if request.command == _C.RESUME:
         return motion.conclusive
     # It may rest at any place of the motions that were commanded before.
-    return bool(motion.way and way) and all(
-        any(abs(there - here) > _APART for there, here in zip(place, way[-1], strict=True))
-        for place in motion.way
+    return bool(motion.waypoints and waypoints) and all(
+        any(abs(there - here) > _APART for there, here in zip(place, waypoints[-1], strict=True))
+        for place in motion.waypoints
     )
 
 
-def _behind(
-    before: tuple[tuple[float, ...], ...], way: tuple[tuple[float, ...], ...]
+def _appended(
+    before: tuple[tuple[float, ...], ...], waypoints: tuple[tuple[float, ...], ...]
 ) -> tuple[tuple[float, ...], ...]:
     """One way behind another; not known if it gets too long to be followed."""
-    both = (*before, *(place for place in way if place not in before[-1:]))
-    return both if len(both) <= LONGEST_WAY else ()
+    both = (*before, *(place for place in waypoints if place not in before[-1:]))
+    return both if len(both) <= MOST_WAYPOINTS else ()
 
 
 def refused(authority: Authority) -> Authority:
@@ -98,7 +100,7 @@ def refused(authority: Authority) -> Authority:
     lease = authority.lease
     if lease is None or lease.motion is None or authority.moving:
         return authority
-    if lease.motion.seen or not lease.motion.alone:
+    if lease.motion.seen or not lease.motion.isolated:
         return authority
     return replace(authority, lease=replace(lease, motion=None))
 

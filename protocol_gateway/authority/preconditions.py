@@ -46,7 +46,7 @@ class Controller:
 
     Attributes:
         positions: Where its joints are [rad] or [m]; None: not told, or not any more.
-        positions_gone: That they are not received any more; None: they are, or never were.
+        positions_stale: That they are not received any more; None: they are, or never were.
         read_only: Why nothing is ever sent to it; None: commands may be sent to it.
         accept_unknown: What it never tells and the site file says to do without: "mode", "homed".
     """
@@ -55,7 +55,7 @@ class Controller:
     status: StatusReceived
     fault: str = ""
     positions: tuple[float, ...] | None = None
-    positions_gone: Reason | None = None
+    positions_stale: Reason | None = None
     read_only: Reason | None = None
     accept_unknown: frozenset[str] = frozenset()
 
@@ -102,8 +102,8 @@ def _state_obstacle(request: CommandRequest, controller: Controller) -> Reason |
         return codes.CONTROLLER_FAULT(fault=controller.fault or "it does not say which")
     if status.activity is Activity.HOLDING and request.command != _C.RESUME:
         return codes.CONTROLLER_HOLDING()
-    if controller.positions_gone is not None:
-        return codes.POSITIONS_UNKNOWN(controller.positions_gone)
+    if controller.positions_stale is not None:
+        return codes.POSITIONS_UNKNOWN(controller.positions_stale)
     # Many an arm cannot tell where it is before it is homed; one that could and cannot any more is not moved.
     if controller.positions is None and request.command != _C.HOME:
         return codes.POSITIONS_NONE()
@@ -150,7 +150,7 @@ def target_of(request: CommandRequest, controller: Controller, joints: Joints) -
     return None
 
 
-def after(request: CommandRequest, controller: Controller, joints: Joints) -> Controller:
+def predicted(request: CommandRequest, controller: Controller, joints: Joints) -> Controller:
     """The controller as a command will leave it: so it is for the next one of the same unit."""
     status = controller.status
     match request.command:

@@ -9,7 +9,7 @@ from robomesh.reasons import Reason
 
 
 @dataclass(frozen=True)
-class Whereabouts:
+class Occupancy:
     """What a robot may take up from now on.
 
     Attributes:
@@ -21,27 +21,27 @@ class Whereabouts:
     unknown: Reason | None = None
 
 
-class CellMates:
+class CellOccupancy:
     """Robots that can meet.
 
     Attributes:
-        turn: Held from a motion's check until it is on its controller's socket: one motion at a time is
-            admitted, so what was checked against the others is still so when it begins.
+        motion_lock: Held from a motion's check until its unit is on the controller's socket. One motion at a
+            time is admitted, so the other robots are still where the check assumed them when it begins.
     """
 
     def __init__(self) -> None:
-        self.turn = asyncio.Lock()
-        self._robots: dict[str, Callable[[], Whereabouts]] = {}
+        self.motion_lock = asyncio.Lock()
+        self._robots: dict[str, Callable[[], Occupancy]] = {}
 
-    def join(self, name: str, whereabouts: Callable[[], Whereabouts]) -> None:
+    def add(self, name: str, occupancy: Callable[[], Occupancy]) -> None:
         """Another robot of the cell."""
-        self._robots[name] = whereabouts
+        self._robots[name] = occupancy
 
-    def others(self, name: str, cell: tuple[str, ...]) -> dict[str, Whereabouts]:
-        """Where the cell's robots but one are; what no robot of this gateway is, nobody here knows."""
-        nobody = Whereabouts(unknown=codes.OTHER_NOT_SERVED())
+    def others(self, name: str, cell: tuple[str, ...]) -> dict[str, Occupancy]:
+        """Where the cell's robots but one are; what no robot of this gateway is, unserved here knows."""
+        unserved = Occupancy(unknown=codes.OTHER_NOT_SERVED())
         return {
-            other: self._robots[other]() if other in self._robots else nobody
+            other: self._robots[other]() if other in self._robots else unserved
             for other in cell
             if other != name
         }

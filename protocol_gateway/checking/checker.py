@@ -17,13 +17,13 @@ from robots.errors import RobotError
 log = logging.getLogger(__name__)
 
 # A command that waits for over a second is not sent any more.
-MOTION_WITHIN_S = 0.8
-PROGRAM_WITHIN_S = 25.0
+MOTION_TIMEOUT_S = 0.8
+PROGRAM_TIMEOUT_S = 25.0
 # Past this, the process is ended: it hangs.
-_HANGS_S = 10.0
-_PREPARED_WITHIN_S = 60.0
-_AGAIN_S = 5.0
-_PENDING_S = 1.0
+_HANG_TIMEOUT_S = 10.0
+_PREPARE_TIMEOUT_S = 60.0
+_RESTART_S = 5.0
+_PENDING_POLL_S = 1.0
 # For cells of several robots: beyond that, some share one.
 MOST_PROCESSES = 8
 _STARTING = codes.CHECK_STARTING()
@@ -36,18 +36,18 @@ class Checker:
 
     Args:
         cells: What stands around each robot, by the robot's name.
-        at_once: Begin with the gateway, so that the first motion need not wait; otherwise with the first
+        start_now: Begin with the gateway, so that the first motion need not wait; otherwise with the first
             program.
     """
 
-    def __init__(self, cells: Mapping[str, CellDescription], *, at_once: bool) -> None:
+    def __init__(self, cells: Mapping[str, CellDescription], *, start_now: bool) -> None:
         self._robots = tuple(cells)
-        self._wanted = asyncio.Event()
-        if at_once:
-            self._wanted.set()
+        self._start_requested = asyncio.Event()
+        if start_now:
+            self._start_requested.set()
         self._worker = Worker("protocol_gateway.checking.worker", dict(cells))
         self._problems: dict[str, Reason | None] = dict.fromkeys(cells, _STARTING)
-        self._turn = asyncio.Lock()
+        self._lock = asyncio.Lock()
         self._failed = ""
         self._process: int | None = None
         self._pending: tuple[str, ...] = ()
@@ -67,29 +67,29 @@ class Checker:
 
     async def run(self) -> None:
         """Keep the process running and every robot's cell ready, until cancelled."""
-        await self._wanted.wait()
+        await self._start_requested.wait()
         try:
             while True:
                 if self._worker.pid is None or self._worker.pid != self._process:
                     if not self._failed:
                         self._problems = dict.fromkeys(self._robots, _STARTING)
-                    self._process = await self._started()
+                    self._process = await self._start_worker()
                 elif self._pending:
                     with contextlib.suppress(WorkerError):
                         await self._prepare()
-                waits_s = 0.1 if not self._pending else _PENDING_S
-                await asyncio.sleep(waits_s if self._process is not None else _AGAIN_S)
+                waits_s = 0.1 if not self._pending else _PENDING_POLL_S
+                await asyncio.sleep(waits_s if self._process is not None else _RESTART_S)
         finally:
             await self._worker.close()
 
-    async def _started(self) -> int | None:
+    async def _start_worker(self) -> int | None:
         try:
             await self._worker.start()
             process = self._worker.pid
             self._pending = self._robots
             await self._prepare()
         except Exception as error:
-            why = _in_words(error)
+            why = _error_text(error)
             if why != self._failed:
                 log.error("motions cannot be checked: %s", why)
             self._failed = why
@@ -101,18 +101,18 @@ class Checker:
     async def _prepare(self) -> None:
         """Prepare the robots that are not ready; one whose links are being studied is asked for again."""
         for robot in self._pending:
-            text = await self._prepared(robot)
+            text = await self._prepare_robot(robot)
             if text != PENDING:
                 self._pending = tuple(each for each in self._pending if each != robot)
                 self._problems[robot] = codes.CHECK_IMPOSSIBLE(detail=text) if text else None
 
-    async def _prepared(self, robot: str) -> str:
+    async def _prepare_robot(self, robot: str) -> str:
         try:
-            text: str = await self._worker.ask(Prepare(robot), timeout_s=_PREPARED_WITHIN_S)
+            text: str = await self._worker.ask(Prepare(robot), timeout_s=_PREPARE_TIMEOUT_S)
         except WorkerError:
             raise
         except Exception as error:
-            text = _in_words(error)
+            text = _error_text(error)
         if text and text != PENDING:
             log.warning("%s: its motions cannot be checked: %s", robot, text)
         return text
@@ -123,7 +123,7 @@ class Checker:
         Raises:
             CheckError: If it cannot be checked, or not in time; the text says why.
         """
-        return await self._ask(question, within_s=MOTION_WITHIN_S)
+        return await self._ask(question, timeout_s=MOTION_TIMEOUT_S)
 
     async def program(self, question: CheckProgram) -> Checked:
         """What a check of a program finds.
@@ -131,60 +131,60 @@ class Checker:
         Raises:
             CheckError: If it cannot be checked, or not in time; the text says why.
         """
-        self._wanted.set()
+        self._start_requested.set()
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(PROGRAM_WITHIN_S):
+            async with asyncio.timeout(PROGRAM_TIMEOUT_S):
                 while self._problems[question.robot] == _STARTING:
                     await asyncio.sleep(0.05)
-        return await self._ask(question, within_s=PROGRAM_WITHIN_S)
+        return await self._ask(question, timeout_s=PROGRAM_TIMEOUT_S)
 
-    async def _ask(self, question: CheckMotion | CheckProgram, *, within_s: float) -> Checked:
+    async def _ask(self, question: CheckMotion | CheckProgram, *, timeout_s: float) -> Checked:
         if (problem := self._problems[question.robot]) is not None:
             raise CheckError(problem)
-        began_s = time.monotonic()
+        start_s = time.monotonic()
         try:
             # What nobody waits for any more is not begun.
-            async with asyncio.timeout(within_s):
-                await self._turn.acquire()
+            async with asyncio.timeout(timeout_s):
+                await self._lock.acquire()
         except TimeoutError:
-            raise CheckError(codes.CHECK_QUEUED_TOO_LONG(seconds=within_s)) from None
-        asked = asyncio.ensure_future(self._answer(question, max(_HANGS_S, within_s)))
-        asked.add_done_callback(self._done)
+            raise CheckError(codes.CHECK_QUEUED_TOO_LONG(seconds=timeout_s)) from None
+        asked = asyncio.ensure_future(self._answer(question, max(_HANG_TIMEOUT_S, timeout_s)))
+        asked.add_done_callback(self._on_done)
         # What is merely late goes on: ending the process would make the next one late, too.
-        done, _ = await asyncio.wait([asked], timeout=max(within_s - (time.monotonic() - began_s), 0.0))
+        done, _ = await asyncio.wait([asked], timeout=max(timeout_s - (time.monotonic() - start_s), 0.0))
         if not done:
-            asked.add_done_callback(_told)
-            raise CheckError(codes.CHECK_TOO_SLOW(seconds=within_s))
+            asked.add_done_callback(_log_late_failure)
+            raise CheckError(codes.CHECK_TOO_SLOW(seconds=timeout_s))
         return asked.result()
 
-    async def _answer(self, question: CheckMotion | CheckProgram, hangs_s: float) -> Checked:
+    async def _answer(self, question: CheckMotion | CheckProgram, hang_timeout_s: float) -> Checked:
         try:
-            found: Checked = await self._worker.ask(question, timeout_s=hangs_s)
+            found: Checked = await self._worker.ask(question, timeout_s=hang_timeout_s)
         except Exception as error:
-            raise CheckError(codes.CHECK_FAILED(detail=_in_words(error))) from error
+            raise CheckError(codes.CHECK_FAILED(detail=_error_text(error))) from error
         return found
 
-    def _done(self, asked: asyncio.Future[Checked]) -> None:
-        self._turn.release()
+    def _on_done(self, asked: asyncio.Future[Checked]) -> None:
+        self._lock.release()
         if not asked.cancelled():
             asked.exception()  # whoever asked may be gone
 
 
-def _in_words(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     """What went wrong; by its name, too, where nobody foresaw it."""
     if isinstance(error, (WorkerError, RobotError)):
         return str(error)
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
 
 
-def _told(asked: asyncio.Future[Checked]) -> None:
+def _log_late_failure(asked: asyncio.Future[Checked]) -> None:
     """Nobody waits for it any more; what went wrong is said all the same."""
     if not asked.cancelled() and (error := asked.exception()) is not None:
         log.warning("a check that came too late failed: %s", error)
 
 
-def checkers_of(
-    surroundings: Mapping[str, CellDescription], *, at_once: Collection[str] = ()
+def make_checkers(
+    surroundings: Mapping[str, CellDescription], *, start_now: Collection[str] = ()
 ) -> dict[str, Checker]:
     """A checker for each robot: robots of one cell share one, and few processes share all cells.
 
@@ -192,7 +192,7 @@ def checkers_of(
 
     Args:
         surroundings: What stands around each robot, by the robot's name.
-        at_once: Robots whose checkers begin with the gateway.
+        start_now: Robots whose checkers begin with the gateway.
     """
     cells: dict[frozenset[str], dict[str, CellDescription]] = {}
     for name, cell in surroundings.items():
@@ -210,6 +210,6 @@ def checkers_of(
         name: checker
         for share in shares
         if share
-        for checker in [Checker(share, at_once=any(name in at_once for name in share))]
+        for checker in [Checker(share, start_now=any(name in start_now for name in share))]
         for name in share
     }

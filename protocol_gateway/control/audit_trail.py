@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from hashlib import sha256
 
-from protocol_gateway.audit.flood_counter import STOP, Floods
+from protocol_gateway.audit.flood_counter import STOP, FloodCounter
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome
 from protocol_gateway.authority.admission import LONGEST_WAIT_S
 from protocol_gateway.authority.lease_rules import Answer
@@ -18,16 +18,16 @@ from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest, Event, LeaseRequest
 
 
-class Ledger:
+class AuditTrail:
     """Entries of one robot. What cannot be written is said in an event, and stops nothing but motion."""
 
     def __init__(self, audit: AuditLog, journal: Journal) -> None:
         self._audit = audit
         self._journal = journal
-        self._floods = Floods()
+        self._floods = FloodCounter()
         self._failing = False
 
-    async def before(self, *entries: Entry) -> None:
+    async def write_before(self, *entries: Entry) -> None:
         """Write down what is about to be done, all or nothing; it is on disk when this returns.
 
         Raises:
@@ -38,36 +38,36 @@ class Ledger:
             self._write_counts(STOP)
         late = AuditError(codes.AUDIT_SLOW(seconds=LONGEST_WAIT_S))
         if self._audit.stuck_s > LONGEST_WAIT_S:
-            self._not_done(entries, late, Outcome.REFUSED)
+            self._record_not_done(entries, late, Outcome.REFUSED)
             raise late
         try:
             async with asyncio.timeout(LONGEST_WAIT_S):
                 await asyncio.gather(*map(self._audit.append, entries))
         except AuditError as error:
-            self._not_done(entries, error, Outcome.REFUSED)
+            self._record_not_done(entries, error, Outcome.REFUSED)
             raise
         except TimeoutError:
             # The entry will be on disk yet, so what became of it has to stand behind it.
-            self._not_done(entries, late, Outcome.FAILED)
+            self._record_not_done(entries, late, Outcome.FAILED)
             raise late from None
 
-    def after_later(self, entry: Entry) -> None:
+    def write_later(self, entry: Entry) -> None:
         """Write down what has happened, without waiting for the disk; a flood of it is counted."""
         if self._floods.admits(entry, time.monotonic()):
-            self._note(entry)
+            self._append_later(entry)
 
-    def look(self) -> None:
+    def write_pending(self) -> None:
         """Write what was counted, and what the disk refused before; to be called each second."""
         self._write_counts()
-        self._audit.pay()
+        self._audit.retry()
         latch = self._audit.latch
         latch.retry()
         if latch.problem is not None:
             if not self._failing:
-                self._say_failed(AuditError(latch.problem))
+                self._report_failure(AuditError(latch.problem))
         elif self._failing and not self._audit.problem and self._audit.stuck_s < LONGEST_WAIT_S:
             self._failing = False
-            self._journal.say(Event.Severity.INFO, "audit.mended", "the audit log is written again")
+            self._journal.report(Event.Severity.INFO, "audit.mended", "the audit log is written again")
 
     async def settle(self) -> None:
         """Wait until all that was begun is written, or could not be."""
@@ -76,26 +76,26 @@ class Ledger:
 
     def _write_counts(self, request: str = "") -> None:
         for entry in self._floods.counts(time.monotonic(), request=request):
-            self._note(entry)
+            self._append_later(entry)
 
-    def _note(self, entry: Entry) -> None:
-        self._audit.note(entry).add_done_callback(self._noted)
+    def _append_later(self, entry: Entry) -> None:
+        self._audit.append_later(entry).add_done_callback(self._on_written)
 
-    def _noted(self, told: asyncio.Future[Entry]) -> None:
-        error = None if told.cancelled() else told.exception()
+    def _on_written(self, written: asyncio.Future[Entry]) -> None:
+        error = None if written.cancelled() else written.exception()
         if error is not None:
-            self._say_failed(error)
+            self._report_failure(error)
 
-    def _not_done(self, entries: Sequence[Entry], error: AuditError, outcome: Outcome) -> None:
+    def _record_not_done(self, entries: Sequence[Entry], error: AuditError, outcome: Outcome) -> None:
         for entry in entries:
             reason = codes.NOT_DONE(error.reason)
-            self.after_later(replace(entry, outcome=outcome, text=reason.text, reason=reason))
-        self._say_failed(error)
+            self.write_later(replace(entry, outcome=outcome, text=reason.text, reason=reason))
+        self._report_failure(error)
 
-    def _say_failed(self, error: BaseException) -> None:
+    def _report_failure(self, error: BaseException) -> None:
         self._failing = True
         text = f"{error}: the robot is not moved while that is so; stop still works"
-        self._journal.say(Event.Severity.ERROR, "audit.failed", text)
+        self._journal.report(Event.Severity.ERROR, "audit.failed", text)
 
 
 def entry_of(

@@ -16,12 +16,12 @@ from contextlib import AbstractAsyncContextManager
 from dataclasses import dataclass, replace
 
 from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, not_sent, refused
-from protocol_gateway.authority.preconditions import Controller, after, target_of
-from protocol_gateway.checking.cell_occupancy import CellMates, Whereabouts
+from protocol_gateway.authority.preconditions import Controller, predicted, target_of
+from protocol_gateway.checking.cell_occupancy import CellOccupancy, Occupancy
 from protocol_gateway.checking.checker import Checker
 from protocol_gateway.checking.policy import Policy
 from protocol_gateway.checking.worker_messages import Checked, CheckMotion, CheckProgram, Positions
-from protocol_gateway.control.stop_handler import Guarded
+from protocol_gateway.control.stop_handler import ControlContext
 from protocol_gateway.drivers.driver import Activity
 from protocol_gateway.errors import CheckError
 from protocol_gateway.motion import has_arrived
@@ -33,7 +33,7 @@ from robots.joints import Joints
 _C = CommandRequest.Command
 _CLOSE, _FAILED, _SKIPPED = "check.warning", "check.failed", "check.skipped"
 # What a robot at rest may seem to move by [rad] or [m].
-_STOOD = 1e-3
+_REST_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +56,7 @@ class Finding:
     others: Mapping[str, tuple[Positions, ...]] | None = None
 
     @property
-    def serious(self) -> bool:
+    def is_violation(self) -> bool:
         """Whether it would have been refused where checks are required."""
         return self.code != _CLOSE
 
@@ -78,15 +78,15 @@ class Checks:
         cell: Sequence[str],
         checker: Checker,
         planner: Checker,
-        mates: CellMates,
+        cell_occupancy: CellOccupancy,
         joints: Joints,
-        guarded: Guarded,
+        context: ControlContext,
     ) -> None:
         self.policy = policy
         self._name, self._cell = name, tuple(cell)
-        self._checker, self._planner, self._mates = checker, planner, mates
-        self._joints, self._guarded = joints, guarded
-        mates.join(name, self.whereabouts)
+        self._checker, self._planner, self._cell_occupancy = checker, planner, cell_occupancy
+        self._joints, self._context = joints, context
+        cell_occupancy.add(name, self.occupancy)
 
     @property
     def problem(self) -> Reason | None:
@@ -98,27 +98,27 @@ class Checks:
         """Whether motions cannot be checked only because the check is getting ready."""
         return self.policy is not Policy.OFF and self._checker.starting(self._name)
 
-    def turn(self, requests: Sequence[CommandRequest]) -> AbstractAsyncContextManager[None]:
+    def motion_lock(self, requests: Sequence[CommandRequest]) -> AbstractAsyncContextManager[None]:
         """The cell, for commands that move the robot: nobody else's motion begins meanwhile."""
         moves = any(each.command in MOTION_COMMANDS for each in requests)
         # Who is not checked himself is one whom the others are checked against.
         meets = self.policy is not Policy.OFF or len(self._cell) > 1
-        return self._mates.turn if moves and meets else contextlib.nullcontext()
+        return self._cell_occupancy.motion_lock if moves and meets else contextlib.nullcontext()
 
-    async def find(self, requests: Sequence[CommandRequest]) -> Finding:
+    async def check(self, requests: Sequence[CommandRequest]) -> Finding:
         """What is to be said of commands that would be sent now."""
         moves = any(each.command in MOTION_COMMANDS and each.command != _C.RUN_PROGRAM for each in requests)
         if self.policy is Policy.OFF or not moves:
             return Finding()
         try:
-            start = self._start(standing=self.policy is Policy.REQUIRE)
+            start = self._start(must_rest=self.policy is Policy.REQUIRE)
             others, left_out = self._others()
             checked = await self._checker.motion(
                 CheckMotion(robot=self._name, start=start, targets=self._targets(requests), others=others)
             )
         except CheckError as error:
-            return self._unchecked(error.reason)
-        return self._judged(checked, left_out, start, others)
+            return self._not_checked(error.reason)
+        return self._evaluate(checked, left_out, start, others)
 
     async def program(self, text: str) -> tuple[Checked, Finding]:
         """What a program does from where the robot is, and what is to be said of it.
@@ -127,7 +127,7 @@ class Checks:
             CheckError: If it cannot be checked, or not in time: then nobody knows its steps.
         """
         # Whatever the policy, its steps are found from here on.
-        start = self._start(standing=True)
+        start = self._start(must_rest=True)
         others, left_out = self._others()
         checked = await self._planner.program(
             CheckProgram(robot=self._name, text=text, start=start, others=others)
@@ -135,29 +135,29 @@ class Checks:
         if not checked.readable:
             return checked, Finding(refusal=_refused("Not run", checked.refusals))
         # Each step is checked again, against the others as they are then.
-        finding = self._judged(checked, left_out, start, others, program=True)
+        finding = self._evaluate(checked, left_out, start, others, program=True)
         return checked, replace(finding, start=start, others=None)
 
-    def whereabouts(self) -> Whereabouts:
+    def occupancy(self) -> Occupancy:
         """What this robot may take up from now on."""
-        guarded = self._guarded
-        controller, authority = guarded.controller(), guarded.authority
+        context = self._context
+        controller, authority = context.controller(), context.authority
         if controller.positions is None:
-            return Whereabouts(unknown=codes.OTHER_NO_POSITION())
+            return Occupancy(unknown=codes.OTHER_NO_POSITION())
         motion = None if authority.lease is None else authority.lease.motion
-        ahead = () if guarded.program is None else guarded.program.ahead
-        if motion is not None and motion.way:
-            ahead = (*motion.way, *ahead)
+        ahead = () if context.program is None else context.program.ahead
+        if motion is not None and motion.waypoints:
+            ahead = (*motion.waypoints, *ahead)
         elif motion is not None or _moves(controller, authority.moving):
-            return Whereabouts(unknown=codes.OTHER_MOVES())
-        return Whereabouts(path=(controller.positions, *ahead))
+            return Occupancy(unknown=codes.OTHER_MOVES())
+        return Occupancy(path=(controller.positions, *ahead))
 
     def changed(self, finding: Finding) -> Reason | None:
         """Return what has changed since a motion was checked; None: nothing has."""
-        if finding.start and not self.stands_at(finding.start):
+        if finding.start and not self.is_resting_at(finding.start):
             return codes.ROBOT_MOVED()
         for name, checked in (finding.others or {}).items():
-            now = self._mates.others(self._name, self._cell)[name]
+            now = self._cell_occupancy.others(self._name, self._cell)[name]
             # On its way it is somewhere on it; one that stood has to stand there.
             stood = len(checked) == 1 and now.path and not self._near(now.path[0], checked[0])
             told = any(not any(self._near(place, was) for was in checked) for place in now.path[1:])
@@ -166,27 +166,29 @@ class Checks:
         return None
 
     def _near(self, one: Positions, other: Positions) -> bool:
-        return len(one) == len(other) and all(abs(a - b) <= _STOOD for a, b in zip(one, other, strict=True))
+        return len(one) == len(other) and all(
+            abs(a - b) <= _REST_TOLERANCE for a, b in zip(one, other, strict=True)
+        )
 
-    def stands_at(self, start: Positions) -> bool:
+    def is_resting_at(self, start: Positions) -> bool:
         """Whether the robot is where it was when its motion was checked, at rest."""
-        controller = self._guarded.controller()
-        resting = not _moves(controller, self._guarded.authority.moving)
+        controller = self._context.controller()
+        resting = not _moves(controller, self._context.authority.moving)
         return resting and has_arrived(start, controller.positions, self._joints.types)
 
-    def _start(self, *, standing: bool) -> Positions:
+    def _start(self, *, must_rest: bool) -> Positions:
         """Where the robot is.
 
         Args:
-            standing: It must not move, nor be about to.
+            must_rest: It must not move, nor be about to.
 
         Raises:
             CheckError: If that is no place to check a motion from.
         """
-        controller, authority = self._guarded.controller(), self._guarded.authority
+        controller, authority = self._context.controller(), self._context.authority
         if controller.positions is None:
             raise CheckError(codes.CHECK_NO_POSITION())
-        if standing:
+        if must_rest:
             lease = authority.lease
             motion = None if lease is None else lease.motion
             arrived = motion is not None and has_arrived(
@@ -205,17 +207,17 @@ class Checks:
             CheckError: If nobody knows where one goes.
         """
         targets: list[Positions] = []
-        controller = self._guarded.controller()
+        controller = self._context.controller()
         for request in requests:
             if request.command == _C.RESUME:
-                lease = self._guarded.authority.lease
-                way = () if lease is None or lease.motion is None else lease.motion.way
-                if not way:
+                lease = self._context.authority.lease
+                waypoints = () if lease is None or lease.motion is None else lease.motion.waypoints
+                if not waypoints:
                     raise CheckError(codes.CHECK_HELD_WAY_UNKNOWN())
-                targets += way
+                targets += waypoints
             elif (target := target_of(request, controller, self._joints)) is not None:
                 targets.append(target)
-            controller = after(request, controller, self._joints)
+            controller = predicted(request, controller, self._joints)
         return tuple(targets)
 
     def _others(self) -> tuple[dict[str, tuple[Positions, ...]], Reason | None]:
@@ -224,7 +226,7 @@ class Checks:
         Raises:
             CheckError: If one's is not known, and must be.
         """
-        others = self._mates.others(self._name, self._cell)
+        others = self._cell_occupancy.others(self._name, self._cell)
         unknown = [
             codes.CHECK_OTHER_UNKNOWN(each.unknown, name=name)
             for name, each in others.items()
@@ -235,12 +237,12 @@ class Checks:
         known = {name: each.path for name, each in others.items() if each.unknown is None}
         return known, codes.CHECK_OTHERS_LEFT_OUT(*unknown) if unknown else None
 
-    def _unchecked(self, *why: Reason) -> Finding:
+    def _not_checked(self, *why: Reason) -> Finding:
         if self.policy is Policy.REQUIRE:
             return Finding(refusal=not_sent(codes.CHECK_REQUIRED(*why)))
         return Finding(warning=codes.CHECK_SKIPPED(*why), code=_SKIPPED)
 
-    def _judged(
+    def _evaluate(
         self,
         checked: Checked,
         left_out: Reason | None,
@@ -252,14 +254,14 @@ class Checks:
         said = checked.warnings if left_out is None else (*checked.warnings, left_out)
         if self.policy is Policy.REQUIRE:
             if checked.uncovered:
-                return self._unchecked(*_few(checked.uncovered))
+                return self._not_checked(*_first_few(checked.uncovered))
             if checked.refusals and program:
-                return Finding(refusal=_refused("Not run", _few(checked.refusals)))
+                return Finding(refusal=_refused("Not run", _first_few(checked.refusals)))
             if checked.refusals:
-                return Finding(refusal=not_sent(codes.CHECK_ON_ITS_WAY(*_few(checked.refusals))))
-            return Finding(warning=_together(said), start=start, others=others)
+                return Finding(refusal=not_sent(codes.CHECK_ON_ITS_WAY(*_first_few(checked.refusals))))
+            return Finding(warning=_combined(said), start=start, others=others)
         code = _FAILED if checked.refusals else _SKIPPED if left_out or checked.uncovered else _CLOSE
-        return Finding(warning=_together((*checked.refusals, *checked.uncovered, *said)), code=code)
+        return Finding(warning=_combined((*checked.refusals, *checked.uncovered, *said)), code=code)
 
 
 def _moves(controller: Controller, moving: bool | None) -> bool:
@@ -271,12 +273,12 @@ def _refused(what: str, reasons: Sequence[Reason]) -> Answer:
     return refused(reasons[0] if len(reasons) == 1 else codes.SEVERAL(*reasons), what=what)
 
 
-def _together(reasons: Sequence[Reason]) -> Reason | None:
-    few = _few(reasons)
+def _combined(reasons: Sequence[Reason]) -> Reason | None:
+    few = _first_few(reasons)
     return codes.SEVERAL(*few) if len(few) > 1 else few[0] if few else None
 
 
-def _few(reasons: Sequence[Reason], most: int = 3) -> tuple[Reason, ...]:
+def _first_few(reasons: Sequence[Reason], most: int = 3) -> tuple[Reason, ...]:
     """Return the first reasons, and how many more there are."""
     more = [codes.CHECK_MORE(count=len(reasons) - most)] if len(reasons) > most else []
     return (*reasons[:most], *more)

@@ -19,24 +19,24 @@ from protocol_gateway.authority import lease_rules, motion_owner
 from protocol_gateway.authority.admission import (
     Verdict,
     admit,
-    delay,
-    lateness,
-    remember,
+    after_command,
+    deadline_refusal,
+    keep_answer,
     stop_refusal,
-    used_up,
+    wait_refusal,
 )
 from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, Authority, Now, not_sent
 from protocol_gateway.authority.preconditions import (
     Controller,
-    after,
     controller_command,
     obstacle,
+    predicted,
     target_of,
 )
 from protocol_gateway.control.audit_trail import command_entry
 from protocol_gateway.control.checks import Checks, Finding
 from protocol_gateway.control.leases import Leases
-from protocol_gateway.control.stop_handler import Guarded, Stops, both_clocks
+from protocol_gateway.control.stop_handler import ControlContext, StopHandler, read_clocks
 from protocol_gateway.drivers.driver import Activity
 from protocol_gateway.errors import AuditError, CheckError, CommandError, LinkError
 from protocol_gateway.motion import has_arrived, motion_may_be_held
@@ -61,19 +61,19 @@ class _Attempt:
 
     Attributes:
         arrived_s: When they came (monotonic).
-        counted: Their ids are the holder's, so the answer is kept for a repeat.
+        id_used: Their ids are the holder's, so the answer is kept for a repeat.
         step: The program that runs asks for them.
         begin: What is done in the place of sending a unit.
-        said: What the answer says of that.
+        outcome_text: What the answer says of that.
     """
 
     requests: tuple[schema.CommandRequest, ...]
     entries: tuple[Entry, ...]
     arrived_s: float
-    counted: bool = False
+    id_used: bool = False
     step: bool = False
     begin: Callable[[], None] | None = None
-    said: str = "it runs"
+    outcome_text: str = "it runs"
 
 
 class Control:
@@ -84,26 +84,26 @@ class Control:
         speed_percent: Last set through here, since the link came up; None: not known.
     """
 
-    def __init__(self, joints: Joints, guarded: Guarded, checks: Checks | None = None) -> None:
+    def __init__(self, joints: Joints, context: ControlContext, checks: Checks | None = None) -> None:
         self._joints = joints
-        self._guarded = guarded
+        self._context = context
         self._checks = checks
-        self._stops = Stops(guarded)
-        self._ledger, self._journal, self._driver = guarded.ledger, guarded.journal, guarded.driver
+        self._stop_handler = StopHandler(context)
+        self._audit_trail, self._journal, self._driver = context.audit_trail, context.journal, context.driver
         self.speed_percent: float | None = None
         self._reset_s: float | None = None
-        self._unit_s = float("-inf")  # when the newest unit of commands was sent
-        self._one_at_a_time = asyncio.Lock()
-        self.leases = Leases(guarded, self._stops, self._one_at_a_time)
+        self._last_unit_s = float("-inf")  # when the newest unit of commands was sent
+        self._command_lock = asyncio.Lock()
+        self.leases = Leases(context, self._stop_handler, self._command_lock)
 
     @property
     def authority(self) -> Authority:
         """Who controls, and whether a stop is latched."""
-        return self._guarded.authority
+        return self._context.authority
 
     def stop(self, *, by: str, reason: str, source: str) -> schema.StopAnswer:
         """Stop the robot; from anyone, at any time."""
-        return self._stops.stop(by=by, reason=reason, source=source)
+        return self._stop_handler.stop(by=by, reason=reason, source=source)
 
     def link_lost(self, why: str) -> None:
         """No units come any more: where motion of the holder's runs, stop the robot."""
@@ -152,39 +152,41 @@ class Control:
             begin: What is done in the place of sending a unit.
             refused: Why not, where that is known already: it is answered and written down.
         """
-        arrived_s = both_clocks().monotonic_s
+        arrived_s = read_clocks().monotonic_s
         entries = tuple(command_entry(each, operator=operator, source=source) for each in requests)
         # HOLD makes a robot slower whatever comes before it: it waits for nobody's check.
         holds = all(each.command == _C.HOLD for each in requests)
-        async with contextlib.nullcontext() if holds else self._one_at_a_time:
+        async with contextlib.nullcontext() if holds else self._command_lock:
             verdict = self.admit(requests, operator)
             if verdict.repeat:
                 return verdict.answer
             problem = verdict.answer if not verdict.answer.accepted else None
             if refused is not None:
                 problem = refused
-            attempt = _Attempt(tuple(requests), entries, arrived_s, counted=verdict.counted, begin=begin)
+            attempt = _Attempt(tuple(requests), entries, arrived_s, id_used=verdict.id_used, begin=begin)
             if holds and problem is None:
-                attempt = self._cancel_what_has_not_begun(attempt)
+                attempt = self._cancel_preparing(attempt)
             return await self._do(attempt, problem)
 
-    def _cancel_what_has_not_begun(self, hold: _Attempt) -> _Attempt:
+    def _cancel_preparing(self, hold: _Attempt) -> _Attempt:
         """Let HOLD cancel the programs that are being checked; where nothing moves, it is only that.
 
         A HOLD that is sent to an arm at rest leaves it holding nothing, and it then refuses every motion.
         """
-        cancelled = self._guarded.cancel_preparing(codes.PROGRAM_HOLD())
+        cancelled = self._context.cancel_preparing(codes.PROGRAM_HOLD())
         lease = self.authority.lease
         rests = self.authority.moving is False and (lease is None or lease.motion is None)
-        if not cancelled or not rests or self._guarded.program is not None:
+        if not cancelled or not rests or self._context.program is not None:
             return hold
-        return replace(hold, begin=lambda: None, said="the program was not started, and nothing is on hold")
+        return replace(
+            hold, begin=lambda: None, outcome_text="the program was not started, and nothing is on hold"
+        )
 
     async def step(self, request: schema.CommandRequest, *, operator: str) -> Answer:
         """Do a step of the program that the holder runs: all is judged but its id."""
-        arrived_s = both_clocks().monotonic_s
+        arrived_s = read_clocks().monotonic_s
         entries = (command_entry(request, operator=operator, source=PROGRAM),)
-        async with self._one_at_a_time:
+        async with self._command_lock:
             self.leases.expire()
             problem = None
             if not lease_rules.holds(self.authority, operator, request.lease):
@@ -194,36 +196,38 @@ class Control:
     def admit(self, requests: Sequence[schema.CommandRequest], operator: str) -> Verdict:
         """Whether commands are their holder's, in time and new, and no stop forbids them."""
         self.leases.expire()
-        authority, now = self.authority, both_clocks()
+        authority, now = self.authority, read_clocks()
         for request in requests:
             verdict = admit(authority, request, operator=operator, now=now)
             if verdict.repeat or not verdict.answer.accepted:
                 return verdict
-            authority = used_up(authority, request)
+            authority = after_command(authority, request)
         return verdict
 
     async def _do(self, attempt: _Attempt, problem: Answer | None) -> Answer:
-        async with contextlib.nullcontext() if self._checks is None else self._checks.turn(attempt.requests):
+        async with (
+            contextlib.nullcontext() if self._checks is None else self._checks.motion_lock(attempt.requests)
+        ):
             problem = problem or self._refusal(attempt)
             send, finding = attempt.begin, Finding()
             if problem is None and send is None:
                 try:
                     unit = self._driver.encode(*map(controller_command, attempt.requests))
-                    send = partial(self._guarded.send, unit)
+                    send = partial(self._context.send, unit)
                 except CommandError as error:
                     problem = not_sent(error.reason)
             if problem is None and self._checks is not None:
-                finding = await self._checks.find(attempt.requests)
+                finding = await self._checks.check(attempt.requests)
                 problem = finding.refusal
             if problem is not None:
-                self._remember(attempt, problem)
-                self._note(attempt.entries, Outcome.REFUSED, problem)
+                self._keep_answer(attempt, problem)
+                self._record(attempt.entries, Outcome.REFUSED, problem)
                 return problem
             assert send is not None
             # Used up before anything is done: whatever happens below, a repeat does not do it again.
-            self._remember(attempt, not_sent(codes.COMMAND_BROKEN_OFF()))
+            self._keep_answer(attempt, not_sent(codes.COMMAND_BROKEN_OFF()))
             answer = await self._write_and_send(attempt, send, finding)
-            self._remember(attempt, answer)
+            self._keep_answer(attempt, answer)
             return answer
 
     async def _write_and_send(self, attempt: _Attempt, send: Callable[[], None], finding: Finding) -> Answer:
@@ -233,70 +237,72 @@ class Control:
             for entry in attempt.entries
         ]
         try:
-            await self._ledger.before(*entries)
+            await self._audit_trail.write_before(*entries)
         except AuditError as error:
             return not_sent(codes.COMMAND_NOT_WRITTEN(error.reason))
-        problem = self._second_thoughts(attempt, finding)
+        problem = self._recheck(attempt, finding)
         if problem is None:
             try:
                 send()
             except (LinkError, CheckError) as error:
                 problem = not_sent(error.reason)
         if problem is not None:
-            self._note(attempt.entries, Outcome.FAILED, problem)
+            self._record(attempt.entries, Outcome.FAILED, problem)
             return problem
-        now = both_clocks()
-        alone = now.monotonic_s - self._unit_s >= motion_owner.ANSWERED_WITHIN_S
-        self._unit_s = now.monotonic_s
+        now = read_clocks()
+        isolated = now.monotonic_s - self._last_unit_s >= motion_owner.ANSWERED_WITHIN_S
+        self._last_unit_s = now.monotonic_s
         names = ", ".join(_C.Name(request.command) for request in attempt.requests)
         if attempt.begin is None:
-            controller = self._guarded.controller()
+            controller = self._context.controller()
             for request in attempt.requests:
                 # Each goes on from where those before it lead.
-                self._sent(request, now, controller, alone=alone)
-                controller = after(request, controller, self._joints)
+                self._sent(request, now, controller, isolated=isolated)
+                controller = predicted(request, controller, self._joints)
             text = f"{names} {'is' if len(attempt.requests) == 1 else 'are'} on the controller's socket"
         else:
-            text = f"{names}: {attempt.said}"
-        if warning is not None and (finding.serious or not attempt.step):
-            self._journal.say(_S.WARNING, finding.code, f"{names}: {warning}", why=warning, command=names)
+            text = f"{names}: {attempt.outcome_text}"
+        if warning is not None and (finding.is_violation or not attempt.step):
+            self._journal.report(_S.WARNING, finding.code, f"{names}: {warning}", why=warning, command=names)
         if warning is not None:
             text = f"{text}; mind: {warning}"
         return Answer(True, text, warning)
 
-    def _second_thoughts(self, attempt: _Attempt, finding: Finding) -> Answer | None:
+    def _recheck(self, attempt: _Attempt, finding: Finding) -> Answer | None:
         """Why what was allowed before it was written down must not be sent now; None: it may."""
         self.leases.expire()
         if not lease_rules.holds(self.authority, attempt.entries[0].operator, attempt.requests[0].lease):
             return not_sent(codes.COMMAND_CONTROL_ENDED_MEANWHILE())
-        if refusal := self._held_up(attempt) or self._refusal(attempt):
+        if refusal := self._overtaken_by_hold(attempt) or self._refusal(attempt):
             return refusal
         changed = None if self._checks is None else self._checks.changed(finding)
         return None if changed is None else not_sent(codes.COMMAND_CHANGED(changed))
 
-    def _held_up(self, attempt: _Attempt) -> Answer | None:
+    def _overtaken_by_hold(self, attempt: _Attempt) -> Answer | None:
         """That HOLD, which waits for nothing, has overtaken a motion: whoever held the robot expects none."""
         if not any(each.command in MOTION_COMMANDS for each in attempt.requests):
             return None
-        lease, program = self.authority.lease, self._guarded.program
+        lease, program = self.authority.lease, self._context.program
         if attempt.step:
             held = program is not None and (program.held or program.given_up)
         else:
             held = lease is not None and lease.last_id > attempt.requests[-1].id
         return not_sent(codes.COMMAND_HELD()) if held else None
 
-    def _note(self, entries: Sequence[Entry], outcome: Outcome, answer: Answer) -> None:
+    def _record(self, entries: Sequence[Entry], outcome: Outcome, answer: Answer) -> None:
         for entry in entries:
-            self._ledger.after_later(replace(entry, outcome=outcome, text=answer.text, reason=answer.reason))
+            self._audit_trail.write_later(
+                replace(entry, outcome=outcome, text=answer.text, reason=answer.reason)
+            )
 
-    def _remember(self, attempt: _Attempt, answer: Answer) -> None:
-        if attempt.counted:
-            self._guarded.authority = remember(self.authority, attempt.requests[-1], answer)
+    def _keep_answer(self, attempt: _Attempt, answer: Answer) -> None:
+        if attempt.id_used:
+            self._context.authority = keep_answer(self.authority, attempt.requests[-1], answer)
 
     def _refusal(self, attempt: _Attempt) -> Answer | None:
         """Why commands cannot be done now, each judged as those before it leave things; None: they can."""
-        authority, controller, now = self.authority, self._guarded.controller(), both_clocks()
-        refusal = delay(attempt.arrived_s, now)
+        authority, controller, now = self.authority, self._context.controller(), read_clocks()
+        refusal = wait_refusal(attempt.arrived_s, now)
         motions = [each.command for each in attempt.requests if each.command in MOTION_COMMANDS]
         if len(motions) > 1 and _C.RESUME in motions:
             # Some go on with what is on hold first, some forget it: nobody would know the way.
@@ -304,7 +310,7 @@ class Control:
         for request in attempt.requests:
             refusal = (
                 refusal
-                or lateness(request, now)
+                or deadline_refusal(request, now)
                 or stop_refusal(authority, request)
                 or self._latch_refusal(request)
                 or (None if attempt.step else self._program_refusal(request))
@@ -312,68 +318,70 @@ class Control:
             )
             if refusal is not None:
                 return refusal
-            authority = used_up(authority, request)
-            controller = after(request, controller, self._joints)
+            authority = after_command(authority, request)
+            controller = predicted(request, controller, self._joints)
         return refusal
 
     def _latch_refusal(self, request: schema.CommandRequest) -> Answer | None:
-        problem = self._guarded.latch.problem if request.command in MOTION_COMMANDS else None
+        problem = self._context.latch.problem if request.command in MOTION_COMMANDS else None
         return None if problem is None else not_sent(codes.COMMAND_NOT_LATCHED(problem))
 
     def _program_refusal(self, request: schema.CommandRequest) -> Answer | None:
-        program = self._guarded.program
+        program = self._context.program
         # Of its speed its check is true.
         if program is None or request.command not in (MOTION_COMMANDS | {_C.SPEED}) - {_C.RESUME}:
             return None
         return not_sent(codes.COMMAND_PROGRAM_RUNS(name=program.name))
 
-    def why_not(self, request: schema.CommandRequest) -> Answer | None:
+    def current_obstacle(self, request: schema.CommandRequest) -> Answer | None:
         """Return why the controller as it is now cannot do a command; None: it can."""
-        return self._obstacle(request, self._guarded.controller())
+        return self._obstacle(request, self._context.controller())
 
     def _obstacle(self, request: schema.CommandRequest, controller: Controller) -> Answer | None:
         status = controller.status
-        now_s = both_clocks().monotonic_s
+        now_s = read_clocks().monotonic_s
         just_reset = self._reset_s is not None and now_s - self._reset_s < RESET_SHOWS_WITHIN_S
         if just_reset and status.activity in (Activity.STOPPED, Activity.FAULT):
             # It still tells the stop that was just reset; if it does refuse, it says so itself.
             controller = replace(controller, status=replace(status, activity=None))
         return obstacle(request, controller, self._joints)
 
-    def _sent(self, request: schema.CommandRequest, now: Now, controller: Controller, *, alone: bool) -> None:
+    def _sent(
+        self, request: schema.CommandRequest, now: Now, controller: Controller, *, isolated: bool
+    ) -> None:
         latched = self.authority.stop
         target = target_of(request, controller, self._joints)
-        self._guarded.authority = motion_owner.command_sent(
+        self._context.authority = motion_owner.command_sent(
             self.authority,
             request,
             now,
-            way=() if target is None else (target,),
+            waypoints=() if target is None else (target,),
             arrived=self._has_arrived(),
-            alone=alone,
+            isolated=isolated,
         )
-        program = self._guarded.program
+        program = self._context.program
         if program is not None and request.command in (_C.HOLD, _C.RESUME):
-            self._guarded.program = replace(program, held=request.command == _C.HOLD)
+            self._context.program = replace(program, held=request.command == _C.HOLD)
         if program is not None and request.command == _C.RESET:
             given_up = program.held or controller.status.activity is Activity.HOLDING
-            self._guarded.program = replace(program, given_up=given_up)
+            self._context.program = replace(program, given_up=given_up)
         if request.command == _C.SPEED:
             self.speed_percent = request.speed_percent
         if request.command == _C.RESET:
             self._reset_s = now.monotonic_s
             if latched is not None:
-                self._guarded.keep_latch()
+                self._context.write_latch()
                 text = f"stop request {latched.id} was reset"
-                self._journal.say(_S.INFO, "stop.reset", text, stop_id=latched.id)
-        self._guarded.on_change()
+                self._journal.report(_S.INFO, "stop.reset", text, stop_id=latched.id)
+        self._context.on_change()
 
     # ----------------------------------------------------------------- motion
 
     def send_latched_stop(self) -> None:
         """Send the latched stop, if there is one: units can be sent again, or soon."""
-        self._stops.send_latched_stop()
+        self._stop_handler.send_latched_stop()
 
-    def news(self) -> None:
+    def status_changed(self) -> None:
         """The controller told something new of itself: after a RESET, a stop or fault is a new one."""
         self._reset_s = None
 
@@ -381,27 +389,27 @@ class Control:
         """The controller refused a unit."""
         self.speed_percent = None  # which unit is not said; it may have been that
         before = self.authority
-        self._guarded.authority = motion_owner.refused(before)
+        self._context.authority = motion_owner.refused(before)
         if before is not self.authority:
-            self._guarded.on_change()
+            self._context.on_change()
 
     def observe(self, *, moving: bool | None) -> None:
         """Follow whether the robot moves; called some times a second. None: it is not known."""
         if moving is None:
             return
-        now = both_clocks()
+        now = read_clocks()
         self._stop_orphan(moving)
         before = self.authority
-        self._guarded.authority, foreign = motion_owner.observe(
+        self._context.authority, foreign = motion_owner.observe(
             before,
             moving=moving,
-            pending=motion_may_be_held(self._guarded.controller().status.activity),
+            pending=motion_may_be_held(self._context.controller().status.activity),
             arrived=self._has_arrived(),
             now=now,
         )
         lease = self.authority.lease
         if foreign and not lease_rules.moved_recently(before, now):
-            self._journal.say(
+            self._journal.report(
                 _S.INFO if lease is None else _S.WARNING,
                 "motion.foreign",
                 "the robot began to move, and nobody commanded it through the gateway",
@@ -409,8 +417,8 @@ class Control:
         if foreign and lease is not None and not lease.tolerates_motion:
             self.leases.end(codes.ENDED_FOREIGN_MOTION(), foreign=True)
         if (before.lease and before.lease.motion is None) != (lease and lease.motion is None):
-            self._guarded.on_change()
-        self._stops.check_heeded(moving=moving, now=now)
+            self._context.on_change()
+        self._stop_handler.check_heeded(moving=moving, now=now)
 
     def reported(self, activity: Activity | None, dated_s: float) -> None:
         """Follow a status unit; it and the newest positions were new at `dated_s` (monotonic)."""
@@ -418,17 +426,17 @@ class Control:
         if lease is None or lease.motion is None:
             return
         resting = activity is Activity.IDLE and self._has_arrived()
-        self._guarded.authority = motion_owner.reported(self.authority, resting=resting, dated_s=dated_s)
+        self._context.authority = motion_owner.reported(self.authority, resting=resting, dated_s=dated_s)
 
     def _stop_orphan(self, moving: bool) -> None:
         """Stop what still moves of a motion that a killed gateway's holder commanded: nobody holds it now."""
-        mover, self._guarded.orphan = self._guarded.orphan, ""
+        mover, self._context.orphan = self._context.orphan, ""
         if mover and moving and self.authority.lease is None:
             text = f"dead-man: the gateway was killed while {mover} had control, and the robot still moves"
             self.stop(by=GATEWAY, reason=text, source=GATEWAY)
 
     def _has_arrived(self) -> bool:
-        lease, controller = self.authority.lease, self._guarded.controller()
+        lease, controller = self.authority.lease, self._context.controller()
         if lease is None or lease.motion is None or controller.status.homed is False:
             return False  # a robot that is at its home, but does not know it, has still to be homed
         return has_arrived(lease.motion.target, controller.positions, self._joints.types)
@@ -436,7 +444,7 @@ class Control:
     async def close(self) -> None:
         """End the lease, if there still is one, and write what is still to be written."""
         self.leases.close()
-        await self._ledger.settle()
+        await self._audit_trail.settle()
 
 
 def refusal(answer: Answer) -> RefusedError:

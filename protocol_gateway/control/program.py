@@ -23,7 +23,7 @@ from protocol_gateway.checking.worker_messages import Checked
 from protocol_gateway.control.audit_trail import entry_of
 from protocol_gateway.control.checks import Checks
 from protocol_gateway.control.control import PROGRAM, Control, command_answer, refusal
-from protocol_gateway.control.stop_handler import Guarded, Running
+from protocol_gateway.control.stop_handler import ControlContext, RunningProgram
 from protocol_gateway.drivers.driver import Activity
 from protocol_gateway.errors import CheckError
 from protocol_gateway.foreign_text import LONGEST, one_line
@@ -39,16 +39,16 @@ _C = schema.CommandRequest.Command
 _S = schema.Event.Severity
 _STATE = schema.ProgramState
 
-_LOOK_S = 0.02
+_POLL_S = 0.02
 # A robot that is where its step goes already may still begin to move: homing looks for its marks.
-_BEGINS_WITHIN_S = 0.3
+_START_TIMEOUT_S = 0.3
 # However long its asker waits.
-WITHIN_S = 25.0
+PREPARE_TIMEOUT_S = 25.0
 # What the answer takes to its asker: a refusal is to be there before it gives up.
-_ANSWER_S = 0.1
+_ANSWER_MARGIN_S = 0.1
 
 # No client waits for a step, so a busy machine may check it again for so long.
-_CHECKED_WITHIN_S = 10.0
+_RECHECK_TIMEOUT_S = 10.0
 _TOO_SLOW = frozenset({codes.CHECK_TOO_SLOW.name, codes.CHECK_QUEUED_TOO_LONG.name})
 
 log = logging.getLogger(__name__)
@@ -93,8 +93,8 @@ class Programs:
         state: Of the program that runs, or ran last; its timestamp is set when it is published.
     """
 
-    def __init__(self, control: Control, guarded: Guarded, checks: Checks) -> None:
-        self._control, self._guarded, self._checks = control, guarded, checks
+    def __init__(self, control: Control, context: ControlContext, checks: Checks) -> None:
+        self._control, self._context, self._checks = control, context, checks
         self.state = _STATE()
         self._task: asyncio.Task[None] | None = None
 
@@ -110,7 +110,7 @@ class Programs:
         try:
             return await self._begin(request, cancelled, operator=operator, source=source)
         finally:
-            self._guarded.preparing.discard(cancelled)
+            self._context.preparing.discard(cancelled)
 
     async def _begin(
         self, request: schema.CommandRequest, cancelled: asyncio.Future[Reason], *, operator: str, source: str
@@ -120,9 +120,9 @@ class Programs:
         # What was refused stays so, though its reason may be gone a moment later: nothing was planned.
         prepared = _Prepared(None if verdict.answer.accepted else verdict.answer)
         if verdict.answer.accepted and not verdict.repeat:
-            self._guarded.preparing.add(cancelled)
+            self._context.preparing.add(cancelled)
             try:
-                prepared = await self._in_time(request, cancelled, name, operator)
+                prepared = await self._prepare_in_time(request, cancelled, name, operator)
             except CheckError as error:
                 prepared = _Prepared(refused(error.reason, what="Not run"))
         answer = await self._control.attempt(
@@ -135,20 +135,20 @@ class Programs:
             answer = answer._replace(text=text, reason=prepared.warning)
         return command_answer(answer)
 
-    async def _in_time(
+    async def _prepare_in_time(
         self, request: schema.CommandRequest, cancelled: asyncio.Future[Reason], name: str, operator: str
     ) -> "_Prepared":
-        """As `_prepared`, unless its asker gives up, or HOLD or a stop comes before.
+        """As `_prepare`, unless its asker gives up, or HOLD or a stop comes before.
 
         Raises:
             CheckError: If it cannot be checked, in time or at all.
         """
-        waits_s = WITHIN_S
+        waits_s = PREPARE_TIMEOUT_S
         if request.HasField("not_after"):
-            waits_s = (request.not_after.ToNanoseconds() - time.time_ns()) * 1e-9 - _ANSWER_S
-        prepared = asyncio.ensure_future(self._prepared(request, name, operator))
+            waits_s = (request.not_after.ToNanoseconds() - time.time_ns()) * 1e-9 - _ANSWER_MARGIN_S
+        prepared = asyncio.ensure_future(self._prepare(request, name, operator))
         try:
-            within_s = max(0.0, min(waits_s, WITHIN_S))
+            within_s = max(0.0, min(waits_s, PREPARE_TIMEOUT_S))
             await asyncio.wait((prepared, cancelled), timeout=within_s, return_when=asyncio.FIRST_COMPLETED)
             if cancelled.done():
                 raise CheckError(cancelled.result())
@@ -157,26 +157,26 @@ class Programs:
         finally:
             prepared.cancel()
             await asyncio.gather(prepared, return_exceptions=True)
-        if waits_s < WITHIN_S:
+        if waits_s < PREPARE_TIMEOUT_S:
             raise CheckError(codes.PROGRAM_ASKER_GAVE_UP())
-        raise CheckError(codes.PROGRAM_PLAN_TOO_SLOW(seconds=WITHIN_S))
+        raise CheckError(codes.PROGRAM_PLAN_TOO_SLOW(seconds=PREPARE_TIMEOUT_S))
 
-    async def _prepared(self, request: schema.CommandRequest, name: str, operator: str) -> "_Prepared":
+    async def _prepare(self, request: schema.CommandRequest, name: str, operator: str) -> "_Prepared":
         """Check a program."""
         if len(request.program.encode()) > MOST_BYTES:
             raise CheckError(codes.PROGRAM_TOO_LONG(kib=MOST_BYTES // 1024))
         checked, finding = await self._checks.program(request.program)
         lines = tuple(request.program.split("\n"))
-        newest_stop = self._guarded.authority.last_stop_id
+        newest_stop = self._context.authority.last_stop_id
         run = _Run(name, operator, request.lease, newest_stop, lines, checked)
         if finding.refusal is not None:
             return _Prepared(finding.refusal)
         first = next((step for step in checked.steps if step.target is not None), None)
         # Whether it is homed, or on hold, is known before its first step.
-        if first is not None and (problem := self._control.why_not(_request(first, ""))) is not None:
+        if first is not None and (problem := self._control.current_obstacle(_request(first, ""))) is not None:
             return _Prepared(problem)
         if finding.warning is not None:
-            self._guarded.journal.say(
+            self._context.journal.report(
                 _S.WARNING,
                 finding.code,
                 f"program {name}: {finding.warning}",
@@ -186,9 +186,9 @@ class Programs:
         targets = tuple(tuple(each.target.tolist()) for each in checked.steps if each.target is not None)
 
         def begin() -> None:
-            if finding.start and not self._checks.stands_at(finding.start):
+            if finding.start and not self._checks.is_resting_at(finding.start):
                 raise CheckError(codes.PROGRAM_MOVED())
-            self._guarded.program = Running(name, targets)
+            self._context.program = RunningProgram(name, targets)
             self.state = _STATE(
                 outcome=_STATE.RUNNING,
                 name=name,
@@ -209,10 +209,12 @@ class Programs:
 
     async def _run(self, run: _Run) -> None:
         said = f"{run.operator} runs program {run.name}"
-        self._guarded.journal.say(_S.INFO, "program.started", said, operator=run.operator, program=run.name)
+        self._context.journal.report(
+            _S.INFO, "program.started", said, operator=run.operator, program=run.name
+        )
         problem: Reason | None = codes.PROGRAM_FAILED()
         try:
-            problem = await self._all_steps(run)
+            problem = await self._run_steps(run)
         except asyncio.CancelledError:
             problem = codes.ENDED_GATEWAY()
             raise
@@ -221,28 +223,28 @@ class Programs:
         finally:
             self._end(run, problem)
 
-    async def _all_steps(self, run: _Run) -> Reason | None:
+    async def _run_steps(self, run: _Run) -> Reason | None:
         """Do a program's steps; return why it was broken off."""
         for number, step in enumerate(run.checked.steps):
             self.state.step, self.state.line = number + 1, step.line
             self.state.statement = one_line(run.lines[step.line - 1].partition("#")[0].strip(), LONGEST)
-            self._guarded.on_change()
+            self._context.on_change()
             problem = await self._step(run, step)
             if problem is not None:
                 return problem
         # Whoever gives control back when it is done ends no motion by that.
-        return await self._until(run, self._settled)
+        return await self._wait_until(run, self._motion_is_over)
 
     async def _step(self, run: _Run, step: Step) -> Reason | None:
         begin_s = time.monotonic()
         if step.kind is StepKind.WAIT:
-            return await self._until(run, lambda: time.monotonic() - begin_s >= (step.seconds or 0.0))
+            return await self._wait_until(run, lambda: time.monotonic() - begin_s >= (step.seconds or 0.0))
         while True:
             # On hold between two motions, it waits for RESUME like a motion would.
-            if (problem := await self._until(run, self._not_held)) is not None:
+            if (problem := await self._wait_until(run, self._not_held)) is not None:
                 return problem
             answer = await self._control.step(_request(step, run.secret), operator=run.operator)
-            if _checked_too_slowly(answer) and time.monotonic() - begin_s < _CHECKED_WITHIN_S:
+            if _checked_too_slowly(answer) and time.monotonic() - begin_s < _RECHECK_TIMEOUT_S:
                 continue
             if answer.accepted or answer.reason is None or answer.reason.code != codes.COMMAND_HELD.name:
                 break
@@ -251,54 +253,54 @@ class Programs:
         if step.target is None:
             return None
         # From now on the motion itself says where the robot goes.
-        if (running := self._guarded.program) is not None:
-            self._guarded.program = replace(running, done=running.done + 1)
+        if (running := self._context.program) is not None:
+            self._context.program = replace(running, done=running.done + 1)
         target = tuple(step.target.tolist())
-        begun = not self._checks.stands_at(target)
+        begun = not self._checks.is_resting_at(target)
 
         def arrived() -> bool:
             nonlocal begun
-            begun = begun or not self._checks.stands_at(target)
-            patience_s = 0.0 if begun else _BEGINS_WITHIN_S
-            return self._checks.stands_at(target) and time.monotonic() - begin_s >= patience_s
+            begun = begun or not self._checks.is_resting_at(target)
+            patience_s = 0.0 if begun else _START_TIMEOUT_S
+            return self._checks.is_resting_at(target) and time.monotonic() - begin_s >= patience_s
 
-        return await self._until(run, arrived, moves=True)
+        return await self._wait_until(run, arrived, moves=True)
 
-    async def _until(self, run: _Run, done: Callable[[], bool], *, moves: bool = False) -> Reason | None:
+    async def _wait_until(self, run: _Run, done: Callable[[], bool], *, moves: bool = False) -> Reason | None:
         """Wait; return why the program is broken off."""
         while True:
-            if (problem := self._broken_off(run)) is not None:
+            if (problem := self._abort_reason(run)) is not None:
                 return problem
             if done():
                 return None
-            lease = self._guarded.authority.lease
+            lease = self._context.authority.lease
             if moves and (lease is None or lease.motion is None):
                 return codes.PROGRAM_NOT_ARRIVED()
-            await asyncio.sleep(_LOOK_S)
+            await asyncio.sleep(_POLL_S)
 
-    def _settled(self) -> bool:
-        lease = self._guarded.authority.lease
+    def _motion_is_over(self) -> bool:
+        lease = self._context.authority.lease
         return lease is None or lease.motion is None
 
     def _not_held(self) -> bool:
-        program = self._guarded.program
-        holding = self._guarded.controller().status.activity is Activity.HOLDING
+        program = self._context.program
+        holding = self._context.controller().status.activity is Activity.HOLDING
         return not holding and (program is None or not program.held)
 
-    def _broken_off(self, run: _Run) -> Reason | None:
-        authority = self._guarded.authority
+    def _abort_reason(self, run: _Run) -> Reason | None:
+        authority = self._context.authority
         if authority.stop is not None:
             return codes.PROGRAM_STOPPED(by=authority.stop.by, reason=authority.stop.reason)
         if authority.last_stop_id != run.last_stop_id:
             return codes.PROGRAM_STOPPED_BY_NUMBER(id=authority.last_stop_id)
-        if self._guarded.program is not None and self._guarded.program.given_up:
+        if self._context.program is not None and self._context.program.given_up:
             return codes.PROGRAM_GIVEN_UP()
         if not lease_rules.holds(authority, run.operator, run.secret):
             return codes.PROGRAM_CONTROL_ENDED(authority.ended or codes.ENDED_UNKNOWN())
         return None
 
     def _end(self, run: _Run, problem: Reason | None) -> None:
-        self._guarded.program = None
+        self._context.program = None
         if problem is None:
             self.state.outcome, said = _STATE.DONE, codes.PROGRAM_DONE(program=run.name)
         else:
@@ -306,8 +308,8 @@ class Programs:
             self.state.reason.CopyFrom(reason_message(problem))
             said = codes.PROGRAM_ENDED(problem, program=run.name, line=self.state.line)
         severity = _S.INFO if problem is None else _S.WARNING
-        self._guarded.journal.say(severity, said.code, said.text, why=said, program=run.name)
-        self._guarded.ledger.after_later(
+        self._context.journal.report(severity, said.code, said.text, why=said, program=run.name)
+        self._context.audit_trail.write_later(
             entry_of(
                 "PROGRAM_END",
                 operator=run.operator,
@@ -317,7 +319,7 @@ class Programs:
                 why=said,
             )
         )
-        self._guarded.on_change()
+        self._context.on_change()
 
 
 def _checked_too_slowly(answer: Answer) -> bool:

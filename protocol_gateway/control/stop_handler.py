@@ -1,4 +1,4 @@
-"""Stops of one robot: on the wire first, latched, and only then said and written down.
+"""StopHandler of one robot: on the wire first, latched, and only then said and written down.
 
     stop          controller's socket -> latched, in its file -> event -> audit, owed while the disk is full
     link is back  a latched stop is sent (again): the controller may not have had it, or was restarted
@@ -19,7 +19,7 @@ from protocol_gateway.audit.log import GATEWAY, Outcome
 from protocol_gateway.authority import lease_rules
 from protocol_gateway.authority.lease_rules import Authority, Now
 from protocol_gateway.authority.preconditions import Controller
-from protocol_gateway.control.audit_trail import Ledger, entry_of
+from protocol_gateway.control.audit_trail import AuditTrail, entry_of
 from protocol_gateway.drivers.driver import Driver, Stop
 from protocol_gateway.errors import CommandError, LinkError
 from protocol_gateway.journal import Journal
@@ -32,18 +32,18 @@ from robomesh.schemas import robomesh_pb2 as schema
 _S = schema.Event.Severity
 
 # Longer than any arm takes to come to rest: one that still moves does not heed its stop unit.
-HEEDED_WITHIN_S = 2.0
+HEED_TIMEOUT_S = 2.0
 # Dozens of units at once would look like a controller that does not read, and cost the connection.
-ON_ITS_WAY_S = 0.1
+IN_TRANSIT_S = 0.1
 
 
-def both_clocks() -> Now:
+def read_clocks() -> Now:
     """Now, on both clocks."""
     return Now(time.monotonic(), time.time_ns())
 
 
 @dataclass(frozen=True)
-class Running:
+class RunningProgram:
     """The program that moves a robot.
 
     Attributes:
@@ -66,7 +66,7 @@ class Running:
 
 
 @dataclass(kw_only=True)
-class Guarded:
+class ControlContext:
     """One robot as what guards it has it.
 
     Attributes:
@@ -83,13 +83,13 @@ class Guarded:
 
     authority: Authority
     driver: Driver
-    ledger: Ledger
+    audit_trail: AuditTrail
     latch: LatchFile
     journal: Journal
     send: Callable[[bytes], None]
     controller: Callable[[], Controller]
     on_change: Callable[[], None]
-    program: Running | None = None
+    program: RunningProgram | None = None
     preparing: set[asyncio.Future[Reason]] = field(default_factory=set)
     orphan: str = ""
 
@@ -100,45 +100,45 @@ class Guarded:
                 each.set_result(why)
         return bool(self.preparing)
 
-    def keep_latch(self) -> None:
+    def write_latch(self) -> None:
         """Write soon whether a stop is latched, and the newest number."""
         self.latch.keep(self.authority.stop, self.authority.last_stop_id)
 
 
-class Stops:
-    """Stops one robot, and sees to it that the stop is heeded."""
+class StopHandler:
+    """StopHandler one robot, and sees to it that the stop is heeded."""
 
-    def __init__(self, guarded: Guarded) -> None:
-        self._guarded = guarded
-        self._told_disobeyed_s = 0.0
-        self._newest: tuple[str, str, Reason, schema.StopAnswer] | None = None  # asked by, from where
+    def __init__(self, context: ControlContext) -> None:
+        self._context = context
+        self._disobeyed_reported_s = 0.0
+        self._last_stop: tuple[str, str, Reason, schema.StopAnswer] | None = None  # asked by, from where
 
     def stop(self, *, by: str, reason: str, source: str) -> schema.StopAnswer:
         """Send the stop unit, latch it, and only then say and write down that it was so."""
-        guarded, now = self._guarded, both_clocks()
-        if guarded.controller().read_only:
+        context, now = self._context, read_clocks()
+        if context.controller().read_only:
             return self._stop_of_read_only(by=by, reason=reason, source=source)
-        sent_s = self._on_its_way_since(now)
-        if sent_s is not None and self._newest is not None and self._newest[:2] == (by, source):
-            _, _, said, answer = self._newest
-            self._note("STOP", said, answer.stop_id, sent=answer.sent, by=by, source=source, reason=reason)
+        sent_s = self._in_transit_since(now)
+        if sent_s is not None and self._last_stop is not None and self._last_stop[:2] == (by, source):
+            _, _, said, answer = self._last_stop
+            self._record("STOP", said, answer.stop_id, sent=answer.sent, by=by, source=source, reason=reason)
             return answer
         problem = self._send() if sent_s is None else None
-        number = guarded.latch.next_number(guarded.authority.last_stop_id, now.wall_ns)
-        guarded.authority, latched = lease_rules.stop(
-            guarded.authority, by=by, reason=reason, now=now, number=number
+        number = context.latch.next_number(context.authority.last_stop_id, now.wall_ns)
+        context.authority, latched = lease_rules.stop(
+            context.authority, by=by, reason=reason, now=now, number=number
         )
-        guarded.keep_latch()
-        guarded.cancel_preparing(codes.PROGRAM_STOPPED(by=by, reason=latched.reason))
+        context.write_latch()
+        context.cancel_preparing(codes.PROGRAM_STOPPED(by=by, reason=latched.reason))
         if problem is None:
-            guarded.authority = lease_rules.stop_sent(
-                guarded.authority, latched.id, sent_s or now.monotonic_s
+            context.authority = lease_rules.stop_sent(
+                context.authority, latched.id, sent_s or now.monotonic_s
             )
             said = codes.STOP_SENT(id=latched.id)
         else:
             said = codes.STOP_NOT_SENT(problem, id=latched.id)
-        guarded.on_change()
-        guarded.journal.say(
+        context.on_change()
+        context.journal.report(
             _S.ERROR if problem else _S.WARNING,
             "stop.latched",
             f"{said} ({by}: {latched.reason})",
@@ -149,60 +149,60 @@ class Stops:
             sent=not problem,
         )
         answer = _answer(said, latched.id, sent=problem is None)
-        self._newest = None if problem else (by, source, said, answer)
-        self._note(
+        self._last_stop = None if problem else (by, source, said, answer)
+        self._record(
             "STOP", said, latched.id, sent=problem is None, by=by, source=source, reason=latched.reason
         )
         return answer
 
     def _stop_of_read_only(self, *, by: str, reason: str, source: str) -> schema.StopAnswer:
         """Nothing is sent, and nothing latched: nobody could clear it, and nothing needs it."""
-        guarded = self._guarded
-        why = guarded.controller().read_only
+        context = self._context
+        why = context.controller().read_only
         assert why is not None
         said = codes.STOP_READ_ONLY(why)
-        guarded.journal.say(_S.ERROR, "stop.not_sent", f"{said} ({by}: {reason})", why=said, by=by)
+        context.journal.report(_S.ERROR, "stop.not_sent", f"{said} ({by}: {reason})", why=said, by=by)
         answer = _answer(said, 0, sent=False)
-        self._note("STOP", said, 0, sent=False, by=by, source=source, reason=reason)
+        self._record("STOP", said, 0, sent=False, by=by, source=source, reason=reason)
         return answer
 
     def send_latched_stop(self) -> None:
         """Send a latched stop (again)."""
-        guarded = self._guarded
-        latched = guarded.authority.stop
-        if latched is None or guarded.controller().read_only:
+        context = self._context
+        latched = context.authority.stop
+        if latched is None or context.controller().read_only:
             return
         if self._send() is None:
-            guarded.authority = lease_rules.stop_sent(
-                guarded.authority, latched.id, both_clocks().monotonic_s, first=True
+            context.authority = lease_rules.stop_sent(
+                context.authority, latched.id, read_clocks().monotonic_s, first=True
             )
-            guarded.on_change()
+            context.on_change()
             said = codes.STOP_SENT_AGAIN(id=latched.id)
-            guarded.journal.say(_S.WARNING, "stop.sent", said.text, why=said, stop_id=latched.id)
-            self._note_again(said, latched.id, sent=True)
+            context.journal.report(_S.WARNING, "stop.sent", said.text, why=said, stop_id=latched.id)
+            self._record_repeat(said, latched.id, sent=True)
 
     def check_heeded(self, *, moving: bool, now: Now) -> None:
         """A robot that goes on moving after its stop is told of, and told again."""
-        guarded = self._guarded
-        latched, first_s = guarded.authority.stop, guarded.authority.stopping_s
+        context = self._context
+        latched, first_s = context.authority.stop, context.authority.stopping_s
         if not moving or latched is None or first_s is None:
             return
-        if now.monotonic_s - max(first_s, self._told_disobeyed_s) < HEEDED_WITHIN_S:
+        if now.monotonic_s - max(first_s, self._disobeyed_reported_s) < HEED_TIMEOUT_S:
             return
-        self._told_disobeyed_s = now.monotonic_s
+        self._disobeyed_reported_s = now.monotonic_s
         problem = self._send()
         said = codes.STOP_DISOBEYED(problem or codes.STOP_UNIT_REPEATED(), id=latched.id)
-        guarded.journal.say(_S.CRITICAL, "stop.disobeyed", said.text, why=said, stop_id=latched.id)
-        self._note_again(said, latched.id, sent=problem is None)
+        context.journal.report(_S.CRITICAL, "stop.disobeyed", said.text, why=said, stop_id=latched.id)
+        self._record_repeat(said, latched.id, sent=problem is None)
 
-    def _note_again(self, said: Reason, stop_id: int, *, sent: bool) -> None:
+    def _record_repeat(self, said: Reason, stop_id: int, *, sent: bool) -> None:
         # By a name of its own: it latches nothing, so a start need not read it.
-        self._note("STOP_AGAIN", said, stop_id, sent=sent, by=GATEWAY, source=GATEWAY)
+        self._record("STOP_AGAIN", said, stop_id, sent=sent, by=GATEWAY, source=GATEWAY)
 
-    def _note(
+    def _record(
         self, request: str, said: Reason, stop_id: int, *, sent: bool, by: str, source: str, reason: str = ""
     ) -> None:
-        self._guarded.ledger.after_later(
+        self._context.audit_trail.write_later(
             entry_of(
                 request,
                 operator=by,
@@ -215,21 +215,21 @@ class Stops:
             )
         )
 
-    def _on_its_way_since(self, now: Now) -> float | None:
+    def _in_transit_since(self, now: Now) -> float | None:
         """When the latched stop's unit was sent (monotonic), if just now; no RESET came behind it."""
-        latched = self._guarded.authority.stop
+        latched = self._context.authority.stop
         if (
             latched is None
             or latched.sent_s is None
-            or self._guarded.controller().link.state is not LinkState.UP
+            or self._context.controller().link.state is not LinkState.UP
         ):
             return None
-        return latched.sent_s if now.monotonic_s - latched.sent_s < ON_ITS_WAY_S else None
+        return latched.sent_s if now.monotonic_s - latched.sent_s < IN_TRANSIT_S else None
 
     def _send(self) -> Reason | None:
         """Put the stop unit on the socket; return why that failed."""
         try:
-            self._guarded.send(self._guarded.driver.encode(Stop()))
+            self._context.send(self._context.driver.encode(Stop()))
         except (LinkError, CommandError) as error:
             return codes.STOP_SENT_LATER(error.reason)
         return None

@@ -47,11 +47,11 @@ class CodeTable:
     meanings: Mapping[int, Meaning]
     codes: Mapping[Meaning, int]
 
-    def can_say(self, word: str) -> bool:
+    def supports(self, word: str) -> bool:
         """Whether its controller knows a command: by name, or, where it knows codes only, by a code."""
         return not self.codes or Meaning(COMMAND) in self.codes or Meaning(COMMAND, word) in self.codes
 
-    def marks(self, word: str) -> tuple[bytes, ...]:
+    def command_markers(self, word: str) -> tuple[bytes, ...]:
         """What a unit that says a command holds, one at least: the word, or its code's digits."""
         code = self.codes.get(Meaning(COMMAND, word))
         return (word.encode(),) if code is None else (word.encode(), b"%d" % abs(code))

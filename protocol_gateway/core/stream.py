@@ -66,11 +66,11 @@ class UnitStream:
         self._offset = 0  # of the buffer's first byte
         self._lost = False  # past 64 KiB: skipping to the next "@"
 
-    def receive(self, data: bytes, holding: Collection[bytes] | None = None) -> list[StreamEvent]:
+    def receive(self, data: bytes, containing: Collection[bytes] | None = None) -> list[StreamEvent]:
         """Events of the next bytes; the same however they are cut.
 
         Args:
-            holding: Units without any of these are passed over unread, which costs next to nothing.
+            containing: Units without any of these are passed over unread, which costs next to nothing.
         """
         *ends, rest = data.split(TERMINATOR)
         events: list[StreamEvent] = []
@@ -81,7 +81,7 @@ class UnitStream:
                 self._buffer.clear()
             if self._lost:
                 self._lost = False
-            elif holding is None or any(each in unit for each in holding):
+            elif containing is None or any(each in unit for each in containing):
                 events.append(self._unit(unit, self._offset))
             self._offset += len(unit) + 1
         self._buffer += rest

@@ -86,7 +86,7 @@ class UnitDriver:
     @property
     def can_stop(self) -> bool:
         """Whether there is a stop unit: a controller of codes does not know the word `stop`."""
-        return self._table.can_say(_WORDS[Stop])
+        return self._table.supports(_WORDS[Stop])
 
     def connected(self) -> None:
         """Forget the unfinished unit of the connection before."""
@@ -98,7 +98,7 @@ class UnitDriver:
         for received in self._stream.receive(data):
             match received:
                 case Unit():
-                    self._take(received, events)
+                    self._read_unit(received, events)
                 case Malformed(offset, text, reason):
                     events.append(MalformedReceived(offset, text, reason))
         return events
@@ -116,7 +116,7 @@ class UnitDriver:
 
     # -------------------------------------------------------------- from the controller
 
-    def _take(self, unit: Unit, events: list[ControllerEvent]) -> None:
+    def _read_unit(self, unit: Unit, events: list[ControllerEvent]) -> None:
         positions: list[tuple[float, ...]] = []
         velocities: list[tuple[float, ...]] = []
         time_s: float | None = None
@@ -142,7 +142,7 @@ class UnitDriver:
         for si, velocity in zip_longest(positions, velocities[: len(positions)]):
             events.append(JointsReceived(si, velocity, time_s))
         for record in others:
-            _tell(record, unit, time_s, events)
+            _append_event(record, unit, time_s, events)
         if time_s is not None and not positions and not others:
             events.append(StatusReceived(controller_time_s=time_s))
 
@@ -155,9 +155,9 @@ class UnitDriver:
     def _record(self, command: ControllerCommand) -> Record:
         match command:
             case MoveAbsolute(positions):
-                return AbsolutePositions(self._legacy(positions))
+                return AbsolutePositions(self._protocol_values(positions))
             case MoveRelative(offsets):
-                return RelativePositions(self._legacy(offsets))
+                return RelativePositions(self._protocol_values(offsets))
             case Speed(percent):
                 return Command((f"speed={write_number(percent)}",))
             case Trace(on):
@@ -165,19 +165,19 @@ class UnitDriver:
             case _:
                 return Command((_WORDS[type(command)],))
 
-    def _legacy(self, values: Sequence[float]) -> tuple[float, ...]:
+    def _protocol_values(self, values: Sequence[float]) -> tuple[float, ...]:
         if len(values) != len(self._scales):
             raise CommandError(f"{len(values)} values for {len(self._scales)} joints")
         # Nine decimals are finer than any encoder, and keep pi/2 readable as 90.00.
         return tuple([round(value / scale, 9) for value, scale in zip(values, self._scales, strict=True)])
 
 
-def _tell(record: Record, unit: Unit, time_s: float | None, events: list[ControllerEvent]) -> None:
+def _append_event(record: Record, unit: Unit, time_s: float | None, events: list[ControllerEvent]) -> None:
     match record:
         case Error(number, text):
             events.append(Refused(number, one_line(text)))
         case Status(words):
-            said, unknown = _said(words)
+            said, unknown = _parse_status(words)
             events.append(StatusReceived(*said, time_s))
             if unknown:
                 events.append(UnknownReceived("STATUS", unknown, unit.data, time_s))
@@ -193,7 +193,7 @@ def _tell(record: Record, unit: Unit, time_s: float | None, events: list[Control
 
 # A controller says the same all day.
 @lru_cache(maxsize=64)
-def _said(
+def _parse_status(
     words: tuple[str, ...],
 ) -> tuple[tuple[Activity | None, Mode | None, bool, bool], tuple[str, ...]]:
     """What a status record says, and its words that say nothing known.

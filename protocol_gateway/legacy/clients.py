@@ -16,7 +16,7 @@ import os
 from protocol_gateway.audit.log import Outcome
 from protocol_gateway.control.audit_trail import entry_of
 from protocol_gateway.control.control import Control
-from protocol_gateway.control.stop_handler import Guarded
+from protocol_gateway.control.stop_handler import ControlContext
 from protocol_gateway.core.codes import CodeTable
 from protocol_gateway.core.records import Error, write_unit
 from protocol_gateway.core.stream import Malformed, StreamEvent, Unit, printable
@@ -38,23 +38,28 @@ from robots.joints import Joints
 
 _S = schema.Event.Severity
 # Those who came when there were too many are told so; when very many come, they are not.
-_MOST_TURNED_AWAY = 32
+_MOST_REJECTED = 32
 
 
 class LegacyClients:
     """All old client programs of one robot."""
 
     def __init__(
-        self, settings: LegacySettings, table: CodeTable, joints: Joints, control: Control, guarded: Guarded
+        self,
+        settings: LegacySettings,
+        table: CodeTable,
+        joints: Joints,
+        control: Control,
+        context: ControlContext,
     ) -> None:
         self._settings = settings
         self._table = table
         self._joints = joints
         self._control = control
-        self._guarded = guarded
-        self._journal = guarded.journal
+        self._context = context
+        self._journal = context.journal
         self._clients: dict[Client, Commander | None] = {}
-        self._turned_away: set[Client] = set()
+        self._rejected: set[Client] = set()
         self._ending: set[asyncio.Task[None]] = set()
         self._empty = asyncio.Event()
         self._listener: asyncio.Server | None = None
@@ -101,18 +106,18 @@ class LegacyClients:
                     client.answer(unit)
         elif self._clients:
             if not self._units:
-                asyncio.get_running_loop().call_soon(self._tell)
+                asyncio.get_running_loop().call_soon(self._send_states)
             self._units.append(unit)
 
-    def _tell(self) -> None:
+    def _send_states(self) -> None:
         *earlier, newest = self._units
         self._units.clear()
         for client in self._clients:
-            client.tell(newest, earlier=earlier)
+            client.send_state(newest, earlier=earlier)
 
     def link_is_down(self, why: str) -> None:
         """Close those who were told states, as the controller would: nobody may go on showing old ones."""
-        for client in [client for client in self._clients if client.told]:
+        for client in [client for client in self._clients if client.got_state]:
             client.close(self._error(FAULT, why))
 
     async def close(self) -> None:
@@ -120,9 +125,9 @@ class LegacyClients:
         self._closing = True
         if self._listener is not None:
             self._listener.close()
-        for client in [*self._clients, *self._turned_away]:
+        for client in [*self._clients, *self._rejected]:
             client.close(self._error(FAULT, "the gateway is being ended"))
-        while self._clients or self._turned_away:
+        while self._clients or self._rejected:
             self._empty.clear()
             await self._empty.wait()
         if self._ending:
@@ -130,24 +135,24 @@ class LegacyClients:
 
     # ----------------------------------------------------------------- of its clients
 
-    def joined(self, client: Client) -> None:
+    def client_connected(self, client: Client) -> None:
         """Take a client in, or turn it away."""
         if self._closing:
             client.abort()
             return
         operator = self._operator(client)
-        if len(self._clients) >= self._settings.most - self._kept_free(operator):
-            self._turn_away(client)
+        if len(self._clients) >= self._settings.most - self._reserved_places(operator):
+            self._reject(client)
             return
         self._clients[client] = self._commander(client, operator) if operator else None
         may = f"may command as {operator}" if operator else "reads"
         text = f"an old client program has come: {client.name} {may}, {len(self._clients)} in all"
-        self._journal.say(_S.INFO, "legacy.attached", text, client=client.name)
-        self._guarded.on_change()
+        self._journal.report(_S.INFO, "legacy.attached", text, client=client.name)
+        self._context.on_change()
 
-    def left(self, client: Client) -> None:
+    def client_disconnected(self, client: Client) -> None:
         """Forget a client; its control ends with it."""
-        self._turned_away.discard(client)
+        self._rejected.discard(client)
         if client in self._clients:
             commander = self._clients.pop(client)
             self._counts.states_skipped += client.skipped
@@ -157,15 +162,15 @@ class LegacyClients:
                 self._ending.add(task)
                 task.add_done_callback(self._ending.discard)
             text = f"an old client program has gone: {client.name}, {len(self._clients)} are left"
-            self._journal.say(_S.INFO, "legacy.gone", text, client=client.name)
-            self._guarded.on_change()
+            self._journal.report(_S.INFO, "legacy.gone", text, client=client.name)
+            self._context.on_change()
         self._empty.set()
 
-    def heard(self, client: Client, events: list[StreamEvent]) -> None:
+    def units_received(self, client: Client, events: list[StreamEvent]) -> None:
         """Do what a client's units ask for; a stop among them before all else."""
         if client not in self._clients:
             return
-        self.overheard(client, events)
+        self.stops_received(client, events)
         commander = self._clients[client]
         for event in events:
             if isinstance(event, Malformed):
@@ -176,19 +181,19 @@ class LegacyClients:
             if not asks_for_more(event.records):
                 continue
             if commander is not None:
-                commander.take(event)
+                commander.submit(event)
             else:
                 self._counts.units_refused += 1
                 refusal = Error(READ_ONLY, "read only: this address is not among the site file's commanders")
                 self._refuse(client, "", event, refusal, False)
 
-    def overheard(self, client: Client, events: list[StreamEvent]) -> None:
+    def stops_received(self, client: Client, events: list[StreamEvent]) -> None:
         """Stop if a unit asks for it: of anybody, also of one that is turned away or sends too much."""
         if any(isinstance(event, Unit) and asks_to_stop(event.records) for event in events):
             by = self._operator(client) or f"legacy {client.address[0]}"
             self._control.stop(by=by, reason="a stop unit", source=f"legacy {client.name}")
 
-    def outpaced(self, client: Client) -> None:
+    def client_throttled(self, client: Client) -> None:
         """Say to a client that what it sends is not done."""
         limits = self._settings.limits
         text = (
@@ -197,12 +202,12 @@ class LegacyClients:
         )
         client.answer(self._error(FAULT, text))
 
-    def gave_up(self, client: Client, why: str) -> None:
+    def client_dropped(self, client: Client, why: str) -> None:
         """A client is being closed by this end."""
         if client in self._clients:
             self._counts.closed += 1
             text = f"an old client program was closed: {client.name} {why}"
-            self._journal.say(_S.WARNING, "legacy.closed", text, client=client.name)
+            self._journal.report(_S.WARNING, "legacy.closed", text, client=client.name)
 
     # ------------------------------------------------------------------------- inside
 
@@ -211,7 +216,7 @@ class LegacyClients:
         host, _ = client.address
         return self._settings.commanders.get(plain_address(host), "")
 
-    def _kept_free(self, operator: str) -> int:
+    def _reserved_places(self, operator: str) -> int:
         """How many places are not for this client: readers leave one to the first that may command."""
         commanders = self._settings.commanders and not operator
         return int(bool(commanders) and not any(self._clients.values()))
@@ -219,14 +224,14 @@ class LegacyClients:
     def _new_client(self) -> Client:
         return Client(self, self._table, self._settings.limits)
 
-    def _turn_away(self, client: Client) -> None:
+    def _reject(self, client: Client) -> None:
         self._counts.turned_away += 1
         text = f"an old client program was turned away: {client.name}, {self._settings.most} are attached"
-        self._journal.say(_S.WARNING, "legacy.turned_away", text, client=client.name)
-        if len(self._turned_away) >= _MOST_TURNED_AWAY:
+        self._journal.report(_S.WARNING, "legacy.turned_away", text, client=client.name)
+        if len(self._rejected) >= _MOST_REJECTED:
             client.abort()
             return
-        self._turned_away.add(client)
+        self._rejected.add(client)
         client.close(self._error(TOO_MANY, "too many clients"))
 
     def _commander(self, client: Client, operator: str) -> Commander:
@@ -243,7 +248,7 @@ class LegacyClients:
 
     def _malformed(self, client: Client, malformed: Malformed) -> None:
         self._counts.units_refused += 1
-        self._journal.say(
+        self._journal.report(
             _S.WARNING,
             "legacy.malformed",
             f"a unit of the old client program {client.name} is malformed: {malformed.reason}",
@@ -265,7 +270,7 @@ class LegacyClients:
 
     def _write_down(self, client: Client, operator: str, unit: str, error: Error) -> None:
         host, _ = client.address
-        self._guarded.ledger.after_later(
+        self._context.audit_trail.write_later(
             entry_of(
                 "UNIT",
                 operator=operator or f"legacy {host}",

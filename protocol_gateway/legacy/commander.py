@@ -58,7 +58,7 @@ class Commander:
         self._waiting: deque[tuple[Unit, float]] = deque()
         self._work: asyncio.Task[None] | None = None
         self._renewal: asyncio.Task[None] | None = None
-        self._gone: Reason | None = None
+        self._end_reason: Reason | None = None
 
     @property
     def in_control(self) -> bool:
@@ -72,7 +72,7 @@ class Commander:
             self._renewed_s = now_s
             self._renewal = asyncio.create_task(self._renew())
 
-    def take(self, unit: Unit) -> None:
+    def submit(self, unit: Unit) -> None:
         """Do what a unit asks for, after those before it."""
         if len(self._waiting) >= _MOST_WAITING:
             self._refuse(unit, Error(FAULT, f"{_MOST_WAITING} units of yours wait: send fewer"), False)
@@ -83,7 +83,7 @@ class Commander:
 
     def end(self, why: Reason) -> None:
         """Its connection has ended: so has its control."""
-        self._gone = why
+        self._end_reason = why
         self._waiting.clear()
         if self.in_control:
             self._control.leases.end(why)
@@ -100,21 +100,21 @@ class Commander:
 
     async def _do_all(self) -> None:
         while self._waiting:
-            unit, heard_s = self._waiting.popleft()
-            requests = self._requests(unit, heard_s)
+            unit, received_s = self._waiting.popleft()
+            requests = self._requests(unit, received_s)
             if isinstance(requests, Error):
                 self._refuse(unit, requests, False)
             elif requests:
                 await self._do(unit, requests)
 
-    def _requests(self, unit: Unit, heard_s: float) -> Sequence[CommandRequest] | Error:
+    def _requests(self, unit: Unit, received_s: float) -> Sequence[CommandRequest] | Error:
         requests = requests_of(unit.records, self._joints)
         if isinstance(requests, Error):
             return requests
-        waited_s = time.monotonic() - heard_s
+        waited_s = time.monotonic() - received_s
         for request in requests:
             if request.command == _RESET:
-                stop = stop_to_reset(self._control.authority, heard_s)
+                stop = stop_to_reset(self._control.authority, received_s)
                 if isinstance(stop, Error):
                     return stop
                 request.stop_id = stop
@@ -128,8 +128,8 @@ class Commander:
         except RefusedError as error:
             self._refuse(unit, Error(READ_ONLY, str(error)), True)
             return
-        if self._gone is not None:
-            self.end(self._gone)
+        if self._end_reason is not None:
+            self.end(self._end_reason)
             return
         for request in requests:
             self._last_id += 1

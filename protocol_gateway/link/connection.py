@@ -20,7 +20,7 @@ READ_BYTES = 16 * 1024
 # What we wrote and the controller's host has not acknowledged for this long breaks the connection.
 _UNACKNOWLEDGED_MS = 3000
 # How long a controller that goes on sending has to take what was sent to it last.
-_LAST_WORD_S = 0.1
+_FINAL_SEND_S = 0.1
 # Of Linux's `struct tcp_info`: tcpi_rtt, microseconds, smoothed.
 _ROUND_TRIP_AT = 68
 
@@ -30,8 +30,10 @@ class Connection(asyncio.BufferedProtocol):
 
     _transport: asyncio.Transport
 
-    def __init__(self, made: Callable[["Connection"], None], receive: Callable[[bytes], None]) -> None:
-        self._made = made
+    def __init__(
+        self, on_connected: Callable[["Connection"], None], receive: Callable[[bytes], None]
+    ) -> None:
+        self._on_connected = on_connected
         self._receive = receive
         loop = asyncio.get_running_loop()
         self.lost: asyncio.Future[str] = loop.create_future()
@@ -49,7 +51,7 @@ class Connection(asyncio.BufferedProtocol):
             send_buffer_bytes=_SEND_BUFFER_BYTES,
             unacknowledged_ms=_UNACKNOWLEDGED_MS,
         )
-        self._guarded(lambda: self._made(self))
+        self._call_or_fail(lambda: self._on_connected(self))
 
     def get_buffer(self, sizehint: int) -> bytearray:
         """Called by asyncio: where bytes are to be put."""
@@ -58,7 +60,7 @@ class Connection(asyncio.BufferedProtocol):
     def buffer_updated(self, nbytes: int) -> None:
         """Called by asyncio: so many bytes came."""
         data = bytes(memoryview(self._buffer)[:nbytes])
-        self._guarded(lambda: self._receive(data))
+        self._call_or_fail(lambda: self._receive(data))
 
     def connection_lost(self, error: Exception | None) -> None:
         """Called by asyncio: it has ended."""
@@ -92,7 +94,7 @@ class Connection(asyncio.BufferedProtocol):
 
     def later(self, seconds: float, call: Callable[[], None]) -> asyncio.TimerHandle:
         """Call something then; bad code in it ends the link, as it would from `receive`."""
-        return asyncio.get_running_loop().call_later(seconds, self._guarded, call)
+        return asyncio.get_running_loop().call_later(seconds, self._call_or_fail, call)
 
     def give_up(self, why: str) -> None:
         """End it now, for a reason of ours in words."""
@@ -123,12 +125,12 @@ class Connection(asyncio.BufferedProtocol):
             if not self._transport.is_closing():
                 with contextlib.suppress(OSError):  # the controller was faster
                     self._transport.write_eof()
-                await asyncio.wait([self._closed], timeout=_LAST_WORD_S)
+                await asyncio.wait([self._closed], timeout=_FINAL_SEND_S)
         finally:
             self._transport.abort()
         await self._closed
 
-    def _guarded(self, call: Callable[[], None]) -> None:
+    def _call_or_fail(self, call: Callable[[], None]) -> None:
         """Bad code ends `run` with its own exception; asyncio would only log it."""
         try:
             call()

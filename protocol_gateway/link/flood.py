@@ -25,39 +25,39 @@ _CALM_BYTES = 1 << 18
 _HOLD_S = 0.005
 
 
-class Flood:
+class FloodDetector:
     """Whether far more comes than a controller sends.
 
     Attributes:
-        on: More than 2,000 units a second came, and no calm half second since.
+        active: More than 2,000 units a second came, and no calm half second since.
         deluge: So much came that nothing of it can be taken, and it has not ended yet.
     """
 
     def __init__(self) -> None:
-        self.on = self.deluge = False
+        self.active = self.deluge = False
         self._begin_s = 0.0
         self._units = self._bytes = 0
         self._more_waited = False
 
-    def came(self, length: int, now_s: float, *, more_waits: bool) -> None:
+    def add_bytes(self, length: int, now_s: float, *, more_waits: bool) -> None:
         """Bytes came, and are not parsed yet; `more_waits`: there may be more behind them."""
         if now_s - self._begin_s >= _BIN_S:
             self.deluge = self.deluge and (more_waits or self._more_waited or self._bytes > _CALM_BYTES)
-            self.on = self.deluge or (self.on and self._units >= _CALM_UNITS)
+            self.active = self.deluge or (self.active and self._units >= _CALM_UNITS)
             self._begin_s, self._units, self._bytes, self._more_waited = now_s, 0, 0, False
         self._bytes += length
         self._more_waited = self._more_waited or more_waits
         self.deluge = self.deluge or self._bytes > _MOST_BYTES
-        self.on = self.on or self.deluge
+        self.active = self.active or self.deluge
 
-    def count(self, units: int) -> None:
+    def add_units(self, units: int) -> None:
         """Of the bytes that came last, so many units were read."""
         self._units += units
-        self.on = self.on or self._units > _MOST_UNITS
+        self.active = self.active or self._units > _MOST_UNITS
         self.deluge = self.deluge or self._units > _MOST_READ_UNITS
 
 
-class HandOver:
+class EventDispatcher:
     """Hands over what came: all of it at once; of too much the newest of each kind, within 5 ms.
 
     Args:
@@ -66,7 +66,7 @@ class HandOver:
 
     Attributes:
         flood: To be told of what comes.
-        left_out: So many positions, for newer ones.
+        skipped: So many positions, for newer ones.
     """
 
     def __init__(
@@ -74,55 +74,55 @@ class HandOver:
         on_event: Callable[[ControllerEvent, Received], None],
         later: Callable[[float, Callable[[], None]], asyncio.TimerHandle],
     ) -> None:
-        self.flood = Flood()
-        self.left_out = 0
+        self.flood = FloodDetector()
+        self.skipped = 0
         self._on_event = on_event
         self._later = later
-        self._held: dict[Hashable, Callable[[], None]] = {}
+        self._deferred: dict[Hashable, Callable[[], None]] = {}
         self._timer: asyncio.TimerHandle | None = None
 
-    def give(self, events: Sequence[ControllerEvent], dates: Sequence[Received], *, burst: bool) -> None:
+    def dispatch(self, events: Sequence[ControllerEvent], dates: Sequence[Received], *, burst: bool) -> None:
         """Hand over what was read at once; `burst`: it may have been held back on the way."""
         if burst:
-            self._put_off()
-        elif not self.flood.on:
-            self._do_all()
+            self._restart_timer()
+        elif not self.flood.active:
+            self._flush()
         for event, date in zip(events, dates, strict=True):
-            if self.flood.on or (burst and _nobody_dates(event)):
-                older = self.hold(_kind(event), partial(self._on_event, event, date))
+            if self.flood.active or (burst and _is_undated_state(event)):
+                older = self.defer(_kind(event), partial(self._on_event, event, date))
             else:
-                older = self._held.pop(_kind(event), None) is not None
+                older = self._deferred.pop(_kind(event), None) is not None
                 self._on_event(event, date)
-            self.left_out += older and isinstance(event, JointsReceived)
+            self.skipped += older and isinstance(event, JointsReceived)
 
-    def hold(self, kind: Hashable, call: Callable[[], None]) -> bool:
+    def defer(self, kind: Hashable, call: Callable[[], None]) -> bool:
         """Do it soon, unless something newer of its kind comes; whether it is in an older one's place."""
-        older = self._held.pop(kind, None)
-        self._held[kind] = call
+        older = self._deferred.pop(kind, None)
+        self._deferred[kind] = call
         if self._timer is None:
-            self._timer = self._later(_HOLD_S, self._do_all)
+            self._timer = self._later(_HOLD_S, self._flush)
         return older is not None
 
     def forget(self) -> None:
         """Hand over nothing of what is held."""
-        self._held = {}
+        self._deferred = {}
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
 
-    def _put_off(self) -> None:
+    def _restart_timer(self) -> None:
         if self._timer is not None:
             self._timer.cancel()
-            self._timer = self._later(_HOLD_S, self._do_all)
+            self._timer = self._later(_HOLD_S, self._flush)
 
-    def _do_all(self) -> None:
-        held = self._held
+    def _flush(self) -> None:
+        held = self._deferred
         self.forget()
         for call in held.values():
             call()
 
 
-def _nobody_dates(event: ControllerEvent) -> bool:
+def _is_undated_state(event: ControllerEvent) -> bool:
     """Whether an event tells the arm's state, and not of what time."""
     return isinstance(event, JointsReceived | StatusReceived) and event.controller_time_s is None
 

@@ -59,7 +59,7 @@ class Arrivals:
         return spans_s[(len(spans_s) - 1) * 99 // 100] - spans_s[len(spans_s) // 2]
 
 
-class Losses:
+class LossCounter:
     """Units that never came: gaps in the controller's clock, where it beats regularly.
 
     Judged by twenty and more units at once, so that a unit told late is not taken for a lost one.
@@ -76,7 +76,7 @@ class Losses:
         """What comes next is no continuation."""
         self._times_s.clear()
 
-    def see(self, controller_time_s: float) -> None:
+    def add(self, controller_time_s: float) -> None:
         """A unit came; of one that gives several events, each may say so."""
         times_s = self._times_s
         if times_s and not 0.0 <= controller_time_s - times_s[-1] < _LONGEST_GAP_S:
@@ -97,7 +97,7 @@ def _missing(times_s: Sequence[float]) -> int:
     return max(0, int((times_s[-1] - times_s[0]) / period_s - len(spans_s) + 0.25))
 
 
-class Answers:
+class ResponseTimer:
     """How soon the controller shows that it got a command: a refusal, or a status that changes.
 
     Attributes:
@@ -109,11 +109,11 @@ class Answers:
         self._sent_s: float | None = None
         self._status: StatusReceived | None = None
 
-    def sent(self, now_s: float) -> None:
+    def command_sent(self, now_s: float) -> None:
         """A command is on the socket."""
         self._sent_s = now_s
 
-    def see(self, event: ControllerEvent, now_s: float) -> None:
+    def event_received(self, event: ControllerEvent, now_s: float) -> None:
         """The controller told something."""
         before = self._status
         if isinstance(event, StatusReceived):

@@ -34,10 +34,10 @@ from protocol_gateway.drivers.driver import (
 )
 from protocol_gateway.errors import LinkDownError
 from protocol_gateway.link.connection import READ_BYTES, Connection, reason_of
-from protocol_gateway.link.flood import Flood, HandOver
-from protocol_gateway.link.health import Answers, Arrivals, LinkHealth, Losses
+from protocol_gateway.link.flood import EventDispatcher, FloodDetector
+from protocol_gateway.link.health import Arrivals, LinkHealth, LossCounter, ResponseTimer
 from protocol_gateway.link.status import LinkState, LinkStatus
-from protocol_gateway.link.timestamping import Dating, Received
+from protocol_gateway.link.timestamping import Received, Timestamper
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robomesh.wall_clock import WallClock
@@ -123,12 +123,12 @@ class ControllerLink:
         self._unusable: tuple[float, Reason, str] | None = (
             None  # when such came last, why, and the event's code
         )
-        self._dating = Dating()
+        self._timestamper = Timestamper()
         self._arrivals = Arrivals()
-        self._losses = Losses()
-        self._answers = Answers()
-        self._handing = HandOver(on_event, self._later)
-        self._wanted = asyncio.Event()  # something could not be sent
+        self._losses = LossCounter()
+        self._response_timer = ResponseTimer()
+        self._dispatcher = EventDispatcher(on_event, self._later)
+        self._send_failed = asyncio.Event()  # something could not be sent
 
     @property
     def status(self) -> LinkStatus:
@@ -141,7 +141,7 @@ class ControllerLink:
         return LinkCounters(
             units_received=self._driver.units_received,
             units_lost=self._losses.lost,
-            units_skipped=self._handing.left_out,
+            units_skipped=self._dispatcher.skipped,
             **self._counts,
         )
 
@@ -161,7 +161,7 @@ class ControllerLink:
         return LinkHealth(
             jitter_s=self._arrivals.jitter_s(self._monotonic_s()),
             network_round_trip_s=self._connection.round_trip_s if self._connection else None,
-            answer_s=self._answers.answer_s,
+            answer_s=self._response_timer.answer_s,
         )
 
     async def run(self) -> None:
@@ -177,12 +177,12 @@ class ControllerLink:
         """Pause between two attempts; not for long while something waits to be sent."""
         # Spread: the gateways of a hall must not all knock on a restarted controller at once.
         spread = random.uniform(0.8, 1.2)
-        if self._wanted.is_set():
+        if self._send_failed.is_set():
             await asyncio.sleep(_FIRST_PAUSE_S * spread)
             return
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(pause_s * spread):
-                await self._wanted.wait()
+                await self._send_failed.wait()
 
     def send(self, data: bytes) -> None:
         """Write a whole unit to the socket, now. Nothing is ever queued, so nothing goes before it.
@@ -195,20 +195,20 @@ class ControllerLink:
             LinkDownError: If there is no connection.
             LinkCloggedError: If the socket does not take it whole; the connection is given up then.
         """
-        self._wanted.set()
+        self._send_failed.set()
         if self._connection is None:
             raise LinkDownError(self._status.reason)
         self._connection.write(data)
-        self._wanted.clear()
+        self._send_failed.clear()
         self._counts["units_sent"] += 1
         self._counts["bytes_sent"] += len(data)
-        self._answers.sent(self._monotonic_s())
+        self._response_timer.command_sent(self._monotonic_s())
 
-    def thins(self, kind: Hashable, call: Callable[[], None]) -> bool:
+    def defer_in_flood(self, kind: Hashable, call: Callable[[], None]) -> bool:
         """Whether there is a flood: then the newest of each kind is done, 200 times a second."""
-        if self._handing.flood.on:
-            self._handing.hold(kind, call)
-        return self._handing.flood.on
+        if self._dispatcher.flood.active:
+            self._dispatcher.defer(kind, call)
+        return self._dispatcher.flood.active
 
     async def _attempt(self) -> bool:
         """One connection, from the attempt to its end; whether units came over it."""
@@ -216,13 +216,15 @@ class ControllerLink:
         try:
             async with asyncio.timeout(self._settings.connect_timeout_s):
                 _, connection = await loop.create_connection(
-                    lambda: Connection(self._made, self._receive), self._settings.host, self._settings.port
+                    lambda: Connection(self._on_connected, self._receive),
+                    self._settings.host,
+                    self._settings.port,
                 )
         except TimeoutError:
-            self._tell(LinkState.DOWN, codes.LINK_NO_ANSWER(where=self._where))
+            self._set_status(LinkState.DOWN, codes.LINK_NO_ANSWER(where=self._where))
             return False
         except OSError as error:
-            self._tell(LinkState.DOWN, codes.LINK_FAILED(where=self._where, detail=reason_of(error)))
+            self._set_status(LinkState.DOWN, codes.LINK_FAILED(where=self._where, detail=reason_of(error)))
             return False
         units_before = self._driver.units_received
         reason = codes.LINK_CLOSED()
@@ -230,9 +232,9 @@ class ControllerLink:
             reason = await self._watch(connection)
         finally:
             self._connection = None
-            self._handing.forget()
+            self._dispatcher.forget()
             await connection.end()
-            self._tell(LinkState.DOWN, reason)
+            self._set_status(LinkState.DOWN, reason)
         came = self._driver.units_received > units_before
         return came and not self._refusal
 
@@ -256,16 +258,16 @@ class ControllerLink:
             return codes.LINK_REFUSED(where=self._where, detail=self._refusal)
         return codes.LINK_LOST(where=self._where, detail=end)
 
-    def _made(self, connection: Connection) -> None:
+    def _on_connected(self, connection: Connection) -> None:
         self._driver.connected()
-        self._dating.connected()
+        self._timestamper.connected()
         self._losses.forget()
-        self._handing.flood = Flood()
+        self._dispatcher.flood = FloodDetector()
         self._unusable = None
         self._connection = connection
         self._refusal = ""
         self._counts["connections"] += 1
-        self._tell(LinkState.SILENT, codes.LINK_NO_UNIT(where=self._where))
+        self._set_status(LinkState.SILENT, codes.LINK_NO_UNIT(where=self._where))
 
     def _later(self, seconds: float, call: Callable[[], None]) -> asyncio.TimerHandle:
         assert self._connection is not None
@@ -283,7 +285,7 @@ class ControllerLink:
             self._arrivals.count(units, now.monotonic_s)
         for event in events:
             self._count(event, now.monotonic_s)
-        self._handing.flood.count(max(units, len(events)))
+        self._dispatcher.flood.add_units(max(units, len(events)))
         other_joints = self._sends_other_joints(now.monotonic_s)
         if other_joints:
             # The link says so, once; which of the positions are this robot's is not known.
@@ -291,23 +293,23 @@ class ControllerLink:
             self._fall_silent()
         for event in events:
             self._note_losses(event)
-        dates = self._dating.dates(events, now)
+        dates = self._timestamper.timestamps(events, now)
         if units > self._driver.refusals_received - refusals_before and not other_joints:
             self._refusal, self._unusable = "", None
-            self._alive(max(dates, key=lambda date: date.monotonic_s, default=now), now)
+            self._unit_received(max(dates, key=lambda date: date.monotonic_s, default=now), now)
         elif not units and self._unusable is not None and self._status.state is LinkState.SILENT:
             self._fall_silent()
             return  # said once, not again for each unit
-        if self._handing.flood.on is not self._status.flooding:
-            self._tell(self._status.state, self._status.reason, self._status.code)
-        self._handing.give(events, dates, burst=self._dating.after_gap(now.monotonic_s))
+        if self._dispatcher.flood.active is not self._status.flooding:
+            self._set_status(self._status.state, self._status.reason, self._status.code)
+        self._dispatcher.dispatch(events, dates, burst=self._timestamper.after_gap(now.monotonic_s))
 
     def _is_deluge(self, length: int, now_s: float) -> bool:
         """Whether bytes are thrown away unread: they are far too many. A stop gets through all the same."""
-        before = self._handing.flood.deluge
+        before = self._dispatcher.flood.deluge
         more_waits = length == READ_BYTES
-        self._handing.flood.came(length, now_s, more_waits=more_waits)
-        if self._handing.flood.deluge:
+        self._dispatcher.flood.add_bytes(length, now_s, more_waits=more_waits)
+        if self._dispatcher.flood.deluge:
             assert self._connection is not None
             self._connection.pause(_DELUGE_EACH_S)
             self._unusable = now_s, codes.LINK_DELUGE(where=self._where), "link.deluge"
@@ -315,7 +317,7 @@ class ControllerLink:
         elif before:
             self._driver.connected()
             self._losses.forget()
-        return before or self._handing.flood.deluge
+        return before or self._dispatcher.flood.deluge
 
     def _sends_other_joints(self, now_s: float) -> bool:
         """Return whether a unit of another joint count came within the stale time."""
@@ -325,35 +327,35 @@ class ControllerLink:
 
     def _fall_silent(self) -> None:
         if self._unusable is None:
-            self._handing.flood = Flood()
-            self._tell(LinkState.SILENT, codes.LINK_NO_DATA(where=self._where))
+            self._dispatcher.flood = FloodDetector()
+            self._set_status(LinkState.SILENT, codes.LINK_NO_DATA(where=self._where))
         else:
             _, reason, code = self._unusable
-            self._tell(LinkState.SILENT, reason, code)
+            self._set_status(LinkState.SILENT, reason, code)
 
     def _now(self) -> Received:
         if self._wall_clock.was_set():
-            self._dating.wall_clock_was_set()
+            self._timestamper.wall_clock_was_set()
         now_s = self._monotonic_s()
         return Received(now_s, self._wall_clock.earliest_ns(round(now_s * 1e9)))
 
     def _note_losses(self, event: ControllerEvent) -> None:
         if isinstance(event, JointsReceived | StatusReceived):
-            if self._handing.flood.on:
+            if self._dispatcher.flood.active:
                 self._losses.forget()
             elif event.controller_time_s is not None:
-                self._losses.see(event.controller_time_s)
+                self._losses.add(event.controller_time_s)
 
-    def _alive(self, newest: Received, now: Received) -> None:
+    def _unit_received(self, newest: Received, now: Received) -> None:
         self._last_received = newest
         old = now.monotonic_s - newest.monotonic_s >= self._settings.stale_after_s
         if not old and self._status.state is not LinkState.UP:
-            self._tell(LinkState.UP, codes.LINK_CONNECTED(where=self._where))
+            self._set_status(LinkState.UP, codes.LINK_CONNECTED(where=self._where))
 
     def _count(self, event: ControllerEvent, now_s: float) -> None:
         match event:
             case StatusReceived():
-                self._answers.see(event, now_s)
+                self._response_timer.event_received(event, now_s)
             case MalformedReceived():
                 self._counts["units_malformed"] += 1
                 if event.joint_count:
@@ -362,13 +364,13 @@ class ControllerLink:
             case UnknownReceived():
                 self._counts["records_unknown"] += 1
             case Refused(_, text):
-                self._answers.see(event, now_s)
+                self._response_timer.event_received(event, now_s)
                 self._counts["refusals"] += 1
                 if self._status.state is not LinkState.UP:
                     self._refusal = text
 
-    def _tell(self, state: LinkState, reason: Reason, code: str = "") -> None:
-        flooding = self._handing.flood.on and state is not LinkState.DOWN
+    def _set_status(self, state: LinkState, reason: Reason, code: str = "") -> None:
+        flooding = self._dispatcher.flood.active and state is not LinkState.DOWN
         status = LinkStatus(state, reason, code, flooding)
         if status == self._status:
             return

@@ -37,7 +37,7 @@ class LinkStatus:
         return self.reason.text
 
 
-def news(before: LinkStatus, after: LinkStatus) -> list[tuple[Event.Severity, str, str]]:
+def transition_events(before: LinkStatus, after: LinkStatus) -> list[tuple[Event.Severity, str, str]]:
     """Severity, code and text of the events that tell a change; none where only words changed."""
     said: list[tuple[Event.Severity, str, str]] = []
     if before.state is not after.state or after.code not in ("", before.code):

@@ -63,7 +63,7 @@ class Received:
     clock: int = 0
 
 
-class Dating:
+class Timestamper:
     """Time stamps of one link's events."""
 
     def __init__(self) -> None:
@@ -91,7 +91,7 @@ class Dating:
         """Begin another clock: the gateway's own was set."""
         self._clock += 1
 
-    def dates(self, events: Sequence[ControllerEvent], now: Received) -> list[Received]:
+    def timestamps(self, events: Sequence[ControllerEvent], now: Received) -> list[Received]:
         """Return when each event of a read was new: now, or earlier.
 
         Args:

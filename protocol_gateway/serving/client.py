@@ -1,10 +1,10 @@
-"""One TCP client of whoever serves units, a controller or the gateway: read at its rate, never waited for.
+"""One TCP client of a server of units (a simulated controller or the gateway), with its limits.
 
-    keeps up --socket full--> behind: the newest state alone is kept --socket empty--> sent, keeps up
-    heard    --over its limits--> overheard: nothing but a stop counts --for a second or two--> heard
-    behind for 5 s, or over its limits for 5 s --> given up, overheard to the last
+    keeps up   --socket full--> behind: only the newest state is kept --socket empty--> sent, keeps up
+    all units  --over its limits--> stops only --for a second or two--> all units
+    behind for 5 s, or over its limits for 5 s --> dropped; its stops are read until the end
 
-A client's trouble costs its server one unit of memory, and no time.
+A slow client costs its server the memory of one unit, and no time.
 """
 
 import asyncio
@@ -17,44 +17,47 @@ from protocol_gateway.core.stream import StreamEvent, UnitStream
 from protocol_gateway.serving.rate_limit import Budget, Limits
 from protocol_gateway.sockets import configure
 
-# Small, so that a client that does not read is noticed before it is given old states for minutes.
+# Small: the server must notice a client that does not read, instead of filling its buffer with old states.
 _SEND_BUFFER_BYTES = 16 * 1024
 _ANSWERS_BYTES = 64 * 1024
 _PATIENCE_S = 5.0
-# A piece of this size holds so few units that nobody waits for its parsing.
+# A chunk of this size holds so few units that its parsing delays no other client.
 _READ_BYTES = 1024
-# A host that vanished is noticed in seconds, and not before one that only does not read is given up in words.
+# Longer than _PATIENCE_S: a client that only does not read is dropped with its reason before this timeout.
 _UNACKNOWLEDGED_MS = 6000
-_LAST_WORD_S = 0.5
-# Who is overheard is read at 200 KiB/s.
-_NEXT_PIECE_S = 0.005
+_FINAL_SEND_S = 0.5
+# Between reads of a throttled client: 200 KiB/s.
+_STOPS_ONLY_PAUSE_S = 0.005
 
 
 class Server(Protocol):
-    """What a client needs of its server."""
+    """Callbacks of a client's server."""
 
-    def joined(self, client: "Client") -> None:
-        """A client has come."""
+    def client_connected(self, client: "Client") -> None:
+        """Handle a new connection."""
         ...
 
-    def left(self, client: "Client") -> None:
-        """It has gone."""
+    def client_disconnected(self, client: "Client") -> None:
+        """Handle the end of a connection."""
         ...
 
-    def heard(self, client: "Client", events: list[StreamEvent]) -> None:
-        """It sent units, or what should have been some."""
+    def units_received(self, client: "Client", events: list[StreamEvent]) -> None:
+        """Handle units, or malformed bytes."""
         ...
 
-    def overheard(self, client: "Client", events: list[StreamEvent]) -> None:
-        """As `heard`, of one that is over its limits, turned away or given up: nothing but a stop counts."""
+    def stops_received(self, client: "Client", events: list[StreamEvent]) -> None:
+        """Handle units that may hold a stop, from a client that is throttled or being closed.
+
+        The server ignores everything else in them.
+        """
         ...
 
-    def outpaced(self, client: "Client") -> None:
-        """It is over its limits."""
+    def client_throttled(self, client: "Client") -> None:
+        """Handle a client that exceeds its limits."""
         ...
 
-    def gave_up(self, client: "Client", why: str) -> None:
-        """It is being closed by this end, for the reason in words; `left` follows."""
+    def client_dropped(self, client: "Client", why: str) -> None:
+        """Report that this end closes the connection, and why; `client_disconnected` follows."""
         ...
 
 
@@ -62,11 +65,11 @@ class Client(asyncio.BufferedProtocol):
     """A client's connection.
 
     Args:
-        limits: Of what it may send; None: it may send what it likes.
+        limits: Rate limits for the client; None: no limits.
 
     Attributes:
-        told: It was told a state.
-        skipped: States that it was not told, because newer ones came before it had read.
+        got_state: A state was sent to the client.
+        skipped: States that were not sent, because newer ones replaced them before the client had read.
     """
 
     _transport: asyncio.Transport
@@ -74,76 +77,76 @@ class Client(asyncio.BufferedProtocol):
     def __init__(self, server: Server, table: CodeTable, limits: Limits | None = None) -> None:
         self._server = server
         self._stream = UnitStream(table)
-        self._stop = table.marks("stop")
+        self._stop_markers = table.command_markers("stop")
         self._loop = asyncio.get_running_loop()
         self._budget = None if limits is None else Budget(limits, self._loop.time())
-        self._read = bytearray(_READ_BYTES)
+        self._read_buffer = bytearray(_READ_BYTES)
         self._newest = b""
         self._patience: asyncio.TimerHandle | None = None  # while it is behind
-        self._pause: asyncio.TimerHandle | None = None  # until its next piece is read
+        self._pause: asyncio.TimerHandle | None = None  # until the next read
         self._end: asyncio.TimerHandle | None = None  # while it is being closed
         self._closing = False
-        self._overheard_until_s = 0.0
-        self.told = False
+        self._stops_only_until_s = 0.0
+        self.got_state = False
         self.skipped = 0
 
     # ---------------------------------------------------------------- called by asyncio
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """The connection stands."""
+        """Configure the socket of a new connection."""
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
-        # What is not in the socket is behind.
+        # The client is behind as soon as the socket does not take everything.
         transport.set_write_buffer_limits(high=0)
         configure(
             transport.get_extra_info("socket"),
             send_buffer_bytes=_SEND_BUFFER_BYTES,
             unacknowledged_ms=_UNACKNOWLEDGED_MS,
         )
-        self._server.joined(self)
+        self._server.client_connected(self)
 
     def connection_lost(self, error: Exception | None) -> None:
-        """It has ended."""
+        """Cancel the timers and notify the server."""
         self._cancel_timers()
-        self._server.left(self)
+        self._server.client_disconnected(self)
 
     def get_buffer(self, sizehint: int) -> bytearray:
-        """Where the next bytes go."""
-        return self._read
+        """Return the buffer for the next bytes."""
+        return self._read_buffer
 
     def buffer_updated(self, count: int) -> None:
-        """Bytes came."""
-        now_s, data = self._loop.time(), bytes(self._read[:count])
-        if self._closing or now_s < self._overheard_until_s:
-            self._overhear(data)
+        """Parse received bytes, within the client's limits."""
+        now_s, data = self._loop.time(), bytes(self._read_buffer[:count])
+        if self._closing or now_s < self._stops_only_until_s:
+            self._read_stops_only(data)
             return
         events = self._stream.receive(data)
         if events:
-            self._server.heard(self, events)
+            self._server.units_received(self, events)
         if self._budget is None or self._closing:
             return
         over_s = self._budget.spend(units=len(events), length=count, now_s=now_s)
         if over_s and self._budget.is_flood(now_s):
-            self._server.gave_up(self, "sends more than it may")
+            self._server.client_dropped(self, "sends more than it may")
             self.close()
         elif over_s:
-            self._overheard_until_s = now_s + over_s
-            self._server.outpaced(self)
+            self._stops_only_until_s = now_s + over_s
+            self._server.client_throttled(self)
 
     def pause_writing(self) -> None:
-        """The socket is full."""
+        """Start the timeout of a client that does not read: the socket is full."""
         if not self._closing:
-            self._patience = self._loop.call_later(_PATIENCE_S, self._give_up)
+            self._patience = self._loop.call_later(_PATIENCE_S, self._drop)
 
     def resume_writing(self) -> None:
-        """The socket has taken everything."""
+        """Send the newest state: the socket has taken everything."""
         if self._patience is not None:
             self._patience.cancel()
             self._patience = None
-        # Not from here: when a write fails inside this call, asyncio ends the connection twice.
-        self._loop.call_soon(self._tell_newest)
+        # Deferred, because asyncio ends the connection twice when a write fails inside this callback.
+        self._loop.call_soon(self._send_newest)
 
-    def _tell_newest(self) -> None:
+    def _send_newest(self) -> None:
         if self._patience is None:
             unit, self._newest = self._newest, b""
             self._write(unit)
@@ -152,26 +155,26 @@ class Client(asyncio.BufferedProtocol):
 
     @property
     def address(self) -> tuple[str, int]:
-        """Its host and port."""
+        """Host and port of the client."""
         host, port, *_ = self._transport.get_extra_info("peername") or ("0.0.0.0", 0)
         return host, port
 
     @property
     def name(self) -> str:
-        """Its address, for logs."""
+        """Address of the client, for logs."""
         host, port = self.address
         return f"{host}:{port}"
 
-    def tell(self, unit: bytes, cut: int = 0, *, earlier: Sequence[bytes] = ()) -> None:
-        """Send the newest state; a client that has not read the one before gets it when it has.
+    def send_state(self, unit: bytes, cut: int = 0, *, earlier: Sequence[bytes] = ()) -> None:
+        """Send the newest state, or keep it until the client has read the one before.
 
         Args:
-            cut: Where the unit is cut into two pieces, as readers of the paper's kind get it.
-            earlier: Units before it, which came with it: for a client that keeps up.
+            cut: Offset at which the unit is split into two writes, as the paper's controllers split it.
+            earlier: Units that came just before; sent only to a client that keeps up.
         """
         if self._closing:
             return
-        self.told = True
+        self.got_state = True
         if self._patience is not None or self._newest:
             self.skipped += len(earlier) + bool(self._newest)
             self._newest = unit
@@ -181,15 +184,15 @@ class Client(asyncio.BufferedProtocol):
         self._write(unit[cut:])
 
     def answer(self, unit: bytes) -> None:
-        """Send an answer; one who sends much and reads nothing gets none."""
+        """Send an answer, unless the client has left too many answers unread."""
         if self._transport.get_write_buffer_size() < _ANSWERS_BYTES:
             self._write(unit)
 
     def close(self, last: bytes = b"") -> None:
-        """Close the connection, with a last unit; what comes meanwhile is overheard.
+        """Close the connection after a last unit; until it ends, stops are still read.
 
-        A socket that is closed with something unread in it is reset, and a reset may take the last unit
-        from the client. So only the sending ends at first.
+        Closing a socket that holds unread bytes resets it, and the client may lose the last unit to the
+        reset. Therefore only the sending direction is closed first.
         """
         if self._closing:
             return
@@ -197,23 +200,23 @@ class Client(asyncio.BufferedProtocol):
         self._closing = True
         self._newest = b""
         self._cancel_timers()
-        with contextlib.suppress(OSError, RuntimeError):  # the client was faster
+        with contextlib.suppress(OSError, RuntimeError):  # the client has already closed
             self._transport.write_eof()
             self._transport.resume_reading()
-        self._end = self._loop.call_later(_LAST_WORD_S, self._transport.abort)
+        self._end = self._loop.call_later(_FINAL_SEND_S, self._transport.abort)
 
     def abort(self) -> None:
-        """Close the connection now."""
+        """Close the connection immediately."""
         self._closing = True
         self._transport.abort()
 
-    def freeze(self) -> None:
-        """Read no more; the socket stays open."""
+    def pause_reading(self) -> None:
+        """Stop reading; the socket stays open."""
         if not self._transport.is_closing():
             self._transport.pause_reading()
 
-    def read_on(self) -> None:
-        """Read again."""
+    def resume_reading(self) -> None:
+        """Continue reading."""
         if not self._transport.is_closing():
             self._transport.resume_reading()
 
@@ -224,19 +227,19 @@ class Client(asyncio.BufferedProtocol):
             if timer is not None:
                 timer.cancel()
 
-    def _give_up(self) -> None:
-        self._server.gave_up(self, "does not read")
+    def _drop(self) -> None:
+        self._server.client_dropped(self, "does not read")
         self.abort()
 
-    def _overhear(self, data: bytes) -> None:
-        events = self._stream.receive(data, holding=self._stop)
+    def _read_stops_only(self, data: bytes) -> None:
+        events = self._stream.receive(data, containing=self._stop_markers)
         if events:
-            self._server.overheard(self, events)
+            self._server.stops_received(self, events)
         if not self._transport.is_closing():
             self._transport.pause_reading()
-            self._pause = self._loop.call_later(_NEXT_PIECE_S, self.read_on)
+            self._pause = self._loop.call_later(_STOPS_ONLY_PAUSE_S, self.resume_reading)
 
     def _write(self, data: bytes) -> None:
-        """Write what is still for somebody."""
+        """Write data, unless the connection is closing."""
         if data and not self._closing and not self._transport.is_closing():
             self._transport.write(data)

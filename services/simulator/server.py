@@ -80,7 +80,7 @@ class Server:
 
     # ------------------------------------------------------------------------ clients
 
-    def joined(self, client: Client) -> None:
+    def client_connected(self, client: Client) -> None:
         """Accept a client, or reject it if there are too many."""
         self._connections.add(client)
         self._empty.clear()
@@ -96,7 +96,7 @@ class Server:
         self._faults.first_client(time.monotonic())
         logger.info("client %s connected, %d in all", client.name, len(self._clients))
 
-    def left(self, client: Client) -> None:
+    def client_disconnected(self, client: Client) -> None:
         """Remove a client that has disconnected."""
         if client in self._clients:
             self._clients.remove(client)
@@ -105,11 +105,11 @@ class Server:
         if not self._connections:
             self._empty.set()
 
-    def gave_up(self, client: Client, why: str) -> None:
+    def client_dropped(self, client: Client, why: str) -> None:
         """Log that a client is closed because it misbehaved."""
         logger.warning("client %s %s: closed", client.name, why)
 
-    def heard(self, client: Client, events: list[StreamEvent]) -> None:
+    def units_received(self, client: Client, events: list[StreamEvent]) -> None:
         """Execute a client's units in order; answer the refused ones."""
         now_s = time.monotonic()
         self._apply_faults(now_s)
@@ -121,10 +121,10 @@ class Server:
                 logger.info("refused: %s", refusal.text)
                 client.answer(write_unit((refusal,), self._controller.table))
 
-    def overheard(self, client: Client, events: list[StreamEvent]) -> None:
+    def stops_received(self, client: Client, events: list[StreamEvent]) -> None:
         """Do nothing: a controller ignores units of a rejected client."""
 
-    def outpaced(self, client: Client) -> None:
+    def client_throttled(self, client: Client) -> None:
         """Do nothing: the rate of a client's units is not limited."""
 
     def _refusal_of(self, event: StreamEvent, now_s: float) -> Error | None:
@@ -158,7 +158,7 @@ class Server:
             return
         unit *= faults.copies(self._active)
         for client in tuple(self._clients):
-            client.tell(unit, number * _CUT_STEP % len(unit))
+            client.send_state(unit, number * _CUT_STEP % len(unit))
 
     # ---------------------------------------------------------------------------- faults
 
@@ -172,10 +172,10 @@ class Server:
             logger.warning("fault %s is over", name)
         if "freeze" in before - self._active:
             for client in self._clients:
-                client.read_on()
+                client.resume_reading()
         if "freeze" in self._active:
             for client in self._clients:
-                client.freeze()
+                client.pause_reading()
         if "drop" in self._active and now_s - self._dropped_s >= _DROP_EACH_S:
             self._dropped_s = now_s
             self._abort_all()

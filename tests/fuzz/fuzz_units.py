@@ -27,7 +27,7 @@ from protocol_gateway.drivers.driver import JointsReceived
 from protocol_gateway.drivers.unit import UnitDriver
 from protocol_gateway.journal import Journal
 from protocol_gateway.legacy.requests import asks_for_more, asks_to_stop, requests_of
-from protocol_gateway.link.timestamping import Dating, Received
+from protocol_gateway.link.timestamping import Received, Timestamper
 from protocol_gateway.telemetry import Telemetry
 from robots.description import load
 from robots.joints import joints_of
@@ -136,7 +136,7 @@ class Gateway:
         self._driver = UnitDriver(JOINTS.types, codes)
         self._client = UnitStream(code_table(codes))
         self._now_s = 0.0
-        self._dating = Dating()
+        self._timestamper = Timestamper()
         journal = Journal(Sink(), "arm", monotonic_s=lambda: self._now_s)  # type: ignore[arg-type]
         self._telemetry = Telemetry(
             JOINTS,
@@ -155,7 +155,7 @@ class Gateway:
         self._now_s += 0.01
         events = [event for piece in pieces for event in self._driver.receive(piece)]
         now = Received(self._now_s, int(self._now_s * 1e9))
-        for event, received in zip(events, self._dating.dates(events, now), strict=True):
+        for event, received in zip(events, self._timestamper.timestamps(events, now), strict=True):
             if received.wall_ns > now.wall_ns:
                 return f"{event} is stamped {received.wall_ns - now.wall_ns} ns after its receipt"
             self._telemetry.on_event(event, received)

@@ -23,5 +23,5 @@ def clock(monkeypatch):
     """In place of both of control's clocks; the lease's alarm and the disk go by their own."""
     it = Clock()
     for module in (control, stop_handler):
-        monkeypatch.setattr(module, "both_clocks", lambda: it.now)
+        monkeypatch.setattr(module, "read_clocks", lambda: it.now)
     return it

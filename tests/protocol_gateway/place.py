@@ -5,9 +5,9 @@ from contextlib import asynccontextmanager
 from protocol_gateway.audit.log import AuditLog, read_entries
 from protocol_gateway.authority.lease_rules import Authority
 from protocol_gateway.authority.preconditions import Controller
-from protocol_gateway.control.audit_trail import Ledger
+from protocol_gateway.control.audit_trail import AuditTrail
 from protocol_gateway.control.control import Control
-from protocol_gateway.control.stop_handler import Guarded
+from protocol_gateway.control.stop_handler import ControlContext
 from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
 from protocol_gateway.drivers.unit import UnitDriver
 from protocol_gateway.errors import LinkDownError
@@ -36,10 +36,10 @@ class Place:
         journal = Journal(self, "arm")
         self.control = Control(
             joints,
-            Guarded(
+            ControlContext(
                 authority=Authority(),
                 driver=UnitDriver(joints.types),
-                ledger=Ledger(self.log, journal),
+                audit_trail=AuditTrail(self.log, journal),
                 latch=self.log.latch,
                 journal=journal,
                 send=self.send,

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome, read_entries, verify
-from protocol_gateway.audit.persisted_state import remembered
+from protocol_gateway.audit.persisted_state import authority_after
 from protocol_gateway.errors import AuditError
 from tests.conftest import run
 
@@ -111,7 +111,7 @@ def test_a_torn_last_line_is_cut_off_and_told(tmp_path):
     path = tmp_path / "arm.jsonl"
     path.write_bytes(b"".join(three_lines(path))[:-20])
     log, _ = write(path, entry(id="new"))
-    assert "torn last line" in log.mended
+    assert "torn last line" in log.damage
     assert [each.values["id"] for each in read_entries(path)] == ["1", "2", "new"]
     assert verify(path).ok
 
@@ -121,7 +121,7 @@ def test_a_broken_chain_is_told_and_not_mended(tmp_path):
     first, second, third = three_lines(path)
     path.write_bytes(first + second.replace(b"HOME", b"HOLD") + third)
     log, _ = write(path, entry())
-    assert log.mended == "the chain is broken at entry 2"
+    assert log.damage == "the chain is broken at entry 2"
     assert verify(path).first_break == 2
 
 
@@ -259,5 +259,5 @@ def test_what_was_said_to_be_written_is_there_after_kill_nine(tmp_path):
     ],
 )
 def test_a_stop_that_nobody_reset_is_remembered_from_the_log(entries, latched):
-    stop = remembered(entries).stop
+    stop = authority_after(entries).stop
     assert (stop.id if stop else None) == latched

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from protocol_gateway.audit.entry import audit_entry, link_of, parse_line
+from protocol_gateway.audit.entry import audit_entry, chain_link, parse_line
 from protocol_gateway.audit.files import older_parts, read_entries, verify
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome
 from protocol_gateway.audit.persisted_state import UNKNOWN
@@ -34,7 +34,7 @@ def write(live, *entries, rotate_bytes=1 << 20):
             if each.request == "RESET":  # it was sent
                 log.latch.keep(None, int(each.values.get("stop_id", "0")))
         await log.close()
-        return log.mended, log.memory
+        return log.damage, log.state
 
     return run(main())
 
@@ -250,7 +250,7 @@ def test_whatever_a_line_says_it_is_an_entry_or_an_audit_error(tmp_path_factory,
     live.write_bytes(line)
     with contextlib.suppress(AuditError):
         audit_entry(parse_line(line))
-    link_of(line)
+    chain_link(line)
     find(live, Query(since_ns=0))
     assert not verify(live).ok or verify(live).entries == 1
     write(live, entry())

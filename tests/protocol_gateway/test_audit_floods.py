@@ -1,4 +1,4 @@
-"""Floods in the audit log: what is written, what is counted, and that nothing is forgotten."""
+"""FloodCounter in the audit log: what is written, what is counted, and that nothing is forgotten."""
 
 from dataclasses import replace
 
@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol_gateway.audit.flood_counter import IN_FULL, MOST_KINDS, Floods
+from protocol_gateway.audit.flood_counter import IN_FULL, MOST_KINDS, FloodCounter
 from protocol_gateway.audit.log import Entry, Outcome
-from protocol_gateway.audit.persisted_state import remembered
+from protocol_gateway.audit.persisted_state import authority_after
 
 
 def entry(operator="li", request="HOME", outcome=Outcome.REFUSED, text="no", **values):
@@ -24,7 +24,7 @@ def entry(operator="li", request="HOME", outcome=Outcome.REFUSED, text="no", **v
 
 
 def test_the_first_five_of_a_second_are_written_the_rest_is_one_entry_a_second():
-    floods = Floods()
+    floods = FloodCounter()
     assert [floods.admits(entry(), 0.01 * n) for n in range(50)] == [True] * IN_FULL + [False] * 45
     (counted,) = floods.counts(1.0)
     assert (counted.repeated, counted.text) == (44, "no")
@@ -37,7 +37,7 @@ def test_the_first_five_of_a_second_are_written_the_rest_is_one_entry_a_second()
 
 
 def test_a_single_one_too_many_is_written_as_it_is():
-    floods = Floods()
+    floods = FloodCounter()
     written = [floods.admits(entry(text=str(n)), 0.0) for n in range(IN_FULL + 1)]
     assert not written[-1]
     (last,) = floods.counts(0.5)
@@ -46,12 +46,12 @@ def test_a_single_one_too_many_is_written_as_it_is():
 
 @pytest.mark.parametrize("outcome", [Outcome.ACCEPTED, Outcome.FAILED])
 def test_what_was_accepted_is_never_counted(outcome):
-    floods = Floods()
+    floods = FloodCounter()
     assert all(floods.admits(entry(outcome=outcome), 0.0) for _ in range(1000))
 
 
 def test_kinds_do_not_hide_each_other():
-    floods = Floods()
+    floods = FloodCounter()
     for number in range(100):
         floods.admits(entry("li", "HOME"), 0.001 * number)
     assert floods.admits(entry("li", "ACQUIRE"), 0.5)
@@ -59,7 +59,7 @@ def test_kinds_do_not_hide_each_other():
 
 
 def test_whoever_floods_under_ever_new_names_fills_neither_memory_nor_disk():
-    floods, written = Floods(), 0
+    floods, written = FloodCounter(), 0
     flood = 20_000
     for number in range(flood):
         written += floods.admits(entry(f"name-{number}"), 0.0001 * number)
@@ -72,7 +72,7 @@ def test_whoever_floods_under_ever_new_names_fills_neither_memory_nor_disk():
 
 
 def test_a_long_text_leaves_room_for_what_it_stands_for():
-    floods = Floods()
+    floods = FloodCounter()
     for number in range(MOST_KINDS + 20):
         floods.admits(entry(f"name-{number}", text="x" * 800), 0.0)
     (counted,) = floods.counts(1.0)
@@ -81,7 +81,7 @@ def test_a_long_text_leaves_room_for_what_it_stands_for():
 
 
 def test_whoever_comes_back_over_a_new_connection_is_counted_with_the_one_before():
-    floods = Floods()
+    floods = FloodCounter()
     asked = [
         replace(entry(), source=f"legacy {host}:{port}")
         for host in ("10.0.0.9", "::1")
@@ -105,7 +105,7 @@ def test_whoever_comes_back_over_a_new_connection_is_counted_with_the_one_before
     )
 )
 def test_every_request_is_counted_once_and_the_last_stop_is_remembered(asked):
-    floods, now_s, stop, written = Floods(), 0.0, 0, []
+    floods, now_s, stop, written = FloodCounter(), 0.0, 0, []
     looked_s = 0.0
     for operator, request, wait_s in asked:
         now_s += wait_s
@@ -119,9 +119,9 @@ def test_every_request_is_counted_once_and_the_last_stop_is_remembered(asked):
             written.append(one)
     # What stands before a RESET in the log.
     written += floods.counts(now_s, request="STOP")
-    latched = remembered(written).stop
+    latched = authority_after(written).stop
     assert (latched.id if latched else 0) == stop
-    assert remembered(written).last_stop_id == stop
+    assert authority_after(written).last_stop_id == stop
     written += floods.counts(now_s)
     for request in ("STOP", "HOME"):
         told = sum(1 + each.repeated for each in written if each.request == request)

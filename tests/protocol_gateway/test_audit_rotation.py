@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from protocol_gateway.audit.files import older_parts, part_name
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome, read_entries, verify
-from protocol_gateway.audit.persisted_state import remembered
+from protocol_gateway.audit.persisted_state import authority_after
 from protocol_gateway.audit.search import Query, find, matches, query_of
 from protocol_gateway.authority.lease_rules import Stop
 from robomesh.errors import RefusedError
@@ -46,7 +46,7 @@ def write(path, *entries, rotate_bytes=SMALL):
             await log.append(each)
         await log.close()
         again = AuditLog(path, rotate_bytes=rotate_bytes)
-        head, memory, mended = again.head, again.memory, log.mended or again.mended
+        head, memory, mended = again.head, again.state, log.damage or again.damage
         await again.close()
         assert head == log.head
         return memory, mended
@@ -152,7 +152,7 @@ def test_what_a_restart_must_remember_is_in_every_file_by_itself(tmp_path, asked
     live = tmp_path / "arm.jsonl"
     # Rotated after each entry, so that each step is remembered over a file's end.
     write(live, *asked, *(entry(9) for _ in range(after)), rotate_bytes=1)
-    expected = remembered(read_entries(live))
+    expected = authority_after(read_entries(live))
     for part in older_parts(live):
         part.unlink()
     memory, _ = write(live)
@@ -165,7 +165,7 @@ def test_what_a_restart_must_remember_is_in_every_file_by_itself(tmp_path, asked
 
 def test_a_late_count_of_older_stops_does_not_take_the_newest_ones_place():
     entries = [entry(1, "STOP", stop_id=9, operator="wang"), entry(2, "STOP", stop_id=8)]
-    assert remembered(entries).stop.id == 9
+    assert authority_after(entries).stop.id == 9
 
 
 KILLED = """

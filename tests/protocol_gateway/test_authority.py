@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol_gateway.authority.admission import admit, delay, remember
+from protocol_gateway.authority.admission import admit, keep_answer, wait_refusal
 from protocol_gateway.authority.lease_rules import (
     Answer,
     Authority,
@@ -169,7 +169,7 @@ def test_a_refusal_of_something_else_does_not_end_the_holders_motion():
 
 
 def test_what_is_resumed_goes_where_it_was_sent():
-    state = command_sent(held(), command(C.MOVE_ABSOLUTE), at(0), way=((1.0,),))
+    state = command_sent(held(), command(C.MOVE_ABSOLUTE), at(0), waypoints=((1.0,),))
     state = command_sent(state, command(C.HOLD), at(1))
     assert command_sent(state, command(C.RESUME), at(2)).lease.motion.target == (1.0,)
 
@@ -250,12 +250,12 @@ def test_a_latched_stop_does_not_forbid_what_moves_nothing(kind):
 
 
 def test_an_id_is_used_once():
-    state = remember(held(), command(C.HOME, 5), Answer(True, "done"))
+    state = keep_answer(held(), command(C.HOME, 5), Answer(True, "done"))
     again = admit(state, command(C.HOME, 5), operator="li", now=at(0))
     assert (again.answer, again.repeat) == (Answer(True, "done"), True)
     lower = admit(state, command(C.HOME, 4), operator="li", now=at(0))
     assert "id 4 is not higher than 5" in lower.answer.text
-    assert not lower.counted
+    assert not lower.id_used
     assert "id 0" in admit(held(), command(C.HOME, 0), operator="li", now=at(0)).answer.text
     assert admit(state, command(C.HOME, 6), operator="li", now=at(0)).answer.accepted
 
@@ -275,11 +275,11 @@ MOVE = {"joint_positions": [0.1, 0.0], "program_name": ""}
 )
 def test_an_id_names_one_command_and_its_values(kind, fields, words):
     first = command(C.MOVE_ABSOLUTE, 5, **MOVE)
-    state = remember(held(), first, Answer(True, "done"))
+    state = keep_answer(held(), first, Answer(True, "done"))
     verdict = admit(state, command(kind, 5, **fields), operator="li", now=at(0))
     if words:
         assert words in verdict.answer.text
-        assert [verdict.repeat, verdict.counted, verdict.answer.accepted] == [False] * 3
+        assert [verdict.repeat, verdict.id_used, verdict.answer.accepted] == [False] * 3
     else:
         assert verdict.repeat
     late = command(C.MOVE_ABSOLUTE, 5, **MOVE)
@@ -289,7 +289,7 @@ def test_an_id_names_one_command_and_its_values(kind, fields, words):
 
 def test_an_answer_is_not_kept_under_somebody_elses_lease():
     state = ask(held(), A.TAKE, "wang", reason="he left", secret="w").authority
-    assert remember(state, command(C.HOME, 9), Answer(True, "")) == state
+    assert keep_answer(state, command(C.HOME, 9), Answer(True, "")) == state
 
 
 def test_what_was_delayed_on_the_way_is_refused():
@@ -298,12 +298,12 @@ def test_what_was_delayed_on_the_way_is_refused():
     assert admit(held(), late, operator="li", now=at(1)).answer.accepted
     refused = admit(held(), late, operator="li", now=at(1.5))
     assert "0.50 s after its not_after" in refused.answer.text
-    assert refused.counted
+    assert refused.id_used
 
 
 def test_what_waited_over_a_second_in_the_gateway_is_not_sent():
-    assert delay(at(0).monotonic_s, at(0.9)) is None
-    assert delay(at(0).monotonic_s, at(6)).text.startswith("Not sent: it waited 6.0 s in the gateway")
+    assert wait_refusal(at(0).monotonic_s, at(0.9)) is None
+    assert wait_refusal(at(0).monotonic_s, at(6)).text.startswith("Not sent: it waited 6.0 s in the gateway")
 
 
 def test_the_secret_is_not_in_the_leases_own_text():

@@ -4,7 +4,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from protocol_gateway.authority.admission import admit, remember
+from protocol_gateway.authority.admission import admit, keep_answer
 from protocol_gateway.authority.lease_rules import (
     MOTION_COMMANDS,
     Answer,
@@ -104,9 +104,9 @@ class Machine(RuleBasedStateMachine):
         )
         verdict = admit(self.authority, request, operator=name, now=self.now)
         if verdict.repeat or not verdict.answer.accepted:
-            if verdict.counted:
+            if verdict.id_used:
                 self.sent_under[secret] = number
-                self.authority = remember(self.authority, request, verdict.answer)
+                self.authority = keep_answer(self.authority, request, verdict.answer)
             return
         assert self.authority.lease is not None
         assert self.authority.lease.holder == name
@@ -115,7 +115,7 @@ class Machine(RuleBasedStateMachine):
             assert command not in MOTION_COMMANDS
             assert command != C.RESET or request.stop_id == latched.id
         self.sent_under[secret] = number
-        self.authority = remember(self.authority, request, Answer(True, ""))
+        self.authority = keep_answer(self.authority, request, Answer(True, ""))
         self.authority = command_sent(self.authority, request, self.now)
         if command in MOTION_COMMANDS or command == C.HOLD:
             self.rests = 0

@@ -8,7 +8,7 @@ import pytest
 from protocol_gateway.authority.preconditions import Controller, controller_command, obstacle
 from protocol_gateway.drivers.driver import Activity, Mode, MoveAbsolute, Speed, StatusReceived, Trace
 from protocol_gateway.link.link import LinkState, LinkStatus
-from protocol_gateway.motion import PositionWatch, has_arrived, is_moving, motion_may_be_held
+from protocol_gateway.motion import MotionDetector, has_arrived, is_moving, motion_may_be_held
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest
 from robots.description import load
@@ -133,7 +133,7 @@ def test_a_robot_that_never_told_where_it_is_is_homed_but_not_moved():
 
 
 def test_a_robot_that_tells_no_more_where_it_is_is_not_even_homed():
-    gone = replace(READY, positions=None, positions_gone=codes.POSITIONS_STALE(seconds=1.0))
+    gone = replace(READY, positions=None, positions_stale=codes.POSITIONS_STALE(seconds=1.0))
     for kind in (C.MOVE_RELATIVE, C.MOVE_ABSOLUTE, C.RESUME, C.HOME):
         assert obstacle(command(kind), gone, JOINTS).text == (
             "Not sent: where the robot is now is not known (joint positions have not come for 1 s)."
@@ -147,10 +147,10 @@ def test_commands_become_the_drivers_own():
 
 
 def watched(positions_at):
-    watch = PositionWatch(TYPES)
+    detector = MotionDetector(TYPES)
     for number in range(200):
-        watch.see(positions_at(number * 0.01), number * 0.01)
-    return watch
+        detector.add(positions_at(number * 0.01), number * 0.01)
+    return detector
 
 
 @pytest.mark.parametrize(
@@ -171,7 +171,7 @@ def test_the_controllers_word_counts_where_it_gives_one():
     still, moving = watched(lambda t: (0.0, 0.0)), watched(lambda t: (t, 0.0))
     assert is_moving(Activity.HOMING, still) is True
     assert is_moving(Activity.IDLE, moving) is False
-    assert is_moving(None, PositionWatch(TYPES)) is None
+    assert is_moving(None, MotionDetector(TYPES)) is None
     assert [motion_may_be_held(each) for each in (None, Activity.HOLDING, Activity.IDLE)] == [
         True,
         True,

@@ -1,15 +1,15 @@
-"""What beat and has ceased to."""
+"""What watchdog and has ceased to."""
 
 import pytest
 
-from protocol_gateway.watchdog import Beat
+from protocol_gateway.watchdog import Watchdog
 
 
 def seen(*told_at):
-    beat = Beat()
+    watchdog = Watchdog()
     for told, time_s in told_at:
-        beat.see(told, time_s)
-    return beat
+        watchdog.reset(told, time_s)
+    return watchdog
 
 
 @pytest.mark.parametrize(
@@ -25,12 +25,12 @@ def seen(*told_at):
     ],
 )
 def test_only_what_was_seen_to_repeat_itself_can_cease(told_at, ceased):
-    assert seen(*told_at).ceased(1000.0) is ceased
+    assert seen(*told_at).expired(1000.0) is ceased
 
 
 def test_it_has_ceased_after_three_seconds_and_beats_again_at_once():
-    beat = seen(*(("idle", t) for t in range(4)))
-    assert not beat.ceased(5.9)
-    assert beat.ceased(6.0)
-    beat.see("idle", 6.1)
-    assert not beat.ceased(6.2)
+    watchdog = seen(*(("idle", t) for t in range(4)))
+    assert not watchdog.expired(5.9)
+    assert watchdog.expired(6.0)
+    watchdog.reset("idle", 6.1)
+    assert not watchdog.expired(6.2)

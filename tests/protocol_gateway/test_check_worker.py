@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 
-from protocol_gateway.checking.checker import MOST_PROCESSES, Checker, checkers_of
+from protocol_gateway.checking.checker import MOST_PROCESSES, Checker, make_checkers
 from protocol_gateway.checking.worker import begin
 from protocol_gateway.checking.worker_messages import Checked, CheckMotion
 from protocol_gateway.errors import CheckError
@@ -63,7 +63,7 @@ def test_robots_of_a_cell_share_a_process_and_who_is_alone_needs_none_of_his_own
     ]
     surroundings = {robot.name: pair for pair in pairs for robot in pair.robots}
     surroundings |= {f"a{n}": alone(f"a{n}", "pt600") for n in range(100)}
-    checkers = checkers_of(surroundings, at_once=["a7"])
+    checkers = make_checkers(surroundings, start_now=["a7"])
     assert checkers.keys() == surroundings.keys()
     assert len(set(checkers.values())) == MOST_PROCESSES + 1
     assert all(checkers[f"l{n}"] is checkers[f"r{n}"] for n in range(len(pairs)))
@@ -75,7 +75,7 @@ def test_robots_of_a_cell_share_a_process_and_who_is_alone_needs_none_of_his_own
 @pytest.mark.slow
 def test_what_nobody_waits_for_any_more_is_not_begun(tmp_path, monkeypatch):
     async def main():
-        checker = Checker({"arm": alone("arm", bar_arm(tmp_path))}, at_once=True)
+        checker = Checker({"arm": alone("arm", bar_arm(tmp_path))}, start_now=True)
         begun = []
         ask = checker._worker.ask
 
@@ -88,13 +88,13 @@ def test_what_nobody_waits_for_any_more_is_not_begun(tmp_path, monkeypatch):
             await ready(checker, "arm")
             begun.clear()
             os.kill(checker.pid, signal.SIGSTOP)
-            monkeypatch.setattr("protocol_gateway.checking.checker.MOTION_WITHIN_S", 0.2)
+            monkeypatch.setattr("protocol_gateway.checking.checker.MOTION_TIMEOUT_S", 0.2)
             late = await asyncio.gather(
                 *(checker.motion(motion("arm")) for _ in range(20)), return_exceptions=True
             )
             assert all(isinstance(each, CheckError) and "took longer" in str(each) for each in late)
             os.kill(checker.pid, signal.SIGCONT)
-            monkeypatch.setattr("protocol_gateway.checking.checker.MOTION_WITHIN_S", 30.0)
+            monkeypatch.setattr("protocol_gateway.checking.checker.MOTION_TIMEOUT_S", 30.0)
             assert isinstance(await checker.motion(motion("arm")), Checked)
             # The one that hung, and the one that was waited for.
             assert len(begun) == 2
@@ -114,7 +114,7 @@ def test_an_error_that_nobody_foresaw_is_said_in_words_and_ends_nothing(tmp_path
             "bad": alone("bad", model, Fixture("odd", (shape,), np.eye(4))),
             "good": alone("good", model),
         }
-        checker = Checker(cells, at_once=True)
+        checker = Checker(cells, start_now=True)
         async with running(checker) as task:
             await ready(checker, "good")
             assert "LinAlgError" in checker.problem("bad").text
@@ -165,8 +165,8 @@ def test_a_mates_long_program_is_gone_through_only_where_it_is_near(tmp_path):
     fixture = block("post", (0.1, 0.1, 0.1), placed(0.0, 1.0))
 
     def cell(apart):
-        mates = CellRobot("arm", bars, placed(0.0)), CellRobot("mate", bars, placed(apart))
-        return begin({"arm": CellDescription(mates, (fixture,))})
+        robots = CellRobot("arm", bars, placed(0.0)), CellRobot("mate", bars, placed(apart))
+        return begin({"arm": CellDescription(robots, (fixture,))})
 
     rng = np.random.default_rng(0)
     way = tuple(map(tuple, rng.uniform(-3.0, 3.0, (101, 2)).tolist()))

@@ -7,7 +7,7 @@ from math import radians
 
 import pytest
 
-from protocol_gateway.checking.cell_occupancy import CellMates
+from protocol_gateway.checking.cell_occupancy import CellOccupancy
 from protocol_gateway.checking.policy import Policy
 from protocol_gateway.control.checks import Checks
 from protocol_gateway.drivers.driver import Activity, Mode, StatusReceived
@@ -26,38 +26,38 @@ READY = StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=True)
 HERE, FAR, NEAR = (0.0,) * 5, (1.0, 0.0, 0.0, 0.0, 0.0), (0.1, 0.0, 0.0, 0.0, 0.0)
 
 
-def whereabouts(it):
+def occupied_path(it):
     """As the cell's other robots get it."""
-    guarded = it.control._guarded
-    mates = CellMates()
+    context = it.control._context
+    cell_occupancy = CellOccupancy()
     Checks(
         "arm",
         Policy.OFF,
         cell=("arm", "arm-2"),
         checker=None,
         planner=None,
-        mates=mates,
+        cell_occupancy=cell_occupancy,
         joints=JOINTS,
-        guarded=guarded,
+        context=context,
     )
-    return mates.others("arm-2", ("arm", "arm-2"))["arm"].path
+    return cell_occupancy.others("arm-2", ("arm", "arm-2"))["arm"].path
 
 
 @pytest.mark.parametrize(
-    ("second", "way"),
+    ("second", "path"),
     [
         ((C.MOVE_ABSOLUTE, {"joint_positions": NEAR}), (HERE, FAR, NEAR)),
         ((C.MOVE_RELATIVE, {"joint_positions": NEAR}), (HERE, FAR, (1.1, 0.0, 0.0, 0.0, 0.0))),
     ],
 )
-def test_of_a_unit_of_two_motions_the_others_are_kept_out_of_both(tmp_path, second, way):
+def test_of_a_unit_of_two_motions_the_others_are_kept_out_of_both(tmp_path, second, path):
     async def main():
         async with place(tmp_path) as it:
             await it.lease(A.ACQUIRE)
             it.status = READY
             await it.commands((C.MOVE_ABSOLUTE, {"joint_positions": FAR}), second)
-            told = whereabouts(it)
-            assert [tuple(round(value, 9) for value in each) for each in told] == list(way)
+            told = occupied_path(it)
+            assert [tuple(round(value, 9) for value in each) for each in told] == list(path)
 
     run(main())
 

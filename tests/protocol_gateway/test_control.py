@@ -253,8 +253,8 @@ def test_what_a_killed_gateways_holder_set_in_motion_is_stopped_by_the_next_one(
         async with place(tmp_path) as it:
             await it.lease(A.ACQUIRE)
             await it.commands((C.HOME, {}))
-            it.control._guarded.authority = Authority()
-            it.control._guarded.orphan = it.log.memory.mover
+            it.control._context.authority = Authority()
+            it.control._context.orphan = it.log.state.mover
             it.control.observe(moving=True)
             assert it.control.authority.stop.reason == (
                 "dead-man: the gateway was killed while li had control, and the robot still moves"
@@ -267,13 +267,13 @@ def test_what_a_killed_gateways_holder_set_in_motion_is_stopped_by_the_next_one(
 def test_a_robot_that_stands_when_the_gateway_is_back_is_not_stopped(tmp_path):
     async def main():
         async with place(tmp_path) as it:
-            it.control._guarded.orphan = "li"
+            it.control._context.orphan = "li"
             it.control.observe(moving=False)
             it.control.observe(moving=True)
             assert it.control.authority.stop is None
             await it.lease(A.ACQUIRE)
             await it.commands((C.HOME, {}))
             await it.lease(A.RELEASE, lease=it.secret)
-            await until(lambda: it.log.memory.mover == "")
+            await until(lambda: it.log.state.mover == "")
 
     run(main())

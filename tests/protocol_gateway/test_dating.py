@@ -10,7 +10,7 @@ from protocol_gateway.drivers.driver import (
     StatusReceived,
     UnknownReceived,
 )
-from protocol_gateway.link.timestamping import Dating, Received
+from protocol_gateway.link.timestamping import Received, Timestamper
 
 MS = 1_000_000
 
@@ -23,8 +23,8 @@ def joints(time_s=None):
     return JointsReceived((0.0,), None, time_s)
 
 
-def date(dating, time_s, now):
-    (received,) = dating.dates([joints(time_s)], now)
+def date(timestamper, time_s, now):
+    (received,) = timestamper.timestamps([joints(time_s)], now)
     return received
 
 
@@ -32,45 +32,45 @@ def near(seconds):
     return pytest.approx(seconds, abs=1e-6)
 
 
-def fresh(dating, begin_s=100.0, clock_s=0.0):
+def fresh(timestamper, begin_s=100.0, clock_s=0.0):
     """A second of units at 100 Hz; when it ends."""
     for number in range(101):
         now = at(begin_s + number * 0.01)
-        assert date(dating, clock_s + number * 0.01, now).monotonic_s == near(now.monotonic_s)
+        assert date(timestamper, clock_s + number * 0.01, now).monotonic_s == near(now.monotonic_s)
     return begin_s + 1.0
 
 
 def test_units_that_come_as_they_are_sent_are_dated_when_they_come():
-    fresh(Dating())
+    fresh(Timestamper())
 
 
 def test_a_burst_after_a_gap_is_dated_when_it_should_have_come():
-    dating = Dating()
-    end_s = fresh(dating)
+    timestamper = Timestamper()
+    end_s = fresh(timestamper)
     # Three seconds held back, then everything within a few milliseconds.
     for number in range(1, 280):
-        received = date(dating, 1.0 + number * 0.01, at(end_s + 3.0 + number * 1e-5))
+        received = date(timestamper, 1.0 + number * 0.01, at(end_s + 3.0 + number * 1e-5))
         assert received.monotonic_s == near(end_s + number * 0.01)
         assert received.wall_ns == pytest.approx((end_s + number * 0.01) * 1e9, abs=1000)
         assert received.clock == 0
     now = at(end_s + 3.01)
-    assert date(dating, 1.0 + 3.01, now).monotonic_s == near(now.monotonic_s)
+    assert date(timestamper, 1.0 + 3.01, now).monotonic_s == near(now.monotonic_s)
 
 
 def test_a_controller_that_was_silent_itself_is_fresh_when_it_speaks_again():
-    dating = Dating()
-    end_s = fresh(dating)
-    assert date(dating, 1.0 + 3.0, at(end_s + 3.0)).monotonic_s == near(end_s + 3.0)
+    timestamper = Timestamper()
+    end_s = fresh(timestamper)
+    assert date(timestamper, 1.0 + 3.0, at(end_s + 3.0)).monotonic_s == near(end_s + 3.0)
 
 
 @pytest.mark.parametrize("clock_s", [0.2, 1.0, 5000.0])
 def test_a_clock_that_was_set_or_is_stuck_makes_nothing_look_old_without_a_gap(clock_s):
-    dating = Dating()
-    end_s = fresh(dating)
+    timestamper = Timestamper()
+    end_s = fresh(timestamper)
     clocks = set()
     for number in range(1, 300):
         now = at(end_s + number * 0.01)
-        received = date(dating, clock_s, now)
+        received = date(timestamper, clock_s, now)
         # Of units with one TIME the second may have come with the first.
         assert number <= 2 or received.monotonic_s == near(now.monotonic_s)
         clocks.add(received.clock)
@@ -78,30 +78,30 @@ def test_a_clock_that_was_set_or_is_stuck_makes_nothing_look_old_without_a_gap(c
 
 
 def test_after_a_gap_a_slow_clock_is_believed_for_a_second_only():
-    dating = Dating()
-    end_s = fresh(dating)
-    assert date(dating, 1.01, at(end_s + 2.0)).monotonic_s == near(end_s + 0.01)
+    timestamper = Timestamper()
+    end_s = fresh(timestamper)
+    assert date(timestamper, 1.01, at(end_s + 2.0)).monotonic_s == near(end_s + 0.01)
     for number in range(1, 200):
-        received = date(dating, 1.01 + number * 0.01, at(end_s + 2.0 + number * 0.01))
+        received = date(timestamper, 1.01 + number * 0.01, at(end_s + 2.0 + number * 0.01))
     assert received.clock == 1
-    assert date(dating, 3.01, at(end_s + 4.0)).monotonic_s == near(end_s + 4.0)
+    assert date(timestamper, 3.01, at(end_s + 4.0)).monotonic_s == near(end_s + 4.0)
 
 
 def test_without_a_clock_everything_is_dated_when_it_comes():
-    dating = Dating()
+    timestamper = Timestamper()
     for now in (at(1.0), at(1.01), at(5.0), at(5.02)):
-        assert date(dating, None, now) == now
+        assert date(timestamper, None, now) == now
 
 
 def test_units_of_one_read_without_time_come_at_the_measured_rate_and_none_after_its_receipt():
-    dating = Dating()
+    timestamper = Timestamper()
     for number in range(150):
-        date(dating, None, at(10.0 + number * 0.01))
-    read = dating.dates([joints() for _ in range(5)], at(11.54))
+        date(timestamper, None, at(10.0 + number * 0.01))
+    read = timestamper.timestamps([joints() for _ in range(5)], at(11.54))
     stamps = [received.monotonic_s for received in read]
     assert stamps == [near(11.50), near(11.51), near(11.52), near(11.53), near(11.54)]
     # Sooner than the rate has room for: between the newest stamp and the receipt.
-    read = dating.dates([joints() for _ in range(4)], at(11.56))
+    read = timestamper.timestamps([joints() for _ in range(4)], at(11.56))
     assert [received.monotonic_s for received in read] == [near(11.545 + 0.005 * n) for n in range(4)]
 
 
@@ -114,7 +114,7 @@ def test_what_a_unit_says_of_one_time_has_one_stamp_and_what_it_says_twice_has_t
         MalformedReceived(0, "", "nonsense"),
         joints(1.01),
     ]
-    position, status, oven, oven_again, _, following = Dating().dates(unit, at(5.0))
+    position, status, oven, oven_again, _, following = Timestamper().timestamps(unit, at(5.0))
     assert position == status == oven
     assert 0 < oven_again.wall_ns - oven.wall_ns < MS
     assert 9 * MS < following.wall_ns - oven_again.wall_ns <= 10 * MS
@@ -122,37 +122,39 @@ def test_what_a_unit_says_of_one_time_has_one_stamp_and_what_it_says_twice_has_t
 
 
 def test_the_gateways_own_clock_that_is_set_begins_another_and_keeps_the_spacing():
-    dating = Dating()
-    end_s = fresh(dating)
-    dating.wall_clock_was_set()
-    received = date(dating, 1.01, Received(end_s + 0.03, round((end_s + 500.0) * 1e9)))
+    timestamper = Timestamper()
+    end_s = fresh(timestamper)
+    timestamper.wall_clock_was_set()
+    received = date(timestamper, 1.01, Received(end_s + 0.03, round((end_s + 500.0) * 1e9)))
     assert (received.monotonic_s, received.clock) == (near(end_s + 0.01), 1)
 
 
 def test_a_new_connection_believes_no_clock_of_the_one_before():
-    dating = Dating()
-    end_s = fresh(dating)
-    dating.connected()
-    assert date(dating, 1.0 + 0.5, at(end_s + 2.0)) == Received(end_s + 2.0, round((end_s + 2.0) * 1e9), 1)
+    timestamper = Timestamper()
+    end_s = fresh(timestamper)
+    timestamper.connected()
+    assert date(timestamper, 1.0 + 0.5, at(end_s + 2.0)) == Received(
+        end_s + 2.0, round((end_s + 2.0) * 1e9), 1
+    )
 
 
 @pytest.mark.parametrize("nonsense_s", [1e305, -1e305, 1e11, 5e-324])
 def test_a_time_that_no_clock_says_ends_nothing(nonsense_s):
-    dating = Dating()
-    end_s = fresh(dating)
+    timestamper = Timestamper()
+    end_s = fresh(timestamper)
     for number in range(1, 50):
         time_s = nonsense_s if number % 7 == 3 else 1.0 + number * 0.01
         now = at(end_s + number * 0.01)
-        assert 0 <= now.wall_ns - date(dating, time_s, now).wall_ns < 20 * MS
+        assert 0 <= now.wall_ns - date(timestamper, time_s, now).wall_ns < 20 * MS
 
 
 @pytest.mark.parametrize("ppm", [-5000, -200, 0, 200, 5000])
 def test_a_clock_that_drifts_is_followed_in_one_identity(ppm):
-    dating = Dating()
+    timestamper = Timestamper()
     dates = []
     for number in range(6000):
         now = at(100.0 + number * 0.01)
-        received = date(dating, 5.0 + number * 0.01 * (1.0 - ppm * 1e-6), now)
+        received = date(timestamper, 5.0 + number * 0.01 * (1.0 - ppm * 1e-6), now)
         dates.append(received)
         assert 0.0 <= now.monotonic_s - received.monotonic_s < 0.1
     assert {received.clock for received in dates} == {0}
@@ -163,7 +165,7 @@ def test_a_clock_that_drifts_is_followed_in_one_identity(ppm):
 @pytest.mark.parametrize("seed", range(25))
 def test_whatever_comes_however_late_stamps_increase_follow_time_and_precede_their_receipt(seed):
     chance = random.Random(seed)
-    dating = Dating()
+    timestamper = Timestamper()
     period_s = chance.choice([0.001, 0.004, 0.01, 0.1])
     digits = chance.choice([3, 6, 9])
     now_s, made_s, waiting, last, quiet_until_s = 1000.0, 0.0, [], {}, 0.0
@@ -182,7 +184,9 @@ def test_whatever_comes_however_late_stamps_increase_follow_time_and_precede_the
         if read_s > quiet_until_s and chance.random() < 0.02:
             quiet_until_s = read_s + 1.0
             times.insert(chance.randrange(len(times) + 1), None)  # a unit that tells no TIME
-        for time_s, received in zip(times, dating.dates([joints(t) for t in times], at(read_s)), strict=True):
+        for time_s, received in zip(
+            times, timestamper.timestamps([joints(t) for t in times], at(read_s)), strict=True
+        ):
             before = last.get(received.clock)
             assert received.wall_ns <= at(read_s).wall_ns
             if before is not None:

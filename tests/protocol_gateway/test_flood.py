@@ -8,7 +8,7 @@ import time
 import pytest
 
 from protocol_gateway.drivers.driver import Activity, JointsReceived, Mode, Refused, StatusReceived
-from protocol_gateway.link.flood import Flood, HandOver
+from protocol_gateway.link.flood import EventDispatcher, FloodDetector
 from protocol_gateway.link.timestamping import Received
 from robomesh.keys import robot_key
 from tests.conftest import run
@@ -18,30 +18,30 @@ from tests.protocol_gateway.old_program import legacy, program
 
 
 def flooded(rate_hz, seconds, flood=None, begin_s=10.0):
-    it = flood or Flood()
+    it = flood or FloodDetector()
     for number in range(int(rate_hz * seconds)):
-        it.came(100, begin_s + number / rate_hz, more_waits=False)
+        it.add_bytes(100, begin_s + number / rate_hz, more_waits=False)
         assert not it.deluge
-        it.count(1)
+        it.add_units(1)
     return it
 
 
 def test_a_thousand_units_a_second_are_no_flood_and_three_thousand_are():
-    assert not flooded(1000, 5).on
-    assert flooded(3000, 1).on
+    assert not flooded(1000, 5).active
+    assert flooded(3000, 1).active
 
 
 def test_a_flood_is_over_after_half_a_second_of_calm_and_not_before():
     it = flooded(3000, 1)
-    assert flooded(100, 0.4, it, 11.0).on
-    assert not flooded(100, 1.2, it, 11.4).on
+    assert flooded(100, 0.4, it, 11.0).active
+    assert not flooded(100, 1.2, it, 11.4).active
 
 
 def test_more_than_a_mebibyte_in_half_a_second_is_a_deluge_until_half_a_second_is_calm():
-    it = Flood()
+    it = FloodDetector()
 
     def deluge(length, now_s, *, more_waits=False):
-        it.came(length, now_s, more_waits=more_waits)
+        it.add_bytes(length, now_s, more_waits=more_waits)
         return it.deluge
 
     assert not deluge(1 << 20, 10.0)
@@ -50,17 +50,17 @@ def test_more_than_a_mebibyte_in_half_a_second_is_a_deluge_until_half_a_second_i
     assert deluge(1, 11.0)
     assert deluge(1, 11.2, more_waits=True)  # few bytes, but more of them wait
     assert deluge(1, 11.7)
-    assert it.on
+    assert it.active
     assert not deluge(1, 12.3)
-    assert not it.on
+    assert not it.active
 
 
 def test_units_so_many_that_others_would_wait_for_their_reading_are_a_deluge_too():
-    it = Flood()
-    it.came(10_000, 10.0, more_waits=False)
-    it.count(10_000)
+    it = FloodDetector()
+    it.add_bytes(10_000, 10.0, more_waits=False)
+    it.add_units(10_000)
     assert not it.deluge
-    it.count(1)
+    it.add_units(1)
     assert it.deluge
 
 
@@ -81,13 +81,13 @@ class Timers:
 def handed_over(*reads, burst):
     """What is handed over of the events of reads, before and after a time without more."""
     seen, timers, now = [], Timers(), Received(1.0, 10**9)
-    it = HandOver(lambda event, date: seen.append(event), timers.later)
+    it = EventDispatcher(lambda event, date: seen.append(event), timers.later)
     for events in reads:
-        it.give(events, [now] * len(events), burst=burst)
+        it.dispatch(events, [now] * len(events), burst=burst)
     before = list(seen)
     (call,) = timers.calls or [lambda: None]
     call()
-    return before, seen[len(before) :], it.left_out
+    return before, seen[len(before) :], it.skipped
 
 
 def joints(number):

@@ -3,7 +3,7 @@
 import pytest
 
 from protocol_gateway.drivers.driver import Activity, JointsReceived, Refused, StatusReceived
-from protocol_gateway.link.health import Answers, Arrivals, Losses
+from protocol_gateway.link.health import Arrivals, LossCounter, ResponseTimer
 
 IDLE, MOVING = StatusReceived(activity=Activity.IDLE), StatusReceived(activity=Activity.MOVING)
 
@@ -36,9 +36,9 @@ def test_what_few_units_or_old_ones_tell_of_jitter_and_rate_is_nothing():
 
 
 def losses(*times_s):
-    it = Losses()
+    it = LossCounter()
     for time_s in times_s:
-        it.see(time_s)
+        it.add(time_s)
     return it.lost
 
 
@@ -63,26 +63,26 @@ def test_units_that_never_came_are_gaps_in_a_clock_that_beats_regularly(times_s,
 
 
 def test_an_answer_is_a_refusal_or_a_status_that_changes_after_a_command():
-    it = Answers()
-    it.see(IDLE, 1.0)
-    it.see(MOVING, 1.1)
+    it = ResponseTimer()
+    it.event_received(IDLE, 1.0)
+    it.event_received(MOVING, 1.1)
     assert it.answer_s is None  # nothing was asked
-    it.sent(2.0)
-    it.see(JointsReceived((0.0,)), 2.01)
-    it.see(MOVING, 2.02)
+    it.command_sent(2.0)
+    it.event_received(JointsReceived((0.0,)), 2.01)
+    it.event_received(MOVING, 2.02)
     assert it.answer_s is None
-    it.see(IDLE, 2.03)
+    it.event_received(IDLE, 2.03)
     assert it.answer_s == pytest.approx(0.03)
-    it.see(MOVING, 2.5)
+    it.event_received(MOVING, 2.5)
     assert it.answer_s == pytest.approx(0.03)
-    it.sent(3.0)
-    it.see(Refused(5, "limit"), 3.2)
+    it.command_sent(3.0)
+    it.event_received(Refused(5, "limit"), 3.2)
     assert it.answer_s == pytest.approx(0.2)
 
 
 def test_what_comes_more_than_two_seconds_after_a_command_is_no_answer_to_it():
-    it = Answers()
-    it.see(IDLE, 0.0)
-    it.sent(1.0)
-    it.see(MOVING, 3.5)
+    it = ResponseTimer()
+    it.event_received(IDLE, 0.0)
+    it.command_sent(1.0)
+    it.event_received(MOVING, 3.5)
     assert it.answer_s is None

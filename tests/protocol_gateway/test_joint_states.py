@@ -21,5 +21,5 @@ def test_message_that_is_filled_in_again_is_the_one_that_would_be_made_anew(unit
                 for name, position, velocity in zip(NAMES, positions, velocities or (None, None), strict=True)
             ],
         )
-        filled = message.of(JointsReceived(positions, velocities), wall_ns)
+        filled = message.fill(JointsReceived(positions, velocities), wall_ns)
         assert filled.SerializeToString() == anew.SerializeToString()

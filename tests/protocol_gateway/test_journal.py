@@ -16,7 +16,7 @@ def test_of_many_of_a_kind_five_are_said_then_one_each_five_seconds_and_all_are_
     heard, now_s = Heard(), 100.0
     journal = Journal(heard, "arm", monotonic_s=lambda: now_s)
     for _ in range(1000):  # 100 s of ten a second
-        journal.say(Event.WARNING, "unit.malformed", "a unit is malformed")
+        journal.report(Event.WARNING, "unit.malformed", "a unit is malformed")
         now_s += 0.1
     assert 23 <= len(heard.events) <= 26
     said = len(heard.events) + sum(int(event.values.get("left_out", 0)) for event in heard.events)
@@ -29,8 +29,8 @@ def test_a_flood_of_one_kind_leaves_out_no_other():
     heard, now_s = Heard(), 100.0
     journal = Journal(heard, "arm", monotonic_s=lambda: now_s)
     for _ in range(100):
-        journal.say(Event.WARNING, "unit.malformed", "a unit is malformed")
-    journal.say(Event.WARNING, "stop.latched", "stop request 1")
+        journal.report(Event.WARNING, "unit.malformed", "a unit is malformed")
+    journal.report(Event.WARNING, "stop.latched", "stop request 1")
     assert [event.code for event in heard.events] == ["unit.malformed"] * 5 + ["stop.latched"]
 
 
@@ -38,9 +38,9 @@ def test_after_a_rest_as_many_are_said_at_once_as_at_first():
     heard, now_s = Heard(), 100.0
     journal = Journal(heard, "arm", monotonic_s=lambda: now_s)
     for _ in range(10):
-        journal.say(Event.INFO, "link.up", "up")
+        journal.report(Event.INFO, "link.up", "up")
     now_s += 60.0
     for _ in range(10):
-        journal.say(Event.INFO, "link.up", "up")
+        journal.report(Event.INFO, "link.up", "up")
     assert len(heard.events) == 10
     assert heard.events[5].values["left_out"] == "5"

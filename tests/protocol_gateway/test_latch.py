@@ -209,7 +209,7 @@ def test_a_stop_that_only_the_latch_file_knows_is_remembered_and_written_down(tm
         if latched is not None:
             audit.latch.keep(latched, latched.id)
             settle(audit.latch)
-        found = audit.memory, audit.mended
+        found = audit.state, audit.damage
         if kill:
             audit.latch.close = lambda: None
         await audit.close()
@@ -250,7 +250,7 @@ def test_a_stop_whose_reset_was_written_down_and_not_sent_stays_latched(tmp_path
         if latched is not None:
             audit.latch.keep(latched, latched.id)
             settle(audit.latch)
-        found = audit.memory
+        found = audit.state
         audit.latch.close = lambda: None  # killed
         await audit.close()
         return found
@@ -270,7 +270,7 @@ def test_a_stop_whose_reset_was_written_down_and_not_sent_stays_latched(tmp_path
 def test_the_number_of_a_stop_for_a_damaged_file_was_never_given_out(tmp_path):
     async def life():
         audit = AuditLog(tmp_path / "arm.jsonl")
-        found = audit.memory
+        found = audit.state
         audit.latch.keep(stop(7), 7)  # in no log
         settle(audit.latch)
         audit.latch.close = lambda: None  # killed
@@ -288,7 +288,7 @@ def test_the_number_of_a_stop_for_a_damaged_file_was_never_given_out(tmp_path):
 def test_a_damaged_latch_file_latches_a_stop_once(tmp_path):
     async def life():
         audit = AuditLog(tmp_path / "arm.jsonl")
-        found = audit.memory, audit.mended
+        found = audit.state, audit.damage
         await audit.close()
         return found
 

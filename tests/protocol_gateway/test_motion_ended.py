@@ -31,8 +31,8 @@ def ask(authority, action, operator="li", **fields):
     return request_lease(authority, request, operator=operator, now=at(0), secret="s")
 
 
-def command(state, kind, time_s, way=(THERE,)):
-    return command_sent(state, CommandRequest(lease="s", command=kind), at(time_s), way=way)
+def command(state, kind, time_s, waypoints=(THERE,)):
+    return command_sent(state, CommandRequest(lease="s", command=kind), at(time_s), waypoints=waypoints)
 
 
 def see(state, moves, time_s):
@@ -99,31 +99,31 @@ def test_a_robot_that_moves_once_more_is_the_holders_until_it_rests_once_more(at
 
 
 def test_a_new_motion_begins_the_proof_again(at_rest):
-    state = command(report(report(at_rest, 1.0), 1.01), C.MOVE_ABSOLUTE, 1.1, way=(ELSEWHERE,))
+    state = command(report(report(at_rest, 1.0), 1.01), C.MOVE_ABSOLUTE, 1.1, waypoints=(ELSEWHERE,))
     assert stops(report(report(state, 1.2), 1.3))
     state = see(see(state, True, 1.9), False, 2.0)
     assert not stops(report(report(state, 2.1), 2.2))
 
 
 def test_home_of_a_robot_that_was_on_its_way_home_is_not_over_with_the_first_of_both(controlled):
-    state = see(command(controlled, C.MOVE_ABSOLUTE, 0.0, way=(HERE,)), True, 0.1)
-    state = see(see(command(state, C.HOME, 0.9, way=(HERE,)), True, 1.0), False, 1.1)
+    state = see(command(controlled, C.MOVE_ABSOLUTE, 0.0, waypoints=(HERE,)), True, 0.1)
+    state = see(see(command(state, C.HOME, 0.9, waypoints=(HERE,)), True, 1.0), False, 1.1)
     assert stops(report(report(state, 1.2), 1.3))
     assert see(state, False, 1.5).lease.motion is None  # 0.5 s later, as ever
 
 
 def test_a_place_that_is_passed_twice_proves_nothing_when_it_is_reached_first(controlled):
-    state = command(controlled, C.MOVE_ABSOLUTE, 0.0, way=(THERE,))
+    state = command(controlled, C.MOVE_ABSOLUTE, 0.0, waypoints=(THERE,))
     state = command(
-        command(state, C.MOVE_ABSOLUTE, 0.1, way=(ELSEWHERE,)), C.MOVE_ABSOLUTE, 0.2, way=(THERE,)
+        command(state, C.MOVE_ABSOLUTE, 0.1, waypoints=(ELSEWHERE,)), C.MOVE_ABSOLUTE, 0.2, waypoints=(THERE,)
     )
     state = see(see(state, True, 0.9), False, 1.0)
     assert stops(report(report(state, 1.1), 1.2))
 
 
 def test_a_motion_behind_another_has_ended_at_its_own_target(controlled):
-    state = see(command(controlled, C.MOVE_ABSOLUTE, 0.0, way=(THERE,)), True, 0.1)
-    state = see(see(command(state, C.MOVE_ABSOLUTE, 0.2, way=(ELSEWHERE,)), True, 1.9), False, 2.0)
+    state = see(command(controlled, C.MOVE_ABSOLUTE, 0.0, waypoints=(THERE,)), True, 0.1)
+    state = see(see(command(state, C.MOVE_ABSOLUTE, 0.2, waypoints=(ELSEWHERE,)), True, 1.9), False, 2.0)
     assert not stops(report(report(state, 2.1), 2.2))
 
 

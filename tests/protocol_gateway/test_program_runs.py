@@ -12,7 +12,7 @@ import pytest
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from protocol_gateway.checking.checker import Checker
-from protocol_gateway.control.deadlines import date
+from protocol_gateway.control.deadlines import set_deadline
 from protocol_gateway.errors import CheckError
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
@@ -343,7 +343,7 @@ def test_a_question_says_until_when_its_asker_waits_and_not_after_wins_where_it_
         command = schema.CommandRequest(command=kind)
         if not_after_s is not None:
             command.not_after.FromNanoseconds(round(not_after_s * second))
-        date(command, Request(None, command, "li", received_ns=100 * second, within_s=within_s))
+        set_deadline(command, Request(None, command, "li", received_ns=100 * second, within_s=within_s))
         return command.not_after.ToNanoseconds() / second if command.HasField("not_after") else None
 
     assert dated() == 102.0

@@ -7,7 +7,7 @@ import pytest
 import zenoh
 
 from protocol_gateway.audit.log import Outcome, read_entries
-from protocol_gateway.audit.persisted_state import remembered
+from protocol_gateway.audit.persisted_state import authority_after
 from robomesh.errors import NoAnswerError, RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
@@ -152,8 +152,8 @@ def test_a_stop_that_is_sent_again_is_in_the_audit_log_and_latches_nothing(tmp_p
         assert {entry.values["stop_id"] for entry in entries} == {"1"}
         assert "when its link came back" in entries[1].text
         assert "was sent again" in entries[2].text
-        assert remembered(entries[1:]).stop is None
-        assert remembered(entries).stop.by == "wang"
+        assert authority_after(entries[1:]).stop is None
+        assert authority_after(entries).stop.by == "wang"
 
     run(main())
 

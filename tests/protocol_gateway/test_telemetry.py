@@ -37,7 +37,7 @@ class Desk:
             self.now_s += 0.1
             if positions:
                 self.telemetry.on_event(JointsReceived((0.0,) * 5), Received(self.now_s, 0))
-            self.telemetry.look(self.now_s)
+            self.telemetry.check_timeouts(self.now_s)
 
 
 def test_positions_that_come_and_go_are_one_event_until_they_have_come_for_a_while():

@@ -27,7 +27,7 @@ from pathlib import Path
 import zenoh
 
 from protocol_gateway.audit.log import read_entries, verify
-from protocol_gateway.audit.persisted_state import remembered
+from protocol_gateway.audit.persisted_state import authority_after
 from robomesh.endpoints import router_config
 from robomesh.errors import NoAnswerError, RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
@@ -163,7 +163,7 @@ class Trial:
         shown = state.stop.id if state.HasField("stop") else 0
         begun_s = time.monotonic()
         while True:
-            logged = remembered(read_entries(self.log)).stop
+            logged = authority_after(read_entries(self.log)).stop
             # One that the gateway latched for a torn line is written in its first second.
             if shown == (logged.id if logged else 0) or time.monotonic() - begun_s > READY_S:
                 break
