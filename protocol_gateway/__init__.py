@@ -1,1 +1,1 @@
-"""Between a controller and the mesh: protocol core, drivers, link, authority, audit, gateway."""
+"""Gateway between controllers and the mesh: protocol core, drivers, link, authority, audit log."""

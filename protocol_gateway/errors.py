@@ -1,17 +1,17 @@
 """Errors of the protocol gateway.
 
 ProtocolGatewayError
-├── UnitError               bytes that are not a unit, or a record that is not what its type says
-├── UnitFormatError         a value that no unit can hold: a separator in an item, a number that is not finite
+├── UnitError               bytes that are not a unit, or a record whose data do not fit its type
+├── UnitFormatError         a value that a unit cannot hold: a separator in an item, or not finite
 ├── CodeTableError          a site file's table of type codes that cannot be used
-├── CommandError            a command that the controller's protocol cannot say
+├── CommandError            a command that the controller's protocol cannot express
 ├── LinkError               a unit that did not reach the controller's socket
 │   ├── LinkDownError       there is no connection
-│   └── LinkCloggedError    the controller does not read: the connection was given up
-├── AuthorityError          a failure of what guards the robot
+│   └── LinkCloggedError    the controller does not read, so the connection was closed
+├── AuthorityError          a failure of the audit log or of the motion check
 │   ├── AuditError          an audit entry that is not on disk, or a line that is not an entry
-│   └── CheckError          a motion that cannot be checked, or not in time
-└── GatewaySettingsError    settings that no gateway can run with
+│   └── CheckError          a motion that could not be checked, or not in time
+└── GatewaySettingsError    settings that a gateway cannot use
 """
 
 from robomesh import reason_codes as codes
@@ -23,15 +23,15 @@ class ProtocolGatewayError(Exception):
 
 
 class UnitError(ProtocolGatewayError):
-    """A unit that is malformed. A peer's bad input: it becomes an event at the edge of the core."""
+    """A malformed unit. The stream turns it into an event, because it is a peer's bad input."""
 
 
 class UnitFormatError(ProtocolGatewayError):
-    """A unit that cannot be written as it was asked for."""
+    """A value that a unit cannot hold."""
 
 
 class CodeTableError(ProtocolGatewayError):
-    """A table of type codes that cannot be used; the text names the entry and says what would be right."""
+    """An invalid table of type codes; the text names the entry and what is allowed."""
 
 
 class CommandError(ProtocolGatewayError):
@@ -55,11 +55,11 @@ class LinkDownError(LinkError):
 
 
 class LinkCloggedError(LinkError):
-    """The controller does not read, so a unit did not fit; the connection was given up with it."""
+    """The controller does not read, so a unit did not fit; the connection was closed."""
 
 
 class AuthorityError(ProtocolGatewayError):
-    """A failure of what guards the robot; `reason` says why."""
+    """A failure of the audit log or of the motion check; `reason` says why."""
 
     def __init__(self, reason: Reason | str) -> None:
         super().__init__(str(reason))
@@ -71,8 +71,8 @@ class AuditError(AuthorityError):
 
 
 class CheckError(AuthorityError):
-    """A motion that cannot be checked, or not in time; the text says why."""
+    """A motion that could not be checked, or not in time; the text says why."""
 
 
 class GatewaySettingsError(ProtocolGatewayError):
-    """Settings that no gateway can run with."""
+    """Settings that a gateway cannot use."""

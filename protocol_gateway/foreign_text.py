@@ -1,11 +1,11 @@
-"""Texts of others, as the gateway shows them, publishes them and writes them down."""
+"""Length limits for texts of operators and controllers that the gateway publishes and logs."""
 
 from robomesh.texts import one_line
 
 __all__ = ["LONGEST", "LONGEST_SENTENCE", "one_line"]
 
 LONGEST = 200
-"""Characters of an operator's or a controller's text."""
+"""Most characters of an operator's or a controller's text."""
 
 LONGEST_SENTENCE = 800
-"""Characters of what the gateway says; it holds several such texts at most."""
+"""Most characters of the gateway's own sentence, which may contain several of these texts."""

@@ -1,4 +1,4 @@
-"""The gateway service: robots with legacy controllers, on the mesh. One process serves many."""
+"""The gateway service: publishes and controls robots with legacy controllers. One process serves many."""
 
 import asyncio
 import gc
@@ -19,17 +19,17 @@ log = logging.getLogger(__name__)
 
 
 async def serve(session: Session, settings: Settings) -> None:
-    """Put the robots on the mesh until cancelled; then stop what moves under a lease.
+    """Serve the robots until cancelled; then stop motion under a lease.
 
     Raises:
-        GatewaySettingsError, DescriptionError, CodeTableError, AuditError, KeyNameError: If a robot
-            cannot be run as it is set; the text names it.
+        GatewaySettingsError, DescriptionError, CodeTableError, AuditError, KeyNameError: If a robot's
+            settings cannot be used; the text names the robot.
     """
     check(settings)
     async with AsyncExitStack() as stack:
         robots = []
         surroundings = {robot.name: robot.surroundings for robot in settings.robots}
-        # Processes of their own: whoever has a long program planned delays nobody's motion.
+        # Separate processes, so that planning a long program delays no motion.
         checked = [robot.name for robot in settings.robots if robot.check != Policy.OFF]
         checkers = make_checkers(surroundings, start_now=checked)
         planners = make_checkers(surroundings)
@@ -51,10 +51,10 @@ async def serve(session: Session, settings: Settings) -> None:
             robots.append(robot)
             await robot.listen()
             log.info("%s: controller at %s:%d", each.name, each.host, each.port)
-        # What lives as long as the process is no garbage: looking through it all stops every robot for 20 ms.
         measure_links(
             session, {robot.name: each.link for robot, each in zip(settings.robots, robots, strict=True)}
         )
+        # A collection over all permanent objects would pause every robot for 20 ms.
         gc.collect()
         gc.freeze()
         stack.callback(gc.unfreeze)

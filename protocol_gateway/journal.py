@@ -1,4 +1,4 @@
-"""A robot's events, on the mesh and in the log: each kind at a limited rate, the rest counted."""
+"""A robot's events, published and logged: each kind at a limited rate, the rest counted."""
 
 import logging
 import time
@@ -13,8 +13,8 @@ from robomesh.schemas.robomesh_pb2 import Event
 
 log = logging.getLogger(__name__)
 
-# A controller that sends rubbish must fill neither logs nor the hundred events that a late joiner is told:
-# so many of a kind at once, then one in so long.
+# A controller that sends rubbish must fill neither the log nor the hundred events that a late joiner gets.
+# Token bucket for each kind: a burst of 5, then one each 5 s.
 _BURST = 5.0
 _REFILL_S = 5.0
 
@@ -29,7 +29,7 @@ _LEVELS = {
 
 @dataclass
 class _Kind:
-    """`tokens`: so many more at once, at the time `at_s`."""
+    """Token bucket of one event code: `tokens` at the time `at_s`."""
 
     at_s: float
     tokens: float = _BURST
@@ -37,7 +37,7 @@ class _Kind:
 
 
 class Journal:
-    """Says events of one robot on its `events` topic."""
+    """Reporter of one robot's events, on its `events` topic."""
 
     def __init__(
         self, publisher: Publisher, robot: str, *, monotonic_s: Callable[[], float] = time.monotonic
@@ -56,12 +56,13 @@ class Journal:
         why: Reason | None = None,
         **values: object,
     ) -> None:
-        """Publish an event; of many of one code one each 5 s, which counts the others.
+        """Publish an event; of a flood of one code, publish one each 5 s with the count of the others.
 
         Args:
-            code: Stable, for programs: "unit.malformed".
-            text: For people.
-            why: The reason that the text holds.
+            code: Stable code for programs: "unit.malformed".
+            text: Sentence for people.
+            why: The reason that the text contains.
+            values: Further values of the event.
         """
         now_s = self._monotonic_s()
         kind = self._kinds.setdefault(code, _Kind(now_s))

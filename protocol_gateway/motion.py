@@ -1,4 +1,4 @@
-"""Whether a robot moves: told by its controller, or seen from its positions. No I/O."""
+"""Motion detection, from the controller's status or from changing positions. No I/O."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -6,24 +6,24 @@ from collections.abc import Sequence
 from protocol_gateway.drivers.driver import Activity
 from robots.joints import JointType
 
-# A window long enough to tell the slowest motion (1 % of 20 degrees a second) from a sensor's last digit.
+# Long enough to distinguish the slowest motion (1 % of 20 degrees a second) from a sensor's last digit.
 WINDOW_S = 0.5
 _SAMPLE_S = 0.1
-# Longer than the window: what is left in it of the motion before is no motion.
+# Longer than the window, which may still hold positions of the motion before.
 _SETTLED_S = 2 * WINDOW_S
 _STILL_ROTARY = 1e-3  # rad
 _STILL_PRISMATIC = 1e-4  # m
 
 
 class MotionDetector:
-    """Sees motion in positions, for controllers that do not tell their activity."""
+    """Detector of motion in positions, for controllers that do not report their activity."""
 
     def __init__(self, joint_types: Sequence[JointType]) -> None:
         self._still = _still(joint_types)
         self._samples: deque[tuple[float, tuple[float, ...]]] = deque()
 
     def add(self, positions: tuple[float, ...], time_s: float) -> None:
-        """Take note of positions [rad] or [m] at a monotonic time; more than ten a second are passed over."""
+        """Add positions [rad] or [m] at a monotonic time; uses at most ten a second."""
         if self._samples and time_s - self._samples[-1][0] < _SAMPLE_S:
             return
         self._samples.append((time_s, positions))
@@ -31,12 +31,12 @@ class MotionDetector:
             self._samples.popleft()
 
     def forget(self) -> None:
-        """The link was lost: what comes next is no continuation."""
+        """Drop all positions, because the next ones do not continue them."""
         self._samples.clear()
 
     @property
     def moving(self) -> bool | None:
-        """Whether it moved within the last half second; None: too little was seen."""
+        """True if the robot moved within the last half second; None: too few positions."""
         if len(self._samples) < 2:
             return None
         last = self._samples[-1][1]
@@ -54,7 +54,7 @@ def _still(joint_types: Sequence[JointType]) -> tuple[float, ...]:
 def has_arrived(
     target: Sequence[float] | None, positions: Sequence[float] | None, joint_types: Sequence[JointType]
 ) -> bool:
-    """Whether the joints are where they were to go [rad] or [m]; where one of both is not known: no."""
+    """Return whether the joints are at the target [rad] or [m]; False if either is unknown."""
     if target is None or positions is None:
         return False
     return all(
@@ -66,11 +66,11 @@ def has_arrived(
 def is_moving(
     activity: Activity | None, detector: MotionDetector, reported_for_s: float = 0.0
 ) -> bool | None:
-    """Whether the robot moves: the controller's word where it gives one; None: not known.
+    """Return whether the robot moves, by the controller's activity if it reports one; None: unknown.
 
     Args:
-        reported_for_s: How long the controller has said so. An arm that has been at rest for a while by its
-            controller's word, and whose positions change, moves all the same.
+        reported_for_s: How long the controller has reported this activity. After a while, changing positions
+            count as motion even if the controller reports rest.
     """
     if activity is None:
         return detector.moving
@@ -80,5 +80,5 @@ def is_moving(
 
 
 def motion_may_be_held(activity: Activity | None) -> bool:
-    """Whether a held motion may be waiting: the controller says that it holds, or does not say."""
+    """Return whether a held motion may be waiting: the controller reports HOLDING, or no activity."""
     return activity is None or activity is Activity.HOLDING

@@ -1,4 +1,4 @@
-"""One robot of a gateway: its link, topics and authority. What fails here, fails for this robot alone."""
+"""One robot of a gateway: its link, topics and authority. A failure here affects only this robot."""
 
 import asyncio
 import contextlib
@@ -53,12 +53,12 @@ log = logging.getLogger(__name__)
 _S = schema.Event.Severity
 
 _POLL_S = 0.1
-# Of the stale time: that a controller is silent takes a moment to be with the monitors.
+# Share of the stale time after which the link is silent: monitors must hear of it within the whole time.
 _SHOWN_WITHIN = 0.95
 _HEARTBEAT_S = 1.0
 _RETRY_S = 1.0
 MESH = "mesh"
-# In the audit log, where it cannot be read which one.
+# Request names in the audit log where the request itself could not be read.
 _LEASE, _COMMAND = "LEASE", "COMMAND"
 
 
@@ -66,7 +66,7 @@ class Robot:
     """A robot on the mesh, from its controller's socket to its keys.
 
     Raises:
-        DescriptionError, CodeTableError, AuditError, KeyNameError: If it cannot be run as it is set.
+        DescriptionError, CodeTableError, AuditError, KeyNameError: If its settings cannot be used.
     """
 
     def __init__(
@@ -163,7 +163,10 @@ class Robot:
         self._report_startup()
 
     def _persisted_authority(self) -> Authority:
-        """The authority that the log leaves; of a read-only robot no stop, which nobody could reset."""
+        """Return the authority from the audit log, without the stop if the robot is read-only.
+
+        No operator could reset the stop of a read-only robot.
+        """
         authority = self._audit.state.authority
         return replace(authority, stop=None) if self._read_only else authority
 
@@ -176,23 +179,23 @@ class Robot:
             self._journal.report(_S.WARNING, "robot.read_only", f"the robot is read-only: {self._read_only}")
         stop = self._control.authority.stop
         if stop is not None:
-            text = f"stop request {stop.id} ({stop.by}: {stop.reason}) is latched from the start"
+            text = f"stop request {stop.id} ({stop.by}: {stop.reason}) is still latched after the restart"
             self._journal.report(_S.WARNING, "stop.remembered", text, stop_id=stop.id)
         for entry in find(self._audit.path, Query(most=LIST_LENGTH)):
-            with contextlib.suppress(ValueError, TypeError):  # somebody changed that line: `verify` tells
+            with contextlib.suppress(ValueError, TypeError):  # a changed line: `verify` reports it
                 self._audit_topic.remember(audit_entry(entry), source_time_ns=entry.time_ns)
         self._publish_state()
 
     @property
     def link(self) -> ControllerLink:
-        """To its controller."""
+        """Link to the robot's controller."""
         return self._link
 
     async def listen(self) -> None:
-        """Let old client programs come, where the site file lets them.
+        """Listen for old client programs, if the site file allows them.
 
         Raises:
-            GatewaySettingsError: If it cannot listen there.
+            GatewaySettingsError: If the address cannot be used.
         """
         if self._legacy is None:
             return
@@ -202,15 +205,15 @@ class Robot:
             raise GatewaySettingsError(f"robot {self._settings.name}: {error}") from None
 
     async def run(self) -> None:
-        """Keep the link and the heartbeats until cancelled; then stop what moves under a lease."""
-        self._control.send_latched_stop()  # there is no link yet, but now it hurries
+        """Keep the link and the heartbeats until cancelled; then stop motion under a lease."""
+        self._control.send_latched_stop()  # no link yet, but the failed send makes it connect without pauses
         link = asyncio.create_task(self._keep_running(self._link.run))
         sessions = asyncio.create_task(self._keep_running(self._watch_sessions))
         try:
             await self._keep_running(self._poll)
         finally:
             try:
-                # While there is a link to stop it over.
+                # Before the link ends, because the stop is sent over it.
                 self._control.leases.end(codes.ENDED_GATEWAY())
             finally:
                 link.cancel()
@@ -218,25 +221,25 @@ class Robot:
                 await asyncio.gather(link, sessions, return_exceptions=True)
 
     async def close(self) -> None:
-        """Close the old client programs, write what is still to be written, and close the audit log."""
+        """Disconnect old client programs, write pending entries, and close the audit log."""
         if self._legacy is not None:
             await self._legacy.close()
         await self._programs.close()
         await self._control.close()
-        # No stop or command is answered that can no longer be written down.
+        # Stop answering before the audit log closes, so that every answer has an entry.
         for each in (self._stops, *self._answerers):
             each.close()
         await self._audit.close()
 
     async def _keep_running(self, work: Callable[[], Awaitable[None]]) -> None:
-        """Do endless work; when it fails begin it anew, for the other robots know nothing of it."""
+        """Run endless work, and restart it after a failure, so that other robots are not affected."""
         while True:
             try:
                 await work()
             except Exception:
-                log.exception("%s: the gateway failed at this robot and begins anew", self._settings.name)
-                text = "the gateway failed at this robot and begins anew: its log says why"
-                with contextlib.suppress(Exception):  # what failed may be the saying itself
+                log.exception("%s: the gateway failed for this robot and restarts", self._settings.name)
+                text = "the gateway failed for this robot and restarts: see the gateway's log"
+                with contextlib.suppress(Exception):  # reporting itself may be what failed
                     self._journal.report(_S.ERROR, "gateway.failed", text)
                 await asyncio.sleep(_RETRY_S)
 
@@ -256,7 +259,7 @@ class Robot:
                 self._audit_trail.write_pending()
 
     def _note_turned_away(self) -> None:
-        """What was refused at the door, because too many requests waited, is in the audit log as a number."""
+        """Write the number of requests that were rejected because too many waited into the audit log."""
         turned_away = sum(each.turned_away for each in self._answerers)
         if more := turned_away - self._turned_away:
             self._turned_away = turned_away
@@ -267,7 +270,7 @@ class Robot:
             self._audit_trail.write_later(replace(entry, repeated=more - 1))
 
     async def _watch_sessions(self) -> None:
-        """An operator's program or page that is gone holds no robot."""
+        """End the lease of an operator's program or page when its session ends."""
         async for who, alive in self._operators:
             if not alive:
                 self._control.leases.end_session(who.id)
@@ -277,7 +280,7 @@ class Robot:
     async def _answer_stop(self, request: Request) -> schema.StopAnswer:
         message = request.message
         assert isinstance(message, schema.StopRequest)
-        # Whatever is wrong with its texts, a stop is a stop.
+        # A stop is never refused because of its texts.
         by, reason = one_line(message.by).strip(), one_line(message.reason).strip()
         return self._control.stop(by=by or "somebody", reason=reason, source=MESH)
 
@@ -297,10 +300,10 @@ class Robot:
         return await self._control.command(message, operator=operator, source=MESH)
 
     def _operator(self, what: str, request: Request) -> str:
-        """In whose name something is asked.
+        """Return the name of the operator who sends a request.
 
         Raises:
-            RefusedError: If it is no name: cut or mended, it might become somebody else's.
+            RefusedError: If the name is invalid. Shortened or corrected, it could be another operator's.
         """
         name = request.chunk
         try:
@@ -312,7 +315,7 @@ class Robot:
             raise RefusedError(codes.INVALID(detail=error)) from None
 
     def _record_unreadable(self, what: str, name: str, text: str) -> None:
-        """Write down what nobody judged, because it cannot be read, or its operator's name is none."""
+        """Audit a request that was rejected before evaluation: unreadable, or with an invalid operator."""
         who, why = one_line(name, 40), one_line(text, LONGEST_SENTENCE)
         entry = entry_of(what, operator=who, source=MESH, outcome=Outcome.REFUSED, text=why)
         self._audit_trail.write_later(entry)

@@ -1,4 +1,4 @@
-"""What a gateway and its robots are set to, and what cannot be meant."""
+"""Settings of a gateway and its robots, and their validation."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -22,20 +22,20 @@ class RobotSettings:
     """One robot, as the site file gives it.
 
     Attributes:
-        name: In keys.
+        name: The robot's name in keys.
         description: A library robot's name, or a path.
-        host: Of the controller; `port` too.
-        protocol: Of the controller, by its name in `protocol_gateway.drivers.registry`.
+        host: Host of the controller, with `port`.
+        protocol: Protocol of the controller, by its name in `protocol_gateway.drivers.registry`.
         codes: Type codes, where the controller sends numbers: {2: "ABSOLUTE.DEG", 101: "COMMAND:home"}.
-        accept_unknown: What the controller never tells and is done without: "mode", "homed".
-        stop_proven: The stop unit was tried on this controller; without that the robot is read-only.
+        accept_unknown: States that the controller never reports and that are not required: "mode", "homed".
+        stop_proven: The stop unit was tried on this controller; otherwise the robot is read-only.
             How to try it: docs/safety.md.
-        stale_after_s: Without a unit for this long, nothing is known of the robot any more; without positions
-            for this long, it is not moved.
-        reconnect_after_s: Without a unit for this long, the connection is made anew.
-        legacy_clients: Where old client programs attach; None: none may.
-        check: Whether motions are checked before they are made: "require", "warn", "off".
-        cell: What stands around it; None: nothing does.
+        stale_after_s: Without a unit for this long, the robot's state is unknown. Without positions for this
+            long, motion is refused.
+        reconnect_after_s: Without a unit for this long, the gateway reconnects.
+        legacy_clients: Where old client programs attach; None: they cannot.
+        check: Policy of the collision check before a motion: "require", "warn", "off".
+        cell: Fixtures and other robots around the robot; None: there are none.
     """
 
     name: str
@@ -54,7 +54,7 @@ class RobotSettings:
 
     @property
     def surroundings(self) -> CellDescription:
-        """What its motions are checked against: its cell, or the robot alone."""
+        """The cell that the robot's motions are checked against: its own, or one with only the robot."""
         return self.cell or CellDescription(
             robots=(CellRobot(self.name, self.description, base_to_site=np.eye(4)),)
         )
@@ -66,7 +66,7 @@ class Settings:
 
     Attributes:
         audit_folder: Holds <site>/<robot>.jsonl, the audit logs.
-        audit_rotate_bytes: A log's file that has grown to this becomes an older part.
+        audit_rotate_bytes: Size at which a log's live file becomes an older part.
     """
 
     site: str
@@ -76,38 +76,38 @@ class Settings:
 
 
 def check(settings: Settings) -> None:
-    """Refuse settings that cannot be meant.
+    """Validate the settings.
 
     Raises:
-        GatewaySettingsError, KeyNameError: Naming what is wrong, and what would be right.
+        GatewaySettingsError, KeyNameError: If a setting is invalid; the text names it and what is allowed.
     """
     check_name(settings.site, "site")
     names: set[str] = set()
     for robot in settings.robots:
         check_name(robot.name, "robot")
         if robot.name in names:
-            raise GatewaySettingsError(f"two robots are named {robot.name!r}: each needs a name of its own")
+            raise GatewaySettingsError(f"two robots are named {robot.name!r}: names must be unique")
         names.add(robot.name)
         if robot.protocol not in DRIVERS:
             raise GatewaySettingsError(
-                f"robot {robot.name}: no protocol {robot.protocol!r}; there are {', '.join(DRIVERS)}"
+                f"robot {robot.name}: unknown protocol {robot.protocol!r}; known: {', '.join(DRIVERS)}"
             )
         if robot.check not in list(Policy):
             known = ", ".join(repr(str(each)) for each in Policy)
             raise GatewaySettingsError(f"robot {robot.name}: check = {robot.check!r}: should be {known}")
         if robot.name not in {each.name for each in robot.surroundings.robots}:
-            raise GatewaySettingsError(f"robot {robot.name}: its cell does not hold it")
+            raise GatewaySettingsError(f"robot {robot.name}: its cell does not contain it")
         if robot.legacy_clients is not None and robot.protocol != "unit":
             raise GatewaySettingsError(
-                f"robot {robot.name}: legacy_clients speak the protocol 'unit', and its controller "
-                f"speaks {robot.protocol!r}"
+                f"robot {robot.name}: legacy_clients need the protocol 'unit', but its controller "
+                f"uses {robot.protocol!r}"
             )
         if unknown := sorted(robot.accept_unknown - _KNOWN_UNKNOWNS):
             raise GatewaySettingsError(
-                f"robot {robot.name}: accept_unknown {unknown[0]!r}: it can hold 'mode' and 'homed'"
+                f"robot {robot.name}: accept_unknown {unknown[0]!r}: allowed are 'mode' and 'homed'"
             )
         if not 0 < robot.stale_after_s < robot.reconnect_after_s:
             raise GatewaySettingsError(
-                f"robot {robot.name}: stale after {robot.stale_after_s:g} s, connected anew after "
-                f"{robot.reconnect_after_s:g} s: the first must be above 0, and below the second"
+                f"robot {robot.name}: stale_after_s = {robot.stale_after_s:g}, reconnect_after_s = "
+                f"{robot.reconnect_after_s:g}: the first must be above 0, and below the second"
             )

@@ -1,14 +1,14 @@
-"""What every socket that units go over has in common."""
+"""Options of every socket that carries units."""
 
 import socket
 
 
 def configure(connected: socket.socket, *, send_buffer_bytes: int, unacknowledged_ms: int) -> None:
-    """Units go out at once; a host that vanished is noticed in seconds.
+    """Configure a socket to send units without delay, and to detect a vanished host within seconds.
 
     Args:
-        send_buffer_bytes: Of the kernel's: what a peer that does not read is given at most.
-        unacknowledged_ms: What its host has not acknowledged for this long breaks the connection.
+        send_buffer_bytes: Size of the kernel's send buffer: limits what a peer that does not read can get.
+        unacknowledged_ms: Time after which unacknowledged data break the connection.
     """
     connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connected.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, send_buffer_bytes)

@@ -1,4 +1,4 @@
-"""What the gateway knows, as messages of the mesh."""
+"""Conversion of the gateway's state into messages of the mesh."""
 
 from collections.abc import Sequence
 
@@ -34,20 +34,20 @@ _ACTIVITIES = {
 
 
 def timestamp(wall_ns: int) -> Timestamp:
-    """A time in ns since the Unix epoch as protobuf has it."""
+    """Convert a time in ns since the Unix epoch to a protobuf timestamp."""
     seconds, nanos = divmod(wall_ns, 1_000_000_000)
     return Timestamp(seconds=seconds, nanos=nanos)
 
 
 class JointStatesMessage:
-    """The message of one robot's joints: made once and filled in for each unit, in an eighth of the time."""
+    """Reusable message of one robot's joints: filling it takes an eighth of the time of a new one."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self._message = JointStates(joints=[JointState(name=name) for name in names])
         self._rows = list(self._message.joints)
 
     def fill(self, joints: JointsReceived, wall_ns: int) -> JointStates:
-        """Joint positions and velocities, dated when their unit was received; the same message each time."""
+        """Return the message with a unit's positions and velocities, stamped with its receive time."""
         date = self._message.timestamp
         date.seconds, date.nanos = divmod(wall_ns, 1_000_000_000)
         for row, position in zip(self._rows, joints.positions, strict=True):
@@ -62,7 +62,7 @@ class JointStatesMessage:
 
 
 def raw_record(record: UnknownReceived, wall_ns: int) -> schema.RawRecord:
-    """A record that the driver has no meaning for, as it was received."""
+    """Return the message of a record that the driver does not know, as it was received."""
     return schema.RawRecord(
         timestamp=timestamp(wall_ns), type=record.type, items=record.items, data=record.raw
     )
@@ -85,7 +85,7 @@ def controller_state(
     check_starting: bool,
     now: Now,
 ) -> schema.ControllerState:
-    """All that is known of the controller; what it does not tell is "unknown"."""
+    """Return the controller's state; a value that the controller does not report is "unknown"."""
     status, reasons = controller.status, _link_reasons(controller)
     state = schema.ControllerState(
         timestamp=timestamp(now.wall_ns),
@@ -149,7 +149,7 @@ def _health(health: LinkHealth, *, flooding: bool) -> schema.LinkHealth:
 
 def _link_reasons(controller: Controller) -> list[Reason]:
     reasons = [controller.link.reason]
-    # Nothing is received over a link that is not up, so there it says no more.
+    # While the link is not up, its own reason already covers missing positions.
     if controller.positions_stale is not None and controller.link.state is LinkState.UP:
         reasons.append(controller.positions_stale)
     if controller.read_only is not None:
@@ -158,7 +158,7 @@ def _link_reasons(controller: Controller) -> list[Reason]:
 
 
 def lease_state(authority: Authority, now: Now) -> schema.Lease:
-    """Who controls, for everybody: never the secret."""
+    """Return the public lease state, without the secret."""
     message = schema.Lease(timestamp=timestamp(now.wall_ns))
     if authority.ended is not None:
         message.ended = authority.ended.text
@@ -176,7 +176,7 @@ def lease_state(authority: Authority, now: Now) -> schema.Lease:
 
 
 def lease_answer(lease: Lease | None, now: Now) -> schema.LeaseAnswer:
-    """The answer to the lease's holder, with its secret; without a lease, the gateway's clock alone."""
+    """Return the answer to the lease's holder, with the secret; without a lease, only the gateway's time."""
     message = schema.LeaseAnswer(now=timestamp(now.wall_ns))
     if lease is not None:
         message.lease = lease.secret

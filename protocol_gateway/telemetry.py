@@ -1,6 +1,6 @@
-"""What a controller tells, onto the mesh: every unit at once, nothing dated anew, nothing invented.
+"""Publication of what a controller reports: every unit immediately, with its own time stamp.
 
-`on_event` runs straight from the socket's callback: it publishes and keeps the newest, nothing else.
+`on_event` runs in the socket's callback: it only publishes and keeps the newest values.
 """
 
 from collections.abc import Callable
@@ -30,19 +30,19 @@ _SLOW_S = 0.1
 _FAULT = 9  # the protocol's ERROR number for a fault
 
 _S = Event.Severity
-# Longer than the journal's limit of a kind: what comes and goes must not leave the last word out.
+# Longer than the journal's rate limit of 5 s, which must not suppress the last event of a flapping state.
 _BACK_AFTER_S = 6.0
 
 
 class _LossNotice:
-    """Whether something is said to be gone; it is back when it has come for a while."""
+    """Debounced notice that data are lost; they are back only after they were received for a while."""
 
     def __init__(self) -> None:
         self._reported_lost = False
         self._back_s: float | None = None
 
     def update(self, now_s: float, *, gone: bool) -> bool | None:
-        """True: say that it is gone; False: that it is back; None: nothing."""
+        """Return True to report the loss, False to report the return, None to report nothing."""
         if gone:
             self._back_s = None
             news = None if self._reported_lost else True
@@ -54,13 +54,13 @@ class _LossNotice:
 
 
 class Telemetry:
-    """The newest of what one controller tells, and its publication.
+    """Newest positions and status of one controller, and their publication.
 
-    Each of both is known for a time of its own: a controller may go on with one and not with the other.
+    Positions and status expire independently, because a controller may stop sending only one of them.
 
     Attributes:
-        motion_detector: Sees motion in the positions.
-        controller_time_s: On the controller's own clock; None: it does not tell.
+        motion_detector: Detects motion in the positions.
+        controller_time_s: Time on the controller's own clock; None: it reports none.
     """
 
     def __init__(
@@ -90,11 +90,11 @@ class Telemetry:
         self.forget()
 
     def forget(self) -> None:
-        """The link was lost: nothing is known any more, for a controller may come back another."""
+        """Drop all values after the link was lost: another controller may answer next."""
         self._status = StatusReceived()
         self._status_watchdog = Watchdog()
         self._activity_since_s = 0.0
-        self._positions: tuple[tuple[float, ...], float] | None = None  # and when they were so
+        self._positions: tuple[tuple[float, ...], float] | None = None  # with their time
         self._fault = ""
         self._gone = (False, False)
         self._joints_notice, self._status_notice = _LossNotice(), _LossNotice()
@@ -102,35 +102,35 @@ class Telemetry:
         self.motion_detector.forget()
 
     def forget_positions(self) -> None:
-        """Count the positions as gone: the controller may be another robot's now."""
+        """Mark the positions as stale: the controller may belong to another robot now."""
         if self._positions is not None:
             self._positions = self._positions[0], float("-inf")
         self.motion_detector.forget()
 
     def positions(self, now_s: float) -> tuple[float, ...] | None:
-        """The newest [rad] or [m]; None: not told since the link came up, or not for the stale time."""
+        """Return the newest positions [rad] or [m]; None: none since the link came up, or stale."""
         return None if self._positions is None or self.positions_stale(now_s) else self._positions[0]
 
     def positions_stale(self, now_s: float) -> Reason | None:
-        """Return that positions are not received any more; None: they are, or never were."""
+        """Return the reason if the positions are stale; None: they are current, or none were received."""
         if self._positions is None or now_s - self._positions[1] < self._stale_after_s:
             return None
         return codes.POSITIONS_STALE(seconds=self._stale_after_s)
 
     def status(self, now_s: float) -> StatusReceived:
-        """The newest; all unknown when it beat and has ceased to."""
+        """Return the newest status; all values unknown once the watchdog has expired."""
         return StatusReceived() if self._status_watchdog.expired(now_s) else self._status
 
     def moving(self, now_s: float) -> bool | None:
-        """Whether the robot moves; None: not known."""
+        """Return whether the robot moves; None: unknown."""
         return is_moving(self.status(now_s).activity, self.motion_detector, now_s - self._activity_since_s)
 
     def fault(self, now_s: float) -> str:
-        """Text of the fault, while there is one."""
+        """Return the fault's text; empty: no fault."""
         return "" if self._status_watchdog.expired(now_s) else self._fault
 
     def check_timeouts(self, now_s: float) -> None:
-        """Say when positions or status come no more; to be called now and then while the link is up."""
+        """Report positions or status that expired or returned; call it repeatedly while the link is up."""
         before, self._gone = (
             self._gone,
             (bool(self.positions_stale(now_s)), self._status_watchdog.expired(now_s)),
@@ -140,21 +140,21 @@ class Telemetry:
             self.motion_detector.forget()
         news = self._joints_notice.update(now_s, gone=positions)
         if news is True:
-            text = f"{self.positions_stale(now_s)}: where the robot is is not known, motion is refused"
+            text = f"{self.positions_stale(now_s)}: the robot's position is unknown, motion is refused"
             self._journal.report(_S.WARNING, "joints.gone", text)
         elif news is False:
-            self._journal.report(_S.INFO, "joints.back", "joint positions come again")
+            self._journal.report(_S.INFO, "joints.back", "joint positions are received again")
         news = self._status_notice.update(now_s, gone=status)
         if news is True:
-            text = f"the controller's status has not come for {STALE_S:g} s: it is not known any more"
+            text = f"the controller has sent no status for {STALE_S:g} s: its status is unknown now"
             self._journal.report(_S.WARNING, "status.gone", text)
         elif news is False:
-            self._journal.report(_S.INFO, "status.back", "the controller's status comes again")
+            self._journal.report(_S.INFO, "status.back", "the controller sends its status again")
         if self._gone != before:
             self._on_status()
 
     def on_event(self, event: ControllerEvent, received: Received) -> None:
-        """Publish an event of the driver's and keep what it tells."""
+        """Publish a driver's event and keep its values."""
         match event:
             case JointsReceived():
                 self._on_joints(event, received)
@@ -171,7 +171,7 @@ class Telemetry:
                 self._journal.report(
                     _S.WARNING,
                     "unit.malformed",
-                    f"a unit of the controller's is malformed and was left out: {reason}",
+                    f"a malformed unit from the controller was ignored: {reason}",
                     offset=offset,
                     bytes=text,
                     reason=reason,
@@ -194,7 +194,7 @@ class Telemetry:
 
     def _report_changes(self, before: StatusReceived, now: StatusReceived) -> None:
         if now.mode is Mode.LOCAL and before.mode is not Mode.LOCAL:
-            text = "the controller is in local mode: people at it move the robot, and nobody from here"
+            text = "the controller is in local mode: only the operator at the controller can move the robot"
             self._journal.report(_S.WARNING, "controller.local", text)
         if now.mode is Mode.REMOTE and before.mode is Mode.LOCAL:
             self._journal.report(_S.INFO, "controller.remote", "the controller is in remote mode again")
@@ -209,7 +209,7 @@ class Telemetry:
         message = self._message.fill(joints, received.wall_ns)
         self._fast.put(message, source_time_ns=received.wall_ns, dated_by=received.clock)
         if received.monotonic_s >= self._next_slow_s:
-            # In step with the grid, so that 100 Hz gives 10 Hz and not 9; after a gap it begins anew.
+            # On a fixed grid, so that 100 Hz gives 10 Hz and not 9; a gap restarts the grid.
             self._next_slow_s = max(self._next_slow_s + _SLOW_S, received.monotonic_s + _SLOW_S / 2)
             self._slow.put(message, source_time_ns=received.wall_ns, dated_by=received.clock)
         self.motion_detector.add(joints.positions, received.monotonic_s)

@@ -1,1 +1,1 @@
-"""The audit log: what was asked of a robot, by whom, and what became of it."""
+"""Audit log of a robot: its requests, their senders, and their outcomes."""

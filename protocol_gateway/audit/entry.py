@@ -1,13 +1,13 @@
-"""A line of an audit log: an entry, JSON, chained by hashes to the entry before.
+"""Line of an audit log: an entry in JSON, chained to the previous entry by its hash.
 
 `hash` is the SHA-256 of the same object without `hash`, keys sorted, no blanks:
 
     {"hash":"5f…","number":7,"operator":"li","outcome":"ACCEPTED","previous":"c0…","repeated":0,
      "request":"MOVE_ABSOLUTE","source":"mesh","text":"","time_ns":1790000000000000000,"values":{"id":"3"}}
 
-`previous` is the hash of the entry before, 64 zeros in the first, so a changed, missing or moved line
-shows; a cut tail shows to whoever knows a later hash (the head, published on the mesh). The lease's
-secret is never in it.
+`previous` is the hash of the previous entry, 64 zeros in the first. So a changed, missing or moved line is
+detected; a truncated log is detected with a later hash (the head, published on the mesh). An entry never
+holds the lease's secret.
 """
 
 import hashlib
@@ -24,17 +24,17 @@ from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
 
 NO_PREVIOUS = "0" * 64
-# Reasons within reasons; a longer chain is not one that was written here.
+# Most levels of reasons within reasons; the gateway writes fewer.
 _DEEPEST = 10
 
-# Keys are sorted and quotes within texts are escaped, so these are the entry's own and not part of a text.
+# Keys are sorted and quotes within texts are escaped, so these matches cannot be part of a text.
 _CHAIN = re.compile(
     rb'\{"hash":"([0-9a-f]{64})",("number":([1-9]\d{0,17}),.*?"previous":"([0-9a-f]{64})".*\})\n'
 )
 
 
 class Outcome(StrEnum):
-    """What became of a request. FAILED: accepted, but it did not reach the controller."""
+    """Outcome of a request. FAILED: accepted, but it did not reach the controller."""
 
     ACCEPTED = "ACCEPTED"
     REFUSED = "REFUSED"
@@ -43,14 +43,14 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
-    """A line of the log; number, previous and hash are the log's to give.
+    """Entry of the log; the log assigns number, previous and hash.
 
     Attributes:
-        time_ns: When it was asked, ns since the Unix epoch.
-        source: Where it came from: "mesh", "gateway".
-        values: What was asked for, as text.
-        reason: Of the text, where it has a code.
-        repeated: Of a flood: so many more requests like it, before it, have no entry of their own.
+        time_ns: Time of the request, ns since the Unix epoch.
+        source: Source of the request: "mesh", "gateway".
+        values: Values of the request, as text.
+        reason: Reason of the text, if it has a code.
+        repeated: Number of similar requests before it that have no entry, in a flood.
     """
 
     time_ns: int
@@ -68,7 +68,7 @@ class Entry:
 
 
 class ChainLink(NamedTuple):
-    """What a line says of its place in the chain; `whole`: its hash is that of its bytes."""
+    """Position of a line in the chain; `intact`: its hash matches its bytes."""
 
     number: int
     previous: str
@@ -77,22 +77,22 @@ class ChainLink(NamedTuple):
 
 
 def chain_entry(entry: Entry, *, number: int, previous: str) -> tuple[Entry, bytes]:
-    """The entry in its place in the chain, and its line."""
+    """Return the entry with its position in the chain, and its line."""
     placed = replace(entry, number=number, previous=previous)
     row = {**vars(placed), "values": dict(entry.values)}
     del row["hash"], row["reason"]
     if entry.reason is not None:
-        # The last of the keys, so that a torn line still says what was asked.
+        # Sorted last, so that a torn line still holds the request.
         row["why"] = _row_of(entry.reason)
     text = json.dumps(row, ensure_ascii=False, separators=(",", ":"), sort_keys=True)
-    # Half a surrogate pair is no character, and must not keep the rest from being written.
+    # An unpaired surrogate is escaped, so that the entry can be written.
     body = text.encode(errors="backslashreplace")
     own = hashlib.sha256(body).hexdigest()
     return replace(placed, hash=own), b'{"hash":"%s",%s\n' % (own.encode(), body[1:])
 
 
 def chain_link(line: bytes) -> ChainLink | None:
-    """A line's place in the chain, without reading the rest of it; None: it is no line of a log."""
+    """Return a line's position in the chain, without parsing the rest; None: not a line of a log."""
     found = _CHAIN.fullmatch(line)
     if found is None:
         return None
@@ -102,10 +102,10 @@ def chain_link(line: bytes) -> ChainLink | None:
 
 
 def parse_line(line: bytes) -> Entry:
-    """An entry from its line.
+    """Parse an entry from its line.
 
     Raises:
-        AuditError: If the line is not one.
+        AuditError: If the line is not an entry.
     """
     try:
         row = json.loads(line)
@@ -128,10 +128,10 @@ def _row_of(reason: Reason) -> dict[str, Any]:
 
 def _reason_of(row: Mapping[str, Any], text: str, depth: int = 1) -> Reason:
     if depth > _DEEPEST:
-        raise ValueError(f"reasons within reasons, more than {_DEEPEST}")
+        raise ValueError(f"more than {_DEEPEST} levels of reasons within reasons")
     values = row.get("values", {})
     for each in (row["code"], text, *values, *values.values()):
-        each.encode()  # text, without half a surrogate pair
+        each.encode()  # raises for an unpaired surrogate
     causes = (_reason_of(cause, cause["text"], depth + 1) for cause in row.get("causes", ()))
     return Reason(row["code"], values, tuple(causes), text)
 
@@ -139,17 +139,17 @@ def _reason_of(row: Mapping[str, Any], text: str, depth: int = 1) -> Reason:
 def _check(entry: Entry) -> None:
     texts = (entry.operator, entry.source, entry.request, entry.text)
     if not all(isinstance(text, str) for text in (*texts, *entry.values, *entry.values.values())):
-        raise TypeError("a text is none")
+        raise TypeError("a text is not a string")
     for text in (*texts, *entry.values, *entry.values.values()):
-        text.encode()  # half a surrogate pair is no character
+        text.encode()  # raises for an unpaired surrogate
     if not all(type(n) is int and 0 <= n < 1 << 63 for n in (entry.time_ns, entry.repeated, entry.number)):
-        raise TypeError("a number is none, or too large")
+        raise TypeError("a number is missing or out of range")
     for each in (entry.previous, entry.hash):
         bytes.fromhex(each)
 
 
 def audit_entry(entry: Entry) -> schema.AuditEntry:
-    """An entry as a message of the mesh."""
+    """Convert an entry to a message of the mesh."""
     message = schema.AuditEntry(
         number=entry.number,
         operator=entry.operator,

@@ -1,7 +1,7 @@
-"""The files of one robot's audit log: <robot>.jsonl is written, <robot>.<first number>.jsonl are older parts.
+"""Files of one robot's audit log: <robot>.jsonl is live, <robot>.<first number>.jsonl are older parts.
 
-Older parts may have been taken away to an archive: the chain is then checked from the first entry
-that is still there, and how many are not is said. What is taken out anywhere else is a break.
+Older parts may have been moved to an archive: the chain is then verified from the first entry that is still
+there, and the number of the others is reported. A gap anywhere else is a break.
 """
 
 import fcntl
@@ -18,20 +18,20 @@ from protocol_gateway.audit.entry import NO_PREVIOUS, ChainLink, Entry, chain_li
 from protocol_gateway.audit.persisted_state import starts_file
 from protocol_gateway.errors import AuditError
 
-# No entry is nearly as long; whoever reads somebody's file must not fill the memory with its one line.
+# Longer than every entry: a file with one endless line must not fill the reader's memory.
 LONGEST_LINE = 1 << 20
 _PART = re.compile(r"(.+)\.(\d{9,18})\.jsonl")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Verification:
-    """Whether a log is whole.
+    """Result of a log's verification.
 
     Attributes:
-        entries: How many were found whole.
-        first_break: Number of the first entry that is not as it was written; None: none.
-        first: Number of the first entry that is here: above 1 where older parts were taken away.
-        last_hash: Of the last whole entry.
+        entries: Number of intact entries.
+        first_break: Number of the first entry that was changed or is missing; None: none.
+        first: Number of the first entry in the files; above 1 if older parts were moved away.
+        last_hash: Hash of the last intact entry.
     """
 
     ok: bool
@@ -43,18 +43,18 @@ class Verification:
 
 
 def part_name(live: Path, first: int) -> Path:
-    """The name of an older part of a log, by the number of its first entry."""
+    """Return the path of an older part of a log, by the number of its first entry."""
     return live.with_name(f"{live.stem}.{first:09d}.jsonl")
 
 
 def first_number(part: Path) -> int:
-    """The number of an older part's first entry, by its name."""
+    """Return the number of an older part's first entry, from its name."""
     matched = _PART.fullmatch(part.name)
     return int(matched[2]) if matched is not None else 0
 
 
 def older_parts(live: Path) -> list[Path]:
-    """The older parts beside a log's live file, oldest first; of a part itself: none."""
+    """Return the older parts of a log's live file, oldest first; none for an older part."""
     if _PART.fullmatch(live.name):
         return []
     found = []
@@ -66,13 +66,13 @@ def older_parts(live: Path) -> list[Path]:
 
 
 def open_files(live: Path, *, newest_first: bool = False) -> Iterator[BinaryIO]:
-    """Every file of a log, open one after the other.
+    """Yield every file of a log, opened one after the other.
 
     Raises:
         OSError: If the live file cannot be read.
     """
     with ExitStack() as stack:
-        # The live one first: should the log be rotated now, it is what the newest part will be.
+        # Open the live file first: if the log is rotated now, this file becomes the newest part.
         newest = stack.enter_context(live.open("rb"))
         own = os.fstat(newest.fileno())
         parts = [part for part in older_parts(live) if not os.path.samestat(part.stat(), own)]
@@ -86,7 +86,7 @@ def open_files(live: Path, *, newest_first: bool = False) -> Iterator[BinaryIO]:
 
 
 def lines_of(file: BinaryIO) -> Iterator[bytes]:
-    """The lines of a file; one that is too long for an entry comes without its middle."""
+    """Yield the lines of a file; a line that is too long for an entry without its middle."""
     while line := file.readline(LONGEST_LINE):
         piece = line
         while len(piece) == LONGEST_LINE and not piece.endswith(b"\n"):
@@ -95,7 +95,7 @@ def lines_of(file: BinaryIO) -> Iterator[bytes]:
 
 
 def read_entries(live: Path) -> Iterator[Entry]:
-    """Every readable entry of a log, oldest first; no file: none."""
+    """Yield every readable entry of a log, oldest first; none without a file."""
     if not live.exists():
         return
     for file in open_files(live):
@@ -103,14 +103,14 @@ def read_entries(live: Path) -> Iterator[Entry]:
             try:
                 yield parse_line(line)
             except AuditError:
-                continue  # `verify` tells where; who only looks for something goes on
+                continue  # `verify` reports it; a search goes on
 
 
 def verify(live: Path, head: str | None = None) -> Verification:
-    """Check a log's chain, and that the entry whose hash is `head` is still in it.
+    """Verify a log's chain, and that it still holds the entry with the hash `head`.
 
     Args:
-        live: The log's file, with whose older parts beside it the check begins; or one older part alone.
+        live: The live file, which is verified with its older parts; or a single older part.
 
     Raises:
         OSError: If a file cannot be read.
@@ -151,7 +151,7 @@ def verify(live: Path, head: str | None = None) -> Verification:
 
 
 def _problem(line: bytes, link: ChainLink | None, number: int, previous: str) -> str:
-    """Why a line is not the one that belongs there; empty: it is."""
+    """Return why a line is not the expected one; empty: it is."""
     if link is None:
         try:
             parse_line(line)
@@ -165,7 +165,7 @@ def _problem(line: bytes, link: ChainLink | None, number: int, previous: str) ->
 
 
 def _is_being_written(file: BinaryIO) -> bool:
-    """Whether a gateway has the file open: what is torn now may be whole in a moment."""
+    """Return whether a gateway has the file open, so that a torn line may still be completed."""
     try:
         fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:

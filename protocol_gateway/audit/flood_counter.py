@@ -1,12 +1,12 @@
-"""A flood of refusals, or of stops, is written into the audit log as a count. No I/O; time is an argument.
+"""Counting of refusal floods and stop floods for the audit log. No I/O; time is an argument.
 
     the first 5 of a kind within a second   an entry each
-    more of it                              counted: one entry a second, with how many it stands for
-    kinds beyond the 30th                   counted together, as those of "*"
+    further ones                            counted: one entry a second, with their number
+    kinds beyond the 30th                   counted together, with the name "*"
 
-A kind is who asked, from which host, and what: a flood must neither fill the disk nor keep the log from
-being read, and whoever floods under ever new names no more than others. What is accepted is never
-counted, stops excepted: any number of them latches the same robot.
+A kind is an operator, a host and a request. A flood must neither fill the disk nor make the log unreadable,
+even under many invented names. Accepted requests are never counted, except stops, because a repeated stop
+changes nothing.
 """
 
 from collections.abc import Iterator
@@ -33,18 +33,18 @@ class _Kind:
 
 
 class FloodCounter:
-    """Which entries of one robot are written, and which are counted."""
+    """Counter that decides which entries of one robot are written, and which are counted."""
 
     def __init__(self) -> None:
         self._kinds: dict[tuple[str, str, str], _Kind] = {}
 
     def admits(self, entry: Entry, now_s: float) -> bool:
-        """Whether an entry is to be written; else it is counted."""
+        """Return whether to write an entry; otherwise it is counted."""
         if entry.outcome is not Outcome.REFUSED and entry.request != STOP:
             return True
         name = (entry.operator, _host(entry.source), entry.request)
         if name not in self._kinds and len(self._kinds) >= MOST_KINDS:
-            # The last stop's number has to be in the log, so stops are never counted with anything else.
+            # Stops are not counted with other requests, because the last stop's number must be in the log.
             name = (_MANY, _MANY, STOP if entry.request == STOP else _MANY)
         kind = self._kinds.setdefault(name, _Kind(now_s))
         if not kind.counted and now_s - kind.began_s >= WINDOW_S:
@@ -57,20 +57,20 @@ class FloodCounter:
         return False
 
     def counts(self, now_s: float, *, request: str = "") -> Iterator[Entry]:
-        """The entries of what was counted, of one request or of all; to be asked for each second."""
+        """Yield the entries of counted requests, of one request name or of all; call it each second."""
         for name, kind in list(self._kinds.items()):
             if request not in ("", name[2]):
                 continue
             if kind.counted and kind.last is not None:
                 yield _count(kind.last, kind.counted - 1, many=name[0] == _MANY)
-                # It goes on to be counted, unless there is a second's peace.
+                # The kind stays counted until it pauses for a second.
                 kind.counted, kind.last, kind.began_s = 0, None, now_s
             elif now_s - kind.began_s >= WINDOW_S:
                 del self._kinds[name]
 
 
 def _host(source: str) -> str:
-    """Where something came from, without its port: each connection has another."""
+    """Return a source without its port, which differs for each connection."""
     host, _, port = source.rpartition(":")
     return host if port.isdecimal() else source
 

@@ -1,15 +1,15 @@
-"""The latched stop of one robot in a file of fixed size, so that a full disk takes it and a restart finds it.
+"""Latched stop of one robot in a file of fixed size, which can be written on a full disk.
 
-    slot 0, slot 1   whose it is and its state, a line of JSON with its SHA-256, filled up to 4096 bytes
-    a write          goes to the slot that does not hold the newest state, in place
-    a start          takes the newest whole slot; a damaged or empty slot may have been newer, and held a stop
+    slot 0, slot 1   robot and state, a line of JSON with its SHA-256, padded to 4096 bytes
+    write            in place, to the slot that does not hold the newest state
+    start            uses the newest valid slot; a damaged or empty slot may have been newer, and held a stop
 
-Both slots are allocated and written when the gateway starts, so a later write needs no space. A thread of
-its own writes, another one syncs: a stop and its answer wait for neither. A write is in the kernel's hands
-before it is synced, so `kill -9` does not undo it.
+Both slots are allocated and written when the gateway starts, so a later write needs no space. One thread
+writes, another one syncs: a stop and its answer wait for neither. The kernel has the data before the sync, so
+`kill -9` does not lose it.
 
-Stop numbers up to `reserved` may have been given out by a gateway that was killed before it wrote the
-newest: the next one counts on from there. One that ended by itself leaves no gap.
+A gateway that was killed may have given out stop numbers up to `reserved` without writing them: the next
+gateway continues after them. A gateway that shut down normally leaves no gap.
 """
 
 import errno
@@ -31,21 +31,21 @@ from robomesh.reasons import Reason
 
 SLOT_BYTES = 4096
 SLOTS = 2
-# Far more than are given out before the newest is written, also on a busy machine.
+# Far more than the numbers given out before the newest is written, even on a busy machine.
 RESERVED = 1000
-# A write that takes longer counts as failed until it is done.
+# A write that takes longer counts as failed until it completes.
 LONGEST_WRITE_S = 1.0
 _DIGEST = "sha256"
-_LONGEST_TEXT = 400  # characters, so that two of them fit into a slot however they are escaped
+_LONGEST_TEXT = 400  # characters, so that two texts fit into a slot even when escaped
 
 
 @dataclass(frozen=True, kw_only=True)
 class LatchState:
-    """What the file holds.
+    """Content of the file.
 
     Attributes:
-        last_stop_id: Number of the newest stop that is known.
-        reserved: Numbers up to this one may have been given out.
+        last_stop_id: Number of the newest known stop.
+        reserved: Highest number that may have been given out.
     """
 
     stop: Stop | None = None
@@ -54,15 +54,15 @@ class LatchState:
 
 
 class LatchFile:
-    """The latch file of one robot; its audit log's lock keeps other gateways away from it.
+    """Latch file of one robot; the lock of its audit log excludes other gateways.
 
     Args:
-        first: The robot's audit log is empty. An empty latch file is no damage then: a gateway was killed at
+        first: The robot's audit log is empty. Then an empty latch file is no damage: a gateway was killed at
             its first start.
 
     Attributes:
-        found: What was there when it was opened; None: nothing.
-        damage: What is wrong with it, in words; empty: nothing.
+        found: Content when it was opened; None: none.
+        damage: Damage as a sentence; empty: none.
     """
 
     def __init__(self, path: Path, *, first: bool = False) -> None:
@@ -82,7 +82,7 @@ class LatchFile:
 
     @property
     def problem(self) -> Reason | None:
-        """Why a restart would forget a stop now; None: it would not."""
+        """Reason why a restart would lose a stop now; None: it would not."""
         if self._failure:
             return self._failure
         since_s = self._busy_since_s
@@ -91,26 +91,26 @@ class LatchFile:
         return None
 
     def begin(self, stop: Stop | None, last_stop_id: int, *, given_out: int) -> None:
-        """Allocate the file and write both slots; `problem` says if that failed.
+        """Allocate the file and write both slots; a failure is in `problem`.
 
         Args:
-            given_out: Numbers up to this one may have been, of stops that nothing is known of.
+            given_out: Highest number that may have been given out, also for unknown stops.
         """
         self._newest = LatchState(stop=stop, last_stop_id=last_stop_id, reserved=given_out + RESERVED)
         self._try_to_write(self._newest)
 
     def next_number(self, last_stop_id: int, wall_ns: int) -> int:
-        """Return the number of the next stop, which no restart gives out again.
+        """Return the number of the next stop, which is never given out again after a restart.
 
-        Beyond what the disk knows to be reserved the number is the time in microseconds: a disk that takes
-        nothing must not hold up a stop.
+        Above the numbers that are reserved on disk it is the time in microseconds, because a failing disk
+        must not delay a stop.
         """
         number = last_stop_id + 1
         reserved = 0 if self._written is None else self._written.reserved
         return number if number <= reserved else max(number, wall_ns // 1000)
 
     def keep(self, stop: Stop | None, last_stop_id: int) -> None:
-        """Write the latch soon, on the file's own thread; returns at once."""
+        """Write the latch soon, in the file's thread, without waiting."""
         reserved = last_stop_id + RESERVED
         self._write_soon(LatchState(stop=stop, last_stop_id=last_stop_id, reserved=reserved))
 
@@ -126,16 +126,16 @@ class LatchFile:
             self._writer.submit(self._write_newest)
 
     def retry(self) -> None:
-        """Try again what could not be written; to be called now and then."""
+        """Retry a failed write; call it repeatedly."""
         if self._failure:
             self._write_soon(replace(self._newest))
 
     def close(self) -> None:
-        """Write that no number beyond those that are known was given out, and close the file."""
+        """Release the reserved numbers, and close the file."""
         with self._lock:
             self._closed = True
             newest = self._newest
-            # Behind what is being written.
+            # Queued after the write that may be in progress.
             self._writer.submit(self._try_to_write, replace(newest, reserved=newest.reserved - RESERVED))
         self._writer.shutdown()
         self._syncer.shutdown()
@@ -143,7 +143,7 @@ class LatchFile:
             os.close(self._file)
             self._file = None
 
-    # ------------------------------------------------------- on the file's own threads
+    # --------------------------------------------------------- in the file's threads
 
     def _write_newest(self) -> None:
         while True:
@@ -180,7 +180,7 @@ class LatchFile:
             self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o640)
         os.posix_fallocate(self._file, 0, SLOTS * SLOT_BYTES)
         for _ in range(SLOTS):
-            # The older one first, and on disk before the newer one is touched.
+            # The older slot first, and synced before the newer one is overwritten.
             self._write_slot(state)
             os.fdatasync(self._file)
         folder = os.open(self.path.parent, os.O_RDONLY | os.O_CLOEXEC)
@@ -195,7 +195,7 @@ class LatchFile:
         slot = (self._slot + 1) % SLOTS
         line = _line(state, self._sequence + 1, _owner(self.path))
         if os.pwrite(self._file, line, slot * SLOT_BYTES) != SLOT_BYTES:
-            raise OSError(errno.EIO, "Half of it was written")
+            raise OSError(errno.EIO, "Incomplete write")
         self._slot, self._sequence = slot, self._sequence + 1
 
     def _sync(self) -> None:
@@ -213,11 +213,11 @@ class LatchFile:
 
 
 def disk_problem(error: Exception) -> str:
-    """Return why a disk took nothing, and what to do."""
+    """Return why a write failed, and what to do."""
     if not isinstance(error, OSError):
         return repr(error)
     full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-    return f"{error.strerror}: {'make space on its disk' if full else 'see to its disk'}"
+    return f"{error.strerror}: {'make space on its disk' if full else 'check its disk'}"
 
 
 def _owner(path: Path) -> str:
@@ -245,7 +245,7 @@ def _json(row: dict[str, Any]) -> bytes:
 
 
 class _Slot(NamedTuple):
-    """The content of an undamaged slot; `of`: its robot, as `site/robot`, empty in old files."""
+    """Content of an undamaged slot; `of`: its robot as `site/robot`, empty in old files."""
 
     sequence: int
     of: str
@@ -253,7 +253,7 @@ class _Slot(NamedTuple):
 
 
 def _read(path: Path, *, first: bool) -> tuple[LatchState | None, str, int, int]:
-    """The newest whole state, what is wrong in words, its sequence and its slot."""
+    """Return the newest valid state, the damage as a sentence, the state's sequence and its slot."""
     nothing = 0, SLOTS - 1
     try:
         with path.open("rb") as file:
@@ -267,9 +267,9 @@ def _read(path: Path, *, first: bool) -> tuple[LatchState | None, str, int, int]
         return None, "", *nothing
     slots = [_parsed(part) for part in parts]
     if any(slot is not None and slot.of not in ("", _owner(path)) for slot in slots):
-        return None, f"its latch file {path.name} is another robot's", *nothing
+        return None, f"its latch file {path.name} belongs to another robot", *nothing
     found = [(slot.sequence, place, slot.state) for place, slot in enumerate(slots) if slot is not None]
-    # The first write goes to slot 0, the second to slot 1: a gateway was killed between them.
+    # A gateway was killed between its first write, to slot 0, and its second, to slot 1.
     begun = slots[0] is not None and slots[0].sequence == 1 and not parts[1].strip(b"\0")
     damage = "" if len(found) == SLOTS or begun else f"its latch file {path.name} is damaged"
     if not found:
@@ -279,7 +279,7 @@ def _read(path: Path, *, first: bool) -> tuple[LatchState | None, str, int, int]
 
 
 def _parsed(part: bytes) -> _Slot | None:
-    """What a slot holds; None: it is not whole."""
+    """Parse a slot; None: it is damaged."""
     try:
         row = json.loads(part)
         digest = row.pop(_DIGEST)

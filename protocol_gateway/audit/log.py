@@ -1,16 +1,16 @@
-"""The audit log of one robot: who asked for what, and what became of it. Append-only, hash-chained.
+"""Audit log of one robot: requests, senders and outcomes. Append-only, hash-chained.
 
-    append    what is about to be done: on disk, or refused
-    note      what has happened: kept until the disk takes it
+    append          entry of a request before it is executed: on disk, or an error
+    append_later    entry of a past event: kept in memory until the disk takes it
 
-Entries stand in the order of the calls. `audit_entry` says what a line is, `audit_files` where the
-lines are and how a log is checked, `audit_find` how one is searched. When the live file has grown to
-its size it becomes an older part, and a new one goes on with the chain:
+Entries are in the order of the calls. `entry` defines a line, `files` the files of a log and its
+verification, `search` the search. When the live file has reached its size, it becomes an older part, and a
+new file continues the chain:
 
-    new file, locked, ROTATE in it -> the live one's second name, the part's -> the new one is the live one
+    create new file, lock it, write ROTATE -> link the live file under the part's name -> rename the new file
 
-Whoever is killed meanwhile: there is one whole live file, and it is never empty. Beside it stands the latch
-file (`latch`), under the same lock.
+A crash at any step leaves one complete live file, which is never empty. The latch file (`latch`) is in the
+same folder, under the same lock.
 """
 
 import asyncio
@@ -46,8 +46,7 @@ __all__ = ["AuditLog", "Entry", "Outcome", "Verification", "read_entries", "veri
 log = logging.getLogger(__name__)
 
 ROTATE_BYTES = 16 << 20
-# What has happened is noted after the wire, also while the disk is full: so much waits for it to be mended,
-# the second half for all but refusals.
+# Most entries that wait in memory while the disk fails; refusals may use only half of it.
 MOST_PENDING = 1000
 GATEWAY = "gateway"
 
@@ -60,12 +59,12 @@ class _Waiting:
 
 
 class AuditLog:
-    """The open log of one robot. Its file is locked: two gateways must not write one chain.
+    """Open audit log of one robot. Its file is locked, because two gateways must not write one chain.
 
     Attributes:
-        latch: The file that holds the latched stop, beside the log.
-        mended: What was found wrong with the files when they were opened, in words; empty: nothing.
-        problem: Why the last write failed; None: it did not.
+        latch: The latch file of the same robot.
+        damage: Damage found in the files when they were opened, as a sentence; empty: none.
+        problem: Why the last write failed; None: it succeeded.
     """
 
     def __init__(
@@ -75,14 +74,14 @@ class AuditLog:
         on_written: Callable[[Entry], None] = lambda entry: None,
         rotate_bytes: int = ROTATE_BYTES,
     ) -> None:
-        """Open the log, or begin one; a damaged one (`start`) latches a stop.
+        """Open the log, or create one; damage (`recovery`) latches a stop.
 
         Args:
-            on_written: Told of every entry that is on disk, in order.
-            rotate_bytes: A live file that has grown to this becomes an older part.
+            on_written: Called with every entry that is on disk, in order.
+            rotate_bytes: Size at which the live file becomes an older part.
 
         Raises:
-            AuditError: If the folder or file cannot be written, or another process has it open.
+            AuditError: If the folder or file cannot be written, or another process has the log open.
         """
         self.path = path
         self.problem: Reason | None = None
@@ -92,11 +91,11 @@ class AuditLog:
         self._dropped = 0
         self._writer: asyncio.Task[None] | None = None
         self._writing_since_s: float | None = None
-        # A thread of its own: a disk that hangs must not hold the threads of everything else.
+        # A dedicated thread: a disk that hangs must not block the shared thread pool.
         self._disk = ThreadPoolExecutor(1, thread_name_prefix=f"audit-{path.stem}")
         self._torn = False
         self._unpublished: list[Entry] = []
-        self._name_synced = False  # whether the folder is on disk with the file's name in it
+        self._name_synced = False  # the folder, with the file's name, is synced to disk
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = _open_locked(path)
@@ -104,7 +103,7 @@ class AuditLog:
             recovery = find_end(path)
             self._end, self.damage = recovery.end, recovery.problem
             if recovery.stop_may_be_lost:
-                # Until it is written behind a new beginning, the damage stays as it is.
+                # Keep the damaged file as it is; the first write rotates to a new file.
                 self._torn, self._rotate_at = True, 1
             else:
                 os.ftruncate(self._file, self._end.length)
@@ -113,7 +112,7 @@ class AuditLog:
             self._remember_stops(recovery)
         except OSError as error:
             raise AuditError(
-                f"audit log {path} cannot be written ({error.strerror}): without it no robot is moved"
+                f"audit log {path} cannot be written ({error.strerror}): the gateway needs it to move a robot"
             ) from None
 
     @property
@@ -123,17 +122,17 @@ class AuditLog:
 
     @property
     def state(self) -> PersistedState:
-        """What the log's entries say must be remembered across a restart."""
+        """State that the log preserves across a restart."""
         return self._end.state
 
     @property
     def stuck_s(self) -> float:
-        """How long the disk has been busy with one write [s]."""
+        """Duration of the write that is in progress [s]; 0: none."""
         since_s = self._writing_since_s
         return 0.0 if since_s is None else time.monotonic() - since_s
 
     def append(self, entry: Entry) -> asyncio.Future[Entry]:
-        """Write an entry down before it is acted on: awaited, it is on disk, with its number and hashes.
+        """Write the entry of a request before it is executed; the future is done when it is on disk.
 
         Raises (when awaited):
             AuditError: If it could not be written; then it is not in the log.
@@ -141,7 +140,7 @@ class AuditLog:
         return self._put(entry, retried=False)
 
     def append_later(self, entry: Entry) -> asyncio.Future[Entry]:
-        """As `append`, for what has happened already: what cannot be written now is kept, and written later.
+        """Write the entry of a past event; if that fails, keep it and retry later.
 
         Raises (when awaited):
             AuditError: If it could not be written yet.
@@ -155,17 +154,17 @@ class AuditLog:
         return written
 
     def retry(self) -> None:
-        """Try again to write what was kept; to be called now and then."""
+        """Retry failed writes; call it repeatedly."""
         if self._queue or self._dropped:
             self._start_writer()
 
     async def settle(self) -> None:
-        """Wait until all that waits is written, or could not be."""
+        """Wait until all pending entries are written, or have failed."""
         if self._writer is not None:
             await self._writer
 
     async def close(self) -> None:
-        """Write what waits, then close the files."""
+        """Write pending entries, then close the files."""
         self.retry()
         await self.settle()
         await asyncio.to_thread(self.latch.close)
@@ -173,19 +172,19 @@ class AuditLog:
         os.close(self._file)
 
     def _remember_stops(self, recovery: Recovery) -> None:
-        """Take what log and latch file leave behind; where a stop may be lost, latch one."""
+        """Restore the latched stop from log and latch file; latch a new one if a stop may be lost."""
         state, stop, unsent = merge(recovery.end.state, self.latch.found)
         self.damage = ", and ".join(filter(None, (recovery.problem, self.latch.damage)))
         text = (
             f"the gateway was killed before it wrote the entry of stop {stop.id}" if stop is not None else ""
         )
-        # A torn line may have held a stop: the one that the latch file knows. Damage may have held any.
+        # A torn line can only have held the stop that the latch file knows. Other damage may have held any.
         if recovery.damaged or self.latch.damage or (recovery.stop_may_be_lost and stop is None):
             reason = UNKNOWN if recovery.stop_may_be_lost else LATCH_UNKNOWN
             now_ns = time.time_ns()
             number = state.last_stop_id + 1
             if self.latch.found is None:
-                # Which numbers were given out is not known. The time in microseconds is above all of them.
+                # The numbers given out are unknown. The time in microseconds is above all of them.
                 number = max(number, now_ns // 1000)
             state, stop = with_latched_stop(state, number=number, by=GATEWAY, since_ns=now_ns, reason=reason)
             text = self.damage
@@ -214,7 +213,7 @@ class AuditLog:
             self._writer = asyncio.create_task(self._write_queue())
 
     async def _write_queue(self) -> None:
-        """Everything that waits, in one write and one fsync, again until nothing new does."""
+        """Write all pending entries in one write and one fsync, until no new ones are queued."""
         loop = asyncio.get_running_loop()
         while True:
             batch, self._queue = self._queue, []
@@ -223,7 +222,7 @@ class AuditLog:
             dropped, self._dropped = self._dropped, 0
             self._writing_since_s = time.monotonic()
             try:
-                # An fsync takes milliseconds, seconds on a busy disk: the joint stream must not wait for it.
+                # In a thread: an fsync takes up to seconds, and the joint stream must not wait for it.
                 placed = await loop.run_in_executor(self._disk, self._write, [each.entry for each in batch])
             except Exception as error:
                 self.problem = codes.AUDIT_NOT_WRITABLE(file=self.path.name, detail=disk_problem(error))
@@ -233,7 +232,7 @@ class AuditLog:
             else:
                 self.problem = None
                 new = bool(self._queue)
-                # Before them may stand the entry that begins a new file.
+                # The first may be a ROTATE entry, which has no future.
                 for each, entry in zip(batch, placed[-len(batch) :], strict=True):
                     if each.written is not None and not each.written.done():
                         each.written.set_result(entry)
@@ -244,7 +243,7 @@ class AuditLog:
                 return
 
     def _fail(self, batch: list[_Waiting]) -> list[_Waiting]:
-        """Tell who waits that it was not written; those that are kept."""
+        """Fail the futures of entries that were not written; return the entries to retry."""
         for each in batch:
             if each.written is not None and not each.written.done():
                 each.written.set_exception(
@@ -285,7 +284,7 @@ class AuditLog:
         return to_publish
 
     def _rotate(self) -> None:
-        """Go on in a new file; where that fails, in this one, until it has grown by as much again."""
+        """Continue in a new file; if that fails, in this one, until it has grown by the size again."""
         end, fresh = self._end, self.path.with_suffix(".new")
         part = part_name(self.path, end.first)
         text = f"the log goes on from {part.name}"
@@ -295,7 +294,7 @@ class AuditLog:
             file = os.open(fresh, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o640)
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                # Before it is the live file: one that is empty was emptied by somebody.
+                # Written before the rename, so that an empty live file always means tampering.
                 _write_all(file, line, 0)
                 os.fsync(file)
                 if end.length:
@@ -319,7 +318,7 @@ class AuditLog:
 
 
 def _dropped_entry(number: int) -> Entry:
-    text = f"{number} requests have no entry here: the disk took none, and no more could be kept"
+    text = f"{number} requests have no entry here: the disk failed, and the queue in memory was full"
     return _own_entry("LOST", Outcome.FAILED, text, {"requests": str(number)})
 
 
@@ -345,11 +344,11 @@ def _open_locked(path: Path) -> int:
             raise AuditError(f"audit log {path} is open in another gateway: stop that one first") from None
         if os.path.samestat(os.fstat(file), path.stat()):
             return file
-        os.close(file)  # it has become an older part meanwhile
+        os.close(file)  # rotated meanwhile: it is an older part now
 
 
 def _finish_rotation(path: Path) -> None:
-    """Take away what a rotation that was broken off has left: the log is whole without it."""
+    """Remove the remains of an interrupted rotation; the log is complete without them."""
     path.with_suffix(".new").unlink(missing_ok=True)
     for part in older_parts(path):
         if part.samefile(path):

@@ -1,9 +1,8 @@
-"""What a gateway must remember across its own restart: the stop that was latched, and whose motion may still
-run. It is in the audit log; the latch and the newest stop's number are in the latch file (`latch`) too, which
-a full disk takes. Where that one knows a newer stop, it wins.
+"""State that a gateway preserves across a restart: the latched stop, and whose motion may still run.
 
-A log's live file begins with an entry ROTATE that carries what the older files leave behind, so that
-a start reads one file, however long the log has become.
+It is in the audit log. The latch and the newest stop's number are also in the latch file (`latch`), which can
+be written on a full disk; if that has a newer stop, it wins. A log's live file begins with a ROTATE entry,
+which holds the state after the older files, so that a start reads only one file.
 """
 
 import json
@@ -26,11 +25,12 @@ _REQUESTS = tuple(f'"request":"{name}"'.encode() for name in (*_MOTIONS, *_LEASE
 
 @dataclass(frozen=True, kw_only=True)
 class PersistedState:
-    """What a log leaves behind.
+    """State after the entries of a log.
 
     Attributes:
-        cleared: A stop whose RESET is written down, but may not have been sent.
-        mover: Who commanded motion under a lease of which no end is written: the gateway was killed.
+        cleared: A stop whose RESET is in the log, but may not have been sent.
+        mover: Operator who commanded motion under a lease whose end is not in the log, because the gateway
+            was killed.
     """
 
     stop: Stop | None = None
@@ -40,7 +40,7 @@ class PersistedState:
 
     @property
     def authority(self) -> Authority:
-        """Nobody in control, the last stop latched if none reset it."""
+        """Authority without a lease, with the stop that was not reset."""
         return Authority(stop=self.stop, last_stop_id=self.last_stop_id)
 
 
@@ -48,24 +48,24 @@ EMPTY = PersistedState()
 
 
 def may_change_state(line: bytes) -> bool:
-    """Whether a log's line may change what is remembered; quicker than to parse it."""
+    """Return whether a log's line may change the state, without parsing it."""
     return may_change_stop(line) or any(request in line for request in _REQUESTS)
 
 
 def may_change_stop(line: bytes) -> bool:
-    """Whether a log's line, or a part of one, may change whether a stop is latched."""
+    """Return whether a log's line, or a part of one, may latch or clear a stop."""
     return any(request in line for request in _STOPS)
 
 
 def starts_file(line: bytes) -> bool:
-    """Whether a log's line is one with which a new file begins."""
+    """Return whether a log's line is a ROTATE entry, which begins a new file."""
     return _STOPS[-1] in line
 
 
 def apply_entry(state: PersistedState, entry: Entry) -> PersistedState:
-    """What is remembered after one more entry."""
+    """Return the state after one more entry."""
     number = _number(entry.values.get("stop_id", ""))
-    # Stops that were counted in a flood are written after newer ones.
+    # Counted stops of a flood are written after newer ones, so an older number changes nothing.
     if entry.request == "STOP" and number > state.last_stop_id:
         reason = entry.values.get("reason", "")
         latched = Stop(id=number, by=entry.operator, reason=reason, since_ns=entry.time_ns)
@@ -79,7 +79,7 @@ def apply_entry(state: PersistedState, entry: Entry) -> PersistedState:
             return replace(state, stop=None, cleared=state.stop)
         return replace(state, cleared=None)
     if entry.request == "RESET" and entry.outcome is Outcome.FAILED:
-        # It was written down before it was sent, and then it was not sent.
+        # The accepted RESET was written before it was sent, but then it was not sent.
         return replace(state, stop=state.stop or state.cleared, cleared=None)
     if entry.request == ROTATE:
         return _from_values(entry.values)
@@ -89,18 +89,18 @@ def apply_entry(state: PersistedState, entry: Entry) -> PersistedState:
 def with_latched_stop(
     state: PersistedState, *, number: int, by: str, since_ns: int, reason: str = UNKNOWN
 ) -> tuple[PersistedState, Stop]:
-    """What a damaged log leaves behind, with the stop that is latched because one may be lost."""
+    """Return the state with a new latched stop, for a damaged log that may have lost one."""
     stop = Stop(id=number, by=by, reason=reason, since_ns=since_ns)
     return replace(state, stop=stop, last_stop_id=stop.id), stop
 
 
 class MergedState(NamedTuple):
-    """What log and latch file leave behind together.
+    """State from log and latch file together.
 
     Attributes:
-        unwritten: A stop that only the latch file knows: the gateway was killed before its entry was written.
-        unsent: A stop whose RESET is written down, and may not have been sent: the gateway was killed before
-            it wrote either. It stays latched.
+        unwritten: A stop only in the latch file, because the gateway was killed before it wrote the entry.
+        unsent: A stop whose RESET is in the log but may not have been sent, because the gateway was killed
+            before it wrote the outcome. The stop stays latched.
     """
 
     state: PersistedState
@@ -123,7 +123,7 @@ def merge(state: PersistedState, latch: LatchState | None) -> MergedState:
 
 
 def authority_after(entries: Iterable[Entry]) -> Authority:
-    """The authority that a log leaves behind; oldest entry first."""
+    """Return the authority after a log's entries, oldest first."""
     state = EMPTY
     for entry in entries:
         state = apply_entry(state, entry)
@@ -131,7 +131,7 @@ def authority_after(entries: Iterable[Entry]) -> Authority:
 
 
 def to_values(state: PersistedState) -> dict[str, str]:
-    """A state as an entry's values."""
+    """Convert a state to an entry's values."""
     rows = {"stop": _text(state.stop), "cleared": _text(state.cleared), "mover": state.mover}
     return {name: row for name, row in rows.items() if row} | {"last_stop_id": str(state.last_stop_id)}
 
@@ -161,4 +161,4 @@ def _stop(text: str) -> Stop | None:
         row: dict[str, Any] = json.loads(text)
         return Stop(**row)
     except (ValueError, TypeError, RecursionError):
-        return None  # somebody changed that line: `verify` tells
+        return None  # a changed line: `verify` reports it

@@ -1,11 +1,11 @@
-"""The end of a log as a start finds it, and whether what must be remembered is there for certain.
+"""Recovery of a log's end at the start of a gateway, with detection of damage.
 
-    torn last line                    cut off: its gateway was killed as it wrote, nobody was told it is there
+    torn last line                    cut off: the gateway was killed while writing, before it confirmed it
     ... that may be a STOP or RESET   a stop may be lost
     any other damage                  a stop may be lost
 
-Who may have lost a stop latches one (`AuditLog`), and goes on in a new file: the damaged one becomes an
-older part, as it is, and the next start does not find the same damage again.
+If a stop may be lost, the gateway latches one (`AuditLog`) and continues in a new file. The damaged file
+becomes an older part without changes, so that the next start does not find the same damage again.
 """
 
 import contextlib
@@ -26,13 +26,13 @@ from protocol_gateway.audit.persisted_state import (
 )
 from protocol_gateway.errors import AuditError
 
-# Quotes within texts are escaped, so no text looks like this.
+# Quotes within texts are escaped, so no text matches.
 _REQUEST = re.compile(rb'"request":"[A-Z_]+"')
 
 
 @dataclass(frozen=True, kw_only=True)
 class LogEnd:
-    """Where a log's live file ends; `first`: number of its first entry, `length`: bytes."""
+    """End of a log's live file; `first`: number of its first entry, `length`: bytes."""
 
     first: int = 1
     number: int = 0
@@ -42,12 +42,12 @@ class LogEnd:
 
 
 class Recovery(NamedTuple):
-    """What a start finds.
+    """Result of the recovery.
 
     Attributes:
-        problem: What is wrong, in words.
-        stop_may_be_lost: A stop may be lost with it.
-        damaged: More is wrong than a torn last line.
+        problem: Damage as a sentence; empty: none.
+        stop_may_be_lost: The damage may have held a stop.
+        damaged: There is more damage than a torn last line.
     """
 
     end: LogEnd
@@ -63,13 +63,13 @@ class _Scan(NamedTuple):
 
 
 def find_end(live: Path) -> Recovery:
-    """The end of the live file; where that is damaged, older parts tell the last number."""
+    """Find the end of the live file; if it is damaged, use the last number of the older parts."""
     end, torn, damage = _scan(live)
     parts = older_parts(live)
     if parts and not end.length:
-        damage = "its live file is empty or was missing, but older parts are there"
+        damage = "its live file is empty or was missing, but older parts exist"
     elif parts and first_number(parts[-1]) >= end.first:
-        damage = damage or f"its live file does not go on from {parts[-1].name}"
+        damage = damage or f"its live file does not continue {parts[-1].name}"
     if parts and damage:
         end = _continued_after(end, parts[-1])
     problem = damage
@@ -80,7 +80,7 @@ def find_end(live: Path) -> Recovery:
 
 
 def _continued_after(end: LogEnd, newest: Path) -> LogEnd:
-    """The end of a damaged live file, put behind the newest part: numbers never go back."""
+    """Return the end of a damaged live file, with numbers after those of the newest part."""
     before, named = _scan(newest).end, first_number(newest)
     last_stop_id = max(end.state.last_stop_id, before.state.last_stop_id)
     return replace(
@@ -93,7 +93,7 @@ def _continued_after(end: LogEnd, newest: Path) -> LogEnd:
 
 
 def _scan(path: Path) -> _Scan:
-    """The end of a file, the torn line after it, and what else is wrong with it in words."""
+    """Return the end of a file, the torn line after it, and other damage as a sentence."""
     first, number, last, length, state = 1, 0, NO_PREVIOUS, 0, EMPTY
     torn, damage = b"", ""
     with path.open("rb") as file:

@@ -1,4 +1,4 @@
-"""Looking for entries in a robot's audit log, for people and for the request `audit/find`."""
+"""Search in a robot's audit log, for the command line and the request `audit/find`."""
 
 import asyncio
 import json
@@ -20,22 +20,22 @@ from robomesh.server import Request
 
 MOST = 10_000
 DEFAULT_MOST = 1000
-# Who asks more than so many questions at once is not listened to: each may read the whole log.
+# Most pending searches, because each may read the whole log.
 _MOST_SEARCHES = 8
 
 _TIME = re.compile(rb'"time_ns":(\d{1,19}),"values":')
-# A gentle search lets go of the interpreter now and then.
+# A search in the background releases the interpreter regularly.
 _LINES_AT_ONCE = 200
 _PAUSE_S = 0.0005
 
 
 @dataclass(frozen=True, kw_only=True)
 class Query:
-    """What is looked for; what is empty or None matches everything.
+    """Search filter; an empty value or None matches everything.
 
     Attributes:
-        since_ns: Asked then or later, ns since the Unix epoch; `until_ns`: then or before.
-        most: The newest so many.
+        since_ns: Earliest time of the request, ns since the Unix epoch; `until_ns`: latest time.
+        most: Maximum number of entries; the newest are returned.
     """
 
     operator: str = ""
@@ -47,7 +47,7 @@ class Query:
 
 
 def matches(entry: Entry, query: Query) -> bool:
-    """Whether an entry is among what is looked for."""
+    """Return whether an entry matches a query."""
     return (
         query.operator in ("", entry.operator)
         and query.request in ("", entry.request)
@@ -58,10 +58,10 @@ def matches(entry: Entry, query: Query) -> bool:
 
 
 def find(live: Path, query: Query, *, in_background: bool = False) -> list[Entry]:
-    """The newest entries of a log, with its older parts, that match; oldest first.
+    """Find the newest matching entries of a log and its older parts; oldest first.
 
     Args:
-        in_background: In a thread beside robots, which must not wait for it.
+        in_background: Yield regularly, because the search runs in a thread of a gateway.
 
     Raises:
         OSError: If the log cannot be read.
@@ -83,14 +83,14 @@ def find(live: Path, query: Query, *, in_background: bool = False) -> list[Entry
         try:
             entry = parse_line(line)
         except AuditError:
-            continue  # somebody changed that line: `verify` tells
+            continue  # a changed line: `verify` reports it
         if matches(entry, query):
             entries.append(entry)
     return entries
 
 
 def _filter(query: Query) -> Callable[[bytes], bool]:
-    """Tells lines that cannot match, without parsing them."""
+    """Return a function that excludes lines that cannot match, without parsing them."""
     words = {"operator": query.operator, "request": query.request, "outcome": query.outcome or ""}
     needles = [
         f'"{name}":{json.dumps(word, ensure_ascii=False)}'.encode(errors="backslashreplace")
@@ -112,7 +112,7 @@ def _filter(query: Query) -> Callable[[bytes], bool]:
 
 
 class SearchServer:
-    """Answers `audit/find` from a robot's log: one search after the other, none on the event loop."""
+    """Handler of `audit/find` for a robot's log: one search at a time, in a thread."""
 
     def __init__(self, live: Path) -> None:
         self._live = live
@@ -120,10 +120,10 @@ class SearchServer:
         self._pending = 0
 
     async def answer(self, request: Request) -> schema.AuditList:
-        """The entries that match.
+        """Return the matching entries.
 
         Raises:
-            RefusedError: If too much is asked at once, or the log cannot be read.
+            RefusedError: If too many searches are pending, or the log cannot be read.
         """
         assert isinstance(request.message, schema.AuditQuery)
         query = query_of(request.message)
@@ -145,10 +145,10 @@ class SearchServer:
 
 
 def query_of(message: schema.AuditQuery) -> Query:
-    """A query from its message.
+    """Convert a message to a query.
 
     Raises:
-        RefusedError: Naming what cannot be meant.
+        RefusedError: If it asks for too many entries.
     """
     if message.most > MOST:
         raise RefusedError(codes.AUDIT_TOO_MANY(count=message.most, most=MOST))

@@ -1,1 +1,1 @@
-"""Who may move a robot, and what forbids it: pure rules, time is an argument."""
+"""Rules of authority over a robot: leases, stops, preconditions. Pure functions; time is an argument."""

@@ -1,14 +1,14 @@
-"""Whether a command may be done: it is its holder's, in time and new, and no stop forbids it. No I/O.
+"""Admission of commands: from the holder, in time and new, and not forbidden by a stop. No I/O.
 
-    id > the last one           judged, and used up whatever becomes of it
-    id = the last one           the same content: the first answer again, nothing is done
-                                other content: refused; the answer of the first is kept
+    id > the last one           evaluated; the id is used even if the command fails
+    id = the last one           same content: the first answer again, nothing is executed
+                                other content: refused; the first answer is kept
     id < the last one, or 0     refused
     not_after has passed        refused: it was delayed on the way
-    waited here for over 1 s    refused: its sender may have been told that nobody answered
-    a stop is latched           motion refused; RESET only with that stop's id, and while the robot stands
+    waited here for over 1 s    refused: its sender may have timed out
+    a stop is latched           motion refused; RESET only with that stop's id, and while the robot rests
 
-What the controller's state and the joints' limits forbid is for `obstacles` to say.
+`preconditions` evaluates the controller's state and the joint limits.
 """
 
 import hmac
@@ -31,23 +31,20 @@ from robomesh.schemas.robomesh_pb2 import CommandRequest
 
 _RESET = CommandRequest.Command.RESET
 
-# Well below the time after which who asks is told that nobody answered (2 s unless he says otherwise).
+# Well below the client's default timeout of 2 s.
 LONGEST_WAIT_S = 1.0
 
 
 class Verdict(NamedTuple):
-    """Whether a command may go on; `repeat`: it was answered before, and is not done again."""
+    """Result of the admission; `repeat`: the command was answered before, and is not executed again."""
 
     answer: Answer
     repeat: bool = False
-    id_used: bool = False  # its id is the holder's, so the answer is kept for a repeat
+    id_used: bool = False  # the id is used by the holder, so the answer is kept for a repeat
 
 
 def admit(authority: Authority, request: CommandRequest, *, operator: str, now: Now) -> Verdict:
-    """Whether a command comes from the holder, in time and for the first time, and no stop forbids it.
-
-    What the controller's state and the joints' limits forbid is for `obstacles` to say.
-    """
+    """Evaluate whether a command is the holder's, in time and new, and no stop forbids it."""
     if not holds(authority, operator, request.lease) or authority.lease is None:
         return Verdict(not_sent(why_not_holder(authority, operator)))
     lease = authority.lease
@@ -63,7 +60,7 @@ def admit(authority: Authority, request: CommandRequest, *, operator: str, now: 
 
 
 def content_of(request: CommandRequest) -> Content:
-    """Return what a request asks for: two requests of one id are the same command if these are equal."""
+    """Return a request's content: requests of one id with equal content are the same command."""
     return Content(
         command=request.command,
         joint_positions=tuple(request.joint_positions),
@@ -75,7 +72,7 @@ def content_of(request: CommandRequest) -> Content:
 
 
 def deadline_refusal(request: CommandRequest, now: Now) -> Answer | None:
-    """Why a command comes too late; None: it does not."""
+    """Return the refusal of a command after its deadline; None: it is in time."""
     if not request.HasField("not_after"):
         return None
     late_s = (now.wall_ns - request.not_after.ToNanoseconds()) * 1e-9
@@ -85,10 +82,10 @@ def deadline_refusal(request: CommandRequest, now: Now) -> Answer | None:
 
 
 def wait_refusal(arrived_s: float, now: Now) -> Answer | None:
-    """Why a command has waited for too long in the gateway; None: it has not.
+    """Return the refusal of a command that has waited too long in the gateway; None: it has not.
 
     Args:
-        arrived_s: When it arrived (monotonic).
+        arrived_s: Time of its arrival (monotonic).
     """
     waited_s = now.monotonic_s - arrived_s
     if waited_s <= LONGEST_WAIT_S:
@@ -97,7 +94,7 @@ def wait_refusal(arrived_s: float, now: Now) -> Answer | None:
 
 
 def stop_refusal(authority: Authority, request: CommandRequest) -> Answer | None:
-    """Why a latched stop, or that there is none, forbids a command; None: it does not."""
+    """Return the refusal of a command because of a latched stop, or of a RESET without one; None: allowed."""
     reason = _stopped(authority, request)
     return None if reason is None else not_sent(reason)
 
@@ -116,12 +113,12 @@ def _stopped(authority: Authority, request: CommandRequest) -> Reason | None:
 
 
 def keep_answer(authority: Authority, request: CommandRequest, answer: Answer) -> Authority:
-    """Keep a command's answer for its repeat; the id is used up from now on."""
+    """Keep a command's answer for its repeat, and mark the id as used."""
     lease = authority.lease
     if lease is None or not hmac.compare_digest(lease.secret.encode(), request.lease.encode()):
         return authority
     if request.id < lease.last_id:
-        return authority  # a HOLD overtook it
+        return authority  # a HOLD overtook this command
     return replace(
         authority,
         lease=replace(lease, last_id=request.id, last_content=content_of(request), last_answer=answer),
@@ -129,7 +126,7 @@ def keep_answer(authority: Authority, request: CommandRequest, answer: Answer) -
 
 
 def after_command(authority: Authority, request: CommandRequest) -> Authority:
-    """The authority that a command leaves to the one behind it in the same unit: its id is used up."""
+    """Return the authority after a command, for the next command of the same unit."""
     if request.command == _RESET and authority.stop is not None and authority.stop.id == request.stop_id:
         authority = replace(authority, stop=None)
     return keep_answer(authority, request, Answer(True, ""))

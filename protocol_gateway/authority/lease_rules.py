@@ -1,6 +1,6 @@
-"""Who may move a robot: lease, once-only commands, latched stop. No I/O; time is an argument.
+"""State machine of control over a robot: lease and latched stop. No I/O; time is an argument.
 
-Two states that do not know each other, the lease's and the stop's:
+Lease and stop are independent states:
 
     lease    ACQUIRE  RENEW   an end of it                    motion command  motion over  link lost
     -------  -------  ------  ------------------------------  --------------  -----------  -----------------
@@ -8,23 +8,23 @@ Two states that do not know each other, the lease's and the stop's:
     held     no*      held    free                            moving          -            held
     moving   no*      moving  free, and the robot is stopped  moving          held         held, and stopped
 
-    ends of a lease: its RELEASE, its time is over, another's TAKE, the offered one's ACCEPT (not while
-    moving), its holder's session is gone, motion that nobody commanded
+    end of a lease: RELEASE, expiry, another operator's TAKE, ACCEPT after an OFFER (not while moving), end of
+    the holder's session, motion without a command
 
-    stop                 STOP      RESET of this stop   RESET of another   motion command
-    -------------------  --------  -------------------  -----------------  --------------
-    clear                latched   no                   no                 yes
-    latched, it moves    latched   no                   no                 no
-    latched, it stands   latched   clear                no                 no
+    stop                   STOP      RESET of this stop   RESET of another   motion command
+    ---------------------  --------  -------------------  -----------------  --------------
+    clear                  latched   no                   no                 yes
+    latched, robot moves   latched   no                   no                 no
+    latched, robot rests   latched   clear                no                 no
 
-"no" is a refusal in words, * but the holder's own ACQUIRE renews. OFFER and ACCEPT pass a lease that
-does not move on to another operator; TAKE gives a reason, which everybody is told; ASK changes
-nothing, but everybody sees for half a minute who would like to have control. Every stop has a number
-of its own, so a RESET never clears a stop that its sender has not seen; nor one that is not heeded
-yet, for what moves on would be nobody's motion. "moving" covers motion that is held (HOLD): it would
-go on with anybody's RESUME. A link that is lost, or silent, while the holder's motion runs is a stop:
-nobody sees any more where the arm goes. Motion that nobody commanded stops the robot too, where motion
-had been commanded under the lease: it may be that motion, begun far too late.
+"no" is a refusal with a reason; * the holder's own ACQUIRE renews. OFFER and ACCEPT hand a lease over while
+its motion does not run. TAKE needs a reason, which is published. ASK changes nothing, but its operator is
+published for half a minute. Every stop has its own number, so that a RESET never clears a stop that its
+sender has not seen. RESET is refused while the robot moves, because the motion would have no owner
+afterwards. "moving" includes held motion (HOLD), which any RESUME would continue. A link that is lost or
+silent while the holder's motion runs causes a stop, because the arm's position is unknown then. Motion
+without a command also stops the robot if motion was commanded under the lease: it may be that motion, started
+far too late.
 """
 
 import hmac
@@ -40,13 +40,13 @@ DEFAULT_TTL_S = 2.0
 SHORTEST_TTL_S = 0.5
 LONGEST_TTL_S = 5.0
 
-# A robot that was moved by others this short a while ago may go on: no surprise to the next operator.
+# A lease tolerates motion without a command if the robot already moved by itself this recently.
 RECENT_S = 10.0
-# Who asked for control is shown so long, and so many at most.
+# A request for control is shown for this long.
 ASKED_FOR_S = 30.0
 MOST_ASKERS = 20
 
-# One unit may have been on its way when the motion was commanded, or be the pause between two motions.
+# One unit is not enough: it may have been in transit when the motion was commanded, or show a pause.
 ENDED_AFTER_UNITS = 2
 
 _C = CommandRequest.Command
@@ -54,7 +54,7 @@ MOTION_COMMANDS = frozenset({_C.HOME, _C.RESUME, _C.MOVE_ABSOLUTE, _C.MOVE_RELAT
 
 
 class Now(NamedTuple):
-    """The two clocks: what has passed is measured on the first, dates are told on the second."""
+    """Both clocks: the monotonic one measures durations, the wall clock gives published times."""
 
     monotonic_s: float
     wall_ns: int
@@ -65,13 +65,13 @@ class Motion:
     """The holder's motion, from the command that began it.
 
     Attributes:
-        last_s: When it was last commanded, or seen to move (monotonic).
-        seen: It was seen to move.
-        held: HOLD was sent; it goes on with RESUME.
-        waypoints: Everywhere that it goes, in order, its target last [rad] or [m]; empty: not known.
+        last_s: Time of its command, or of the last observed movement (monotonic).
+        seen: The robot was observed to move.
+        held: HOLD was sent; RESUME continues the motion.
+        waypoints: Positions on its path in order, the target last [rad] or [m]; empty: unknown.
         isolated: No other unit was sent shortly before it, or since: a refusal is an answer to it.
-        conclusive: Rest at its target proves that it has ended: the robot does not rest there before.
-        rests: Consecutive controller units that reported rest at its target, after it was seen to move.
+        conclusive: Rest at the target proves the end, because the robot cannot rest there before.
+        rests: Consecutive controller units that reported rest at the target after the robot moved.
     """
 
     last_s: float
@@ -84,20 +84,20 @@ class Motion:
 
     @property
     def target(self) -> tuple[float, ...] | None:
-        """Where it ends [rad] or [m]; None: not known."""
+        """End of the path [rad] or [m]; None: unknown."""
         return self.waypoints[-1] if self.waypoints else None
 
     @property
     def ended(self) -> bool:
-        """Whether it has demonstrably ended: control that ends now needs no stop."""
+        """True if the motion has demonstrably ended, so that the end of the lease needs no stop."""
         return self.rests >= ENDED_AFTER_UNITS
 
 
 class Answer(NamedTuple):
-    """The outcome of a request, for its sender.
+    """Outcome of a request, for its sender.
 
     Attributes:
-        reason: Why it is refused, or what was done.
+        reason: Reason of a refusal, or what was done.
     """
 
     accepted: bool
@@ -114,7 +114,7 @@ def refused(reason: Reason, *, what: str = "") -> Answer:
     """Return the answer to a request that is refused.
 
     Args:
-        what: Stands before the reason: "Not sent".
+        what: Text before the reason: "Not sent".
     """
     return Answer(False, f"{what}: {reason}." if what else reason.text, reason)
 
@@ -125,7 +125,7 @@ def not_sent(reason: Reason) -> Answer:
 
 
 class Content(NamedTuple):
-    """A command and its values: what makes two requests the same command, whenever they are sent.
+    """A command with its values: equal contents are the same command, whenever they are sent.
 
     Attributes:
         joint_positions: [rad] or [m].
@@ -139,7 +139,7 @@ class Content(NamedTuple):
     program_name: str = ""
 
     def in_words(self) -> str:
-        """Return it for people, on one line."""
+        """Return a readable line."""
         words = [CommandRequest.Command.Name(self.command), *(f"{each:.6g}" for each in self.joint_positions)]
         if self.speed_percent is not None:
             words.append(f"{self.speed_percent:g} %")
@@ -150,14 +150,14 @@ class Content(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Lease:
-    """Control of a robot by one operator, for a time.
+    """Control of a robot by one operator, for a limited time.
 
     Attributes:
-        until_s: End, monotonic; `until_ns` is the same moment on the wall clock.
-        session: Of its holder's program or page; when that is gone, so is the lease. Empty: not told.
-        last_id: Highest command id so far; `last_content` is what it was used for, `last_answer` what it got.
-        commanded: Motion was commanded under it.
-        tolerates_motion: The robot moved by itself when the lease began, so that is no surprise.
+        until_s: Expiry, monotonic; `until_ns` is the same time on the wall clock.
+        session: Session of the holder's program or page, whose end ends the lease. Empty: not given.
+        last_id: Highest command id so far, with its content in `last_content` and answer in `last_answer`.
+        commanded: Motion was commanded under the lease.
+        tolerates_motion: The robot moved by itself when the lease began, so motion does not end the lease.
     """
 
     holder: str
@@ -179,7 +179,7 @@ class Lease:
 
 @dataclass(frozen=True, kw_only=True)
 class Stop:
-    """A latched stop; `sent_s`: when its unit reached the controller's socket (monotonic)."""
+    """A latched stop; `sent_s`: time at which its unit reached the controller's socket (monotonic)."""
 
     id: int
     by: str
@@ -190,7 +190,7 @@ class Stop:
 
 @dataclass(frozen=True, kw_only=True)
 class LeaseEnd:
-    """A lease that is over. `stop`: its holder's motion runs, or may, so the robot must be stopped."""
+    """End of a lease. `stop`: the robot must be stopped, because the holder's motion may run."""
 
     holder: str
     why: Reason
@@ -200,7 +200,7 @@ class LeaseEnd:
 
 @dataclass(frozen=True, kw_only=True)
 class Asker:
-    """Somebody who would like to have control."""
+    """Operator who requests control from the holder."""
 
     operator: str
     reason: str
@@ -210,14 +210,14 @@ class Asker:
 
 @dataclass(frozen=True, kw_only=True)
 class Authority:
-    """The whole state.
+    """State of control over one robot.
 
     Attributes:
-        moving: What was last seen; None before anything was.
-        ended: Why the last lease that is over ended; None: there was none.
-        asked_by: Who asks its holder for control, oldest first.
-        stopping_s: When the first of the stops since the last RESET was sent (monotonic): whoever presses
-            again must not hide that the robot does not heed them.
+        moving: The robot moved at the last observation; None: not observed yet.
+        ended: Reason for the end of the previous lease; None: there was none.
+        asked_by: Operators who request control from the holder, oldest first.
+        stopping_s: Time at which the first stop since the last RESET was sent (monotonic). A repeated stop
+            does not change it, because it must not hide that the robot ignores its stop.
     """
 
     lease: Lease | None = None
@@ -227,12 +227,12 @@ class Authority:
     last_stop_id: int = 0
     stopping_s: float | None = None
     moving: bool | None = None
-    # When motion was last seen that nobody commanded (monotonic).
+    # Time at which motion without a command was last observed (monotonic).
     foreign_s: float | None = None
 
 
 class LeaseOutcome(NamedTuple):
-    """A lease request's outcome; `granted`: the lease to show to the asker, with its secret."""
+    """Outcome of a lease request; `granted`: the lease for the sender, with its secret."""
 
     authority: Authority
     answer: Answer
@@ -243,11 +243,11 @@ class LeaseOutcome(NamedTuple):
 def request_lease(
     authority: Authority, request: LeaseRequest, *, operator: str, now: Now, secret: str
 ) -> LeaseOutcome:
-    """Answer ACQUIRE, RENEW, RELEASE, OFFER, ACCEPT, TAKE, ASK.
+    """Evaluate ACQUIRE, RENEW, RELEASE, OFFER, ACCEPT, TAKE, ASK.
 
     Args:
-        operator: Who asks, as the router vouches for it.
-        secret: Fresh; becomes the lease's if one is granted.
+        operator: Sender of the request, as authenticated by the router.
+        secret: New secret for the lease, if one is granted.
     """
     lease = authority.lease
     action = LeaseRequest.Action
@@ -310,9 +310,9 @@ def request_lease(
 
 
 def holds(authority: Authority, operator: str, secret: str) -> bool:
-    """Whether the operator holds the lease, and this is its secret."""
+    """Return whether the operator holds the lease with this secret."""
     lease = authority.lease
-    # Compared in constant time: how long a refusal takes must not spell the secret.
+    # Compared in constant time, because the time of a refusal must not reveal the secret.
     return (
         lease is not None
         and hmac.compare_digest(lease.secret.encode(), secret.encode())
@@ -321,7 +321,7 @@ def holds(authority: Authority, operator: str, secret: str) -> bool:
 
 
 def expire(authority: Authority, now: Now) -> tuple[Authority, LeaseEnd | None]:
-    """End the lease when its time is over, and forget who asked for it too long ago."""
+    """End the lease if it has expired, and drop expired requests for control."""
     if authority.asked_by and now.monotonic_s >= authority.asked_by[0].until_s:
         authority = replace(authority, asked_by=_current_askers(authority, now))
     lease = authority.lease
@@ -331,7 +331,7 @@ def expire(authority: Authority, now: Now) -> tuple[Authority, LeaseEnd | None]:
 
 
 def end_session(authority: Authority, session: str) -> tuple[Authority, LeaseEnd | None]:
-    """A session is gone: end its lease, and nobody else's."""
+    """End the lease if its holder's session has ended."""
     lease = authority.lease
     if lease is None or not session or lease.session != session:
         return authority, None
@@ -341,10 +341,10 @@ def end_session(authority: Authority, session: str) -> tuple[Authority, LeaseEnd
 def end_lease(
     authority: Authority, why: Reason, *, foreign: bool = False
 ) -> tuple[Authority, LeaseEnd | None]:
-    """End the lease, if there is one; says whether its holder's motion has to be stopped.
+    """End the lease, if there is one; return its end, which says whether to stop the robot.
 
     Args:
-        foreign: Because of motion that nobody is known to have commanded.
+        foreign: The lease ends because of motion without a command.
     """
     lease = authority.lease
     if lease is None:
@@ -372,13 +372,13 @@ def _grant(
         tolerates_motion=moved_recently(authority, now),
     )
     lease = _with_expiry(lease, request.ttl_s, now)
-    # Who waited for it and got it waits no more; the others still do.
+    # The new holder no longer requests control; the others still do.
     asked_by = tuple(each for each in _current_askers(authority, now) if each.operator != operator)
     return LeaseOutcome(replace(authority, lease=lease, asked_by=asked_by), done(said), lease)
 
 
 def _add_asker(authority: Authority, operator: str, reason: str, now: Now) -> Authority:
-    """Somebody asks for control, for the first time or again."""
+    """Add an operator's request for control, or renew it."""
     others = [each for each in _current_askers(authority, now) if each.operator != operator]
     asker = Asker(
         operator=operator, reason=reason, since_ns=now.wall_ns, until_s=now.monotonic_s + ASKED_FOR_S
@@ -401,7 +401,7 @@ def _with_expiry(lease: Lease, ttl_s: float, now: Now) -> Lease:
 
 
 def why_not_holder(authority: Authority, operator: str) -> Reason:
-    """Return why a request in an operator's name is not its lease's holder's."""
+    """Return why a request does not come from the lease's holder."""
     lease = authority.lease
     if lease is None:
         return codes.LEASE_NONE()
@@ -413,10 +413,10 @@ def why_not_holder(authority: Authority, operator: str) -> Reason:
 def stop(
     authority: Authority, *, by: str, reason: str, now: Now, number: int | None = None
 ) -> tuple[Authority, Stop]:
-    """Latch a stop under a number of its own, and forget the motion that it ends.
+    """Latch a stop under a new number, and drop the motion that it ends.
 
     Args:
-        number: Above all before it; None: the next one.
+        number: Number above all previous ones; None: the next one.
     """
     number = authority.last_stop_id + 1 if number is None else number
     latched = Stop(id=number, by=by, reason=reason or "no reason given", since_ns=now.wall_ns)
@@ -427,10 +427,10 @@ def stop(
 
 
 def stop_sent(authority: Authority, stop_id: int, sent_s: float, *, first: bool = False) -> Authority:
-    """The stop's unit is on the controller's socket, since a monotonic time.
+    """Record the monotonic time at which a stop's unit was put on the controller's socket.
 
     Args:
-        first: It is the first one on a new connection: the controller may not have had those before.
+        first: First unit on a new connection: the controller may not have received earlier ones.
     """
     if authority.stop is None or authority.stop.id != stop_id:
         return authority
@@ -442,5 +442,5 @@ def stop_sent(authority: Authority, stop_id: int, sent_s: float, *, first: bool 
 
 
 def moved_recently(authority: Authority, now: Now) -> bool:
-    """Whether the robot was just moved by somebody who did not command it through the gateway."""
+    """Return whether the robot recently moved without a command of the gateway."""
     return authority.foreign_s is not None and now.monotonic_s - authority.foreign_s < RECENT_S

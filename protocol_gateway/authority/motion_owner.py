@@ -1,15 +1,15 @@
-"""What becomes of the holder's motion, and which motion is not the holder's. No I/O; time is an argument.
+"""Tracking of the holder's motion, and detection of foreign motion. No I/O; time is an argument.
 
-    motion of the holder   seen to move   still 0.5 s   at its target   refused   30 s without motion
-    --------------------   ------------   -----------   -------------   -------   -------------------
-    commanded, not seen    seen           -             over after 2 s  over      over
-    seen                   seen           over          -               -         -
+    motion of the holder   robot moves   rests 0.5 s   at its target   refused   30 s without motion
+    --------------------   -----------   -----------   -------------   -------   -------------------
+    commanded, not seen    seen          -             over after 2 s  over      over
+    seen                   seen          over          -               -         -
 
-A motion command begins it, a stop or the lease's end forgets it; motion seen without one is foreign.
+A motion command begins the motion; a stop or the lease's end drops it. Other motion is foreign.
 
-A motion that was seen has demonstrably ended when two consecutive controller units report idle, with
-positions at its target. The end of a lease then needs no stop; the half second above still decides
-whether new motion is the holder's.
+A seen motion has demonstrably ended when two consecutive controller units report idle, with positions at
+its target. The end of a lease then needs no stop. The half second above still decides whether new motion
+is the holder's.
 """
 
 from dataclasses import replace
@@ -17,17 +17,17 @@ from dataclasses import replace
 from protocol_gateway.authority.lease_rules import ENDED_AFTER_UNITS, MOTION_COMMANDS, Authority, Motion, Now
 from robomesh.schemas.robomesh_pb2 import CommandRequest
 
-# Servos and brakes take their time: this long even a robot that is at its target already may begin to move.
+# Servos and brakes need time: even a robot that is already at its target may begin to move for this long.
 START_S = 2.0
-# A controller may do much else first: until then motion is that which was commanded, and not foreign.
+# A controller may start late: until then, motion counts as the commanded one, not as foreign.
 LATEST_START_S = 30.0
-# A refusal that comes later is no answer to a unit, one that comes sooner may be.
+# A refusal within this time may answer a unit; a later one does not.
 ANSWERED_WITHIN_S = 2.0
-# A controller that goes from one motion to the next is idle for a moment in between.
+# A controller is idle for a moment between two motions.
 SETTLE_S = 0.5
-# Of motions told before the first of them was over.
+# Most waypoints of motions that are queued in the controller.
 MOST_WAYPOINTS = 64
-# Places nearer to each other [rad] or [m] are not told apart: well above what counts as arrived.
+# Positions nearer than this [rad] or [m] count as the same: well above the tolerance of `has_arrived`.
 _APART = 0.01
 
 _C = CommandRequest.Command
@@ -42,12 +42,12 @@ def command_sent(
     arrived: bool = False,
     isolated: bool = True,
 ) -> Authority:
-    """The command's unit is on the controller's socket.
+    """Record a command whose unit is on the controller's socket.
 
     Args:
-        waypoints: Where a motion command goes [rad] or [m]; empty: not known.
-        arrived: The robot is where the motion before it went.
-        isolated: No other unit was sent within `ANSWERED_WITHIN_S` before it.
+        waypoints: Path of a motion command [rad] or [m]; empty: unknown.
+        arrived: The robot is at the target of the previous motion.
+        isolated: No other unit was sent within `ANSWERED_WITHIN_S` before.
     """
     lease = authority.lease
     if request.command == _C.RESET and authority.stop is not None and authority.stop.id == request.stop_id:
@@ -60,9 +60,9 @@ def command_sent(
         if motion is not None and request.command == _C.RESUME:
             waypoints = motion.waypoints
         elif motion is not None and not arrived:
-            # A controller may do one after the other: what was told before it is still its way.
+            # A controller may queue motions: earlier targets are still on its path.
             waypoints = _appended(motion.waypoints, waypoints)
-        # From its first motion on, whatever else moves the robot is a surprise.
+        # After the first commanded motion, foreign motion is no longer tolerated.
         lease = replace(lease, commanded=True, tolerates_motion=False)
         motion = Motion(last_s=now.monotonic_s, waypoints=waypoints, isolated=isolated, conclusive=conclusive)
     elif motion is not None:
@@ -74,13 +74,13 @@ def command_sent(
 def _is_conclusive(
     authority: Authority, request: CommandRequest, waypoints: tuple[tuple[float, ...], ...]
 ) -> bool:
-    """Whether the robot cannot rest at a new motion's target before the motion has brought it there."""
+    """Return whether rest at the new motion's target proves that the motion has ended."""
     motion = None if authority.lease is None else authority.lease.motion
     if motion is None:
         return authority.moving is False
     if request.command == _C.RESUME:
         return motion.conclusive
-    # It may rest at any place of the motions that were commanded before.
+    # The robot may rest at any waypoint of the previous motions.
     return bool(motion.waypoints and waypoints) and all(
         any(abs(there - here) > _APART for there, here in zip(place, waypoints[-1], strict=True))
         for place in motion.waypoints
@@ -90,13 +90,13 @@ def _is_conclusive(
 def _appended(
     before: tuple[tuple[float, ...], ...], waypoints: tuple[tuple[float, ...], ...]
 ) -> tuple[tuple[float, ...], ...]:
-    """One way behind another; not known if it gets too long to be followed."""
+    """Append waypoints to those of the previous motion; empty (unknown) if there are too many."""
     both = (*before, *(place for place in waypoints if place not in before[-1:]))
     return both if len(both) <= MOST_WAYPOINTS else ()
 
 
 def refused(authority: Authority) -> Authority:
-    """The controller refused a unit: where that can only be a motion that has not begun, it will not."""
+    """Drop a motion that has not begun, if the controller's refusal can only be for it."""
     lease = authority.lease
     if lease is None or lease.motion is None or authority.moving:
         return authority
@@ -110,7 +110,7 @@ def reported(authority: Authority, *, resting: bool, dated_s: float) -> Authorit
 
     Args:
         resting: The unit reports idle, and the newest positions are at the target of the holder's motion.
-        dated_s: When the unit and the positions were new (monotonic); the older of both.
+        dated_s: The older time stamp of the unit and the positions (monotonic).
     """
     lease = authority.lease
     if lease is None or lease.motion is None:
@@ -129,12 +129,12 @@ def observe(
     """Follow the robot's motion.
 
     Args:
-        moving: Whether it moves now.
-        arrived: It is where its holder's motion goes.
-        pending: A held motion may still be waiting for RESUME: the controller says so, or does not say.
+        moving: The robot moves now.
+        arrived: The robot is at the target of its holder's motion.
+        pending: A held motion may still wait for RESUME: the controller reports it, or reports nothing.
 
     Returns:
-        The state, and whether motion began that nobody commanded.
+        The state, and whether motion without a command began.
     """
     began = moving and authority.moving is not True and not _just_stopped(authority, now)
     authority = replace(authority, moving=moving)
@@ -147,19 +147,19 @@ def observe(
         return replace(authority, lease=replace(lease, motion=motion)), False
     foreign_s = authority.foreign_s
     goes_on = foreign_s is not None and now.monotonic_s - foreign_s < SETTLE_S
-    # A robot that is still slowing down from a stop is neither.
+    # Motion of a robot that is still slowing down after a stop is not foreign.
     if moving and (began or goes_on):
         authority = replace(authority, foreign_s=now.monotonic_s)
     return authority, began
 
 
 def _just_stopped(authority: Authority, now: Now) -> bool:
-    """Whether motion that shows now may be one that a stop has ended; if it goes on, `stops` says so."""
+    """Return whether motion may be the rest of a stopped one; if it goes on, `stop_handler` reports it."""
     return authority.stopping_s is not None and now.monotonic_s - authority.stopping_s < START_S
 
 
 def _at_rest(motion: Motion, *, pending: bool, arrived: bool, now: Now) -> Motion | None:
-    """What becomes of the holder's motion while the robot does not move; None: it is over."""
+    """Return the holder's motion while the robot does not move; None: it is over."""
     if motion.held and pending:
         return motion
     patience_s = SETTLE_S if motion.seen else START_S if arrived else LATEST_START_S

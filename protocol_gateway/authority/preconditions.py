@@ -1,16 +1,16 @@
-"""Why a command cannot go to a controller as it is now: its state, the joints' limits. No I/O.
+"""Preconditions of commands: the controller's state and the joint limits. No I/O.
 
     command                     link  mode  stopped, fault  positions  homed  limits
     --------------------------  ----  ----  --------------  ---------  -----  ------
     HOLD                        x
     RESET TRACE_ON TRACE_OFF    x     x
     SPEED                       x     x                                       1-100 %
-    HOME                        x     x     x               not gone
+    HOME                        x     x     x               not stale
     RESUME                      x     x     x, idle         x          x, or on hold
     RUN_PROGRAM                 x     x     x               x
     MOVE_ABSOLUTE MOVE_RELATIVE x     x     x               x          x      x
 
-HOLD only ever makes a robot slower, so a mode that nobody knows does not forbid it.
+HOLD can only slow a robot down, so an unknown mode does not forbid it.
 """
 
 from dataclasses import dataclass, replace
@@ -42,13 +42,13 @@ _MOVES = frozenset({_C.MOVE_ABSOLUTE, _C.MOVE_RELATIVE})
 
 @dataclass(frozen=True, kw_only=True)
 class Controller:
-    """What is known of a controller now.
+    """Current state of a controller.
 
     Attributes:
-        positions: Where its joints are [rad] or [m]; None: not told, or not any more.
-        positions_stale: That they are not received any more; None: they are, or never were.
-        read_only: Why nothing is ever sent to it; None: commands may be sent to it.
-        accept_unknown: What it never tells and the site file says to do without: "mode", "homed".
+        positions: Joint positions [rad] or [m]; None: none received, or stale.
+        positions_stale: Reason if positions are stale; None: they are current, or none were received.
+        read_only: Reason why nothing is sent to it; None: commands may be sent.
+        accept_unknown: States that it never reports and the site file does not require: "mode", "homed".
     """
 
     link: LinkStatus
@@ -61,7 +61,7 @@ class Controller:
 
 
 def obstacle(request: CommandRequest, controller: Controller, joints: Joints) -> Answer | None:
-    """Why the command cannot be sent: what, why and what next; None: it can."""
+    """Return the refusal of a command that cannot be sent now; None: it can."""
     found = (
         _link_obstacle(controller)
         or _mode_obstacle(request, controller)
@@ -104,15 +104,15 @@ def _state_obstacle(request: CommandRequest, controller: Controller) -> Reason |
         return codes.CONTROLLER_HOLDING()
     if controller.positions_stale is not None:
         return codes.POSITIONS_UNKNOWN(controller.positions_stale)
-    # Many an arm cannot tell where it is before it is homed; one that could and cannot any more is not moved.
+    # Many arms have no positions before they are homed. An arm whose positions became stale is not moved.
     if controller.positions is None and request.command != _C.HOME:
         return codes.POSITIONS_NONE()
     if request.command == _C.RESUME and status.activity is Activity.IDLE:
         return codes.CONTROLLER_NOT_HOLDING()
-    # A program may begin with homing; each of its steps is judged when its turn comes.
+    # A program may begin with homing; each step is evaluated before it is sent.
     if request.command in (_C.HOME, _C.RUN_PROGRAM) or status.homed:
         return None
-    # What is on hold was judged when it began; it may be the way home.
+    # A held motion was evaluated when it began; it may be the homing itself.
     if request.command == _C.RESUME and status.activity is Activity.HOLDING:
         return None
     if status.homed is False:
@@ -131,14 +131,14 @@ def _value_obstacle(request: CommandRequest, controller: Controller, joints: Joi
     count = len(request.joint_positions)
     if count != len(joints):
         return codes.JOINT_COUNT(count=count, joints=len(joints), names=", ".join(joints.names))
-    # Limits and constraints are linear: all of a straight path in joint space is within them when its end is.
+    # Limits and constraints are linear: a straight path in joint space is within them if its end is.
     target = target_of(request, controller, joints)
     found = violations(joints, target) if target is not None else ()
     return codes.JOINTS_OUTSIDE(*found) if found else None
 
 
 def target_of(request: CommandRequest, controller: Controller, joints: Joints) -> tuple[float, ...] | None:
-    """Where a command takes the joints [rad] or [m]; None: nowhere, or it is not known."""
+    """Return the joint positions after a command [rad] or [m]; None: no motion, or unknown."""
     match request.command:
         case _C.HOME:
             return tuple(joints.home.tolist())
@@ -151,7 +151,7 @@ def target_of(request: CommandRequest, controller: Controller, joints: Joints) -
 
 
 def predicted(request: CommandRequest, controller: Controller, joints: Joints) -> Controller:
-    """The controller as a command will leave it: so it is for the next one of the same unit."""
+    """Return the controller's expected state after a command, for the next command of the same unit."""
     status = controller.status
     match request.command:
         case _C.HOME:
@@ -167,10 +167,10 @@ def predicted(request: CommandRequest, controller: Controller, joints: Joints) -
 
 
 def controller_command(request: CommandRequest) -> ControllerCommand:
-    """A command as the driver takes it.
+    """Convert a command for the driver.
 
     Raises:
-        ValueError: If it is none that a driver knows.
+        ValueError: If drivers do not know the command.
     """
     match request.command:
         case _C.HOME:

@@ -1,1 +1,1 @@
-"""Motions checked before they are made: in a worker process of the gateway's own, never over the network."""
+"""Collision checks of motions before they start: in the gateway's worker processes, not over the network."""

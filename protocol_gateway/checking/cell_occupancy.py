@@ -1,4 +1,4 @@
-"""The robots of one cell that this gateway has: where each is, and where it has been told to go."""
+"""Positions and commanded paths of the robots of one cell that this gateway serves."""
 
 import asyncio
 from collections.abc import Callable
@@ -10,11 +10,11 @@ from robomesh.reasons import Reason
 
 @dataclass(frozen=True)
 class Occupancy:
-    """What a robot may take up from now on.
+    """Joint positions that a robot may occupy from now on.
 
     Attributes:
-        path: Where it is, then each place that it has been told to go to, in order [rad] or [m].
-        unknown: Why it is not known; then `path` is empty. None: it is known.
+        path: Its actual positions, then each commanded target in order [rad] or [m].
+        unknown: Reason why the path is unknown and `path` is empty; None: it is known.
     """
 
     path: tuple[tuple[float, ...], ...] = ()
@@ -22,7 +22,7 @@ class Occupancy:
 
 
 class CellOccupancy:
-    """Robots that can meet.
+    """Occupancy of one cell, whose robots can collide.
 
     Attributes:
         motion_lock: Held from a motion's check until its unit is on the controller's socket. One motion at a
@@ -34,11 +34,11 @@ class CellOccupancy:
         self._robots: dict[str, Callable[[], Occupancy]] = {}
 
     def add(self, name: str, occupancy: Callable[[], Occupancy]) -> None:
-        """Another robot of the cell."""
+        """Add a robot of the cell."""
         self._robots[name] = occupancy
 
     def others(self, name: str, cell: tuple[str, ...]) -> dict[str, Occupancy]:
-        """Where the cell's robots but one are; what no robot of this gateway is, unserved here knows."""
+        """Return the occupancy of the cell's other robots, unknown for robots of another gateway."""
         unserved = Occupancy(unknown=codes.OTHER_NOT_SERVED())
         return {
             other: self._robots[other]() if other in self._robots else unserved

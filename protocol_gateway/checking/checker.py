@@ -1,4 +1,4 @@
-"""The gateway's end of a worker process: kept running, asked in time, or said why not."""
+"""Client of a worker process that checks motions: keeps it running, and queries it with a timeout."""
 
 import asyncio
 import contextlib
@@ -16,28 +16,28 @@ from robots.errors import RobotError
 
 log = logging.getLogger(__name__)
 
-# A command that waits for over a second is not sent any more.
+# Below 1 s, after which a waiting command is no longer sent.
 MOTION_TIMEOUT_S = 0.8
 PROGRAM_TIMEOUT_S = 25.0
-# Past this, the process is ended: it hangs.
+# A process that takes longer hangs, and is killed.
 _HANG_TIMEOUT_S = 10.0
 _PREPARE_TIMEOUT_S = 60.0
 _RESTART_S = 5.0
 _PENDING_POLL_S = 1.0
-# For cells of several robots: beyond that, some share one.
+# Most processes for cells of several robots; beyond that, cells share processes.
 MOST_PROCESSES = 8
 _STARTING = codes.CHECK_STARTING()
 
 
 class Checker:
-    """Checks motions of some robots, or their programs: what takes long must not delay a motion.
+    """Checker of motions, or of programs, of some robots. Separate ones, so that programs delay no motion.
 
-    One question at a time; the others wait, as long as somebody waits for their answers.
+    It processes one query at a time; the others wait until their timeouts.
 
     Args:
-        cells: What stands around each robot, by the robot's name.
-        start_now: Begin with the gateway, so that the first motion need not wait; otherwise with the first
-            program.
+        cells: Cell of each robot, by the robot's name.
+        start_now: Start the process immediately, so that the first motion does not wait; otherwise with the
+            first program.
     """
 
     def __init__(self, cells: Mapping[str, CellDescription], *, start_now: bool) -> None:
@@ -54,19 +54,19 @@ class Checker:
 
     @property
     def pid(self) -> int | None:
-        """Of the worker process, while there is one."""
+        """Process id of the worker process, while there is one."""
         return self._worker.pid
 
     def problem(self, robot: str) -> Reason | None:
-        """Why motions of a robot cannot be checked now; None: they can."""
+        """Return why motions of a robot cannot be checked now; None: they can."""
         return self._problems[robot]
 
     def starting(self, robot: str) -> bool:
-        """Whether that is so only because the check is getting ready; a failure is more."""
+        """Return whether the check is starting, in contrast to a failure."""
         return self._problems[robot] == _STARTING
 
     async def run(self) -> None:
-        """Keep the process running and every robot's cell ready, until cancelled."""
+        """Keep the process running with every robot's cell prepared, until cancelled."""
         await self._start_requested.wait()
         try:
             while True:
@@ -99,7 +99,7 @@ class Checker:
         return process
 
     async def _prepare(self) -> None:
-        """Prepare the robots that are not ready; one whose links are being studied is asked for again."""
+        """Prepare the robots that are not ready; ask again for one whose links are still being processed."""
         for robot in self._pending:
             text = await self._prepare_robot(robot)
             if text != PENDING:
@@ -118,18 +118,18 @@ class Checker:
         return text
 
     async def motion(self, question: CheckMotion) -> Checked:
-        """What a check of a motion finds.
+        """Check a motion.
 
         Raises:
-            CheckError: If it cannot be checked, or not in time; the text says why.
+            CheckError: If it could not be checked, or not in time; the text says why.
         """
         return await self._ask(question, timeout_s=MOTION_TIMEOUT_S)
 
     async def program(self, question: CheckProgram) -> Checked:
-        """What a check of a program finds.
+        """Check a program.
 
         Raises:
-            CheckError: If it cannot be checked, or not in time; the text says why.
+            CheckError: If it could not be checked, or not in time; the text says why.
         """
         self._start_requested.set()
         with contextlib.suppress(TimeoutError):
@@ -143,14 +143,14 @@ class Checker:
             raise CheckError(problem)
         start_s = time.monotonic()
         try:
-            # What nobody waits for any more is not begun.
+            # A query is not started after its timeout.
             async with asyncio.timeout(timeout_s):
                 await self._lock.acquire()
         except TimeoutError:
             raise CheckError(codes.CHECK_QUEUED_TOO_LONG(seconds=timeout_s)) from None
         asked = asyncio.ensure_future(self._answer(question, max(_HANG_TIMEOUT_S, timeout_s)))
         asked.add_done_callback(self._on_done)
-        # What is merely late goes on: ending the process would make the next one late, too.
+        # A late query goes on, because a restart of the process would make the next one late, too.
         done, _ = await asyncio.wait([asked], timeout=max(timeout_s - (time.monotonic() - start_s), 0.0))
         if not done:
             asked.add_done_callback(_log_late_failure)
@@ -167,37 +167,37 @@ class Checker:
     def _on_done(self, asked: asyncio.Future[Checked]) -> None:
         self._lock.release()
         if not asked.cancelled():
-            asked.exception()  # whoever asked may be gone
+            asked.exception()  # retrieved, because the caller may have timed out
 
 
 def _error_text(error: Exception) -> str:
-    """What went wrong; by its name, too, where nobody foresaw it."""
+    """Return an error's text, with its type if it is unexpected."""
     if isinstance(error, (WorkerError, RobotError)):
         return str(error)
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
 
 
 def _log_late_failure(asked: asyncio.Future[Checked]) -> None:
-    """Nobody waits for it any more; what went wrong is said all the same."""
+    """Log the failure of a query whose caller has timed out."""
     if not asked.cancelled() and (error := asked.exception()) is not None:
-        log.warning("a check that came too late failed: %s", error)
+        log.warning("a check failed after its timeout: %s", error)
 
 
 def make_checkers(
     surroundings: Mapping[str, CellDescription], *, start_now: Collection[str] = ()
 ) -> dict[str, Checker]:
-    """A checker for each robot: robots of one cell share one, and few processes share all cells.
+    """Create the checker of each robot: robots of one cell share one, and a limited number serves all cells.
 
-    Whoever keeps one cell's process busy delays nobody in the cells of the others.
+    A long query in one cell does not delay the cells of other checkers.
 
     Args:
-        surroundings: What stands around each robot, by the robot's name.
-        start_now: Robots whose checkers begin with the gateway.
+        surroundings: Cell of each robot, by the robot's name.
+        start_now: Robots whose checkers start immediately.
     """
     cells: dict[frozenset[str], dict[str, CellDescription]] = {}
     for name, cell in surroundings.items():
         cells.setdefault(frozenset(robot.name for robot in cell.robots), {})[name] = cell
-    # Who is alone has no mate whose way would have to be gone through: that takes no time.
+    # Cells of one robot share a process: without other robots' paths, their checks are short.
     shares: list[dict[str, CellDescription]] = [{}]
     for names, robots in sorted(cells.items(), key=lambda each: len(each[0])):
         if len(names) == 1:

@@ -1,14 +1,14 @@
-"""Whether motions are checked before they are made."""
+"""Policy of the motion check."""
 
 from enum import StrEnum
 
 
 class Policy(StrEnum):
-    """Of one robot, by the site file: `check = "require"`.
+    """Policy of one robot, from the site file: `check = "require"`.
 
-    require: what was not checked against the present state, or fails, is refused.
-    warn: it is said, and the motion is made.
-    off: nothing is checked.
+    require: refuse a motion that fails the check, or could not be checked against the present state.
+    warn: warn about such a motion, and execute it.
+    off: do not check motions.
     """
 
     REQUIRE = "require"

@@ -1,4 +1,4 @@
-"""The gateway's worker process: answers what `questions` holds, with what `robots` knows."""
+"""The gateway's worker process: answers the queries of `worker_messages` with the checks of `robots`."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -22,18 +22,18 @@ from robots.joints import FloatArray
 from robots.programs.check import check_plan, check_program
 from robots.programs.steps import CheckResult, Step, StepKind, Violation, ViolationKind
 
-# Steps that end before the program does are not run.
+# A program with these violations is not planned to its end, so it must not run.
 _UNREADABLE = (ViolationKind.PROGRAM, ViolationKind.UNREACHABLE)
 
 
 def begin(cells: Cells) -> Callable[[Any], Any]:
-    """What answers a question; robots of one cell share what was made ready for it."""
+    """Return the function that answers queries; robots of one cell share a prepared cell."""
     ready: dict[tuple[str, ...], Cell] = {}
 
     def cell_of(robot: str) -> Cell:
         names = tuple(each.name for each in cells[robot].robots)
         if names not in ready:
-            # Studies of links take up to minutes: they go on beside this process.
+            # Processing of links takes up to minutes, in other processes.
             cell = build_cell(cells[robot], wait=False)
             if pending(cell):
                 return cell
@@ -63,15 +63,15 @@ def begin(cells: Cells) -> Callable[[Any], Any]:
 
 
 def _why_not(cell: Cell, robot: str) -> str:
-    """Why a robot's motions cannot be checked; empty: they can."""
+    """Return why a robot's motions cannot be checked; empty: they can."""
     links = cell.arms[robot].model.link_names
     if len(unshaped(cell, robot)) == len(links):
-        return "its description gives no link a shape, so nothing can be checked"
+        return "its description has no link with a shape, so nothing can be checked"
     return ""
 
 
 def _coverage(cell: Cell) -> tuple[list[Reason], list[Reason]]:
-    """What of a cell no check covers: what moves, and what does not."""
+    """Return the parts of a cell that checks do not cover: moving ones, and fixed ones."""
     uncovered, warnings = [], []
     for name, arm in cell.arms.items():
         bare, missing = unshaped(cell, name), missing_meshes(cell, name)

@@ -1,4 +1,4 @@
-"""What the gateway asks its worker process, and what that answers."""
+"""Messages between the gateway and its worker process."""
 
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -10,15 +10,15 @@ from robots.programs.steps import Step
 Positions: TypeAlias = tuple[float, ...]
 
 
-# The answer to Prepare while links of the cell are being studied: ask again.
+# The answer to Prepare while links of the cell are being processed: ask again.
 PENDING = "pending"
 
 
 @dataclass(frozen=True)
 class Prepare:
-    """Prepare a robot's cell: the shapes of everything in it.
+    """Request to prepare a robot's cell, with the shapes of everything in it.
 
-    The answer is why its motions cannot be checked, empty if they can, or PENDING.
+    The answer is why its motions cannot be checked (empty: they can), or PENDING.
     """
 
     robot: str
@@ -26,10 +26,10 @@ class Prepare:
 
 @dataclass(frozen=True, kw_only=True)
 class CheckMotion:
-    """May a robot go from where it stands through these joint positions [rad] or [m]?
+    """Request to check a motion from `start` through `targets` [rad] or [m].
 
     Attributes:
-        others: For each other robot of the cell where it is and where it has been told to go.
+        others: Actual positions and commanded path of each other robot of the cell.
     """
 
     robot: str
@@ -40,7 +40,7 @@ class CheckMotion:
 
 @dataclass(frozen=True, kw_only=True)
 class CheckProgram:
-    """May a robot run this program from where it stands?"""
+    """Request to check a program that begins at `start`."""
 
     robot: str
     text: str
@@ -50,15 +50,15 @@ class CheckProgram:
 
 @dataclass(frozen=True, kw_only=True)
 class Checked:
-    """What a check found.
+    """Result of a check.
 
     Attributes:
-        refusals: Why the motion must not be made.
-        uncovered: What moves in the cell and cannot be checked: where checks are required, that refuses too.
-        warnings: What is close, but allowed.
-        readable: The program could be read and planned: it has steps.
-        steps: Of a program.
-        duration_s: Of a program.
+        refusals: Reasons to refuse the motion.
+        uncovered: Moving parts of the cell that cannot be checked; also refused if checks are required.
+        warnings: Allowed, but close.
+        readable: The program could be parsed and planned.
+        steps: Steps of a program.
+        duration_s: Duration of a program.
     """
 
     refusals: tuple[Reason, ...] = ()

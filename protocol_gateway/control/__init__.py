@@ -1,1 +1,1 @@
-"""Requests to move or control one robot: judged, written down, done, answered."""
+"""Handling of requests to move or control one robot: evaluated, audited, executed, answered."""

@@ -1,4 +1,4 @@
-"""What Control writes into the audit log: before a thing is done, or after it, but never instead of it."""
+"""Audit entries of Control: written before a command is executed, or after an event has happened."""
 
 import asyncio
 import time
@@ -19,7 +19,7 @@ from robomesh.schemas.robomesh_pb2 import CommandRequest, Event, LeaseRequest
 
 
 class AuditTrail:
-    """Entries of one robot. What cannot be written is said in an event, and stops nothing but motion."""
+    """Writer of one robot's audit entries. A failed write is reported as an event and blocks only motion."""
 
     def __init__(self, audit: AuditLog, journal: Journal) -> None:
         self._audit = audit
@@ -28,13 +28,13 @@ class AuditTrail:
         self._failing = False
 
     async def write_before(self, *entries: Entry) -> None:
-        """Write down what is about to be done, all or nothing; it is on disk when this returns.
+        """Write entries of commands before they are executed; they are on disk when this returns.
 
         Raises:
-            AuditError: If it is not, or not within a second; then it must not be done.
+            AuditError: If they are not on disk within a second; then the commands must not be executed.
         """
         if any(entry.request == "RESET" for entry in entries):
-            # A start reads which stop is latched in the order of the entries.
+            # A restart derives the latched stop from the order of the entries.
             self._write_counts(STOP)
         late = AuditError(codes.AUDIT_SLOW(seconds=LONGEST_WAIT_S))
         if self._audit.stuck_s > LONGEST_WAIT_S:
@@ -47,17 +47,17 @@ class AuditTrail:
             self._record_not_done(entries, error, Outcome.REFUSED)
             raise
         except TimeoutError:
-            # The entry will be on disk yet, so what became of it has to stand behind it.
+            # The entry will still reach the disk, so a FAILED entry must follow it.
             self._record_not_done(entries, late, Outcome.FAILED)
             raise late from None
 
     def write_later(self, entry: Entry) -> None:
-        """Write down what has happened, without waiting for the disk; a flood of it is counted."""
+        """Write the entry of a past event, without waiting for the disk; a flood is counted."""
         if self._floods.admits(entry, time.monotonic()):
             self._append_later(entry)
 
     def write_pending(self) -> None:
-        """Write what was counted, and what the disk refused before; to be called each second."""
+        """Write counted entries, and retry failed writes; call it each second."""
         self._write_counts()
         self._audit.retry()
         latch = self._audit.latch
@@ -67,10 +67,10 @@ class AuditTrail:
                 self._report_failure(AuditError(latch.problem))
         elif self._failing and not self._audit.problem and self._audit.stuck_s < LONGEST_WAIT_S:
             self._failing = False
-            self._journal.report(Event.Severity.INFO, "audit.mended", "the audit log is written again")
+            self._journal.report(Event.Severity.INFO, "audit.mended", "the audit log can be written again")
 
     async def settle(self) -> None:
-        """Wait until all that was begun is written, or could not be."""
+        """Wait until all pending entries are written, or have failed."""
         self._write_counts()
         await self._audit.settle()
 
@@ -94,7 +94,7 @@ class AuditTrail:
 
     def _report_failure(self, error: BaseException) -> None:
         self._failing = True
-        text = f"{error}: the robot is not moved while that is so; stop still works"
+        text = f"{error}: motion is refused until this is fixed; stop still works"
         self._journal.report(Event.Severity.ERROR, "audit.failed", text)
 
 
@@ -108,7 +108,7 @@ def entry_of(
     why: Reason | None = None,
     **values: object,
 ) -> Entry:
-    """An entry dated now; values that are empty are left out, and long ones cut."""
+    """Create an entry with the present time; empty values are omitted, long ones shortened."""
     return Entry(
         time_ns=time.time_ns(),
         operator=operator,
@@ -128,7 +128,7 @@ def entry_of(
 def lease_entry(
     request: LeaseRequest, outcome: Outcome, answer: Answer, *, operator: str, source: str
 ) -> Entry:
-    """The entry of a lease request."""
+    """Create the entry of a lease request."""
     return entry_of(
         LeaseRequest.Action.Name(request.action),
         operator=operator,
@@ -143,7 +143,7 @@ def lease_entry(
 
 
 def command_entry(request: CommandRequest, *, operator: str, source: str) -> Entry:
-    """The entry of a command that is accepted."""
+    """Create the entry of an accepted command."""
     return entry_of(
         CommandRequest.Command.Name(request.command),
         operator=operator,

@@ -1,13 +1,13 @@
-"""Motions of one robot checked before they are made, against where everything in its cell is now.
+"""Collision check of one robot's motions before they start, against the present state of its cell.
 
-    policy    checked and good     warned of       fails           cannot be checked
-    --------  -------------------  --------------  --------------  -----------------
-    require   made                 made, and said  refused         refused
-    warn      made                 made, and said  made, and said  made, and said
-    off       (no motion is; a program is, for its steps are found so, and what that finds is said)
+    policy    check passes   passes with warning   check fails     cannot be checked
+    --------  -------------  --------------------  --------------  -----------------
+    require   sent           sent, warned          refused         refused
+    warn      sent           sent, warned          sent, warned    sent, warned
+    off       motions are not checked; a program is, because the check plans its steps, with warnings only
 
-Checked is the straight path in joint space from where the robot stands to where it is to go, against
-fixtures, its own links, and every other robot of the cell where it is and where it has been told to go.
+The check covers the straight path in joint space from the robot's positions to its target, against fixtures,
+its own links, and every other robot of the cell at its positions and along its commanded path.
 """
 
 import contextlib
@@ -32,21 +32,21 @@ from robots.joints import Joints
 
 _C = CommandRequest.Command
 _CLOSE, _FAILED, _SKIPPED = "check.warning", "check.failed", "check.skipped"
-# What a robot at rest may seem to move by [rad] or [m].
+# Noise in the positions of a robot at rest [rad] or [m].
 _REST_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """What a check says of commands.
+    """Result of the check of commands.
 
     Attributes:
-        refusal: Why they must not be sent; None: they may.
-        warning: What is to be said of them all the same; None: nothing.
-        code: Of the event that says it. "check.warning": something is close; "check.failed": the check found
-            what "require" refuses; "check.skipped": something was not checked.
-        start: Where the robot stood, where that must still be so when they are sent.
-        others: Where the others were and went, where that must still be so.
+        refusal: Refusal of the commands; None: they may be sent.
+        warning: Warning about them; None: no warning.
+        code: Code of the warning's event. "check.warning": something is close; "check.failed": a failure that
+            "require" refuses; "check.skipped": something was not checked.
+        start: Positions at which the robot must still be when the commands are sent; None: anywhere.
+        others: Paths of the other robots, which must still be valid; None: not required.
     """
 
     refusal: Answer | None = None
@@ -57,17 +57,17 @@ class Finding:
 
     @property
     def is_violation(self) -> bool:
-        """Whether it would have been refused where checks are required."""
+        """True if the policy "require" would have refused the commands."""
         return self.code != _CLOSE
 
 
 class Checks:
-    """The check of one robot's motions.
+    """Check of one robot's motions and programs.
 
     Args:
-        cell: Names of the robots of its cell, its own among them.
-        checker: Of motions.
-        planner: Of programs.
+        cell: Names of the robots of its cell, including its own.
+        checker: Worker process for motions.
+        planner: Worker process for programs.
     """
 
     def __init__(
@@ -90,23 +90,23 @@ class Checks:
 
     @property
     def problem(self) -> Reason | None:
-        """Why motions cannot be checked now; None: they can, or need not."""
+        """Reason why motions cannot be checked now; None: they can, or need not."""
         return None if self.policy is Policy.OFF else self._checker.problem(self._name)
 
     @property
     def starting(self) -> bool:
-        """Whether motions cannot be checked only because the check is getting ready."""
+        """True if motions cannot be checked only because the check is starting."""
         return self.policy is not Policy.OFF and self._checker.starting(self._name)
 
     def motion_lock(self, requests: Sequence[CommandRequest]) -> AbstractAsyncContextManager[None]:
-        """The cell, for commands that move the robot: nobody else's motion begins meanwhile."""
+        """Return the cell's motion lock for commands that move the robot, otherwise a null context."""
         moves = any(each.command in MOTION_COMMANDS for each in requests)
-        # Who is not checked himself is one whom the others are checked against.
+        # A robot whose own motions are not checked is an obstacle for the other robots of its cell.
         meets = self.policy is not Policy.OFF or len(self._cell) > 1
         return self._cell_occupancy.motion_lock if moves and meets else contextlib.nullcontext()
 
     async def check(self, requests: Sequence[CommandRequest]) -> Finding:
-        """What is to be said of commands that would be sent now."""
+        """Check commands that would be sent now."""
         moves = any(each.command in MOTION_COMMANDS and each.command != _C.RUN_PROGRAM for each in requests)
         if self.policy is Policy.OFF or not moves:
             return Finding()
@@ -121,12 +121,12 @@ class Checks:
         return self._evaluate(checked, left_out, start, others)
 
     async def program(self, text: str) -> tuple[Checked, Finding]:
-        """What a program does from where the robot is, and what is to be said of it.
+        """Plan and check a program from the robot's present positions.
 
         Raises:
-            CheckError: If it cannot be checked, or not in time: then nobody knows its steps.
+            CheckError: If it could not be planned and checked, or not in time.
         """
-        # Whatever the policy, its steps are found from here on.
+        # The plan begins at these positions with any policy.
         start = self._start(must_rest=True)
         others, left_out = self._others()
         checked = await self._planner.program(
@@ -134,12 +134,12 @@ class Checks:
         )
         if not checked.readable:
             return checked, Finding(refusal=_refused("Not run", checked.refusals))
-        # Each step is checked again, against the others as they are then.
+        # Each step is checked again before it is sent, against the other robots' state at that time.
         finding = self._evaluate(checked, left_out, start, others, program=True)
         return checked, replace(finding, start=start, others=None)
 
     def occupancy(self) -> Occupancy:
-        """What this robot may take up from now on."""
+        """Return the positions that this robot may occupy from now on."""
         context = self._context
         controller, authority = context.controller(), context.authority
         if controller.positions is None:
@@ -153,15 +153,15 @@ class Checks:
         return Occupancy(path=(controller.positions, *ahead))
 
     def changed(self, finding: Finding) -> Reason | None:
-        """Return what has changed since a motion was checked; None: nothing has."""
+        """Return the reason if the cell has changed since a motion was checked; None: unchanged."""
         if finding.start and not self.is_resting_at(finding.start):
             return codes.ROBOT_MOVED()
         for name, checked in (finding.others or {}).items():
             now = self._cell_occupancy.others(self._name, self._cell)[name]
-            # On its way it is somewhere on it; one that stood has to stand there.
-            stood = len(checked) == 1 and now.path and not self._near(now.path[0], checked[0])
-            told = any(not any(self._near(place, was) for was in checked) for place in now.path[1:])
-            if now.unknown or stood or told:
+            # A moving robot was checked along its whole path; a resting one must still be in its place.
+            left = len(checked) == 1 and now.path and not self._near(now.path[0], checked[0])
+            new_target = any(not any(self._near(target, was) for was in checked) for target in now.path[1:])
+            if now.unknown or left or new_target:
                 return codes.ROBOT_OTHER_MOVED(name=name)
         return None
 
@@ -171,19 +171,19 @@ class Checks:
         )
 
     def is_resting_at(self, start: Positions) -> bool:
-        """Whether the robot is where it was when its motion was checked, at rest."""
+        """Return whether the robot rests at the positions where its motion was checked."""
         controller = self._context.controller()
         resting = not _moves(controller, self._context.authority.moving)
         return resting and has_arrived(start, controller.positions, self._joints.types)
 
     def _start(self, *, must_rest: bool) -> Positions:
-        """Where the robot is.
+        """Return the robot's positions, from which a motion is checked.
 
         Args:
-            must_rest: It must not move, nor be about to.
+            must_rest: The robot must neither move nor be about to.
 
         Raises:
-            CheckError: If that is no place to check a motion from.
+            CheckError: If the positions are unknown, or the robot moves but must rest.
         """
         controller, authority = self._context.controller(), self._context.authority
         if controller.positions is None:
@@ -195,16 +195,16 @@ class Checks:
                 motion.target, controller.positions, self._joints.types
             )
             if _moves(controller, authority.moving) or (motion and not motion.held and not arrived):
-                # What moves by itself, as a demonstration does, ends with a command.
+                # A controller's own motion, such as a demonstration, ends when a command arrives.
                 required = self.policy is Policy.REQUIRE
                 raise CheckError((codes.ROBOT_MOVES_STOP if required else codes.ROBOT_MOVES_HOME)())
         return controller.positions
 
     def _targets(self, requests: Sequence[CommandRequest]) -> tuple[Positions, ...]:
-        """Everywhere that the commands take the robot, in order.
+        """Return the targets of the commands, in order.
 
         Raises:
-            CheckError: If nobody knows where one goes.
+            CheckError: If the path of a held motion is unknown.
         """
         targets: list[Positions] = []
         controller = self._context.controller()
@@ -221,10 +221,10 @@ class Checks:
         return tuple(targets)
 
     def _others(self) -> tuple[dict[str, tuple[Positions, ...]], Reason | None]:
-        """Where the cell's other robots are and go; and, where that may be left out, whose is not known.
+        """Return the known paths of the cell's other robots, and the reason for those that are left out.
 
         Raises:
-            CheckError: If one's is not known, and must be.
+            CheckError: If a path is unknown, and checks are required.
         """
         others = self._cell_occupancy.others(self._name, self._cell)
         unknown = [
@@ -265,7 +265,7 @@ class Checks:
 
 
 def _moves(controller: Controller, moving: bool | None) -> bool:
-    # At the first moment nobody knows yet: then its controller's word counts alone.
+    # Before the first observation, only the activity that the controller reports counts.
     return bool(moving) or controller.status.activity in (Activity.MOVING, Activity.HOMING)
 
 
@@ -279,6 +279,6 @@ def _combined(reasons: Sequence[Reason]) -> Reason | None:
 
 
 def _first_few(reasons: Sequence[Reason], most: int = 3) -> tuple[Reason, ...]:
-    """Return the first reasons, and how many more there are."""
+    """Return the first reasons, and the number of the others."""
     more = [codes.CHECK_MORE(count=len(reasons) - most)] if len(reasons) > most else []
     return (*reasons[:most], *more)

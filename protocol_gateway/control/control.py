@@ -1,11 +1,11 @@
-"""Commands to one robot: judged, written down, done, answered.
+"""Commands to one robot: evaluated, audited, sent, answered.
 
-    command                 judge -> check the motion -> audit on disk -> judge again -> controller's socket
-    STOP, dead-man stop     controller's socket -> audit (`stops`)
+    command                 evaluate -> check motion -> audit on disk -> evaluate again -> controller's socket
+    STOP, dead-man stop     controller's socket -> audit (`stop_handler`)
 
-Commands wait for each other, so that they reach the controller in the order of the audit log; stops
-and renewals wait for nothing. Between the two judgements the disk may take its time: a stop or the
-lease's end in between is obeyed, and what has waited too long is not sent any more.
+Commands are serialized, so that they reach the controller in the order of the audit log; stops and renewals
+do not wait. The second evaluation catches a stop or the end of the lease while the entry was being written,
+and a command that has waited too long.
 """
 
 import asyncio
@@ -49,9 +49,9 @@ from robots.joints import Joints
 _C = schema.CommandRequest.Command
 _S = schema.Event.Severity
 
-# A controller goes on telling the stop that was just reset for so long at most.
+# A controller may still report a stop for this long after its reset.
 RESET_SHOWS_WITHIN_S = 0.3
-# In the audit log: where the steps of a program come from.
+# Source of a program's steps, in the audit log.
 PROGRAM = "program"
 
 
@@ -60,11 +60,11 @@ class _Attempt:
     """Commands that go to the controller as one unit.
 
     Attributes:
-        arrived_s: When they came (monotonic).
-        id_used: Their ids are the holder's, so the answer is kept for a repeat.
-        step: The program that runs asks for them.
-        begin: What is done in the place of sending a unit.
-        outcome_text: What the answer says of that.
+        arrived_s: Time of arrival (monotonic).
+        id_used: Their ids are used by the holder, so the answer is kept for a repeat.
+        step: They are a step of the program that runs.
+        begin: Called instead of sending a unit.
+        outcome_text: Text of the answer in that case.
     """
 
     requests: tuple[schema.CommandRequest, ...]
@@ -77,11 +77,11 @@ class _Attempt:
 
 
 class Control:
-    """The authority over one robot: who asks what of it, and what becomes of that.
+    """Control of one robot: evaluates and executes its requests.
 
     Attributes:
-        leases: Who controls.
-        speed_percent: Last set through here, since the link came up; None: not known.
+        leases: The robot's lease.
+        speed_percent: Speed last set by the gateway since the link came up; None: unknown.
     """
 
     def __init__(self, joints: Joints, context: ControlContext, checks: Checks | None = None) -> None:
@@ -98,16 +98,16 @@ class Control:
 
     @property
     def authority(self) -> Authority:
-        """Who controls, and whether a stop is latched."""
+        """State of lease and stop."""
         return self._context.authority
 
     def stop(self, *, by: str, reason: str, source: str) -> schema.StopAnswer:
-        """Stop the robot; from anyone, at any time."""
+        """Stop the robot; allowed for every sender at any time."""
         return self._stop_handler.stop(by=by, reason=reason, source=source)
 
     def link_lost(self, why: str) -> None:
-        """No units come any more: where motion of the holder's runs, stop the robot."""
-        self.speed_percent = None  # a controller may come back another
+        """Handle a lost or silent link: stop the robot if motion of the holder runs."""
+        self.speed_percent = None  # the next connection may reach another controller
         lease = self.authority.lease
         if lease is not None and lease.motion is not None:
             self.stop(by=GATEWAY, reason=f"{lease.holder}'s motion ran, and {why}", source=GATEWAY)
@@ -117,20 +117,20 @@ class Control:
     async def command(
         self, request: schema.CommandRequest, *, operator: str, source: str
     ) -> schema.CommandAnswer:
-        """Do a command; answered when its unit is on the controller's socket.
+        """Execute a command; the answer means that its unit is on the controller's socket.
 
         Raises:
-            RefusedError: With what, why and what next; nothing was sent.
+            RefusedError: If it is refused, with the reason; nothing was sent.
         """
         return await self.commands([request], operator=operator, source=source)
 
     async def commands(
         self, requests: Sequence[schema.CommandRequest], *, operator: str, source: str
     ) -> schema.CommandAnswer:
-        """Do commands in order, as one unit, all of them or none.
+        """Execute commands in order, as one unit, all or none.
 
         Raises:
-            RefusedError: With what, why and what next; nothing was sent.
+            RefusedError: If they are refused, with the reason; nothing was sent.
         """
         answer = await self.attempt(requests, operator=operator, source=source)
         if not answer.accepted:
@@ -146,15 +146,15 @@ class Control:
         begin: Callable[[], None] | None = None,
         refused: Answer | None = None,
     ) -> Answer:
-        """What `commands` does, with a refusal as the answer, and its kind.
+        """Execute commands like `commands`, but return a refusal as the answer.
 
         Args:
-            begin: What is done in the place of sending a unit.
-            refused: Why not, where that is known already: it is answered and written down.
+            begin: Called instead of sending a unit.
+            refused: A refusal that is already known, to be audited and returned.
         """
         arrived_s = read_clocks().monotonic_s
         entries = tuple(command_entry(each, operator=operator, source=source) for each in requests)
-        # HOLD makes a robot slower whatever comes before it: it waits for nobody's check.
+        # HOLD can only slow the robot down, so it does not wait for checks of other commands.
         holds = all(each.command == _C.HOLD for each in requests)
         async with contextlib.nullcontext() if holds else self._command_lock:
             verdict = self.admit(requests, operator)
@@ -169,9 +169,9 @@ class Control:
             return await self._do(attempt, problem)
 
     def _cancel_preparing(self, hold: _Attempt) -> _Attempt:
-        """Let HOLD cancel the programs that are being checked; where nothing moves, it is only that.
+        """Cancel the programs that are being checked; if nothing moves, replace the HOLD by that.
 
-        A HOLD that is sent to an arm at rest leaves it holding nothing, and it then refuses every motion.
+        A HOLD sent to an arm at rest would make the controller refuse every motion.
         """
         cancelled = self._context.cancel_preparing(codes.PROGRAM_HOLD())
         lease = self.authority.lease
@@ -183,7 +183,7 @@ class Control:
         )
 
     async def step(self, request: schema.CommandRequest, *, operator: str) -> Answer:
-        """Do a step of the program that the holder runs: all is judged but its id."""
+        """Execute a step of the holder's program: evaluated like a command, except for its id."""
         arrived_s = read_clocks().monotonic_s
         entries = (command_entry(request, operator=operator, source=PROGRAM),)
         async with self._command_lock:
@@ -194,7 +194,7 @@ class Control:
             return await self._do(_Attempt((request,), entries, arrived_s, step=True), problem)
 
     def admit(self, requests: Sequence[schema.CommandRequest], operator: str) -> Verdict:
-        """Whether commands are their holder's, in time and new, and no stop forbids them."""
+        """Evaluate whether commands are the holder's, in time and new, and no stop forbids them."""
         self.leases.expire()
         authority, now = self.authority, read_clocks()
         for request in requests:
@@ -224,7 +224,7 @@ class Control:
                 self._record(attempt.entries, Outcome.REFUSED, problem)
                 return problem
             assert send is not None
-            # Used up before anything is done: whatever happens below, a repeat does not do it again.
+            # The id is used before anything is sent, so that a repeat never executes the command again.
             self._keep_answer(attempt, not_sent(codes.COMMAND_BROKEN_OFF()))
             answer = await self._write_and_send(attempt, send, finding)
             self._keep_answer(attempt, answer)
@@ -256,7 +256,7 @@ class Control:
         if attempt.begin is None:
             controller = self._context.controller()
             for request in attempt.requests:
-                # Each goes on from where those before it lead.
+                # Each command starts from the state after the previous one.
                 self._sent(request, now, controller, isolated=isolated)
                 controller = predicted(request, controller, self._joints)
             text = f"{names} {'is' if len(attempt.requests) == 1 else 'are'} on the controller's socket"
@@ -269,7 +269,7 @@ class Control:
         return Answer(True, text, warning)
 
     def _recheck(self, attempt: _Attempt, finding: Finding) -> Answer | None:
-        """Why what was allowed before it was written down must not be sent now; None: it may."""
+        """Evaluate again after the audit entry was written; return the refusal, None: send it."""
         self.leases.expire()
         if not lease_rules.holds(self.authority, attempt.entries[0].operator, attempt.requests[0].lease):
             return not_sent(codes.COMMAND_CONTROL_ENDED_MEANWHILE())
@@ -279,7 +279,7 @@ class Control:
         return None if changed is None else not_sent(codes.COMMAND_CHANGED(changed))
 
     def _overtaken_by_hold(self, attempt: _Attempt) -> Answer | None:
-        """That HOLD, which waits for nothing, has overtaken a motion: whoever held the robot expects none."""
+        """Return the refusal of a motion that a HOLD has overtaken; None: none has."""
         if not any(each.command in MOTION_COMMANDS for each in attempt.requests):
             return None
         lease, program = self.authority.lease, self._context.program
@@ -300,12 +300,12 @@ class Control:
             self._context.authority = keep_answer(self.authority, attempt.requests[-1], answer)
 
     def _refusal(self, attempt: _Attempt) -> Answer | None:
-        """Why commands cannot be done now, each judged as those before it leave things; None: they can."""
+        """Return the refusal of commands, each evaluated after the previous ones; None: allowed."""
         authority, controller, now = self.authority, self._context.controller(), read_clocks()
         refusal = wait_refusal(attempt.arrived_s, now)
         motions = [each.command for each in attempt.requests if each.command in MOTION_COMMANDS]
         if len(motions) > 1 and _C.RESUME in motions:
-            # Some go on with what is on hold first, some forget it: nobody would know the way.
+            # Some controllers resume the held motion first, others drop it, so the path would be unknown.
             return not_sent(codes.COMMAND_TWO_UNITS())
         for request in attempt.requests:
             refusal = (
@@ -328,13 +328,13 @@ class Control:
 
     def _program_refusal(self, request: schema.CommandRequest) -> Answer | None:
         program = self._context.program
-        # Of its speed its check is true.
+        # The check of a program holds only at its speed.
         if program is None or request.command not in (MOTION_COMMANDS | {_C.SPEED}) - {_C.RESUME}:
             return None
         return not_sent(codes.COMMAND_PROGRAM_RUNS(name=program.name))
 
     def current_obstacle(self, request: schema.CommandRequest) -> Answer | None:
-        """Return why the controller as it is now cannot do a command; None: it can."""
+        """Return the refusal of a command by the controller's present state; None: allowed."""
         return self._obstacle(request, self._context.controller())
 
     def _obstacle(self, request: schema.CommandRequest, controller: Controller) -> Answer | None:
@@ -342,7 +342,7 @@ class Control:
         now_s = read_clocks().monotonic_s
         just_reset = self._reset_s is not None and now_s - self._reset_s < RESET_SHOWS_WITHIN_S
         if just_reset and status.activity in (Activity.STOPPED, Activity.FAULT):
-            # It still tells the stop that was just reset; if it does refuse, it says so itself.
+            # The controller still reports the stop that was just reset. If it is stopped, it refuses itself.
             controller = replace(controller, status=replace(status, activity=None))
         return obstacle(request, controller, self._joints)
 
@@ -378,23 +378,23 @@ class Control:
     # ----------------------------------------------------------------- motion
 
     def send_latched_stop(self) -> None:
-        """Send the latched stop, if there is one: units can be sent again, or soon."""
+        """Send the latched stop, if there is one, when units can be sent again."""
         self._stop_handler.send_latched_stop()
 
     def status_changed(self) -> None:
-        """The controller told something new of itself: after a RESET, a stop or fault is a new one."""
+        """Handle a changed controller status: after it, a stop or fault is not the one that was reset."""
         self._reset_s = None
 
     def refused(self) -> None:
-        """The controller refused a unit."""
-        self.speed_percent = None  # which unit is not said; it may have been that
+        """Handle the controller's refusal of a unit."""
+        self.speed_percent = None  # the refused unit is unknown, and may have been the speed
         before = self.authority
         self._context.authority = motion_owner.refused(before)
         if before is not self.authority:
             self._context.on_change()
 
     def observe(self, *, moving: bool | None) -> None:
-        """Follow whether the robot moves; called some times a second. None: it is not known."""
+        """Track whether the robot moves, several times a second; None: unknown."""
         if moving is None:
             return
         now = read_clocks()
@@ -412,7 +412,7 @@ class Control:
             self._journal.report(
                 _S.INFO if lease is None else _S.WARNING,
                 "motion.foreign",
-                "the robot began to move, and nobody commanded it through the gateway",
+                "the robot began to move without a command of the gateway",
             )
         if foreign and lease is not None and not lease.tolerates_motion:
             self.leases.end(codes.ENDED_FOREIGN_MOTION(), foreign=True)
@@ -421,7 +421,7 @@ class Control:
         self._stop_handler.check_heeded(moving=moving, now=now)
 
     def reported(self, activity: Activity | None, dated_s: float) -> None:
-        """Follow a status unit; it and the newest positions were new at `dated_s` (monotonic)."""
+        """Follow a status unit; `dated_s`: older time stamp of it and the newest positions (monotonic)."""
         lease = self.authority.lease
         if lease is None or lease.motion is None:
             return
@@ -429,7 +429,7 @@ class Control:
         self._context.authority = motion_owner.reported(self.authority, resting=resting, dated_s=dated_s)
 
     def _stop_orphan(self, moving: bool) -> None:
-        """Stop what still moves of a motion that a killed gateway's holder commanded: nobody holds it now."""
+        """Stop a motion that was commanded before the gateway was killed, and has no holder now."""
         mover, self._context.orphan = self._context.orphan, ""
         if mover and moving and self.authority.lease is None:
             text = f"dead-man: the gateway was killed while {mover} had control, and the robot still moves"
@@ -438,11 +438,11 @@ class Control:
     def _has_arrived(self) -> bool:
         lease, controller = self.authority.lease, self._context.controller()
         if lease is None or lease.motion is None or controller.status.homed is False:
-            return False  # a robot that is at its home, but does not know it, has still to be homed
+            return False  # at its home position, but not homed yet
         return has_arrived(lease.motion.target, controller.positions, self._joints.types)
 
     async def close(self) -> None:
-        """End the lease, if there still is one, and write what is still to be written."""
+        """End the lease, if there is one, and write pending audit entries."""
         self.leases.close()
         await self._audit_trail.settle()
 

@@ -1,21 +1,21 @@
-"""Until when the asker of a command waits: what is past that is not begun.
+"""Deadlines of commands: after its sender's timeout, a command is not executed.
 
-not_after                  the request says it, by the gateway's clock
-the question's `within`    the asker's time-out, counted from when the question came
+not_after                  given in the request, on the gateway's clock
+the query's `within`       the sender's timeout, from the arrival of the query
 both                       the earlier one
-neither, RUN_PROGRAM       DEFAULT_TIMEOUT_S, for Zenoh does not tell the gateway an asker's time-out
+neither, RUN_PROGRAM       DEFAULT_TIMEOUT_S, because Zenoh does not transmit a query's timeout
 neither, another command   `admission.LONGEST_WAIT_S` in the gateway, as for every command
 """
 
 from robomesh.schemas.robomesh_pb2 import CommandRequest
 from robomesh.server import Request
 
-# The default time-out of a robomesh client.
+# Default timeout of a robomesh client.
 DEFAULT_TIMEOUT_S = 2.0
 
 
 def set_deadline(message: CommandRequest, request: Request) -> None:
-    """Set the command's `not_after` to the time until which its asker waits."""
+    """Set the command's `not_after` to its sender's deadline."""
     within_s = request.within_s
     if (
         within_s is None

@@ -1,8 +1,8 @@
-"""Who controls one robot: lease requests judged, written down, in force; and the ends of a lease.
+"""Lease of one robot: lease requests evaluated, audited and applied; and the ends of a lease.
 
-ACQUIRE, OFFER, ACCEPT, TAKE            judge -> audit on disk -> judge again
-RELEASE, expiry, session's end, ASK     at once (with a dead-man stop if needed) -> audit
-RENEW                                   at once; its lease's end tells how many there were
+ACQUIRE, OFFER, ACCEPT, TAKE            evaluate -> audit on disk -> evaluate again
+RELEASE, expiry, session's end, ASK     applied immediately (with a dead-man stop if needed) -> audit
+RENEW                                   applied immediately; the end of the lease counts the renewals
 """
 
 import asyncio
@@ -28,10 +28,10 @@ _S = schema.Event.Severity
 
 
 class Leases:
-    """The lease of one robot.
+    """Lease of one robot.
 
     Args:
-        command_lock: Held while a command, or a request that is written down first, is done.
+        command_lock: Held while a command, or a lease request that is audited first, is processed.
     """
 
     def __init__(
@@ -47,29 +47,29 @@ class Leases:
         """Answer a lease request.
 
         Raises:
-            RefusedError: With what, why and what next.
+            RefusedError: If it is refused; the text says why and what to do.
         """
-        judge = partial(self._judge_lease, request, operator, secrets.token_urlsafe(24))
+        evaluate = partial(self._evaluate, request, operator, secrets.token_urlsafe(24))
         record = partial(lease_entry, request, operator=operator, source=source)
         if request.action in (_A.RENEW, _A.RELEASE, _A.ASK):
-            # None of them moves anything, and the first two must be in time: they wait for no disk.
+            # These requests move nothing, and RENEW and RELEASE are urgent: they do not wait for the disk.
             asked_before = any(each.operator == operator for each in self._context.authority.asked_by)
-            outcome = judge()
+            outcome = evaluate()
             unrecorded = request.action == _A.RENEW or (request.action == _A.ASK and asked_before)
             if outcome.answer.accepted and not unrecorded:
                 self._audit_trail.write_later(record(Outcome.ACCEPTED, outcome.answer))
-            return self._take_effect(outcome, record)
+            return self._apply(outcome, record)
         async with self._command_lock:
-            outcome = judge()
+            outcome = evaluate()
             if outcome.answer.accepted:
                 try:
                     await self._audit_trail.write_before(record(Outcome.ACCEPTED, outcome.answer))
                 except AuditError as error:
                     raise RefusedError(codes.LEASE_NOT_WRITTEN(error.reason)) from None
-                outcome = judge()
-            return self._take_effect(outcome, record)
+                outcome = evaluate()
+            return self._apply(outcome, record)
 
-    def _judge_lease(self, request: schema.LeaseRequest, operator: str, secret: str) -> LeaseOutcome:
+    def _evaluate(self, request: schema.LeaseRequest, operator: str, secret: str) -> LeaseOutcome:
         self.expire()
         read_only = self._context.controller().read_only
         if read_only is not None and request.action in (_A.ACQUIRE, _A.TAKE):
@@ -78,7 +78,7 @@ class Leases:
             self._context.authority, request, operator=operator, now=read_clocks(), secret=secret
         )
 
-    def _take_effect(self, outcome: LeaseOutcome, record: Callable[..., Entry]) -> schema.LeaseAnswer:
+    def _apply(self, outcome: LeaseOutcome, record: Callable[..., Entry]) -> schema.LeaseAnswer:
         if not outcome.answer.accepted:
             self._audit_trail.write_later(record(Outcome.REFUSED, outcome.answer))
             raise RefusedError(outcome.answer.reason or outcome.answer.text)
@@ -88,7 +88,7 @@ class Leases:
         return lease_answer(outcome.granted, read_clocks())
 
     def expire(self) -> None:
-        """End a lease whose time is over."""
+        """End the lease if it has expired."""
         authority, ended = lease_rules.expire(self._context.authority, read_clocks())
         if ended is not None:
             self._end(authority, ended, "EXPIRE")
@@ -96,13 +96,13 @@ class Leases:
             self._set_authority(authority)
 
     def end_session(self, session: str) -> None:
-        """A program's or page's session is gone: end the lease that was its."""
+        """End the lease of a program's or page's session that has ended."""
         authority, ended = lease_rules.end_session(self._context.authority, session)
         if ended is not None:
             self._end(authority, ended, "REVOKE")
 
     def end(self, why: Reason, *, foreign: bool = False) -> None:
-        """End the lease, if there is one, for a reason of the gateway's; `foreign`: of foreign motion."""
+        """End the lease, if there is one, for the gateway's reason; `foreign`: because of foreign motion."""
         authority, ended = lease_rules.end_lease(self._context.authority, why, foreign=foreign)
         if ended is not None:
             self._end(authority, ended, "REVOKE")
@@ -131,7 +131,7 @@ class Leases:
         self._journal.report(severity, "lease.ended", text, why=ended.why, holder=ended.holder)
 
     def _set_authority(self, authority: Authority) -> None:
-        """Take a new state, and set the alarm clock to its lease's end."""
+        """Set the state, and schedule the lease's expiry."""
         self._context.authority = authority
         if self._expiry is not None:
             self._expiry.cancel()
@@ -139,12 +139,12 @@ class Leases:
         if authority.lease is not None:
             loop = asyncio.get_running_loop()
             left_s = authority.lease.until_s - time.monotonic()
-            # A millisecond late rather than early: early, the alarm would find nothing to end.
+            # A millisecond late: an early timer would find an unexpired lease.
             self._expiry = loop.call_later(max(0.0, left_s) + 0.001, self.expire)
         self._context.on_change()
 
     def close(self) -> None:
-        """End the lease, if there still is one."""
+        """End the lease, if there is one."""
         self.end(codes.ENDED_GATEWAY())
         if self._expiry is not None:
             self._expiry.cancel()

@@ -1,13 +1,13 @@
-"""A program of the holder's, run step by step: each step is a command like any other, judged and checked.
+"""Programs of the holder, run step by step: each step is evaluated and checked like any other command.
 
-    RUN_PROGRAM   read and checked whole (worker process) -> judge -> audit on disk -> it runs
-                  HOLD or a stop before that: not started; its asker gives up before: not started
-    each step     judge -> check against where everything is now -> audit on disk -> controller's socket
-                  -> wait until the robot stands at the step's target
+    RUN_PROGRAM   parse and check the whole program (worker process) -> evaluate -> audit on disk -> run
+                  not started if HOLD, a stop, or the sender's timeout comes first
+    each step     evaluate -> check against the present state of the cell -> audit on disk
+                  -> controller's socket -> wait until the robot rests at the step's target
 
-It ends with its last step, with a stop, with its holder's control, with a refused step, or where the
-robot comes to rest elsewhere. HOLD and RESUME are its holder's, as with any motion, and a RESET that gives
-up what is on hold gives up all of it.
+A program ends with its last step, with a stop, with the end of the lease, with a refused step, or if the
+robot comes to rest elsewhere. HOLD and RESUME apply as with any motion. A RESET that drops a held motion also
+ends its program.
 """
 
 import asyncio
@@ -40,14 +40,14 @@ _S = schema.Event.Severity
 _STATE = schema.ProgramState
 
 _POLL_S = 0.02
-# A robot that is where its step goes already may still begin to move: homing looks for its marks.
+# A robot that is already at its target may still begin to move: homing searches for its marks.
 _START_TIMEOUT_S = 0.3
-# However long its asker waits.
+# Timeout of parsing and checking, even if the sender waits longer.
 PREPARE_TIMEOUT_S = 25.0
-# What the answer takes to its asker: a refusal is to be there before it gives up.
+# Time for the answer's way back: a refusal must arrive before the sender's timeout.
 _ANSWER_MARGIN_S = 0.1
 
-# No client waits for a step, so a busy machine may check it again for so long.
+# No client waits for a step, so a check that timed out is repeated for this long.
 _RECHECK_TIMEOUT_S = 10.0
 _TOO_SLOW = frozenset({codes.CHECK_TOO_SLOW.name, codes.CHECK_QUEUED_TOO_LONG.name})
 
@@ -59,8 +59,8 @@ class _Run:
     """A program that runs.
 
     Attributes:
-        secret: Of the lease under which it runs.
-        last_stop_id: Of the newest stop when it began.
+        secret: Secret of the lease under which it runs.
+        last_stop_id: Number of the newest stop at its start.
     """
 
     name: str
@@ -76,9 +76,9 @@ class _Prepared:
     """A program that was checked.
 
     Attributes:
-        refused: Why it must not run; None: it may.
-        warning: What the check warns of.
-        begin: Begins it.
+        refused: Refusal; None: it may run.
+        warning: Warning of the check.
+        begin: Starts it.
     """
 
     refused: Answer | None = None
@@ -87,10 +87,10 @@ class _Prepared:
 
 
 class Programs:
-    """Runs one robot's programs, one at a time.
+    """Runner of one robot's programs, one at a time.
 
     Attributes:
-        state: Of the program that runs, or ran last; its timestamp is set when it is published.
+        state: State of the current or last program; its timestamp is set when it is published.
     """
 
     def __init__(self, control: Control, context: ControlContext, checks: Checks) -> None:
@@ -101,10 +101,10 @@ class Programs:
     async def run(
         self, request: schema.CommandRequest, *, operator: str, source: str
     ) -> schema.CommandAnswer:
-        """Check a program, and begin it; answered when it runs.
+        """Check a program and start it; the answer means that it runs.
 
         Raises:
-            RefusedError: With what, why and what next; the robot has not moved.
+            RefusedError: If it is refused, with the reason; the robot has not moved.
         """
         cancelled: asyncio.Future[Reason] = asyncio.get_running_loop().create_future()
         try:
@@ -117,7 +117,7 @@ class Programs:
     ) -> schema.CommandAnswer:
         verdict = self._control.admit([request], operator)
         name = one_line(request.program_name, LONGEST).strip() or "unnamed"
-        # What was refused stays so, though its reason may be gone a moment later: nothing was planned.
+        # A refusal here is final, even if its reason disappears, because the program was not planned.
         prepared = _Prepared(None if verdict.answer.accepted else verdict.answer)
         if verdict.answer.accepted and not verdict.repeat:
             self._context.preparing.add(cancelled)
@@ -138,10 +138,10 @@ class Programs:
     async def _prepare_in_time(
         self, request: schema.CommandRequest, cancelled: asyncio.Future[Reason], name: str, operator: str
     ) -> "_Prepared":
-        """As `_prepare`, unless its asker gives up, or HOLD or a stop comes before.
+        """Prepare a program, unless the sender's timeout, a HOLD or a stop comes first.
 
         Raises:
-            CheckError: If it cannot be checked, in time or at all.
+            CheckError: If it could not be checked, or not in time.
         """
         waits_s = PREPARE_TIMEOUT_S
         if request.HasField("not_after"):
@@ -172,7 +172,7 @@ class Programs:
         if finding.refusal is not None:
             return _Prepared(finding.refusal)
         first = next((step for step in checked.steps if step.target is not None), None)
-        # Whether it is homed, or on hold, is known before its first step.
+        # Refuse now if the present state (not homed, on hold) would refuse the first step.
         if first is not None and (problem := self._control.current_obstacle(_request(first, ""))) is not None:
             return _Prepared(problem)
         if finding.warning is not None:
@@ -202,7 +202,7 @@ class Programs:
         return _Prepared(None, finding.warning, begin)
 
     async def close(self) -> None:
-        """End what runs."""
+        """Cancel the program that runs."""
         if self._task is not None:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
@@ -224,7 +224,7 @@ class Programs:
             self._end(run, problem)
 
     async def _run_steps(self, run: _Run) -> Reason | None:
-        """Do a program's steps; return why it was broken off."""
+        """Execute a program's steps; return the reason of an abort."""
         for number, step in enumerate(run.checked.steps):
             self.state.step, self.state.line = number + 1, step.line
             self.state.statement = one_line(run.lines[step.line - 1].partition("#")[0].strip(), LONGEST)
@@ -232,7 +232,7 @@ class Programs:
             problem = await self._step(run, step)
             if problem is not None:
                 return problem
-        # Whoever gives control back when it is done ends no motion by that.
+        # Wait for the end of the motion, so that releasing the lease afterwards needs no stop.
         return await self._wait_until(run, self._motion_is_over)
 
     async def _step(self, run: _Run, step: Step) -> Reason | None:
@@ -240,7 +240,7 @@ class Programs:
         if step.kind is StepKind.WAIT:
             return await self._wait_until(run, lambda: time.monotonic() - begin_s >= (step.seconds or 0.0))
         while True:
-            # On hold between two motions, it waits for RESUME like a motion would.
+            # A program held between two motions waits for RESUME, like a motion.
             if (problem := await self._wait_until(run, self._not_held)) is not None:
                 return problem
             answer = await self._control.step(_request(step, run.secret), operator=run.operator)
@@ -252,7 +252,7 @@ class Programs:
             return answer.reason or codes.OTHER(detail=answer.text)
         if step.target is None:
             return None
-        # From now on the motion itself says where the robot goes.
+        # From now on the lease's motion holds this target.
         if (running := self._context.program) is not None:
             self._context.program = replace(running, done=running.done + 1)
         target = tuple(step.target.tolist())
@@ -267,7 +267,7 @@ class Programs:
         return await self._wait_until(run, arrived, moves=True)
 
     async def _wait_until(self, run: _Run, done: Callable[[], bool], *, moves: bool = False) -> Reason | None:
-        """Wait; return why the program is broken off."""
+        """Wait until `done`; return the reason if the program must be aborted."""
         while True:
             if (problem := self._abort_reason(run)) is not None:
                 return problem

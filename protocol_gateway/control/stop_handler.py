@@ -1,12 +1,12 @@
-"""StopHandler of one robot: on the wire first, latched, and only then said and written down.
+"""Stops of one robot: sent first, then latched, reported and audited.
 
-    stop          controller's socket -> latched, in its file -> event -> audit, owed while the disk is full
-    link is back  a latched stop is sent (again): the controller may not have had it, or was restarted
+    stop          controller's socket -> latched, also in its file -> event -> audit (retried on a full disk)
+    link is back  a latched stop is sent again: the controller may have missed it, or was restarted
     still moving  2 s after the first stop: critical event, and the stop is sent again, each 2 s
-    within 0.1 s  the unit of one that was just sent is on its way for others too: the same asker's is that
-                  stop, and counted; another's is latched under a number of its own
+    within 0.1 s  a further stop sends no further unit: from the same operator it is counted as the same stop,
+                  from another it is latched under its own number
 
-Nothing here waits, for a lock, a queue or a disk.
+A stop never waits for a lock, a queue or a disk.
 """
 
 import asyncio
@@ -31,26 +31,26 @@ from robomesh.schemas import robomesh_pb2 as schema
 
 _S = schema.Event.Severity
 
-# Longer than any arm takes to come to rest: one that still moves does not heed its stop unit.
+# Longer than any arm needs to come to rest: after this time, a moving arm has ignored its stop unit.
 HEED_TIMEOUT_S = 2.0
-# Dozens of units at once would look like a controller that does not read, and cost the connection.
+# A burst of dozens of units would fill the send buffer, which closes the connection.
 IN_TRANSIT_S = 0.1
 
 
 def read_clocks() -> Now:
-    """Now, on both clocks."""
+    """Return the present time on both clocks."""
     return Now(time.monotonic(), time.time_ns())
 
 
 @dataclass(frozen=True)
 class RunningProgram:
-    """The program that moves a robot.
+    """Program that moves a robot.
 
     Attributes:
-        targets: Everywhere that it goes, in order [rad] or [m].
-        done: So many of them are told to the controller already.
+        targets: Its targets in order [rad] or [m].
+        done: Number of targets that were sent to the controller.
         held: HOLD was sent, and no RESUME since.
-        given_up: RESET was sent while it was on hold: nothing of it is to come after that.
+        given_up: RESET was sent while the program was held, so the rest of it must not run.
     """
 
     name: str
@@ -61,24 +61,24 @@ class RunningProgram:
 
     @property
     def ahead(self) -> tuple[tuple[float, ...], ...]:
-        """Everywhere that it will still go after the motion that runs."""
+        """Targets after the current motion."""
         return self.targets[self.done :]
 
 
 @dataclass(kw_only=True)
 class ControlContext:
-    """One robot as what guards it has it.
+    """State and services that the control of one robot shares.
 
     Attributes:
-        authority: The state of `protocol_gateway.authority.lease_rules`.
-        latch: Where the latched stop and its number outlive this process.
-        send: Puts a unit on the controller's socket at once, or raises LinkError.
-        controller: What is known of the controller now.
-        on_change: Told when lease or stop changed.
-        program: What runs step by step under the lease; None: nothing does.
-        preparing: Of each program that is being checked, or written down, before it begins: to be told why it
-            must not.
-        orphan: Whose motion may still run from before a gateway was killed; empty: nobody's.
+        authority: State of `protocol_gateway.authority.lease_rules`.
+        latch: File that keeps the latched stop and its number across a restart.
+        send: Writes a unit to the controller's socket immediately, or raises LinkError.
+        controller: Returns the current state of the controller.
+        on_change: Callback after a change of lease or stop.
+        program: Program that runs under the lease; None: none runs.
+        preparing: A future of each program that is being checked or audited; its result is the reason to
+            cancel the program.
+        orphan: Operator whose motion may still run from before the gateway was killed; empty: none.
     """
 
     authority: Authority
@@ -94,27 +94,27 @@ class ControlContext:
     orphan: str = ""
 
     def cancel_preparing(self, why: Reason) -> bool:
-        """Let no program begin that has not yet; whether there was one."""
+        """Cancel the programs that have not started; return whether there were any."""
         for each in self.preparing:
             if not each.done():
                 each.set_result(why)
         return bool(self.preparing)
 
     def write_latch(self) -> None:
-        """Write soon whether a stop is latched, and the newest number."""
+        """Write the latched stop and the newest number to the latch file soon."""
         self.latch.keep(self.authority.stop, self.authority.last_stop_id)
 
 
 class StopHandler:
-    """StopHandler one robot, and sees to it that the stop is heeded."""
+    """Handler of one robot's stops, which also detects that a stop is ignored."""
 
     def __init__(self, context: ControlContext) -> None:
         self._context = context
         self._disobeyed_reported_s = 0.0
-        self._last_stop: tuple[str, str, Reason, schema.StopAnswer] | None = None  # asked by, from where
+        self._last_stop: tuple[str, str, Reason, schema.StopAnswer] | None = None  # operator, source
 
     def stop(self, *, by: str, reason: str, source: str) -> schema.StopAnswer:
-        """Send the stop unit, latch it, and only then say and write down that it was so."""
+        """Send the stop unit, latch the stop, and then report and audit it."""
         context, now = self._context, read_clocks()
         if context.controller().read_only:
             return self._stop_of_read_only(by=by, reason=reason, source=source)
@@ -156,7 +156,10 @@ class StopHandler:
         return answer
 
     def _stop_of_read_only(self, *, by: str, reason: str, source: str) -> schema.StopAnswer:
-        """Nothing is sent, and nothing latched: nobody could clear it, and nothing needs it."""
+        """Report and audit a stop of a read-only robot, without sending or latching it.
+
+        No operator could reset the latch, and the gateway never sends motion to this robot.
+        """
         context = self._context
         why = context.controller().read_only
         assert why is not None
@@ -167,7 +170,7 @@ class StopHandler:
         return answer
 
     def send_latched_stop(self) -> None:
-        """Send a latched stop (again)."""
+        """Send the latched stop, if there is one, again."""
         context = self._context
         latched = context.authority.stop
         if latched is None or context.controller().read_only:
@@ -182,7 +185,7 @@ class StopHandler:
             self._record_repeat(said, latched.id, sent=True)
 
     def check_heeded(self, *, moving: bool, now: Now) -> None:
-        """A robot that goes on moving after its stop is told of, and told again."""
+        """Report a robot that still moves after its stop, and send the stop again."""
         context = self._context
         latched, first_s = context.authority.stop, context.authority.stopping_s
         if not moving or latched is None or first_s is None:
@@ -196,7 +199,7 @@ class StopHandler:
         self._record_repeat(said, latched.id, sent=problem is None)
 
     def _record_repeat(self, said: Reason, stop_id: int, *, sent: bool) -> None:
-        # By a name of its own: it latches nothing, so a start need not read it.
+        # A different request name, because a restart must not read it as a new stop.
         self._record("STOP_AGAIN", said, stop_id, sent=sent, by=GATEWAY, source=GATEWAY)
 
     def _record(
@@ -216,7 +219,7 @@ class StopHandler:
         )
 
     def _in_transit_since(self, now: Now) -> float | None:
-        """When the latched stop's unit was sent (monotonic), if just now; no RESET came behind it."""
+        """Return the time at which the latched stop's unit was sent (monotonic), if just now."""
         latched = self._context.authority.stop
         if (
             latched is None
@@ -227,7 +230,7 @@ class StopHandler:
         return latched.sent_s if now.monotonic_s - latched.sent_s < IN_TRANSIT_S else None
 
     def _send(self) -> Reason | None:
-        """Put the stop unit on the socket; return why that failed."""
+        """Write the stop unit to the socket; return the reason of a failure."""
         try:
             self._context.send(self._context.driver.encode(Stop()))
         except (LinkError, CommandError) as error:

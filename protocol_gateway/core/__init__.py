@@ -1,1 +1,1 @@
-"""The unit protocol (Chen, Zhang, Xue 2001, section 4) without I/O: bytes in, units out, and back."""
+"""Unit protocol (Chen, Zhang, Xue 2001, section 4) without I/O: parser and formatter."""

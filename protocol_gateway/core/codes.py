@@ -1,9 +1,9 @@
-"""What a record's type means, when it is a number.
+"""Table of numeric record types.
 
 The paper carries the type "for simplicity, directly as a 32-bit integer", which tells "data or command,
-and which command": so a code stands for a type, or for one command. A site file gives a
-controller's own table, `codes = { 2 = "ABSOLUTE.DEG", 101 = "COMMAND:home" }`; it then replaces
-the default one, because a number must mean nothing that the site file does not say.
+and which command". So a code means a type, or one command. A site file gives a controller's own table,
+`codes = { 2 = "ABSOLUTE.DEG", 101 = "COMMAND:home" }`. It replaces the default table, because a number
+must not have a meaning that the site file does not give.
 """
 
 from collections.abc import Mapping
@@ -24,12 +24,12 @@ TIME = "TIME"
 
 TYPES = (COMMAND, ABSOLUTE, RELATIVE, VELOCITY, STATUS, ERROR, TIME)
 
-# "speed" alone: its number is the record's datum.
+# "speed" without its number, which is the record's datum.
 COMMAND_WORDS = ("trace", "untrace", "home", "stop", "hold", "resume", "reset", "speed")
 
 
 class Meaning(NamedTuple):
-    """What a code stands for: a type, or, with a word, one command."""
+    """Meaning of a code: a type, or, with a word, one command."""
 
     type: str
     word: str | None = None
@@ -40,28 +40,28 @@ class CodeTable:
     """Type codes of one controller.
 
     Attributes:
-        meanings: What each code stands for.
-        codes: The other way; empty where types are written as names.
+        meanings: Meaning of each code.
+        codes: Code of each meaning; empty where types are written as names.
     """
 
     meanings: Mapping[int, Meaning]
     codes: Mapping[Meaning, int]
 
     def supports(self, word: str) -> bool:
-        """Whether its controller knows a command: by name, or, where it knows codes only, by a code."""
+        """Return whether the controller knows a command: by name, or by a code if it only knows codes."""
         return not self.codes or Meaning(COMMAND) in self.codes or Meaning(COMMAND, word) in self.codes
 
     def command_markers(self, word: str) -> tuple[bytes, ...]:
-        """What a unit that says a command holds, one at least: the word, or its code's digits."""
+        """Return byte strings of which every unit with this command contains one: word or code's digits."""
         code = self.codes.get(Meaning(COMMAND, word))
         return (word.encode(),) if code is None else (word.encode(), b"%d" % abs(code))
 
 
 def code_table(codes: Mapping[int, str]) -> CodeTable:
-    """The table of a site file's `codes`; the default one, written as names, when there are none.
+    """Build the table from a site file's `codes`; without codes return the default, which writes names.
 
     Raises:
-        CodeTableError: If an entry is not `TYPE` or `COMMAND:word`, or a meaning stands twice.
+        CodeTableError: If an entry is not `TYPE` or `COMMAND:word`, or two codes have one meaning.
     """
     if not codes:
         return NAMES
@@ -70,7 +70,7 @@ def code_table(codes: Mapping[int, str]) -> CodeTable:
     for code, text in codes.items():
         meaning = _meaning(code, text)
         if meaning in written:
-            raise CodeTableError(f"codes: {text} has two codes, {written[meaning]} and {code}; one is right")
+            raise CodeTableError(f"codes: {text} has two codes, {written[meaning]} and {code}; give one")
         meanings[code] = meaning
         written[meaning] = code
     return CodeTable(MappingProxyType(meanings), MappingProxyType(written))
@@ -78,16 +78,16 @@ def code_table(codes: Mapping[int, str]) -> CodeTable:
 
 def _meaning(code: int, text: str) -> Meaning:
     if not -(2**31) <= code < 2**31:
-        raise CodeTableError(f"codes: {code} is beyond int32")
+        raise CodeTableError(f"codes: {code} is outside int32")
     type_name, colon, word = text.partition(":")
     if colon and type_name == COMMAND and word in COMMAND_WORDS:
         return Meaning(COMMAND, word)
-    # A controller's own type gets a name in the site file, so it is published raw under that name.
+    # The site file may name a controller's own type, which is then published raw under that name.
     if not colon and text and plain_text(text) == text:
         return Meaning(text)
     raise CodeTableError(
-        f"codes: {code} = {text!r} stands for nothing: a type ({', '.join(TYPES)}) "
-        f"or a command (COMMAND: and one of {', '.join(COMMAND_WORDS)})"
+        f"codes: {code} = {text!r} is neither a type ({', '.join(TYPES)}) "
+        f"nor a command (COMMAND: and one of {', '.join(COMMAND_WORDS)})"
     )
 
 
@@ -95,4 +95,4 @@ NAMES = CodeTable(
     meanings=MappingProxyType({code: Meaning(name) for code, name in enumerate(TYPES, start=1)}),
     codes=MappingProxyType({}),
 )
-"""The default: codes 1 to 7 are read, names are written."""
+"""Default table: reads codes 1 to 7, writes names."""

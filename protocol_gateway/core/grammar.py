@@ -1,4 +1,4 @@
-"""One unit: its grammar, read and written.
+"""Grammar of one unit: parser and formatter.
 
     unit    = count "#" record *( "&" record ) "@"      count = number of records, 1 or more
     record  = type [ "*" [ item *( ";" item ) ] ]       "usually two fields": the type may stand alone
@@ -21,23 +21,23 @@ TERMINATOR = b"@"
 BLANKS = " \t\r\n"
 
 _SEPARATORS = re.compile(r"[#*&;@]")
-# There is one way only to read each text, so that a long wrong one is refused in linear time.
+# The pattern is unambiguous, so that it rejects a long invalid text in linear time.
 _NUMBER_TYPE = re.compile(r"([+-]?)[ \t\r\n]*([0-9]+)")
 _INT32 = range(-(2**31), 2**31)
 
 
 class RawRecord(NamedTuple):
-    """A record as the grammar sees it: text, without surrounding blanks."""
+    """A record as text, without surrounding blanks."""
 
     type: str
     items: tuple[str, ...] = ()
 
 
 def parse_unit(data: bytes) -> tuple[RawRecord, ...]:
-    """The records of one unit.
+    """Parse the records of one unit.
 
     Args:
-        data: The unit's bytes up to its "@", without it.
+        data: The unit's bytes without the final "@".
 
     Raises:
         UnitError: If it is malformed; the text says how.
@@ -57,28 +57,28 @@ def parse_unit(data: bytes) -> tuple[RawRecord, ...]:
 
 
 def type_code(type_text: str) -> int | None:
-    """A type's int32 code; None: the type is a name.
+    """Return a type's int32 code; None: the type is a name.
 
     Raises:
-        UnitError: If it is a number beyond int32.
+        UnitError: If it is a number outside int32.
     """
-    # Most types are names, and a name may hold digits: look at one character before the pattern.
+    # Fast path: most types are names, which do not end in a digit.
     if type_text[-1:] not in "0123456789" or not (match := _NUMBER_TYPE.fullmatch(type_text)):
         return None
     sign, digits = match[1], match[2].lstrip("0") or "0"
-    # Ten digits hold every int32; int() itself refuses thousands of them with an exception of its own.
+    # Ten digits are enough for int32; int() raises ValueError for thousands of digits.
     code = int(sign + digits) if len(digits) <= 10 else None
-    # None in a range is looked for in each of its four thousand million numbers.
+    # `None in range` would compare with each of the 2**32 numbers.
     if code is None or code not in _INT32:
-        raise UnitError(f"type {type_text[:24]} is beyond int32")
+        raise UnitError(f"type {type_text[:24]} is outside int32")
     return code
 
 
 def format_unit(records: Sequence[RawRecord]) -> bytes:
-    """A unit's bytes, with its "@", without blanks.
+    """Format a unit's bytes, with its "@", without blanks.
 
     Raises:
-        UnitFormatError: If it has no record, or a text that would not be read as itself.
+        UnitFormatError: If it has no record, or a text that would be parsed differently.
     """
     if not records:
         raise UnitFormatError("a unit has at least one record")
@@ -86,7 +86,7 @@ def format_unit(records: Sequence[RawRecord]) -> bytes:
 
 
 def plain_text(text: str) -> str:
-    """Any text as an item can hold it: ASCII, separators and line ends turned to blanks or "?"."""
+    """Convert a text to one that an item can hold: ASCII, separators and line ends become blanks or "?"."""
     ascii_text = text.encode("ascii", "replace").decode("ascii")
     return " ".join(_SEPARATORS.sub(" ", ascii_text).split())
 
@@ -107,7 +107,7 @@ def _parse_record(text: str) -> RawRecord:
 def _check_count(count: str, records: int) -> None:
     if not count.isdecimal():
         raise UnitError(f"the count of records is {_shortened(count)!r}, not a number")
-    # Compared as text: a count of sixty thousand digits is wrong, not an exception.
+    # Compared as text, because int() raises ValueError for a count of thousands of digits.
     if (count.lstrip("0") or "0") != str(records):
         raise UnitError(f"the count says {_shortened(count)} records, there are {records}")
 
@@ -116,11 +116,11 @@ def _format_record(record: RawRecord) -> str:
     if not record.type:
         raise UnitFormatError("a record has a type")
     if record.items == ("",):
-        raise UnitFormatError(f"one empty item cannot be told from none (record {record.type})")
+        raise UnitFormatError(f"record {record.type}: a single empty item reads like no item")
     for text in (record.type, *record.items):
         if not text.isascii() or text != text.strip(BLANKS) or _SEPARATORS.search(text):
             raise UnitFormatError(
-                f"{text!r} cannot stand in a unit: ASCII, no outer blanks, none of # * & ; @"
+                f"{text!r} is not allowed in a unit: use ASCII, no outer blanks, none of # * & ; @"
             )
     try:
         type_code(record.type)

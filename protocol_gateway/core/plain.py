@@ -1,7 +1,7 @@
-"""Units as controllers write them all day, read fast: known types, plain decimals, words in small letters.
+"""Fast parser for common units: known types, plain decimals, lower-case words.
 
-Only what the grammar would read, and as it would read it: anything else, malformed or merely unusual,
-is the grammar's to read or to refuse. Several times as fast, because a whole record is looked at at once.
+It accepts only what the grammar accepts, with the same result. Everything else, malformed or merely
+unusual, is left to the grammar. It is several times as fast, because it parses a whole record at a time.
 """
 
 from collections.abc import Callable, Mapping
@@ -24,12 +24,12 @@ Reader = Callable[[bytes], Record | None]
 _BLANKS = BLANKS.encode()
 _DECIMALS = b"0123456789.-;" + _BLANKS
 _LETTERS = b"abcdefghijklmnopqrstuvwxyz;"
-# Shorter than the shortest number in it that would be infinite.
+# Shorter than any decimal that overflows to infinity (309 digits).
 _LONGEST_DATA = 300
 
 
 def plain_readers(table: CodeTable) -> Mapping[bytes, Reader]:
-    """What reads the data of each type, by the bytes of its name and of its code."""
+    """Return the reader of each type's data, by the bytes of its name and of its code."""
     numbers = {str(code): meaning for code, meaning in table.meanings.items()}
     names = {name: Meaning(name) for name in _READERS}
     return {
@@ -40,7 +40,7 @@ def plain_readers(table: CodeTable) -> Mapping[bytes, Reader]:
 
 
 def read_plain(data: bytes, readers: Mapping[bytes, Reader]) -> tuple[Record, ...] | None:
-    """The records of a plain unit; None: it is not plain, or not well formed."""
+    """Parse a plain unit; None: it is not plain, or malformed."""
     count, _, body = data.partition(b"#")
     parts = body.split(b"&")
     if count.strip(_BLANKS) != b"%d" % len(parts):
@@ -57,7 +57,7 @@ def read_plain(data: bytes, readers: Mapping[bytes, Reader]) -> tuple[Record, ..
 
 
 def _numbers(items: bytes) -> tuple[float, ...] | None:
-    # Of these characters, float() takes what the grammar takes, but for the paper's "- 67.10".
+    # With these characters, float() accepts what the grammar accepts, except the paper's "- 67.10".
     if len(items) > _LONGEST_DATA or items.translate(None, _DECIMALS):
         return None
     try:

@@ -1,4 +1,4 @@
-"""Typed records: what the records of a unit mean. Values stay in the file's units, degrees and millimetres.
+"""Typed records of a unit. Values stay in the protocol's units, degrees and millimetres.
 
 | type | record | data |
 |---|---|---|
@@ -8,7 +8,7 @@
 | STATUS | Status | words |
 | ERROR | Error | a number and a text |
 | TIME | Time | seconds |
-| anything else | Unknown | as it came |
+| anything else | Unknown | as received |
 """
 
 import math
@@ -25,52 +25,52 @@ from protocol_gateway.core.grammar import RawRecord, format_unit, parse_unit, pl
 from protocol_gateway.errors import UnitError, UnitFormatError
 
 # Some controllers send "- 67.10", with a blank after the sign (Chen et al. 2001, section 4).
-# There is one way only to read each text, so that a long wrong one is refused in linear time.
+# The pattern is unambiguous, so that it rejects a long invalid text in linear time.
 _NUMBER = re.compile(r"([+-]?)[ \t\r\n]*((?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)")
-# Every finite double can be written within it, without an exponent.
+# Enough for every finite double without an exponent.
 _LONGEST_NUMBER = 400
 _SPEED = re.compile(r"speed[ \t\r\n]*=[ \t\r\n]*(.*)", re.DOTALL)
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """Words, done in order; a speed is `speed=NN`. An unknown word is the receiver's to refuse."""
+    """Command words, executed in order; a speed is `speed=NN`. The receiver rejects unknown words."""
 
     words: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class AbsolutePositions:
-    """One a joint [deg] or [mm]: where it is (from the controller), a target (from a client)."""
+    """Joint positions [deg] or [mm]: actual (from a controller) or target (from a client)."""
 
     values: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class RelativePositions:
-    """One a joint [deg] or [mm], added to where it is."""
+    """Joint offsets [deg] or [mm] from the actual positions."""
 
     values: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Velocities:
-    """One a joint [deg/s] or [mm/s]."""
+    """Joint velocities [deg/s] or [mm/s]."""
 
     values: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """Words: `idle`, `remote`, `homed`, `trace`, ..."""
+    """Status words: `idle`, `remote`, `homed`, `trace`, ..."""
 
     words: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Error:
-    """Answers a unit that was refused: 1 too many clients, 2 malformed, 3 unknown word, 4 joint count,
-    5 limit, 6 local mode, 7 read only, 8 stopped, 9 fault."""
+    """Answer to a rejected unit: 1 too many clients, 2 malformed, 3 unknown word, 4 joint count, 5 limit,
+    6 local mode, 7 read only, 8 stopped, 9 fault."""
 
     number: int
     text: str
@@ -78,14 +78,14 @@ class Error:
 
 @dataclass(frozen=True, slots=True)
 class Time:
-    """The controller's own clock [s], for the records beside it."""
+    """Time of the unit's other records on the controller's clock [s]."""
 
     seconds: float
 
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """A type that nobody knows: kept, counted, published raw, never acted on."""
+    """A record of an unknown type: counted and published raw, without any effect."""
 
     type: str
     items: tuple[str, ...]
@@ -97,10 +97,10 @@ Record: TypeAlias = (
 
 
 def read_records(data: bytes, table: CodeTable = codes.NAMES) -> tuple[Record, ...]:
-    """The typed records of one unit, all or none.
+    """Parse the typed records of one unit, all or none.
 
     Args:
-        data: The unit's bytes up to its "@", without it.
+        data: The unit's bytes without the final "@".
 
     Raises:
         UnitError: If anything in it is malformed.
@@ -109,29 +109,29 @@ def read_records(data: bytes, table: CodeTable = codes.NAMES) -> tuple[Record, .
 
 
 def write_unit(records: Iterable[Record], table: CodeTable = codes.NAMES) -> bytes:
-    """A unit's bytes, with its "@": codes where the table has them, else names.
+    """Format a unit's bytes, with its "@": codes where the table has them, otherwise names.
 
     Raises:
-        UnitFormatError: If a value cannot be written so that it is read as itself.
+        UnitFormatError: If a value would be parsed differently.
     """
     return format_unit([raw for record in records for raw in _write(record, table)])
 
 
 def speed_percent(word: str) -> float | None:
-    """The number of a `speed=NN` word; None: it is another word.
+    """Return the number of a `speed=NN` word; None: another word.
 
     Raises:
-        UnitError: If what follows is not a finite number.
+        UnitError: If the value is not a finite number.
     """
     match = _SPEED.fullmatch(word)
     return read_number(match[1]) if match else None
 
 
 def read_number(text: str) -> float:
-    """A finite number, decimal or with an exponent.
+    """Parse a finite number, decimal or with an exponent.
 
     Raises:
-        UnitError: If it is none.
+        UnitError: If the text is not a finite number.
     """
     match = _NUMBER.fullmatch(text) if len(text) <= _LONGEST_NUMBER else None
     value = float(match[1] + match[2]) if match else math.nan
@@ -141,7 +141,7 @@ def read_number(text: str) -> float:
 
 
 def write_number(value: float) -> str:
-    """A number as units hold it: two decimals, or as many more as it takes to be read as itself.
+    """Format a number with two decimals, or with as many as are needed to parse the same value.
 
     Raises:
         UnitFormatError: If it is not finite.
@@ -152,7 +152,7 @@ def write_number(value: float) -> str:
     if float(short) == value:
         return short
     exact = repr(float(value))
-    # The written form has no exponents: the paper's controllers print plain decimals.
+    # Without an exponent, because the paper's controllers use plain decimals.
     return format(Decimal(exact), "f") if "e" in exact else exact
 
 
@@ -180,7 +180,7 @@ def _error(items: Sequence[str]) -> Error:
 
 def _time(items: Sequence[str]) -> Time:
     if len(items) != 1:
-        raise UnitError(f"{len(items)} items, one is right")
+        raise UnitError(f"{len(items)} items, expected one")
     return Time(read_number(items[0]))
 
 
@@ -211,13 +211,13 @@ def _read(record: RawRecord, table: CodeTable) -> Record:
 
 
 def _command(word: str, items: Sequence[str]) -> Command:
-    """The command that a code stands for by itself; only a speed has a datum."""
+    """Return the command that a code means by itself; only a speed has a datum."""
     if word == "speed":
         if len(items) != 1:
-            raise UnitError(f"{len(items)} items, one percentage is right")
+            raise UnitError(f"{len(items)} items, expected one percentage")
         return Command((f"speed={items[0]}",))
     if items:
-        raise UnitError(f"the code stands for {word!r}, which takes no data")
+        raise UnitError(f"the code means {word!r}, which takes no data")
     return Command((word,))
 
 
@@ -237,7 +237,7 @@ def _write(record: Record, table: CodeTable) -> Iterable[RawRecord]:
         case Status(words):
             return (_raw(codes.STATUS, words, table),)
         case Error(number, text):
-            # A text is for people: what an item cannot hold is left out rather than refused.
+            # The text is for people, so unsupported characters are replaced instead of rejected.
             plain = plain_text(text)
             return (_raw(codes.ERROR, (str(number), plain) if plain else (str(number),), table),)
         case Time(seconds):
@@ -249,13 +249,13 @@ def _write(record: Record, table: CodeTable) -> Iterable[RawRecord]:
 def _raw(type_name: str, items: Iterable[str], table: CodeTable) -> RawRecord:
     written = tuple(items)
     if not written:
-        raise UnitFormatError(f"a record {type_name} has data")
+        raise UnitFormatError(f"a record {type_name} must have data")
     code = table.codes.get(Meaning(type_name))
     return RawRecord(type_name if code is None else str(code), written)
 
 
 def _write_command(words: Sequence[str], table: CodeTable) -> Iterable[RawRecord]:
-    """One record for all the words, or one each where a word has a code of its own."""
+    """Return one record for all words, or one record a word if any word has its own code."""
     own = [table.codes.get(Meaning(codes.COMMAND, word.partition("=")[0])) for word in words]
     if all(code is None for code in own):
         return (_raw(codes.COMMAND, words, table),)

@@ -1,9 +1,9 @@
-"""Units out of a stream of bytes that comes in any pieces.
+"""Parser of a byte stream into units, however the bytes are split.
 
     between units --bytes--> in a unit --"@"--> Unit or Malformed, between units
     in a unit --64 KiB without "@"--> Malformed, lost --"@"--> between units
 
-What is malformed harms nothing before its first byte or after its "@".
+A malformed unit affects nothing before its first byte or after its "@".
 """
 
 from collections.abc import Collection
@@ -18,7 +18,7 @@ from protocol_gateway.core.records import Record, read_records
 from protocol_gateway.errors import UnitError
 
 LONGEST_UNIT_BYTES = 64 * 1024
-"""With its "@"."""
+"""Most bytes of a unit, including its "@"."""
 
 _LONGEST_TEXT = 256
 
@@ -28,9 +28,9 @@ class Unit:
     """A well-formed unit.
 
     Attributes:
-        records: In the order in which they are done.
-        data: Its bytes, up to its "@", without it.
-        offset: Of its first byte in the stream.
+        records: In the order of execution.
+        data: The unit's bytes without the final "@".
+        offset: Position of its first byte in the stream.
     """
 
     records: tuple[Record, ...]
@@ -40,12 +40,12 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class Malformed:
-    """Bytes that are no unit; nothing in them was done.
+    """Bytes that are not a valid unit; nothing in them is executed.
 
     Attributes:
-        offset: Of their first byte in the stream.
-        text: The first 256 of them, printable.
-        reason: What is wrong.
+        offset: Position of their first byte in the stream.
+        text: The first 256 bytes, printable.
+        reason: Description of the error.
     """
 
     offset: int
@@ -57,20 +57,20 @@ StreamEvent: TypeAlias = Unit | Malformed
 
 
 class UnitStream:
-    """One direction of one connection."""
+    """Parser of one direction of one connection."""
 
     def __init__(self, table: CodeTable = codes.NAMES) -> None:
         self._table = table
         self._plain = plain_readers(table)
         self._buffer = bytearray()
         self._offset = 0  # of the buffer's first byte
-        self._lost = False  # past 64 KiB: skipping to the next "@"
+        self._lost = False  # after 64 KiB without "@": skip to the next "@"
 
     def receive(self, data: bytes, containing: Collection[bytes] | None = None) -> list[StreamEvent]:
-        """Events of the next bytes; the same however they are cut.
+        """Return the events of the next bytes, independent of how the bytes are split.
 
         Args:
-            containing: Units without any of these are passed over unread, which costs next to nothing.
+            containing: Skip units that contain none of these, without parsing them.
         """
         *ends, rest = data.split(TERMINATOR)
         events: list[StreamEvent] = []
@@ -107,7 +107,7 @@ class UnitStream:
 
 
 def printable(data: bytes) -> str:
-    """Bytes of a peer as text that harms no terminal; the first 256 of them."""
+    """Convert the first 256 bytes from a peer to text that is safe to print."""
     text = data[:_LONGEST_TEXT].decode("ascii", "backslashreplace")
     shown = "".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in text)
     return shown + "…" if len(data) > _LONGEST_TEXT else shown

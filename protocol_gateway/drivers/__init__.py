@@ -1,1 +1,1 @@
-"""Controllers' own protocols behind one seam: bytes in, what they tell out, and back."""
+"""Drivers of controllers' protocols: received bytes to events, commands to bytes."""

@@ -1,7 +1,7 @@
-"""The seam between a controller's own protocol and the rest: another kind of controller is one more file.
+"""Interface between a controller's own protocol and the gateway: another kind of controller is one more file.
 
-A driver does no I/O. It turns bytes into events and commands into bytes, and it is the only place
-that knows degrees, millimetres, words and codes: above it everything is SI.
+A driver does no I/O. It turns bytes into events and commands into bytes. Only the driver knows degrees,
+millimetres, words and codes: above it everything is SI.
 """
 
 from collections.abc import Sequence
@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol, TypeAlias
 
-# ---------------------------------------------------------------- what a controller tells
+# ------------------------------------------------------------ events from a controller
 
 
 class Activity(Enum):
-    """What a controller says that it is doing."""
+    """Activity that a controller reports."""
 
     IDLE = "idle"
     MOVING = "moving"
@@ -24,7 +24,7 @@ class Activity(Enum):
 
 
 class Mode(Enum):
-    """Who may move the arm: the network (remote) or the people at the controller (local)."""
+    """Source that may move the arm: the network (remote) or the operator at the controller (local)."""
 
     REMOTE = "remote"
     LOCAL = "local"
@@ -32,12 +32,12 @@ class Mode(Enum):
 
 @dataclass(frozen=True, slots=True)
 class JointsReceived:
-    """Where the joints are.
+    """Joint positions from the controller.
 
     Attributes:
         positions: One a joint [rad] or [m].
-        velocities: One a joint [rad/s] or [m/s]; None: the controller does not tell.
-        controller_time_s: Seconds on the controller's own clock; None: it does not tell.
+        velocities: One a joint [rad/s] or [m/s]; None: not reported.
+        controller_time_s: Seconds on the controller's own clock; None: not reported.
     """
 
     positions: tuple[float, ...]
@@ -47,7 +47,7 @@ class JointsReceived:
 
 @dataclass(frozen=True, slots=True)
 class StatusReceived:
-    """What the controller says about itself; None: it does not tell (unknown is shown, not invented)."""
+    """Status that the controller reports; None: not reported, and shown as unknown."""
 
     activity: Activity | None = None
     mode: Mode | None = None
@@ -58,7 +58,7 @@ class StatusReceived:
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """The controller refused a unit of ours (or the connection, number 1)."""
+    """Refusal by the controller of the gateway's unit (or of the connection: number 1)."""
 
     number: int
     text: str
@@ -66,14 +66,14 @@ class Refused:
 
 @dataclass(frozen=True, slots=True)
 class MalformedReceived:
-    """Bytes that are no unit; nothing in them was taken.
+    """Bytes that are not a valid unit; nothing in them was used.
 
     Attributes:
-        offset: Of their first byte in the connection's stream.
-        text: The bytes as printable text, cut when long.
-        reason: What is wrong with them.
-        joint_count: They are a unit, but of a robot with other joints: all that such a controller sends
-            is of no use.
+        offset: Position of their first byte in the connection's stream.
+        text: The bytes as printable text, shortened.
+        reason: Description of the error.
+        joint_count: The unit has another number of joints than the robot, so the controller's data are
+            unusable.
     """
 
     offset: int
@@ -84,11 +84,11 @@ class MalformedReceived:
 
 @dataclass(frozen=True, slots=True)
 class UnknownReceived:
-    """A record that the driver has no meaning for: to be published raw, never acted on.
+    """Record that the driver does not know: published raw, without any effect.
 
     Attributes:
-        raw: The bytes of the whole unit that it stood in.
-        controller_time_s: Seconds on the controller's own clock; None: it does not tell.
+        raw: The bytes of the whole unit that contains it.
+        controller_time_s: Seconds on the controller's own clock; None: not reported.
     """
 
     type: str
@@ -99,58 +99,58 @@ class UnknownReceived:
 
 ControllerEvent: TypeAlias = JointsReceived | StatusReceived | Refused | MalformedReceived | UnknownReceived
 
-# ---------------------------------------------------------------- what a controller is told
+# -------------------------------------------------------------- commands to a controller
 
 
 @dataclass(frozen=True, slots=True)
 class Home:
-    """Perform the homing motion."""
+    """Command to perform the homing motion."""
 
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """Come to rest, keep the motion for `Resume`."""
+    """Command to come to rest and keep the motion for `Resume`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Resume:
-    """Go on with what was held."""
+    """Command to continue the held motion."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reset:
-    """Clear a stop."""
+    """Command to clear a stop."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """Stop request: come to rest, forget every motion, refuse more until `Reset`."""
+    """Command to come to rest, discard every motion, and refuse motion until `Reset`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """Turn capture on or off."""
+    """Command to turn capture on or off."""
 
     on: bool
 
 
 @dataclass(frozen=True, slots=True)
 class Speed:
-    """Speed of the motions, 1 to 100 percent."""
+    """Command to set the speed of motions, 1 to 100 percent."""
 
     percent: float
 
 
 @dataclass(frozen=True, slots=True)
 class MoveAbsolute:
-    """Move to joint positions, one a joint [rad] or [m]."""
+    """Command to move to joint positions, one a joint [rad] or [m]."""
 
     positions: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class MoveRelative:
-    """Move by joint offsets, one a joint [rad] or [m], from where the arm is."""
+    """Command to move by joint offsets, one a joint [rad] or [m], from the actual positions."""
 
     offsets: tuple[float, ...]
 
@@ -161,35 +161,35 @@ ControllerCommand: TypeAlias = (
 
 
 class Driver(Protocol):
-    """A controller's protocol, without I/O. One driver serves one connection after another."""
+    """Driver of a controller's protocol, without I/O. One driver serves consecutive connections."""
 
     @property
     def units_received(self) -> int:
-        """Whole, well-formed units since the driver was made; one unit may give several events, or none."""
+        """Number of well-formed units so far; one unit may give several events, or none."""
         ...
 
     @property
     def refusals_received(self) -> int:
-        """Of these, the units that hold refusals alone: an answer is no sign that the arm's state comes."""
+        """Number of these units that hold only refusals, so do not show that the arm's state is received."""
         ...
 
     @property
     def can_stop(self) -> bool:
-        """Whether there is a stop unit for the controller. Whether it is heeded is proven at the site."""
+        """True if the driver has a stop unit for the controller; a test at the site proves that it works."""
         ...
 
     def connected(self) -> None:
-        """A new connection begins, or bytes were thrown away: forget the unfinished unit before."""
+        """Discard the unfinished unit, because a new connection begins or bytes were discarded."""
         ...
 
     def receive(self, data: bytes) -> Sequence[ControllerEvent]:
-        """Events of the next bytes, cut anywhere; bad bytes are a MalformedReceived, never an exception."""
+        """Return the events of the next bytes, split anywhere; invalid bytes give a MalformedReceived."""
         ...
 
     def encode(self, *commands: ControllerCommand) -> bytes:
-        """The bytes that tell the controller commands, to be done in order, all of them or none.
+        """Encode commands that the controller executes in order, all or none.
 
         Raises:
-            CommandError: If the protocol cannot say it (wrong joint count, a number that is not finite).
+            CommandError: If the protocol cannot express them (wrong joint count, number not finite).
         """
         ...

@@ -1,4 +1,4 @@
-"""Which protocols there are. Another one is one more file, and a line here."""
+"""Registry of protocols. A new protocol needs one file, and a line here."""
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Protocol
@@ -9,7 +9,7 @@ from robots.joints import JointType
 
 
 class DriverMaker(Protocol):
-    """Makes the driver of one robot, usually its class."""
+    """Factory of a robot's driver, usually the driver's class."""
 
     def __call__(
         self,
@@ -18,18 +18,18 @@ class DriverMaker(Protocol):
         *,
         relay: Callable[[bytes, bool, Hashable], None] | None,
     ) -> Driver:
-        """A driver.
+        """Create a driver.
 
         Args:
-            joint_types: One a joint, in the order of the controller's numbers.
-            codes: The site file's table of type codes; empty where there is none.
-            relay: Takes units for old client programs, as `UnitDriver` says; None: there are none.
+            joint_types: Types of the joints, in the order of the controller's values.
+            codes: The site file's table of type codes; empty if there is none.
+            relay: Callback with units for old client programs, see `UnitDriver`; None: there are none.
 
         Raises:
-            ProtocolGatewayError: If it cannot be made of these.
+            ProtocolGatewayError: If the arguments are invalid.
         """
         ...
 
 
 DRIVERS: dict[str, DriverMaker] = {"unit": UnitDriver}
-"""By what the site file's `protocol` says."""
+"""Driver factories by the site file's `protocol`."""

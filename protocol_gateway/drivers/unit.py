@@ -1,6 +1,6 @@
 """Driver of controllers that speak the unit protocol: SI above, degrees and millimetres below.
 
-A controller of the paper's own kind sends only ABSOLUTE.DEG. Everything else is optional.
+The paper's controllers send only ABSOLUTE.DEG. Everything else is optional.
 """
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
@@ -57,16 +57,16 @@ _NO_CODES: Mapping[int, str] = MappingProxyType({})
 
 
 class UnitDriver:
-    """The unit protocol behind `protocol_gateway.drivers.driver.Driver`.
+    """Driver of the unit protocol (`protocol_gateway.drivers.driver.Driver`).
 
     Args:
-        joint_types: One a joint, in the order of the controller's numbers.
+        joint_types: Types of the joints, in the order of the controller's values.
         codes: The site file's table of type codes; empty: names.
-        relay: Gets every well-formed unit as it came, with its "@", whether it holds refusals alone, and
-            what it has in common with units that tell the same, newer.
+        relay: Callback with every well-formed unit: its bytes with the "@", whether it holds only refusals,
+            and a key; a newer unit of the same key replaces an older one.
 
     Raises:
-        CodeTableError: If the table cannot be used.
+        CodeTableError: If the table is invalid.
     """
 
     def __init__(
@@ -85,15 +85,15 @@ class UnitDriver:
 
     @property
     def can_stop(self) -> bool:
-        """Whether there is a stop unit: a controller of codes does not know the word `stop`."""
+        """True if there is a stop unit: a controller that knows only codes needs a code for `stop`."""
         return self._table.supports(_WORDS[Stop])
 
     def connected(self) -> None:
-        """Forget the unfinished unit of the connection before."""
+        """Discard the unfinished unit of the previous connection."""
         self._stream = UnitStream(self._table)
 
     def receive(self, data: bytes) -> Sequence[ControllerEvent]:
-        """Events of the next bytes, cut anywhere."""
+        """Return the events of the next bytes, split anywhere."""
         events: list[ControllerEvent] = []
         for received in self._stream.receive(data):
             match received:
@@ -104,10 +104,10 @@ class UnitDriver:
         return events
 
     def encode(self, *commands: ControllerCommand) -> bytes:
-        """The unit that tells commands, a record each.
+        """Encode commands as one unit, a record each.
 
         Raises:
-            CommandError: If it has the wrong joint count, or a number that is not finite.
+            CommandError: If a command has the wrong joint count, or a number that is not finite.
         """
         try:
             return write_unit([self._record(command) for command in commands], self._table)
@@ -124,7 +124,7 @@ class UnitDriver:
         for record in unit.records:
             match record:
                 case AbsolutePositions(values) | Velocities(values):
-                    # A unit is all or nothing: one record of the wrong length refuses it whole.
+                    # All or nothing: one record of the wrong length rejects the whole unit.
                     if len(values) != len(self._scales):
                         events.append(self._wrong_count(values, unit))
                         return
@@ -168,7 +168,7 @@ class UnitDriver:
     def _protocol_values(self, values: Sequence[float]) -> tuple[float, ...]:
         if len(values) != len(self._scales):
             raise CommandError(f"{len(values)} values for {len(self._scales)} joints")
-        # Nine decimals are finer than any encoder, and keep pi/2 readable as 90.00.
+        # Nine decimals are finer than any encoder, and pi/2 becomes 90.00.
         return tuple([round(value / scale, 9) for value, scale in zip(values, self._scales, strict=True)])
 
 
@@ -184,22 +184,22 @@ def _append_event(record: Record, unit: Unit, time_s: float | None, events: list
         case Unknown(type_name, items):
             events.append(UnknownReceived(type_name, items, unit.data, time_s))
         case Command(words):
-            # A controller that sends a client's record commands nobody: shown raw.
+            # Commands from a controller have no effect: published raw.
             events.append(UnknownReceived("COMMAND", words, unit.data, time_s))
         case RelativePositions(values):
             items = tuple(map(write_number, values))
             events.append(UnknownReceived("RELATIVE.DEG", items, unit.data, time_s))
 
 
-# A controller says the same all day.
+# A controller repeats the same few status records.
 @lru_cache(maxsize=64)
 def _parse_status(
     words: tuple[str, ...],
 ) -> tuple[tuple[Activity | None, Mode | None, bool, bool], tuple[str, ...]]:
-    """What a status record says, and its words that say nothing known.
+    """Return a status record's values, and its unknown words.
 
-    `homed` and `trace` have no opposite word, so in a status their absence says no. Of words that
-    contradict each other the one that forbids motion holds, and otherwise none.
+    `homed` and `trace` have no opposite word, so their absence means no. Of contradictory words the one that
+    forbids motion counts; if none forbids motion, the activity is unknown.
     """
     said = {_ACTIVITIES[word] for word in words if word in _ACTIVITIES}
     modes = {_MODES[word] for word in words if word in _MODES}

@@ -1,1 +1,1 @@
-"""Old client programs, which attach to the gateway as if it were the controller."""
+"""Support of old client programs, which connect to the gateway as if it were the controller."""

@@ -1,12 +1,12 @@
-"""Old client programs: they attach to the gateway by TCP as if it were the controller.
+"""Server for old client programs, which connect by TCP as if the gateway were the controller.
 
-    controller --unit--> gateway --at once--> mesh, and the same bytes to every client
-    client --unit--> stop: done at once, whoever sends it, even one that is turned away or sends too much
-                     asks for nothing (somebody's state): renews its sender's lease, no more
-                     from a commander: done in its operator's name, as if it had come over the mesh
-                     from anybody else: ERROR 7, counted, written down
+    controller --unit--> gateway --immediately--> mesh, and the same bytes to every client
+    client --unit--> with a stop: executed immediately, also from a rejected or throttled client
+                     without a request (an echoed state): only renews the sender's lease
+                     from a commander: executed in its operator's name, like a request over the mesh
+                     from another client: ERROR 7, counted, audited
 
-One controller connection serves them all, in step with each other and with the mesh.
+One controller connection serves all clients and the mesh with the same data at the same time.
 Source: Chen, Zhang, Xue 2001, section 5, figures 7 and 8.
 """
 
@@ -37,12 +37,12 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robots.joints import Joints
 
 _S = schema.Event.Severity
-# Those who came when there were too many are told so; when very many come, they are not.
+# Most rejected clients that get an ERROR before they are closed; further ones are closed without it.
 _MOST_REJECTED = 32
 
 
 class LegacyClients:
-    """All old client programs of one robot."""
+    """Server of one robot's old client programs."""
 
     def __init__(
         self,
@@ -68,10 +68,10 @@ class LegacyClients:
         self._counts = schema.LegacyClients()
 
     async def listen(self) -> int:
-        """Let clients come; the port that they come to.
+        """Start to listen; return the port.
 
         Raises:
-            GatewaySettingsError: If it cannot listen there.
+            GatewaySettingsError: If the address cannot be used.
         """
         host, port = self._settings.host, self._settings.port
         loop = asyncio.get_running_loop()
@@ -87,7 +87,7 @@ class LegacyClients:
 
     @property
     def counts(self) -> schema.LegacyClients:
-        """How many are attached, and what was kept from them since the start."""
+        """Number of connected clients, and counters since the start."""
         counts = schema.LegacyClients()
         counts.CopyFrom(self._counts)
         counts.attached = len(self._clients)
@@ -95,10 +95,10 @@ class LegacyClients:
         return counts
 
     def relay(self, unit: bytes, answer: bool) -> None:
-        """Pass a unit of the controller's on, as it came, right after the mesh has what it tells.
+        """Relay the bytes of a controller's unit, after its data were published on the mesh.
 
         Args:
-            answer: It refuses a unit of the gateway's, which concerns nobody but who is in control.
+            answer: The unit refuses a unit of the gateway, which concerns only the client in control.
         """
         if answer:
             for client, commander in self._clients.items():
@@ -116,27 +116,27 @@ class LegacyClients:
             client.send_state(newest, earlier=earlier)
 
     def link_is_down(self, why: str) -> None:
-        """Close those who were told states, as the controller would: nobody may go on showing old ones."""
+        """Close the clients that got states, as the controller would, so that they do not show stale ones."""
         for client in [client for client in self._clients if client.got_state]:
             client.close(self._error(FAULT, why))
 
     async def close(self) -> None:
-        """Close every connection, and wait until what they asked for is done or refused."""
+        """Close every connection, and wait until their requests are executed or refused."""
         self._closing = True
         if self._listener is not None:
             self._listener.close()
         for client in [*self._clients, *self._rejected]:
-            client.close(self._error(FAULT, "the gateway is being ended"))
+            client.close(self._error(FAULT, "the gateway is shutting down"))
         while self._clients or self._rejected:
             self._empty.clear()
             await self._empty.wait()
         if self._ending:
             await asyncio.wait(self._ending)
 
-    # ----------------------------------------------------------------- of its clients
+    # -------------------------------------------------------- callbacks of its clients
 
     def client_connected(self, client: Client) -> None:
-        """Take a client in, or turn it away."""
+        """Accept a client, or reject it if there are too many."""
         if self._closing:
             client.abort()
             return
@@ -146,12 +146,12 @@ class LegacyClients:
             return
         self._clients[client] = self._commander(client, operator) if operator else None
         may = f"may command as {operator}" if operator else "reads"
-        text = f"an old client program has come: {client.name} {may}, {len(self._clients)} in all"
+        text = f"an old client program connected: {client.name} {may}, {len(self._clients)} in all"
         self._journal.report(_S.INFO, "legacy.attached", text, client=client.name)
         self._context.on_change()
 
     def client_disconnected(self, client: Client) -> None:
-        """Forget a client; its control ends with it."""
+        """Remove a client, and end its lease."""
         self._rejected.discard(client)
         if client in self._clients:
             commander = self._clients.pop(client)
@@ -161,13 +161,13 @@ class LegacyClients:
                 task = asyncio.create_task(commander.settle())
                 self._ending.add(task)
                 task.add_done_callback(self._ending.discard)
-            text = f"an old client program has gone: {client.name}, {len(self._clients)} are left"
+            text = f"an old client program disconnected: {client.name}, {len(self._clients)} are left"
             self._journal.report(_S.INFO, "legacy.gone", text, client=client.name)
             self._context.on_change()
         self._empty.set()
 
     def units_received(self, client: Client, events: list[StreamEvent]) -> None:
-        """Do what a client's units ask for; a stop among them before all else."""
+        """Execute a client's units; stops first."""
         if client not in self._clients:
             return
         self.stops_received(client, events)
@@ -188,36 +188,36 @@ class LegacyClients:
                 self._refuse(client, "", event, refusal, False)
 
     def stops_received(self, client: Client, events: list[StreamEvent]) -> None:
-        """Stop if a unit asks for it: of anybody, also of one that is turned away or sends too much."""
+        """Stop the robot if a unit asks for it, also from a rejected or throttled client."""
         if any(isinstance(event, Unit) and asks_to_stop(event.records) for event in events):
             by = self._operator(client) or f"legacy {client.address[0]}"
             self._control.stop(by=by, reason="a stop unit", source=f"legacy {client.name}")
 
     def client_throttled(self, client: Client) -> None:
-        """Say to a client that what it sends is not done."""
+        """Answer a throttled client that its units are ignored."""
         limits = self._settings.limits
         text = (
             f"more than {limits.units_per_s:g} units/s or {limits.bytes_per_s / 1024:g} KiB/s: "
-            "for the next second or two only a stop is heard"
+            "for the next second or two only stops are executed"
         )
         client.answer(self._error(FAULT, text))
 
     def client_dropped(self, client: Client, why: str) -> None:
-        """A client is being closed by this end."""
+        """Report a client that this end closes."""
         if client in self._clients:
             self._counts.closed += 1
             text = f"an old client program was closed: {client.name} {why}"
             self._journal.report(_S.WARNING, "legacy.closed", text, client=client.name)
 
-    # ------------------------------------------------------------------------- inside
+    # ------------------------------------------------------------------------ internal
 
     def _operator(self, client: Client) -> str:
-        """In whose name a client may command; empty: in nobody's."""
+        """Return the operator in whose name a client may command; empty: it may not."""
         host, _ = client.address
         return self._settings.commanders.get(plain_address(host), "")
 
     def _reserved_places(self, operator: str) -> int:
-        """How many places are not for this client: readers leave one to the first that may command."""
+        """Return the number of reserved places: readers leave one for the first commander."""
         commanders = self._settings.commanders and not operator
         return int(bool(commanders) and not any(self._clients.values()))
 
@@ -226,7 +226,7 @@ class LegacyClients:
 
     def _reject(self, client: Client) -> None:
         self._counts.turned_away += 1
-        text = f"an old client program was turned away: {client.name}, {self._settings.most} are attached"
+        text = f"an old client program was rejected: {client.name}, {self._settings.most} are connected"
         self._journal.report(_S.WARNING, "legacy.turned_away", text, client=client.name)
         if len(self._rejected) >= _MOST_REJECTED:
             client.abort()
@@ -251,7 +251,7 @@ class LegacyClients:
         self._journal.report(
             _S.WARNING,
             "legacy.malformed",
-            f"a unit of the old client program {client.name} is malformed: {malformed.reason}",
+            f"a unit from the old client program {client.name} is malformed: {malformed.reason}",
             client=client.name,
             offset=malformed.offset,
             bytes=malformed.text,
@@ -263,7 +263,7 @@ class LegacyClients:
         self._write_down(client, commander.operator if commander else "", malformed.text, refusal)
 
     def _refuse(self, client: Client, operator: str, unit: Unit, error: Error, written: bool) -> None:
-        """Answer a unit that is not done; `written`: that stands in the audit log already."""
+        """Answer a unit that is not executed; `written`: the refusal is already audited."""
         client.answer(self._error(error.number, error.text))
         if not written:
             self._write_down(client, operator, printable(unit.data), error)

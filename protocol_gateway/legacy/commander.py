@@ -1,9 +1,9 @@
-"""An old program that may command: its lease, and its units one after the other.
+"""Old client program that may command: its lease, and its units in order.
 
-unit       heard: its stop is done, its lease renewed --> waits --> lease --> control.commands
-waits > 1 s, or behind 32 others     refused
+unit received    its stop is executed, its lease renewed --> queue --> lease --> control.commands
+waits > 1 s, or 32 units are queued  refused
 2 s without a unit                   the lease expires
-its connection ends                  the lease ends, what waits is dropped
+its connection ends                  the lease ends, queued units are dropped
 """
 
 import asyncio
@@ -25,17 +25,17 @@ from robots.joints import Joints
 
 _A = LeaseRequest.Action
 _RESET = CommandRequest.Command.RESET
-# A lease is renewed so often at most; it ends after 2 s of silence all the same.
+# Shortest interval of renewals; the lifetime includes it, so that a lease ends after 2 s of silence.
 _RENEW_S = 0.1
 _TTL_S = 2.0 + _RENEW_S
 _MOST_WAITING = 32
 
 
 class Commander:
-    """One connection of a program that commands in an operator's name.
+    """Connection of a program that commands in an operator's name.
 
     Args:
-        refuse: Answers a unit with why it was not done; `written`: control has written that down.
+        refuse: Answers a unit with an Error; `written`: Control has already audited the refusal.
     """
 
     def __init__(
@@ -62,40 +62,40 @@ class Commander:
 
     @property
     def in_control(self) -> bool:
-        """Whether it holds the lease."""
+        """True if the program holds the lease."""
         return holds(self._control.authority, self.operator, self._secret)
 
     def renew(self) -> None:
-        """It is alive: its lease, if it has one, goes on."""
+        """Renew the program's lease, if it has one, because a unit was received."""
         now_s = time.monotonic()
         if self.in_control and now_s - self._renewed_s >= _RENEW_S:
             self._renewed_s = now_s
             self._renewal = asyncio.create_task(self._renew())
 
     def submit(self, unit: Unit) -> None:
-        """Do what a unit asks for, after those before it."""
+        """Queue a unit for execution."""
         if len(self._waiting) >= _MOST_WAITING:
-            self._refuse(unit, Error(FAULT, f"{_MOST_WAITING} units of yours wait: send fewer"), False)
+            self._refuse(unit, Error(FAULT, f"{_MOST_WAITING} of your units are queued: send fewer"), False)
             return
         self._waiting.append((unit, time.monotonic()))
         if self._work is None or self._work.done():
             self._work = asyncio.create_task(self._do_all())
 
     def end(self, why: Reason) -> None:
-        """Its connection has ended: so has its control."""
+        """End the lease and drop queued units, because the connection has ended."""
         self._end_reason = why
         self._waiting.clear()
         if self.in_control:
             self._control.leases.end(why)
 
     async def settle(self) -> None:
-        """Wait until what was begun is done, or refused."""
+        """Wait until the current unit is executed or refused."""
         for task in (self._work, self._renewal):
             if task is not None:
                 await asyncio.wait([task])
 
     async def _renew(self) -> None:
-        with suppress(RefusedError):  # it has just ended
+        with suppress(RefusedError):  # the lease has just ended
             await self._lease(_A.RENEW)
 
     async def _do_all(self) -> None:

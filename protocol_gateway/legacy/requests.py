@@ -1,7 +1,7 @@
-"""What an old client program's unit asks for, and the ERROR number of a refusal. No I/O.
+"""Conversion of old client programs' units to requests, and of refusals to ERROR numbers. No I/O.
 
-COMMAND words, ABSOLUTE.DEG, RELATIVE.DEG   requests, done in order, all of them or none
-STATUS, VELOCITY.DEG, TIME, ERROR           ask for nothing; beside a target: somebody's echoed state
+COMMAND words, ABSOLUTE.DEG, RELATIVE.DEG   requests, executed in order, all or none
+STATUS, VELOCITY.DEG, TIME, ERROR           no request; together with a target: refused as an echoed state
 anything else                               refused
 """
 
@@ -53,24 +53,24 @@ _WORDS = {
     "resume": _C.RESUME,
     "reset": _C.RESET,
 }
-# Each is written down before any is done, and others wait for that.
+# Limited, because all of them are audited before the first is executed, and other commands wait for that.
 _MOST_REQUESTS = 16
-# A reset that crossed a fresh stop on the wire must not clear it: nobody can have seen that stop yet.
+# A reset must not clear a stop that was sent while the reset was in transit: its sender has not seen it.
 _SEEN_AFTER_S = 1.0
 
 
 def number_of(answer: Answer) -> int:
-    """Return the protocol's number for a refusal of control's."""
+    """Return the protocol's ERROR number for a refusal by Control."""
     return FAULT if answer.reason is None else _NUMBERS.get(answer.reason.code, FAULT)
 
 
 def asks_to_stop(records: Sequence[Record]) -> bool:
-    """Whether a unit holds a stop: done whoever sends it, and whatever else is in the unit."""
+    """Return whether a unit holds a stop, which every client may send."""
     return any(isinstance(record, Command) and "stop" in record.words for record in records)
 
 
 def asks_for_more(records: Sequence[Record]) -> bool:
-    """Whether a unit holds more than stops, and what a controller tells of itself."""
+    """Return whether a unit holds more than stops and a controller's state."""
     return not all(
         set(record.words) == {"stop"}
         if isinstance(record, Command)
@@ -80,9 +80,9 @@ def asks_for_more(records: Sequence[Record]) -> bool:
 
 
 def requests_of(records: Sequence[Record], joints: Joints) -> list[CommandRequest] | Error:
-    """The requests of a commander's unit, without its stops, which are done already; or why it is none.
+    """Convert a commander's unit to requests, without its stops, which were executed before; or an Error.
 
-    Lease, id and the stop that a RESET names are for the sender to fill in.
+    The caller fills in the lease, the ids and the stop number of a RESET.
     """
     requests: list[CommandRequest] = []
     scales = si_scales(joints.types)
@@ -107,10 +107,10 @@ def requests_of(records: Sequence[Record], joints: Joints) -> list[CommandReques
             case Unknown(type_name):
                 return Error(UNKNOWN_WORD, f"unknown type {type_name[:40]}")
     if len(requests) > _MOST_REQUESTS:
-        return Error(MALFORMED, f"{len(requests)} commands in one unit, {_MOST_REQUESTS} at most")
+        return Error(MALFORMED, f"{len(requests)} commands in one unit, at most {_MOST_REQUESTS} are allowed")
     if requests and any(isinstance(record, Status | Velocities | Time) for record in records):
-        # An echoed state must never move an arm, whoever echoes it.
-        return Error(READ_ONLY, "STATUS, VELOCITY.DEG and TIME are a controller's: a state is no command")
+        # A program that echoes the controller's state must never move the arm.
+        return Error(READ_ONLY, "STATUS, VELOCITY.DEG and TIME come from controllers: a state is no command")
     return requests
 
 
@@ -130,10 +130,10 @@ def _word(word: str) -> CommandRequest | Error | None:
 
 
 def stop_to_reset(authority: Authority, asked_s: float) -> int | Error:
-    """The stop that a `reset` means, for the protocol has no number for it; 0: none is latched.
+    """Return the number of the stop that a `reset` means, which the protocol does not name; 0: none latched.
 
     Args:
-        asked_s: When the unit came (monotonic).
+        asked_s: Time at which the unit was received (monotonic).
     """
     stop = authority.stop
     if stop is None:

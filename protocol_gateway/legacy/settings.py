@@ -1,4 +1,4 @@
-"""Where old client programs attach to a robot's gateway, and what they may do."""
+"""Settings for old client programs of one robot."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,12 +9,12 @@ from protocol_gateway.serving.rate_limit import Limits
 
 @dataclass(frozen=True, kw_only=True)
 class LegacySettings:
-    """Where old client programs attach to a robot, and what they may do.
+    """Address for old client programs of one robot, and their rights.
 
     Attributes:
-        commanders: Operators' names by the addresses that may command, as `plain_address` writes them.
-        most: Clients at once.
-        limits: Of what each may send.
+        commanders: Operator names by the addresses that may command, normalized by `plain_address`.
+        most: Maximum number of connected clients.
+        limits: Rate limits of each client.
     """
 
     host: str
@@ -25,10 +25,10 @@ class LegacySettings:
 
 
 def plain_address(text: str) -> str:
-    """An IP address in one way of writing, an IPv4 one that comes by IPv6 too.
+    """Normalize an IP address, and an IPv4-mapped IPv6 address to IPv4.
 
     Raises:
-        ValueError: If it is none.
+        ValueError: If the text is not an IP address.
     """
     address = ip_address(text)
     if isinstance(address, IPv6Address) and address.ipv4_mapped is not None:

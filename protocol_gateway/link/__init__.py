@@ -1,1 +1,1 @@
-"""The link to one controller: its connection, its health, the dates of what comes over it."""
+"""Link to one controller: its connection, its health, and the time stamps of its data."""

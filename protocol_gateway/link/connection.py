@@ -1,4 +1,4 @@
-"""One TCP connection to a controller: written at once or not at all, read straight into a callback."""
+"""One TCP connection to a controller: writes whole units immediately or fails, reads into a callback."""
 
 import asyncio
 import contextlib
@@ -11,22 +11,22 @@ from protocol_gateway.errors import LinkCloggedError, LinkDownError
 from protocol_gateway.sockets import configure
 from robomesh import reason_codes as codes
 
-# A unit is some hundred bytes. A small send buffer makes a controller that does not read an
-# error at once instead of kilobytes of commands that it would obey late.
+# A unit has some hundred bytes. With a small send buffer, a controller that does not read causes an error
+# immediately, instead of kilobytes of commands that it would execute late.
 _SEND_BUFFER_BYTES = 4096
-# A piece of this size holds so few units that no other robot waits for its parsing.
+# A chunk of this size holds so few units that parsing it delays no other robot.
 READ_BYTES = 16 * 1024
-"""At most so many come at a time: with all of them, there may be more."""
-# What we wrote and the controller's host has not acknowledged for this long breaks the connection.
+"""Most bytes of one read; a read of this size means that more may wait."""
+# Sent data that the controller's host has not acknowledged for this long break the connection.
 _UNACKNOWLEDGED_MS = 3000
-# How long a controller that goes on sending has to take what was sent to it last.
+# A controller that goes on sending has this long to receive the last unit.
 _FINAL_SEND_S = 0.1
-# Of Linux's `struct tcp_info`: tcpi_rtt, microseconds, smoothed.
+# Offset of tcpi_rtt in Linux's `struct tcp_info`: smoothed, in microseconds.
 _ROUND_TRIP_AT = 68
 
 
 class Connection(asyncio.BufferedProtocol):
-    """One TCP connection; `lost` is done, with the reason in words, when it has ended."""
+    """One TCP connection; the future `lost` gets the reason as a sentence when it has ended."""
 
     _transport: asyncio.Transport
 
@@ -38,12 +38,12 @@ class Connection(asyncio.BufferedProtocol):
         loop = asyncio.get_running_loop()
         self.lost: asyncio.Future[str] = loop.create_future()
         self._closed: asyncio.Future[None] = loop.create_future()
-        # Its own: without one asyncio maps 256 KiB of memory anew for each read, which costs more than
-        # all that is done with a unit.
+        # Own buffer: otherwise asyncio maps 256 KiB of memory for each read, which costs more than all
+        # processing of a unit.
         self._buffer = bytearray(READ_BYTES)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Called by asyncio: the connection stands."""
+        """Configure the socket and notify the link (called by asyncio)."""
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
         configure(
@@ -54,31 +54,31 @@ class Connection(asyncio.BufferedProtocol):
         self._call_or_fail(lambda: self._on_connected(self))
 
     def get_buffer(self, sizehint: int) -> bytearray:
-        """Called by asyncio: where bytes are to be put."""
+        """Return the read buffer (called by asyncio)."""
         return self._buffer
 
     def buffer_updated(self, nbytes: int) -> None:
-        """Called by asyncio: so many bytes came."""
+        """Pass received bytes on (called by asyncio)."""
         data = bytes(memoryview(self._buffer)[:nbytes])
         self._call_or_fail(lambda: self._receive(data))
 
     def connection_lost(self, error: Exception | None) -> None:
-        """Called by asyncio: it has ended."""
+        """Set `lost` to the reason of the end (called by asyncio)."""
         reason = reason_of(error) if isinstance(error, OSError) else "the controller closed the connection"
         if not self.lost.done():
             self.lost.set_result(reason)
         self._closed.set_result(None)
 
     def write(self, data: bytes) -> None:
-        """Put a whole unit on the socket, now.
+        """Write a whole unit to the socket immediately.
 
         Raises:
             LinkDownError: If the connection has ended.
-            LinkCloggedError: If the socket does not take it whole; the connection is given up then.
+            LinkCloggedError: If the socket does not take the whole unit; the connection is then aborted.
         """
         if self._transport.is_closing():
             raise LinkDownError(codes.LINK_JUST_ENDED())
-        # asyncio writes at once when its buffer is empty, and here it always is: what does not
+        # asyncio writes immediately while its buffer is empty, which it always is here. A unit that does not
         # fit ends the connection, so that half a unit can never be completed later.
         self._transport.write(data)
         if self._transport.is_closing():
@@ -88,42 +88,42 @@ class Connection(asyncio.BufferedProtocol):
             raise LinkCloggedError(codes.LINK_CLOGGED())
 
     def pause(self, seconds: float) -> None:
-        """Read nothing for so long; what is written goes out all the same."""
+        """Stop reading for some seconds; writing continues."""
         self._transport.pause_reading()
         self.later(seconds, self._transport.resume_reading)
 
     def later(self, seconds: float, call: Callable[[], None]) -> asyncio.TimerHandle:
-        """Call something then; bad code in it ends the link, as it would from `receive`."""
+        """Schedule a call; an exception in it ends the link, as in `receive`."""
         return asyncio.get_running_loop().call_later(seconds, self._call_or_fail, call)
 
     def give_up(self, why: str) -> None:
-        """End it now, for a reason of ours in words."""
+        """Abort the connection for a reason of this end."""
         if not self.lost.done():
             self.lost.set_result(why)
         self._transport.abort()
 
     @property
     def round_trip_s(self) -> float | None:
-        """To the controller's host and back, as the kernel has measured it [s]; None: it does not tell."""
+        """Round-trip time to the controller's host, measured by the kernel [s]; None: unknown."""
         connected: socket.socket = self._transport.get_extra_info("socket")
         try:
-            told = connected.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 128)
-            (microseconds,) = struct.unpack_from("=I", told, _ROUND_TRIP_AT)
-        except (OSError, AttributeError, struct.error):  # it has just ended; not Linux
+            tcp_info = connected.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 128)
+            (microseconds,) = struct.unpack_from("=I", tcp_info, _ROUND_TRIP_AT)
+        except (OSError, AttributeError, struct.error):  # the connection has just ended, or not Linux
             return None
         return float(microseconds) * 1e-6
 
     async def end(self) -> None:
-        """Close it, and wait until it is closed: what was written last, a stop perhaps, still arrives.
+        """Close the connection and wait for it, so that the last unit, perhaps a stop, still arrives.
 
-        A socket that is closed with something unread in it is reset, and a reset may take from the
-        controller what it has not read yet. So only the sending ends at first, and what comes is read.
+        Closing a socket that holds unread bytes resets it, and the controller may lose what it has not read
+        yet. Therefore only the sending direction is closed first, and received bytes are read and discarded.
         """
         self._receive = _ignore
         self._transport.resume_reading()
         try:
             if not self._transport.is_closing():
-                with contextlib.suppress(OSError):  # the controller was faster
+                with contextlib.suppress(OSError):  # the controller has already closed
                     self._transport.write_eof()
                 await asyncio.wait([self._closed], timeout=_FINAL_SEND_S)
         finally:
@@ -131,7 +131,7 @@ class Connection(asyncio.BufferedProtocol):
         await self._closed
 
     def _call_or_fail(self, call: Callable[[], None]) -> None:
-        """Bad code ends `run` with its own exception; asyncio would only log it."""
+        """Make an exception of the callback end `run`; asyncio would only log it."""
         try:
             call()
         except Exception as error:
@@ -141,11 +141,11 @@ class Connection(asyncio.BufferedProtocol):
 
 
 def _ignore(data: bytes) -> None:
-    """What comes after the end tells nobody anything."""
+    """Discard bytes received after the end."""
 
 
 def reason_of(error: OSError) -> str:
-    """What the system says is wrong, without the address that asyncio repeats."""
+    """Return the system's error text, without the address that asyncio repeats."""
     if error.errno is not None and error.errno > 0:
         return os.strerror(error.errno).lower()
     return (error.strerror or str(error)).lower()

@@ -1,10 +1,10 @@
-"""More than is taken: how much is too much, and the newest of each kind in place of all.
+"""Flood protection: detects floods, and then dispatches only the newest event of each kind.
 
     calm --over 2,000 units a second--> flood: the newest of each kind, 200 times a second
-    flood --over 2 MiB or 20,000 units a second--> deluge: read a piece at a time, and thrown away unread
-    deluge --half a second of a quarter of it, and nothing left to read--> calm
+    flood --over 2 MiB or 20,000 units a second--> deluge: read in small chunks, and discarded
+    deluge --half a second with a quarter of it, and nothing left to read--> calm
 
-After a gap the newest of a burst is handed over alone, where nobody can say how old the others are.
+Of a burst after a gap only the newest undated state is dispatched, because the age of the others is unknown.
 """
 
 import asyncio
@@ -14,11 +14,11 @@ from functools import partial
 from protocol_gateway.drivers.driver import ControllerEvent, JointsReceived, Refused, StatusReceived
 from protocol_gateway.link.timestamping import Received
 
-# Twice what the fastest controllers send (1,000 units a second, of 300 bytes), within half a second.
+# Limits for half a second: twice what the fastest controllers send (1,000 units a second, of 300 bytes).
 _BIN_S = 0.5
 _MOST_UNITS = 1000
 _CALM_UNITS = 800
-# What can be parsed in half a core's time: beyond it, one controller would starve the others.
+# Limit for half a core of parsing: above it, one controller would starve the others.
 _MOST_BYTES = 1 << 20
 _MOST_READ_UNITS = 10_000
 _CALM_BYTES = 1 << 18
@@ -26,11 +26,11 @@ _HOLD_S = 0.005
 
 
 class FloodDetector:
-    """Whether far more comes than a controller sends.
+    """Detector of far more data than a controller sends.
 
     Attributes:
-        active: More than 2,000 units a second came, and no calm half second since.
-        deluge: So much came that nothing of it can be taken, and it has not ended yet.
+        active: More than 2,000 units a second were received, without a calm half second since.
+        deluge: Too much is received to parse any of it.
     """
 
     def __init__(self) -> None:
@@ -40,7 +40,7 @@ class FloodDetector:
         self._more_waited = False
 
     def add_bytes(self, length: int, now_s: float, *, more_waits: bool) -> None:
-        """Bytes came, and are not parsed yet; `more_waits`: there may be more behind them."""
+        """Add bytes before they are parsed; `more_waits`: more bytes may wait in the socket."""
         if now_s - self._begin_s >= _BIN_S:
             self.deluge = self.deluge and (more_waits or self._more_waited or self._bytes > _CALM_BYTES)
             self.active = self.deluge or (self.active and self._units >= _CALM_UNITS)
@@ -51,22 +51,22 @@ class FloodDetector:
         self.active = self.active or self.deluge
 
     def add_units(self, units: int) -> None:
-        """Of the bytes that came last, so many units were read."""
+        """Add the number of units parsed from the last bytes."""
         self._units += units
         self.active = self.active or self._units > _MOST_UNITS
         self.deluge = self.deluge or self._units > _MOST_READ_UNITS
 
 
 class EventDispatcher:
-    """Hands over what came: all of it at once; of too much the newest of each kind, within 5 ms.
+    """Dispatcher of events: immediately, or in a flood the newest of each kind within 5 ms.
 
     Args:
-        on_event: Takes it.
-        later: Calls something after seconds, as long as there is a connection.
+        on_event: Callback for each event.
+        later: Schedules a call after a delay [s], as long as the connection lasts.
 
     Attributes:
-        flood: To be told of what comes.
-        skipped: So many positions, for newer ones.
+        flood: Detector, which needs the number of received bytes and units.
+        skipped: Number of joint positions that newer ones replaced.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class EventDispatcher:
         self._timer: asyncio.TimerHandle | None = None
 
     def dispatch(self, events: Sequence[ControllerEvent], dates: Sequence[Received], *, burst: bool) -> None:
-        """Hand over what was read at once; `burst`: it may have been held back on the way."""
+        """Dispatch the events of one read; `burst`: they may have been delayed on the way."""
         if burst:
             self._restart_timer()
         elif not self.flood.active:
@@ -96,7 +96,7 @@ class EventDispatcher:
             self.skipped += older and isinstance(event, JointsReceived)
 
     def defer(self, kind: Hashable, call: Callable[[], None]) -> bool:
-        """Do it soon, unless something newer of its kind comes; whether it is in an older one's place."""
+        """Defer a call until the next flush; return whether it replaces an older one of its kind."""
         older = self._deferred.pop(kind, None)
         self._deferred[kind] = call
         if self._timer is None:
@@ -104,7 +104,7 @@ class EventDispatcher:
         return older is not None
 
     def forget(self) -> None:
-        """Hand over nothing of what is held."""
+        """Discard the deferred calls."""
         self._deferred = {}
         if self._timer is not None:
             self._timer.cancel()
@@ -123,15 +123,15 @@ class EventDispatcher:
 
 
 def _is_undated_state(event: ControllerEvent) -> bool:
-    """Whether an event tells the arm's state, and not of what time."""
+    """Return whether an event holds the arm's state without the controller's time."""
     return isinstance(event, JointsReceived | StatusReceived) and event.controller_time_s is None
 
 
 def _kind(event: ControllerEvent) -> Hashable:
-    """What a newer event must have in common with an older one to stand for it."""
+    """Return the kind of an event: a newer event replaces an older one of the same kind."""
     match event:
         case StatusReceived(activity, mode, homed, trace):
-            # One that says something else is never left out.
+            # A status with other values is never skipped.
             return StatusReceived, activity, mode, homed, trace
         case Refused(number):
             return Refused, number

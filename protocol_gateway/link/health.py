@@ -1,6 +1,6 @@
-"""How well a link does: rate, jitter, what never came, how soon it answers. No I/O.
+"""Health of a link: rate, jitter, lost units, response time. No I/O.
 
-Times are seconds on the gateway's monotonic clock, unless they are the controller's.
+Times are seconds on the gateway's monotonic clock, unless named as the controller's.
 """
 
 from collections import deque
@@ -15,12 +15,12 @@ _WINDOW_S = 5.0
 _MOST_ARRIVALS = 512
 _FEW = 20
 _ANSWERS_WITHIN_S = 2.0
-_LONGEST_GAP_S = 60.0  # of the controller's clock; further, it was set
+_LONGEST_GAP_S = 60.0  # of the controller's clock; a longer gap means that the clock was set
 
 
 @dataclass(frozen=True, slots=True)
 class LinkHealth:
-    """As in `robomesh.LinkHealth`; None: not known."""
+    """Health values, as in `robomesh.LinkHealth`; None: unknown."""
 
     jitter_s: float | None
     network_round_trip_s: float | None
@@ -28,7 +28,7 @@ class LinkHealth:
 
 
 class Arrivals:
-    """When units came."""
+    """Receive times of units."""
 
     def __init__(self) -> None:
         self._times_s: deque[float] = deque(maxlen=_MOST_ARRIVALS)
@@ -37,21 +37,21 @@ class Arrivals:
         self._hz = 0.0
 
     def count(self, units: int, now_s: float) -> None:
-        """Units came, all at once."""
+        """Add units of one read."""
         elapsed_s = now_s - self._begin_s
         if elapsed_s >= 1.0:
-            # After a pause there is no rate to tell yet.
+            # After a pause the rate is unknown.
             self._hz = self._units / elapsed_s if elapsed_s < 2.0 else 0.0
             self._begin_s, self._units = now_s, 0
         self._units += units
         self._times_s.extend((now_s,) * min(units, _MOST_ARRIVALS))
 
     def rate_hz(self, now_s: float) -> float:
-        """Units a second, over the last second or so; 0 when none came."""
+        """Return units a second, over about the last second; 0 if there were none."""
         return self._hz if self._times_s and now_s - self._times_s[-1] < 2.0 else 0.0
 
     def jitter_s(self, now_s: float) -> float | None:
-        """Spread of the time between units within the last 5 s: 99th percentile less median."""
+        """Return the jitter of unit intervals within the last 5 s: 99th percentile minus median."""
         times_s = [each for each in self._times_s if now_s - each < _WINDOW_S]
         if len(times_s) <= _FEW:
             return None
@@ -60,12 +60,12 @@ class Arrivals:
 
 
 class LossCounter:
-    """Units that never came: gaps in the controller's clock, where it beats regularly.
+    """Counter of lost units: gaps in a controller clock that is otherwise regular.
 
-    Judged by twenty and more units at once, so that a unit told late is not taken for a lost one.
+    It evaluates twenty and more units at a time, so that a delayed unit does not count as lost.
 
     Attributes:
-        lost: So many, in all.
+        lost: Number of lost units so far.
     """
 
     def __init__(self) -> None:
@@ -73,11 +73,11 @@ class LossCounter:
         self._times_s: list[float] = []
 
     def forget(self) -> None:
-        """What comes next is no continuation."""
+        """Discard the times, because the next unit does not continue them."""
         self._times_s.clear()
 
     def add(self, controller_time_s: float) -> None:
-        """A unit came; of one that gives several events, each may say so."""
+        """Add a unit's time; several events of one unit may repeat it."""
         times_s = self._times_s
         if times_s and not 0.0 <= controller_time_s - times_s[-1] < _LONGEST_GAP_S:
             times_s.clear()
@@ -98,10 +98,10 @@ def _missing(times_s: Sequence[float]) -> int:
 
 
 class ResponseTimer:
-    """How soon the controller shows that it got a command: a refusal, or a status that changes.
+    """Timer of the controller's response to a command: a refusal, or a changed status.
 
     Attributes:
-        answer_s: After the last command that was answered within 2 s; None: none yet.
+        answer_s: Response time of the last command that was answered within 2 s; None: none yet.
     """
 
     def __init__(self) -> None:
@@ -110,11 +110,11 @@ class ResponseTimer:
         self._status: StatusReceived | None = None
 
     def command_sent(self, now_s: float) -> None:
-        """A command is on the socket."""
+        """Start the timer when a command is on the socket."""
         self._sent_s = now_s
 
     def event_received(self, event: ControllerEvent, now_s: float) -> None:
-        """The controller told something."""
+        """Stop the timer if an event answers the command."""
         before = self._status
         if isinstance(event, StatusReceived):
             self._status = event

@@ -1,17 +1,16 @@
-"""The link to one controller: keeps a connection, tells its state in words, hands over every event at once.
+"""Link to one controller: keeps a connection, reports its state, dispatches every event immediately.
 
     DOWN --connected--> SILENT --unit--> UP
     UP --no unit of use for stale_after_s--> SILENT --none for reconnect_after_s--> DOWN
-    any --connection lost--> DOWN --a pause, 0.2 s growing to 5 s--> connect again
-                                  --something could not be sent--> connect again at once, then each 0.2 s
+    any --connection lost--> DOWN --a pause, 0.2 s growing to 5 s--> reconnect
+                                  --a unit could not be sent--> reconnect immediately, then each 0.2 s
 
-Everything is read at once, for what waits in the kernel's buffers would look new later. Of a flood, and of
-a burst after a gap, the newest of each kind is handed over and the rest is counted (`flood`). A controller
-whose units have another joint count, or one that sends over 2 MiB a second, is SILENT, and stays connected:
-a stop can be sent to it.
+The socket is read continuously, because data waiting in the kernel's buffers would look new later. Of a
+flood, and of a burst after a gap, the newest of each kind is dispatched and the rest is counted (`flood`).
+The link is SILENT if the controller's units have another joint count, or if it sends over 2 MiB a second. It
+stays connected then, so that a stop can be sent.
 
-Data is dated once, when its last byte was read from the socket (or earlier, by its controller's clock:
-see `dating`), and never again.
+Data is stamped once: with the time of the read, or earlier by the controller's clock (`timestamping`).
 """
 
 import asyncio
@@ -55,19 +54,19 @@ logger = logging.getLogger(__name__)
 
 _FIRST_PAUSE_S = 0.2
 _LONGEST_PAUSE_S = 5.0
-# Of a deluge a piece of 16 KiB is thrown away so often: costs little, and its end is seen.
+# Of a deluge, one chunk of 16 KiB is discarded this often: cheap, and its end is detected.
 _DELUGE_EACH_S = 0.01
 JOINT_COUNT = "controller.joint_count"
 
 
 @dataclass(frozen=True, kw_only=True)
 class LinkSettings:
-    """Where the controller is, and how patient the link.
+    """Address of the controller, and the link's timeouts.
 
     Attributes:
         stale_after_s: Without a unit for this long the link is SILENT.
-        reconnect_after_s: Without a unit for this long the connection is given up and made anew.
-        connect_timeout_s: For one attempt to connect.
+        reconnect_after_s: Without a unit for this long the link reconnects.
+        connect_timeout_s: Timeout of one attempt to connect.
     """
 
     host: str
@@ -96,8 +95,8 @@ class LinkCounters:
 class ControllerLink:
     """A link to one controller.
 
-    `on_event` and `on_status` are called on the event loop, straight from the socket's callback:
-    no queue, no task switch. They must return soon, and an exception of theirs ends `run`.
+    `on_event` and `on_status` are called on the event loop from the socket's callback: no queue, no task
+    switch. They must return soon, and an exception in them ends `run`.
     """
 
     def __init__(
@@ -121,18 +120,18 @@ class ControllerLink:
         self._last_received: Received | None = None
         self._refusal = ""
         self._unusable: tuple[float, Reason, str] | None = (
-            None  # when such came last, why, and the event's code
+            None  # time of the last unusable data, reason, and the event's code
         )
         self._timestamper = Timestamper()
         self._arrivals = Arrivals()
         self._losses = LossCounter()
         self._response_timer = ResponseTimer()
         self._dispatcher = EventDispatcher(on_event, self._later)
-        self._send_failed = asyncio.Event()  # something could not be sent
+        self._send_failed = asyncio.Event()
 
     @property
     def status(self) -> LinkStatus:
-        """State of the link, in words too."""
+        """State of the link, with its reason."""
         return self._status
 
     @property
@@ -147,17 +146,17 @@ class ControllerLink:
 
     @property
     def last_received(self) -> Received | None:
-        """When the last well-formed unit came; None: none yet."""
+        """Time of the last well-formed unit; None: none yet."""
         return self._last_received
 
     @property
     def rate_hz(self) -> float:
-        """Units a second, over the last second or so; 0 when none came."""
+        """Units a second, over about the last second; 0 if there were none."""
         return self._arrivals.rate_hz(self._monotonic_s())
 
     @property
     def health(self) -> LinkHealth:
-        """How well it does."""
+        """Health of the link."""
         return LinkHealth(
             jitter_s=self._arrivals.jitter_s(self._monotonic_s()),
             network_round_trip_s=self._connection.round_trip_s if self._connection else None,
@@ -165,7 +164,7 @@ class ControllerLink:
         )
 
     async def run(self) -> None:
-        """Keep the link until cancelled; the connection is closed then."""
+        """Keep the link connected until cancelled; then close the connection."""
         pause_s = _FIRST_PAUSE_S
         while True:
             if await self._attempt():
@@ -174,8 +173,8 @@ class ControllerLink:
             pause_s = min(pause_s * 2.0, _LONGEST_PAUSE_S)
 
     async def _rest(self, pause_s: float) -> None:
-        """Pause between two attempts; not for long while something waits to be sent."""
-        # Spread: the gateways of a hall must not all knock on a restarted controller at once.
+        """Pause between two attempts; only briefly after a unit could not be sent."""
+        # Random spread, so that a restarted controller does not get all connections at the same time.
         spread = random.uniform(0.8, 1.2)
         if self._send_failed.is_set():
             await asyncio.sleep(_FIRST_PAUSE_S * spread)
@@ -185,15 +184,15 @@ class ControllerLink:
                 await self._send_failed.wait()
 
     def send(self, data: bytes) -> None:
-        """Write a whole unit to the socket, now. Nothing is ever queued, so nothing goes before it.
+        """Write a whole unit to the socket immediately. The link has no queue, so nothing precedes the unit.
 
-        On return the unit is in the hands of the operating system, whole. After an error it is not, and it
-        will not be done later; until something is sent, a lost connection is made again without long pauses.
-        Works on a SILENT link too: a stop is worth trying there.
+        On return the operating system has the whole unit. After an error it has not, and the unit will not be
+        sent later; until the next successful send, the link reconnects without long pauses. Works on a SILENT
+        link too, so that a stop can be tried.
 
         Raises:
             LinkDownError: If there is no connection.
-            LinkCloggedError: If the socket does not take it whole; the connection is given up then.
+            LinkCloggedError: If the socket does not take the whole unit; the connection is then aborted.
         """
         self._send_failed.set()
         if self._connection is None:
@@ -205,13 +204,13 @@ class ControllerLink:
         self._response_timer.command_sent(self._monotonic_s())
 
     def defer_in_flood(self, kind: Hashable, call: Callable[[], None]) -> bool:
-        """Whether there is a flood: then the newest of each kind is done, 200 times a second."""
+        """Defer a call in a flood, where only the newest of each kind is done; return whether deferred."""
         if self._dispatcher.flood.active:
             self._dispatcher.defer(kind, call)
         return self._dispatcher.flood.active
 
     async def _attempt(self) -> bool:
-        """One connection, from the attempt to its end; whether units came over it."""
+        """Connect, and serve the connection to its end; return whether usable units were received."""
         loop = asyncio.get_running_loop()
         try:
             async with asyncio.timeout(self._settings.connect_timeout_s):
@@ -235,8 +234,8 @@ class ControllerLink:
             self._dispatcher.forget()
             await connection.end()
             self._set_status(LinkState.DOWN, reason)
-        came = self._driver.units_received > units_before
-        return came and not self._refusal
+        received = self._driver.units_received > units_before
+        return received and not self._refusal
 
     async def _watch(self, connection: Connection) -> Reason:
         """Wait for the connection's end, reporting silence; return the reason of the end."""
@@ -274,7 +273,7 @@ class ControllerLink:
         return self._connection.later(seconds, call)
 
     def _receive(self, data: bytes) -> None:
-        # Dated before it is parsed: what we do with it is not part of its age.
+        # Stamped before it is parsed, so that parsing does not count as age.
         now = self._now()
         self._counts["bytes_received"] += len(data)
         if self._is_deluge(len(data), now.monotonic_s):
@@ -288,7 +287,7 @@ class ControllerLink:
         self._dispatcher.flood.add_units(max(units, len(events)))
         other_joints = self._sends_other_joints(now.monotonic_s)
         if other_joints:
-            # The link says so, once; which of the positions are this robot's is not known.
+            # The link reports this once. Which of the positions belong to this robot is unknown.
             events = [each for each in events if not _is_of_joints(each)]
             self._fall_silent()
         for event in events:
@@ -299,13 +298,13 @@ class ControllerLink:
             self._unit_received(max(dates, key=lambda date: date.monotonic_s, default=now), now)
         elif not units and self._unusable is not None and self._status.state is LinkState.SILENT:
             self._fall_silent()
-            return  # said once, not again for each unit
+            return  # reported once, not for each unit
         if self._dispatcher.flood.active is not self._status.flooding:
             self._set_status(self._status.state, self._status.reason, self._status.code)
         self._dispatcher.dispatch(events, dates, burst=self._timestamper.after_gap(now.monotonic_s))
 
     def _is_deluge(self, length: int, now_s: float) -> bool:
-        """Whether bytes are thrown away unread: they are far too many. A stop gets through all the same."""
+        """Return whether bytes are discarded because they are far too many. Stops can still be sent."""
         before = self._dispatcher.flood.deluge
         more_waits = length == READ_BYTES
         self._dispatcher.flood.add_bytes(length, now_s, more_waits=more_waits)
@@ -320,7 +319,7 @@ class ControllerLink:
         return before or self._dispatcher.flood.deluge
 
     def _sends_other_joints(self, now_s: float) -> bool:
-        """Return whether a unit of another joint count came within the stale time."""
+        """Return whether a unit with another joint count was received within the stale time."""
         if self._unusable is None or self._unusable[2] != JOINT_COUNT:
             return False
         return now_s - self._unusable[0] < self._settings.stale_after_s
@@ -380,5 +379,5 @@ class ControllerLink:
 
 
 def _is_of_joints(event: ControllerEvent) -> bool:
-    """Return whether an event holds joint positions, or says that their count is wrong."""
+    """Return whether an event holds joint positions, or reports a wrong joint count."""
     return isinstance(event, JointsReceived) or (isinstance(event, MalformedReceived) and event.joint_count)

@@ -1,4 +1,4 @@
-"""What a gateway's metrics tell of its links; read when they are asked for."""
+"""Metrics of a gateway's links, evaluated when they are requested."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -9,10 +9,10 @@ from robomesh.session import Session
 
 
 def measure_links(session: Session, links: Mapping[str, ControllerLink]) -> None:
-    """Tell how each robot's link does.
+    """Register the metrics of each robot's link.
 
     Args:
-        links: By robot.
+        links: Links by robot name.
     """
 
     def by_robot(read: Callable[[ControllerLink], float]) -> Callable[[], dict[str, float]]:
@@ -28,14 +28,14 @@ def measure_links(session: Session, links: Mapping[str, ControllerLink]) -> None
     measure = session.measure
     measure("links_up", "Links to controllers that are up", lambda: sum(map(up, links.values())))
     measure("link_up", "Whether the link to the controller is up", by_robot(up))
-    measure("unit_age_seconds", "Since the last unit came; NaN: none yet", by_robot(age_s))
-    measure("units_per_second", "Units of the last second", by_robot(lambda link: link.rate_hz))
+    measure("unit_age_seconds", "Time since the last unit; NaN: none yet", by_robot(age_s))
+    measure("units_per_second", "Units received in the last second", by_robot(lambda link: link.rate_hz))
     for name, text in (
-        ("units_received", "Units that came"),
-        ("units_malformed", "Units that could not be read"),
-        ("units_lost", "Units that never came: gaps in the controller's clock"),
-        ("units_skipped", "Units of a flood, overtaken by newer ones"),
-        ("units_sent", "Units that were sent to the controller"),
+        ("units_received", "Units received"),
+        ("units_malformed", "Malformed units received"),
+        ("units_lost", "Units lost: gaps in the controller's clock"),
+        ("units_skipped", "Units of a flood, replaced by newer ones"),
+        ("units_sent", "Units sent to the controller"),
     ):
         measure(f"{name}_total", text, by_robot(partial(_count, name)))
 

@@ -1,4 +1,4 @@
-"""State of a link in words, and what is said when it changes. No I/O."""
+"""State of a link, and the events of its changes. No I/O."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -19,11 +19,11 @@ class LinkState(Enum):
 
 @dataclass(frozen=True, slots=True)
 class LinkStatus:
-    """State of the link, and why.
+    """State of the link, with its reason.
 
     Attributes:
-        code: Of the event that says so; empty: `link.down`, `link.up` or `link.silent`.
-        flooding: More comes than is taken.
+        code: Code of the event that reports it; empty: `link.down`, `link.up` or `link.silent`.
+        flooding: The controller sends more than the gateway publishes.
     """
 
     state: LinkState
@@ -38,15 +38,15 @@ class LinkStatus:
 
 
 def transition_events(before: LinkStatus, after: LinkStatus) -> list[tuple[Event.Severity, str, str]]:
-    """Severity, code and text of the events that tell a change; none where only words changed."""
+    """Return severity, code and text of the events that report a change; none if only the text changed."""
     said: list[tuple[Event.Severity, str, str]] = []
     if before.state is not after.state or after.code not in ("", before.code):
         lost = after.state is LinkState.DOWN or before.state is LinkState.UP or after.code
         code = after.code or f"link.{after.state.value}"
         said.append((_S.WARNING if lost else _S.INFO, code, f"link to the controller: {after.text}"))
     if after.flooding and not before.flooding:
-        text = "the controller sends far too much: only the newest of it is published, the rest is counted"
+        text = "the controller sends too much: only the newest data are published, the rest is counted"
         said.append((_S.WARNING, "link.flooding", text))
     if before.flooding and not after.flooding and after.state is not LinkState.DOWN:
-        said.append((_S.INFO, "link.flooding_ended", "the controller does not send too much any more"))
+        said.append((_S.INFO, "link.flooding_ended", "the controller no longer sends too much"))
     return said

@@ -1,19 +1,19 @@
-"""Time stamps of what a controller sends: each unit has its own, as its controller's clock says.
+"""Time stamps of a controller's units, by the controller's clock where it sends one.
 
-TCP delivers everything: a cable, a sleeping process or a busy machine holds units back, and several come
-in one read. Where a unit carries the controller's TIME, the quickest unit so far says how both clocks lie:
+TCP may delay units: a cable, a sleeping process or a busy machine holds them back, and one read returns
+several. Where a unit carries the controller's TIME, the fastest unit so far gives the offset of the clocks:
 
     stamp = TIME + the least (receipt - TIME) so far
 
-So stamps are spaced as TIME is, and what was held back is as old as it is. No stamp is after its receipt.
-Of units that come together without TIME, the newest is stamped with its receipt and the others before it,
-at the measured rate.
+So stamps are spaced like TIME, and a delayed unit keeps its real age. No stamp is after its receipt. Of
+several units of one read without TIME, the newest is stamped with its receipt and the others before it, at
+the measured rate.
 
-A controller's clock may drift, or be set. The line follows a drift slowly. Where it cannot be followed (TIME
-goes back, a unit is quicker by more than 1 ms, everything stays late), another clock begins
-(`Received.clock`), and with it another publisher identity: within one, stamps strictly increase and are
-spaced as TIME is. What stays late for a second is no longer believed to be late, so no clock can make live
-data look old for longer.
+A controller's clock may drift, or be set. The offset follows a drift slowly. If it cannot be followed (TIME
+goes back, a unit is early by more than 1 ms, all units stay late), a new clock number begins
+(`Received.clock`), and with it a new publisher identity. Within one number, stamps strictly increase and are
+spaced like TIME. Units that stay late for a second are taken as on time, so that no clock can make live data
+look old for longer.
 """
 
 from collections.abc import Iterator, Sequence
@@ -29,33 +29,33 @@ from protocol_gateway.drivers.driver import (
 
 _MS = 1_000_000
 _S = 1_000_000_000
-# 300 years: no clock says more, and nanoseconds of much more are no number.
+# 300 years: no valid TIME is larger, and much more does not fit into nanoseconds.
 _LONGEST_TIME_S = 1e10
-# Arrivals further apart than this leave room for something held back.
+# After a gap longer than this between reads, the next units may be delayed ones.
 _GAP_S = 0.25
-# A live stream without pauses must not be taken for a burst for longer.
+# Longest time to treat a stream after a gap as a burst: it may be a live stream without pauses.
 _LONGEST_HOLD_S = 0.25
-# Later than this for so long: the controller's clock was set, or is slow. A burst comes as fast as the
-# network can.
+# Units later than _LATE_NS for _BURST_NS: the controller's clock was set, or is slow. A burst is shorter,
+# because it arrives at the speed of the network.
 _LATE_NS, _BURST_NS = 100 * _MS, _S
-# By how much a unit may come sooner than all before it, for its stamp still to be spaced as TIME is.
+# A unit may be early by this much while stamps stay spaced like TIME: absolute, and share of the interval.
 _SOONER_NS, _SOONER_SHARE = 900_000, 0.09
-# A slower clock is followed by this share of the time, once the quickest of a window is 1 ms behind.
+# The offset follows a slower clock by this share of the time, once the fastest unit of a window is 1 ms late.
 _FOLLOWED_SHARE, _WINDOW_NS, _BEHIND_NS = 0.05, 2 * _S, _MS
-# Between stamps of units with one TIME, together within a millisecond.
+# Spacing of stamps of units with the same TIME, in total within a millisecond.
 _TWICE_NS = 100_000
-# Of units that come together before any rate is known.
+# Spacing of units of one read before a rate is known.
 _UNKNOWN_PERIOD_NS = 1000
 
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """When an event was new here.
+    """Time stamp of an event.
 
     Attributes:
-        monotonic_s: On the gateway's monotonic clock: for ages.
-        wall_ns: On the gateway's wall clock, ns since the Unix epoch: the stamp of what is published.
-        clock: Number of the clock that says so. Times of two numbers cannot be compared.
+        monotonic_s: Time on the gateway's monotonic clock, for ages.
+        wall_ns: Time on the gateway's wall clock, ns since the Unix epoch, for publications.
+        clock: Number of the clock. Times of different numbers cannot be compared.
     """
 
     monotonic_s: float
@@ -64,7 +64,7 @@ class Received:
 
 
 class Timestamper:
-    """Time stamps of one link's events."""
+    """Source of time stamps for one link's events."""
 
     def __init__(self) -> None:
         self._clock = 0
@@ -73,30 +73,30 @@ class Timestamper:
         self._line = _Line()
         self._rate = _Rate()
         self._newest_ns: int | None = None
-        # Whether a moment without a new TIME has followed the newest TIME.
+        # A moment without a new TIME has followed the newest TIME.
         self._behind = True
 
     def after_gap(self, now_s: float) -> bool:
-        """Return whether what comes may have been held back, and the newest of it is still to come."""
+        """Return whether units may be delayed ones after a gap, with newer ones still to come."""
         return now_s - self._gap_end_s < _LONGEST_HOLD_S
 
     def connected(self) -> None:
-        """Forget the controller's clock: another connection may be another controller's."""
+        """Discard the controller's clock, because a new connection may reach another controller."""
         self._arrived_s, self._gap_end_s = float("inf"), float("-inf")
         self._rate = _Rate()
         if self._line.time_ns is not None:
             self._begin_clock()
 
     def wall_clock_was_set(self) -> None:
-        """Begin another clock: the gateway's own was set."""
+        """Begin a new clock number, because the gateway's wall clock was set."""
         self._clock += 1
 
     def timestamps(self, events: Sequence[ControllerEvent], now: Received) -> list[Received]:
-        """Return when each event of a read was new: now, or earlier.
+        """Return the time stamp of each event of a read: now, or earlier.
 
         Args:
-            events: In the order in which they came.
-            now: When their bytes were read.
+            events: Events in the order of receipt.
+            now: Time at which their bytes were read.
         """
         if not events:
             return []
@@ -120,7 +120,7 @@ class Timestamper:
         self._newest_ns = None
 
     def _stamps(self, times_ns: Sequence[int | None], now_ns: int) -> list[tuple[int, int]]:
-        """Return stamps on the monotonic clock [ns] and their clocks' numbers, of moments of one read."""
+        """Return stamps on the monotonic clock [ns] and clock numbers of the moments of one read."""
         stamps: list[tuple[int, int]] = []
         begin = 0
         while begin < len(times_ns):
@@ -157,9 +157,9 @@ class Timestamper:
     def _wanted(
         self, times_ns: Sequence[int | None], before_ns: int | None, twice_ns: int
     ) -> Iterator[int | None]:
-        """Yield the stamp of each moment by its controller's clock; None: the clock says nothing of it.
+        """Yield the stamp of each moment by its controller's clock; None: without TIME.
 
-        A moment without a new TIME, behind one that has a new TIME, was at nearly the same time.
+        A moment without a new TIME, after one with a new TIME, gets nearly the same stamp.
         """
         stamp_ns, old_ns = self._newest_ns, before_ns
         for time_ns in times_ns:
@@ -173,13 +173,13 @@ class Timestamper:
                 yield stamp_ns
 
     def _period_since(self, moments: int, now_ns: int) -> int:
-        """Return the period of moments that came since the newest stamp [ns], before a rate is measured."""
+        """Return the period of moments since the newest stamp [ns], before a rate is measured."""
         if self._newest_ns is None or now_ns - self._newest_ns > _S:
             return _UNKNOWN_PERIOD_NS
         return (now_ns - self._newest_ns) // moments
 
     def _in_order(self, stamps: list[int], now_ns: int) -> list[int]:
-        """Return stamps that strictly increase, after the newest so far and not after their receipt."""
+        """Return stamps that strictly increase, after the newest one and not after their receipt."""
         before_ns = self._newest_ns
         whole = stamps if before_ns is None else [before_ns, *stamps]
         if any(later <= earlier for earlier, later in pairwise(whole)) or stamps[-1] > now_ns:
@@ -191,7 +191,7 @@ class Timestamper:
 
 
 class _Line:
-    """The line between a controller's clock and the gateway's monotonic one.
+    """Linear relation between a controller's clock and the gateway's monotonic clock.
 
     Attributes:
         time_ns: The newest TIME; None: none yet.
@@ -199,10 +199,10 @@ class _Line:
 
     def __init__(self) -> None:
         self.time_ns: int | None = None
-        # The line goes through this TIME at this monotonic time.
+        # The line passes through this TIME at this monotonic time.
         self._time_ns = self._at_ns = 0
         self._late_since_ns: int | None = None
-        # The least that reads were late, in this window and in the one before.
+        # Least delay of the reads in this window and in the one before.
         self._least_ns = self._least_before_ns = 0
         self._window_ends_ns = 0
         self._behind_ns = 0
@@ -241,7 +241,7 @@ class _Line:
         self._window_ends_ns = now_ns + _WINDOW_NS
 
     def _follow(self, late_ns: int, since_ns: int, now_ns: int) -> None:
-        """Move the line towards the quickest of the last windows, so slowly that TIME's spacing stays."""
+        """Move the line towards the fastest unit of the last windows, slowly, to keep TIME's spacing."""
         self._least_ns = min(self._least_ns, late_ns)
         if now_ns >= self._window_ends_ns:
             least_ns = min(self._least_ns, self._least_before_ns)
@@ -256,7 +256,7 @@ class _Line:
 
 
 class _Rate:
-    """The rate at which a controller sends, over a second or so."""
+    """Measurement of a controller's send rate, over about a second."""
 
     def __init__(self) -> None:
         self._begin_ns: int | None = None
@@ -264,7 +264,7 @@ class _Rate:
         self._period_ns = 0
 
     def period_ns(self, moments: int, now_ns: int) -> int:
-        """Take moments that came together; return the period [ns], 0: not known yet."""
+        """Add the moments of one read; return the period [ns], 0: unknown."""
         if self._begin_ns is None or now_ns - self._begin_ns > 2 * _S:
             self._begin_ns, self._moments, self._period_ns = now_ns, 0, 0
             return 0
@@ -277,10 +277,10 @@ class _Rate:
 
 
 def _moments(events: Sequence[ControllerEvent]) -> tuple[list[int | None], list[int]]:
-    """Return the TIMEs of a read's moments [ns], None without, and of each event the number of its moment.
+    """Return the TIMEs of a read's moments [ns], None without, and each event's moment number.
 
-    What was said together is a moment. It ends where another TIME is said, or where something that is
-    published with its stamp is said twice.
+    A moment is a group of consecutive events. It ends where TIME changes, or where a type of event that is
+    published with its stamp repeats.
     """
     times_ns: list[int | None] = []
     moment_of: list[int] = []
@@ -313,7 +313,7 @@ def _ns(seconds: float | None) -> int | None:
 
 
 def _end_of_run(times_ns: Sequence[int | None], begin: int, before_ns: int | None) -> int:
-    """Return the end of the moments whose TIME does not go back; `begin` itself, if the first does."""
+    """Return the end of the moments whose TIME does not go back; `begin` itself if the first one does."""
     for number in range(begin, len(times_ns)):
         time_ns = times_ns[number]
         if time_ns is None:

@@ -1,1 +1,1 @@
-"""One TCP client of whoever serves units, a controller or the gateway, and its limits."""
+"""TCP clients of a server of units (a simulated controller or the gateway), and their limits."""

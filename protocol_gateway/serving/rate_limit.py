@@ -1,23 +1,23 @@
-"""What one client may send: a token bucket each for its bytes and its units. No I/O; time is an argument.
+"""Rate limit of one client: a token bucket each for its bytes and its units. No I/O; time is an argument.
 
-bucket not empty --spend--> read on
-bucket empty     --spend--> read no more until it is half full again
-as many such pauses as last for the patience --> the client sends too much
+bucket not empty --spend--> continue reading
+bucket empty     --spend--> pause until it is half full again
+pauses for longer than the patience --> the client is a flood
 """
 
 from dataclasses import dataclass
 
-# A pause that comes so soon after the one before belongs to the same flood.
+# A pause that follows the previous one this soon belongs to the same flood.
 _SAME_FLOOD_S = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """What a client may send.
+    """Rate limits of a client.
 
     Attributes:
-        burst_s: It may be ahead by what it could send in this time.
-        patience_s: It may be over its limits for this long, its reading paused.
+        burst_s: Size of the buckets, as time at the allowed rate.
+        patience_s: A client that exceeds its limits for this long is a flood.
     """
 
     units_per_s: float = 200.0
@@ -27,21 +27,21 @@ class Limits:
 
 
 class Budget:
-    """What one client may send now."""
+    """Token buckets of one client."""
 
     def __init__(self, limits: Limits, now_s: float) -> None:
         self._limits = limits
-        # In seconds of the allowed rate: one bucket is for both kinds what two would be.
+        # Both in seconds at the allowed rate, so that they can be compared.
         self._units_s = self._bytes_s = limits.burst_s
         self._filled_s = now_s
         self._resumed_s = float("-inf")
         self._over_since_s: float | None = None
 
     def spend(self, *, units: int, length: int, now_s: float) -> float:
-        """Pay for what came; for how long nothing more is to be read [s].
+        """Spend tokens for received data; return how long to pause reading [s].
 
         Args:
-            length: In bytes.
+            length: Number of bytes.
         """
         limits, passed_s = self._limits, now_s - self._filled_s
         self._filled_s = now_s
@@ -57,5 +57,5 @@ class Budget:
         return pause_s
 
     def is_flood(self, now_s: float) -> bool:
-        """Whether the client has been over its limits for too long; to be asked when it is paused."""
+        """Return whether the client has exceeded its limits for too long; call it while paused."""
         return self._over_since_s is not None and now_s - self._over_since_s >= self._limits.patience_s

@@ -332,7 +332,7 @@ def settings_with(*robots):
     [
         ([{}, {}], "two robots are named 'arm'"),
         ([{"accept_unknown": frozenset({"limits"})}], "accept_unknown 'limits'"),
-        ([{"stale_after_s": 9.0}], "stale after 9 s"),
+        ([{"stale_after_s": 9.0}], "stale_after_s = 9,"),
     ],
 )
 def test_settings_that_cannot_be_meant_are_refused_in_words(robots, words):

@@ -121,7 +121,7 @@ def test_a_file_of_another_robot_is_damage(path):
     killed(path, (stop(1), 1))
     path.rename(path.with_name("other.latch"))
     latch = LatchFile(path.with_name("other.latch"))
-    assert (latch.found, latch.damage) == (None, "its latch file other.latch is another robot's")
+    assert (latch.found, latch.damage) == (None, "its latch file other.latch belongs to another robot")
 
 
 def test_a_stop_that_comes_while_the_file_is_closed_is_said_to_be_forgotten(path, monkeypatch):
@@ -315,7 +315,7 @@ def test_where_it_cannot_be_allocated_motion_is_refused_with_the_reason_and_stop
             await plant.lease(A.ACQUIRE, ttl_s=5)
             assert await refusal(plant.command(C.HOME)) == (
                 "Not sent: the latch file arm.latch cannot be allocated (No such file or directory: "
-                "see to its disk), so a restart would forget a stop."
+                "check its disk), so a restart would forget a stop."
             )
             await plant.command(C.TRACE_ON)  # moves nothing
             first = await plant.stop(by="wang")
