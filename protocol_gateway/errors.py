@@ -1,7 +1,7 @@
 """Errors of the protocol gateway.
 
 ProtocolGatewayError
-├── UnitError               bytes that are not a unit, or a record whose data do not fit its type
+├── UnitError               bytes that are not a unit, or a record with data that do not fit its type
 ├── UnitFormatError         a value that a unit cannot hold: a separator in an item, or not finite
 ├── CodeTableError          a site file's table of type codes that cannot be used
 ├── CommandError            a command that the controller's protocol cannot express
@@ -31,7 +31,7 @@ class UnitFormatError(ProtocolGatewayError):
 
 
 class CodeTableError(ProtocolGatewayError):
-    """An invalid table of type codes; the text names the entry and what is allowed."""
+    """An invalid table of type codes; the text names the entry and the allowed ones."""
 
 
 class CommandError(ProtocolGatewayError):

@@ -5,11 +5,12 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from protocol_gateway.foreign_text import LONGEST_SENTENCE, one_line
+from protocol_gateway.text_limits import LONGEST_SENTENCE
 from robomesh.messages import reason_message
 from robomesh.publisher import Publisher
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import Event
+from robomesh.texts import one_line
 
 log = logging.getLogger(__name__)
 

@@ -28,7 +28,6 @@ from protocol_gateway.core.codes import code_table
 from protocol_gateway.drivers.driver import Driver
 from protocol_gateway.drivers.registry import DRIVERS
 from protocol_gateway.errors import GatewaySettingsError
-from protocol_gateway.foreign_text import LONGEST, LONGEST_SENTENCE, one_line
 from protocol_gateway.journal import Journal
 from protocol_gateway.legacy.clients import LegacyClients
 from protocol_gateway.link.link import JOINT_COUNT, ControllerLink, LinkSettings, LinkState, LinkStatus
@@ -36,6 +35,7 @@ from protocol_gateway.link.status import transition_events
 from protocol_gateway.settings import RobotSettings
 from protocol_gateway.state_messages import controller_state, lease_state, timestamp
 from protocol_gateway.telemetry import Telemetry
+from protocol_gateway.text_limits import LONGEST_SENTENCE, LONGEST_TEXT
 from robomesh import reason_codes as codes
 from robomesh.errors import KeyNameError, RefusedError
 from robomesh.keys import presence_key
@@ -44,6 +44,7 @@ from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Answerer, Handler, Request
 from robomesh.session import Session
+from robomesh.texts import one_line
 from robomesh.topics import Role, check_operator
 from robots.description import load
 from robots.joints import joints_of
@@ -307,8 +308,10 @@ class Robot:
         """
         name = request.chunk
         try:
-            if len(name) > LONGEST:
-                raise KeyNameError(f"operator {one_line(name, 40)}: a name has at most {LONGEST} characters")
+            if len(name) > LONGEST_TEXT:
+                raise KeyNameError(
+                    f"operator {one_line(name, 40)}: a name has at most {LONGEST_TEXT} characters"
+                )
             return check_operator(name)
         except KeyNameError as error:
             self._record_unreadable(what, name, str(error))

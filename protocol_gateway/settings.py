@@ -79,7 +79,7 @@ def check(settings: Settings) -> None:
     """Validate the settings.
 
     Raises:
-        GatewaySettingsError, KeyNameError: If a setting is invalid; the text names it and what is allowed.
+        GatewaySettingsError, KeyNameError: If a setting is invalid; the text names it and the allowed values.
     """
     check_name(settings.site, "site")
     names: set[str] = set()

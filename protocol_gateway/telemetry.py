@@ -41,9 +41,9 @@ class _LossNotice:
         self._reported_lost = False
         self._back_s: float | None = None
 
-    def update(self, now_s: float, *, gone: bool) -> bool | None:
+    def update(self, now_s: float, *, lost: bool) -> bool | None:
         """Return True to report the loss, False to report the return, None to report nothing."""
-        if gone:
+        if lost:
             self._back_s = None
             news = None if self._reported_lost else True
         else:
@@ -96,7 +96,7 @@ class Telemetry:
         self._activity_since_s = 0.0
         self._positions: tuple[tuple[float, ...], float] | None = None  # with their time
         self._fault = ""
-        self._gone = (False, False)
+        self._lost = (False, False)
         self._joints_notice, self._status_notice = _LossNotice(), _LossNotice()
         self.controller_time_s: float | None = None
         self.motion_detector.forget()
@@ -131,26 +131,26 @@ class Telemetry:
 
     def check_timeouts(self, now_s: float) -> None:
         """Report positions or status that expired or returned; call it repeatedly while the link is up."""
-        before, self._gone = (
-            self._gone,
+        before, self._lost = (
+            self._lost,
             (bool(self.positions_stale(now_s)), self._status_watchdog.expired(now_s)),
         )
-        positions, status = self._gone
+        positions, status = self._lost
         if positions and not before[0]:
             self.motion_detector.forget()
-        news = self._joints_notice.update(now_s, gone=positions)
+        news = self._joints_notice.update(now_s, lost=positions)
         if news is True:
             text = f"{self.positions_stale(now_s)}: the robot's position is unknown, motion is refused"
             self._journal.report(_S.WARNING, "joints.gone", text)
         elif news is False:
             self._journal.report(_S.INFO, "joints.back", "joint positions are received again")
-        news = self._status_notice.update(now_s, gone=status)
+        news = self._status_notice.update(now_s, lost=status)
         if news is True:
             text = f"the controller has sent no status for {STALE_S:g} s: its status is unknown now"
             self._journal.report(_S.WARNING, "status.gone", text)
         elif news is False:
             self._journal.report(_S.INFO, "status.back", "the controller sends its status again")
-        if self._gone != before:
+        if self._lost != before:
             self._on_status()
 
     def on_event(self, event: ControllerEvent, received: Received) -> None:
@@ -161,8 +161,8 @@ class Telemetry:
             case StatusReceived():
                 if event.controller_time_s is not None:
                     self.controller_time_s = event.controller_time_s
-                if any(each is not None for each in _told(event)):  # not the time alone
-                    self._status_watchdog.reset(_told(event), received.monotonic_s)
+                if any(each is not None for each in event.values):  # not the time alone
+                    self._status_watchdog.reset(event.values, received.monotonic_s)
                     self._on_controller_status(event, received.monotonic_s)
             case UnknownReceived():
                 record = raw_record(event, received.wall_ns)
@@ -180,7 +180,7 @@ class Telemetry:
                 self._on_refused(number, text)
 
     def _on_controller_status(self, status: StatusReceived, now_s: float) -> None:
-        changed = _told(status) != _told(self._status)
+        changed = status.values != self._status.values
         if status.activity is not self._status.activity:
             self._activity_since_s = now_s
         before, self._status = self._status, status
@@ -225,7 +225,3 @@ class Telemetry:
             f"the controller refused a unit: {text or 'no reason given'} (error {number})",
             number=number,
         )
-
-
-def _told(status: StatusReceived) -> tuple[object, ...]:
-    return status.activity, status.mode, status.homed, status.trace

@@ -13,8 +13,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from protocol_gateway.audit.entry import Entry, Outcome
-from protocol_gateway.foreign_text import LONGEST_SENTENCE, one_line
+from protocol_gateway.text_limits import LONGEST_SENTENCE
 from robomesh import reason_codes as codes
+from robomesh.texts import one_line
 
 IN_FULL = 5
 WINDOW_S = 1.0

@@ -25,9 +25,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from protocol_gateway.authority.lease_rules import Stop
-from protocol_gateway.foreign_text import one_line
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
+from robomesh.texts import one_line
 
 SLOT_BYTES = 4096
 SLOTS = 2

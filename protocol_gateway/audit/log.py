@@ -103,7 +103,7 @@ class AuditLog:
             recovery = find_end(path)
             self._end, self.damage = recovery.end, recovery.problem
             if recovery.stop_may_be_lost:
-                # Keep the damaged file as it is; the first write rotates to a new file.
+                # Keep the damaged file unchanged; the first write rotates to a new file.
                 self._torn, self._rotate_at = True, 1
             else:
                 os.ftruncate(self._file, self._end.length)
@@ -344,7 +344,7 @@ def _open_locked(path: Path) -> int:
             raise AuditError(f"audit log {path} is open in another gateway: stop that one first") from None
         if os.path.samestat(os.fstat(file), path.stat()):
             return file
-        os.close(file)  # rotated meanwhile: it is an older part now
+        os.close(file)  # it was rotated in the meantime
 
 
 def _finish_rotation(path: Path) -> None:

@@ -1,4 +1,4 @@
-"""State that a gateway preserves across a restart: the latched stop, and whose motion may still run.
+"""State that a gateway preserves across a restart: the latched stop, and the operator of a running motion.
 
 It is in the audit log. The latch and the newest stop's number are also in the latch file (`latch`), which can
 be written on a full disk; if that has a newer stop, it wins. A log's live file begins with a ROTATE entry,
@@ -28,8 +28,8 @@ class PersistedState:
     """State after the entries of a log.
 
     Attributes:
-        cleared: A stop whose RESET is in the log, but may not have been sent.
-        mover: Operator who commanded motion under a lease whose end is not in the log, because the gateway
+        cleared: A stop with a RESET in the log that may not have been sent.
+        mover: Operator who commanded motion under a lease that has no end in the log, because the gateway
             was killed.
     """
 
@@ -99,7 +99,7 @@ class MergedState(NamedTuple):
 
     Attributes:
         unwritten: A stop only in the latch file, because the gateway was killed before it wrote the entry.
-        unsent: A stop whose RESET is in the log but may not have been sent, because the gateway was killed
+        unsent: A stop with a RESET in the log that may not have been sent, because the gateway was killed
             before it wrote the outcome. The stop stays latched.
     """
 

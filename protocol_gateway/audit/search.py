@@ -12,11 +12,11 @@ from pathlib import Path
 from protocol_gateway.audit.entry import Entry, Outcome, audit_entry, parse_line
 from protocol_gateway.audit.files import lines_of, open_files
 from protocol_gateway.errors import AuditError
-from protocol_gateway.foreign_text import one_line
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.server import Request
+from robomesh.texts import one_line
 
 MOST = 10_000
 DEFAULT_MOST = 1000

@@ -31,16 +31,16 @@ import hmac
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
-from protocol_gateway.foreign_text import one_line
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
+from robomesh.texts import one_line
 
 DEFAULT_TTL_S = 2.0
 SHORTEST_TTL_S = 0.5
 LONGEST_TTL_S = 5.0
 
-# A lease tolerates motion without a command if the robot already moved by itself this recently.
+# A lease tolerates uncommanded motion if the robot already moved without a command this recently.
 RECENT_S = 10.0
 # A request for control is shown for this long.
 ASKED_FOR_S = 30.0
@@ -154,10 +154,10 @@ class Lease:
 
     Attributes:
         until_s: Expiry, monotonic; `until_ns` is the same time on the wall clock.
-        session: Session of the holder's program or page, whose end ends the lease. Empty: not given.
+        session: Session of the holder's program or page; the lease ends with it. Empty: not given.
         last_id: Highest command id so far, with its content in `last_content` and answer in `last_answer`.
         commanded: Motion was commanded under the lease.
-        tolerates_motion: The robot moved by itself when the lease began, so motion does not end the lease.
+        tolerates_motion: The robot moved without a command when the lease began, so that does not end it.
     """
 
     holder: str
@@ -228,7 +228,7 @@ class Authority:
     stopping_s: float | None = None
     moving: bool | None = None
     # Time at which motion without a command was last observed (monotonic).
-    foreign_s: float | None = None
+    uncommanded_s: float | None = None
 
 
 class LeaseOutcome(NamedTuple):
@@ -256,7 +256,7 @@ def request_lease(
     match request.action:
         case action.ACQUIRE if lease is None:
             return _grant(
-                authority, request, operator=operator, now=now, secret=secret, said=codes.LEASE_TAKEN()
+                authority, request, operator=operator, now=now, secret=secret, answer=codes.LEASE_TAKEN()
             )
         case action.ACQUIRE | action.RENEW if mine and lease is not None:
             renewed = replace(
@@ -275,23 +275,23 @@ def request_lease(
             return LeaseOutcome(free, done(codes.LEASE_RELEASED()), ended=ended)
         case action.OFFER if mine and lease is not None:
             offered = replace(lease, offered_to="" if request.to == operator else request.to)
-            said = (
+            answer = (
                 codes.LEASE_OFFERED(name=offered.offered_to)
                 if offered.offered_to
                 else codes.LEASE_OFFER_WITHDRAWN()
             )
-            return LeaseOutcome(replace(authority, lease=offered), done(said), offered)
+            return LeaseOutcome(replace(authority, lease=offered), done(answer), offered)
         case action.ACCEPT if lease is not None and lease.offered_to == operator:
             if _may_run(lease.motion):
                 return LeaseOutcome(authority, refused(codes.LEASE_MOVING(holder=lease.holder)))
             free, ended = end_lease(authority, codes.ENDED_HANDED_OVER(name=operator))
-            said = codes.LEASE_TAKEN_FROM(name=lease.holder)
-            granted = _grant(free, request, operator=operator, now=now, secret=secret, said=said)
+            answer = codes.LEASE_TAKEN_FROM(name=lease.holder)
+            granted = _grant(free, request, operator=operator, now=now, secret=secret, answer=answer)
             return granted._replace(ended=ended)
         case action.TAKE if lease is None or mine or reason:
             free, ended = end_lease(authority, codes.ENDED_TAKEN(name=operator, reason=reason))
-            said = codes.LEASE_TAKEN()
-            granted = _grant(free, request, operator=operator, now=now, secret=secret, said=said)
+            answer = codes.LEASE_TAKEN()
+            granted = _grant(free, request, operator=operator, now=now, secret=secret, answer=answer)
             return granted._replace(ended=ended)
         case action.ASK if lease is not None and lease.holder != operator:
             return LeaseOutcome(
@@ -339,17 +339,17 @@ def end_session(authority: Authority, session: str) -> tuple[Authority, LeaseEnd
 
 
 def end_lease(
-    authority: Authority, why: Reason, *, foreign: bool = False
+    authority: Authority, why: Reason, *, uncommanded: bool = False
 ) -> tuple[Authority, LeaseEnd | None]:
     """End the lease, if there is one; return its end, which says whether to stop the robot.
 
     Args:
-        foreign: The lease ends because of motion without a command.
+        uncommanded: The lease ends because of motion without a command.
     """
     lease = authority.lease
     if lease is None:
         return authority, None
-    stop = _may_run(lease.motion) or (foreign and lease.commanded)
+    stop = _may_run(lease.motion) or (uncommanded and lease.commanded)
     ended = LeaseEnd(holder=lease.holder, why=why, renewals=lease.renewals, stop=stop)
     return replace(authority, lease=None, ended=why), ended
 
@@ -359,7 +359,7 @@ def _may_run(motion: Motion | None) -> bool:
 
 
 def _grant(
-    authority: Authority, request: LeaseRequest, *, operator: str, now: Now, secret: str, said: Reason
+    authority: Authority, request: LeaseRequest, *, operator: str, now: Now, secret: str, answer: Reason
 ) -> LeaseOutcome:
     lease = Lease(
         holder=operator,
@@ -374,7 +374,7 @@ def _grant(
     lease = _with_expiry(lease, request.ttl_s, now)
     # The new holder no longer requests control; the others still do.
     asked_by = tuple(each for each in _current_askers(authority, now) if each.operator != operator)
-    return LeaseOutcome(replace(authority, lease=lease, asked_by=asked_by), done(said), lease)
+    return LeaseOutcome(replace(authority, lease=lease, asked_by=asked_by), done(answer), lease)
 
 
 def _add_asker(authority: Authority, operator: str, reason: str, now: Now) -> Authority:
@@ -443,4 +443,4 @@ def stop_sent(authority: Authority, stop_id: int, sent_s: float, *, first: bool 
 
 def moved_recently(authority: Authority, now: Now) -> bool:
     """Return whether the robot recently moved without a command of the gateway."""
-    return authority.foreign_s is not None and now.monotonic_s - authority.foreign_s < RECENT_S
+    return authority.uncommanded_s is not None and now.monotonic_s - authority.uncommanded_s < RECENT_S

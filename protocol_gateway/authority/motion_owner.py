@@ -1,11 +1,11 @@
-"""Tracking of the holder's motion, and detection of foreign motion. No I/O; time is an argument.
+"""Tracking of the holder's motion, and detection of uncommanded motion. No I/O; time is an argument.
 
     motion of the holder   robot moves   rests 0.5 s   at its target   refused   30 s without motion
     --------------------   -----------   -----------   -------------   -------   -------------------
     commanded, not seen    seen          -             over after 2 s  over      over
     seen                   seen          over          -               -         -
 
-A motion command begins the motion; a stop or the lease's end drops it. Other motion is foreign.
+A motion command begins the motion; a stop or the lease's end drops it. Other motion is uncommanded.
 
 A seen motion has demonstrably ended when two consecutive controller units report idle, with positions at
 its target. The end of a lease then needs no stop. The half second above still decides whether new motion
@@ -19,7 +19,7 @@ from robomesh.schemas.robomesh_pb2 import CommandRequest
 
 # Servos and brakes need time: even a robot that is already at its target may begin to move for this long.
 START_S = 2.0
-# A controller may start late: until then, motion counts as the commanded one, not as foreign.
+# A controller may start late: until then, motion counts as the commanded one, not as uncommanded.
 LATEST_START_S = 30.0
 # A refusal within this time may answer a unit; a later one does not.
 ANSWERED_WITHIN_S = 2.0
@@ -42,7 +42,7 @@ def command_sent(
     arrived: bool = False,
     isolated: bool = True,
 ) -> Authority:
-    """Record a command whose unit is on the controller's socket.
+    """Record a command after its unit was put on the controller's socket.
 
     Args:
         waypoints: Path of a motion command [rad] or [m]; empty: unknown.
@@ -62,7 +62,7 @@ def command_sent(
         elif motion is not None and not arrived:
             # A controller may queue motions: earlier targets are still on its path.
             waypoints = _appended(motion.waypoints, waypoints)
-        # After the first commanded motion, foreign motion is no longer tolerated.
+        # After the first commanded motion, uncommanded motion is no longer tolerated.
         lease = replace(lease, commanded=True, tolerates_motion=False)
         motion = Motion(last_s=now.monotonic_s, waypoints=waypoints, isolated=isolated, conclusive=conclusive)
     elif motion is not None:
@@ -145,11 +145,11 @@ def observe(
         else:
             motion = replace(lease.motion, last_s=now.monotonic_s, seen=True, rests=0)
         return replace(authority, lease=replace(lease, motion=motion)), False
-    foreign_s = authority.foreign_s
-    goes_on = foreign_s is not None and now.monotonic_s - foreign_s < SETTLE_S
-    # Motion of a robot that is still slowing down after a stop is not foreign.
+    uncommanded_s = authority.uncommanded_s
+    goes_on = uncommanded_s is not None and now.monotonic_s - uncommanded_s < SETTLE_S
+    # Motion of a robot that is still slowing down after a stop is not uncommanded.
     if moving and (began or goes_on):
-        authority = replace(authority, foreign_s=now.monotonic_s)
+        authority = replace(authority, uncommanded_s=now.monotonic_s)
     return authority, began
 
 

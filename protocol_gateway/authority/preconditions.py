@@ -104,7 +104,7 @@ def _state_obstacle(request: CommandRequest, controller: Controller) -> Reason |
         return codes.CONTROLLER_HOLDING()
     if controller.positions_stale is not None:
         return codes.POSITIONS_UNKNOWN(controller.positions_stale)
-    # Many arms have no positions before they are homed. An arm whose positions became stale is not moved.
+    # Many arms have no positions before they are homed. An arm with stale positions is not moved.
     if controller.positions is None and request.command != _C.HOME:
         return codes.POSITIONS_NONE()
     if request.command == _C.RESUME and status.activity is Activity.IDLE:

@@ -22,7 +22,7 @@ class Occupancy:
 
 
 class CellOccupancy:
-    """Occupancy of one cell, whose robots can collide.
+    """Occupancy of one cell by its robots.
 
     Attributes:
         motion_lock: Held from a motion's check until its unit is on the controller's socket. One motion at a

@@ -99,7 +99,7 @@ class Checker:
         return process
 
     async def _prepare(self) -> None:
-        """Prepare the robots that are not ready; ask again for one whose links are still being processed."""
+        """Prepare the robots that are not ready; ask again while links are being processed."""
         for robot in self._pending:
             text = await self._prepare_robot(robot)
             if text != PENDING:
@@ -178,7 +178,7 @@ def _error_text(error: Exception) -> str:
 
 
 def _log_late_failure(asked: asyncio.Future[Checked]) -> None:
-    """Log the failure of a query whose caller has timed out."""
+    """Log the failure of a query after its caller's timeout."""
     if not asked.cancelled() and (error := asked.exception()) is not None:
         log.warning("a check failed after its timeout: %s", error)
 

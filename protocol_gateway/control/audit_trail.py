@@ -11,11 +11,12 @@ from protocol_gateway.audit.log import AuditLog, Entry, Outcome
 from protocol_gateway.authority.admission import LONGEST_WAIT_S
 from protocol_gateway.authority.lease_rules import Answer
 from protocol_gateway.errors import AuditError
-from protocol_gateway.foreign_text import LONGEST_SENTENCE, one_line
 from protocol_gateway.journal import Journal
+from protocol_gateway.text_limits import LONGEST_SENTENCE
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest, Event, LeaseRequest
+from robomesh.texts import one_line
 
 
 class AuditTrail:

@@ -101,7 +101,7 @@ class Checks:
     def motion_lock(self, requests: Sequence[CommandRequest]) -> AbstractAsyncContextManager[None]:
         """Return the cell's motion lock for commands that move the robot, otherwise a null context."""
         moves = any(each.command in MOTION_COMMANDS for each in requests)
-        # A robot whose own motions are not checked is an obstacle for the other robots of its cell.
+        # A robot without checks of its motions is still an obstacle for the other robots of its cell.
         meets = self.policy is not Policy.OFF or len(self._cell) > 1
         return self._cell_occupancy.motion_lock if moves and meets else contextlib.nullcontext()
 
@@ -195,7 +195,7 @@ class Checks:
                 motion.target, controller.positions, self._joints.types
             )
             if _moves(controller, authority.moving) or (motion and not motion.held and not arrived):
-                # A controller's own motion, such as a demonstration, ends when a command arrives.
+                # A controller's own motion, for example a demonstration, ends when a command arrives.
                 required = self.policy is Policy.REQUIRE
                 raise CheckError((codes.ROBOT_MOVES_STOP if required else codes.ROBOT_MOVES_HOME)())
         return controller.positions
@@ -251,7 +251,7 @@ class Checks:
         *,
         program: bool = False,
     ) -> Finding:
-        said = checked.warnings if left_out is None else (*checked.warnings, left_out)
+        warnings = checked.warnings if left_out is None else (*checked.warnings, left_out)
         if self.policy is Policy.REQUIRE:
             if checked.uncovered:
                 return self._not_checked(*_first_few(checked.uncovered))
@@ -259,9 +259,9 @@ class Checks:
                 return Finding(refusal=_refused("Not run", _first_few(checked.refusals)))
             if checked.refusals:
                 return Finding(refusal=not_sent(codes.CHECK_ON_ITS_WAY(*_first_few(checked.refusals))))
-            return Finding(warning=_combined(said), start=start, others=others)
+            return Finding(warning=_combined(warnings), start=start, others=others)
         code = _FAILED if checked.refusals else _SKIPPED if left_out or checked.uncovered else _CLOSE
-        return Finding(warning=_combined((*checked.refusals, *checked.uncovered, *said)), code=code)
+        return Finding(warning=_combined((*checked.refusals, *checked.uncovered, *warnings)), code=code)
 
 
 def _moves(controller: Controller, moving: bool | None) -> bool:

@@ -400,7 +400,7 @@ class Control:
         now = read_clocks()
         self._stop_orphan(moving)
         before = self.authority
-        self._context.authority, foreign = motion_owner.observe(
+        self._context.authority, uncommanded = motion_owner.observe(
             before,
             moving=moving,
             pending=motion_may_be_held(self._context.controller().status.activity),
@@ -408,14 +408,14 @@ class Control:
             now=now,
         )
         lease = self.authority.lease
-        if foreign and not lease_rules.moved_recently(before, now):
+        if uncommanded and not lease_rules.moved_recently(before, now):
             self._journal.report(
                 _S.INFO if lease is None else _S.WARNING,
                 "motion.foreign",
                 "the robot began to move without a command of the gateway",
             )
-        if foreign and lease is not None and not lease.tolerates_motion:
-            self.leases.end(codes.ENDED_FOREIGN_MOTION(), foreign=True)
+        if uncommanded and lease is not None and not lease.tolerates_motion:
+            self.leases.end(codes.ENDED_FOREIGN_MOTION(), uncommanded=True)
         if (before.lease and before.lease.motion is None) != (lease and lease.motion is None):
             self._context.on_change()
         self._stop_handler.check_heeded(moving=moving, now=now)

@@ -101,9 +101,13 @@ class Leases:
         if ended is not None:
             self._end(authority, ended, "REVOKE")
 
-    def end(self, why: Reason, *, foreign: bool = False) -> None:
-        """End the lease, if there is one, for the gateway's reason; `foreign`: because of foreign motion."""
-        authority, ended = lease_rules.end_lease(self._context.authority, why, foreign=foreign)
+    def end(self, why: Reason, *, uncommanded: bool = False) -> None:
+        """End the lease, if there is one, for a reason of the gateway.
+
+        Args:
+            uncommanded: The lease ends because of uncommanded motion.
+        """
+        authority, ended = lease_rules.end_lease(self._context.authority, why, uncommanded=uncommanded)
         if ended is not None:
             self._end(authority, ended, "REVOKE")
 

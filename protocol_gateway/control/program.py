@@ -26,12 +26,13 @@ from protocol_gateway.control.control import PROGRAM, Control, command_answer, r
 from protocol_gateway.control.stop_handler import ControlContext, RunningProgram
 from protocol_gateway.drivers.driver import Activity
 from protocol_gateway.errors import CheckError
-from protocol_gateway.foreign_text import LONGEST, one_line
 from protocol_gateway.state_messages import timestamp
+from protocol_gateway.text_limits import LONGEST_TEXT
 from robomesh import reason_codes as codes
 from robomesh.messages import reason_message
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.texts import one_line
 from robots.programs.steps import Step, StepKind
 from robots.programs.text import MOST_BYTES
 
@@ -116,7 +117,7 @@ class Programs:
         self, request: schema.CommandRequest, cancelled: asyncio.Future[Reason], *, operator: str, source: str
     ) -> schema.CommandAnswer:
         verdict = self._control.admit([request], operator)
-        name = one_line(request.program_name, LONGEST).strip() or "unnamed"
+        name = one_line(request.program_name, LONGEST_TEXT).strip() or "unnamed"
         # A refusal here is final, even if its reason disappears, because the program was not planned.
         prepared = _Prepared(None if verdict.answer.accepted else verdict.answer)
         if verdict.answer.accepted and not verdict.repeat:
@@ -208,9 +209,9 @@ class Programs:
             await asyncio.gather(self._task, return_exceptions=True)
 
     async def _run(self, run: _Run) -> None:
-        said = f"{run.operator} runs program {run.name}"
+        text = f"{run.operator} runs program {run.name}"
         self._context.journal.report(
-            _S.INFO, "program.started", said, operator=run.operator, program=run.name
+            _S.INFO, "program.started", text, operator=run.operator, program=run.name
         )
         problem: Reason | None = codes.PROGRAM_FAILED()
         try:
@@ -227,7 +228,7 @@ class Programs:
         """Execute a program's steps; return the reason of an abort."""
         for number, step in enumerate(run.checked.steps):
             self.state.step, self.state.line = number + 1, step.line
-            self.state.statement = one_line(run.lines[step.line - 1].partition("#")[0].strip(), LONGEST)
+            self.state.statement = one_line(run.lines[step.line - 1].partition("#")[0].strip(), LONGEST_TEXT)
             self._context.on_change()
             problem = await self._step(run, step)
             if problem is not None:
@@ -302,21 +303,21 @@ class Programs:
     def _end(self, run: _Run, problem: Reason | None) -> None:
         self._context.program = None
         if problem is None:
-            self.state.outcome, said = _STATE.DONE, codes.PROGRAM_DONE(program=run.name)
+            self.state.outcome, outcome = _STATE.DONE, codes.PROGRAM_DONE(program=run.name)
         else:
             self.state.outcome, self.state.text = _STATE.ENDED, problem.text
             self.state.reason.CopyFrom(reason_message(problem))
-            said = codes.PROGRAM_ENDED(problem, program=run.name, line=self.state.line)
+            outcome = codes.PROGRAM_ENDED(problem, program=run.name, line=self.state.line)
         severity = _S.INFO if problem is None else _S.WARNING
-        self._context.journal.report(severity, said.code, said.text, why=said, program=run.name)
+        self._context.journal.report(severity, outcome.code, outcome.text, why=outcome, program=run.name)
         self._context.audit_trail.write_later(
             entry_of(
                 "PROGRAM_END",
                 operator=run.operator,
                 source=PROGRAM,
                 outcome=Outcome.ACCEPTED if problem is None else Outcome.FAILED,
-                text=said.text,
-                why=said,
+                text=outcome.text,
+                why=outcome,
             )
         )
         self._context.on_change()

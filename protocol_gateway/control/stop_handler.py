@@ -78,7 +78,7 @@ class ControlContext:
         program: Program that runs under the lease; None: none runs.
         preparing: A future of each program that is being checked or audited; its result is the reason to
             cancel the program.
-        orphan: Operator whose motion may still run from before the gateway was killed; empty: none.
+        orphan: Operator of a motion that may still run from before the gateway was killed; empty: none.
     """
 
     authority: Authority
@@ -120,8 +120,10 @@ class StopHandler:
             return self._stop_of_read_only(by=by, reason=reason, source=source)
         sent_s = self._in_transit_since(now)
         if sent_s is not None and self._last_stop is not None and self._last_stop[:2] == (by, source):
-            _, _, said, answer = self._last_stop
-            self._record("STOP", said, answer.stop_id, sent=answer.sent, by=by, source=source, reason=reason)
+            _, _, result, answer = self._last_stop
+            self._record(
+                "STOP", result, answer.stop_id, sent=answer.sent, by=by, source=source, reason=reason
+            )
             return answer
         problem = self._send() if sent_s is None else None
         number = context.latch.next_number(context.authority.last_stop_id, now.wall_ns)
@@ -134,24 +136,24 @@ class StopHandler:
             context.authority = lease_rules.stop_sent(
                 context.authority, latched.id, sent_s or now.monotonic_s
             )
-            said = codes.STOP_SENT(id=latched.id)
+            result = codes.STOP_SENT(id=latched.id)
         else:
-            said = codes.STOP_NOT_SENT(problem, id=latched.id)
+            result = codes.STOP_NOT_SENT(problem, id=latched.id)
         context.on_change()
         context.journal.report(
             _S.ERROR if problem else _S.WARNING,
             "stop.latched",
-            f"{said} ({by}: {latched.reason})",
-            why=said,
+            f"{result} ({by}: {latched.reason})",
+            why=result,
             stop_id=latched.id,
             by=by,
             reason=latched.reason,
             sent=not problem,
         )
-        answer = _answer(said, latched.id, sent=problem is None)
-        self._last_stop = None if problem else (by, source, said, answer)
+        answer = _answer(result, latched.id, sent=problem is None)
+        self._last_stop = None if problem else (by, source, result, answer)
         self._record(
-            "STOP", said, latched.id, sent=problem is None, by=by, source=source, reason=latched.reason
+            "STOP", result, latched.id, sent=problem is None, by=by, source=source, reason=latched.reason
         )
         return answer
 
@@ -163,10 +165,10 @@ class StopHandler:
         context = self._context
         why = context.controller().read_only
         assert why is not None
-        said = codes.STOP_READ_ONLY(why)
-        context.journal.report(_S.ERROR, "stop.not_sent", f"{said} ({by}: {reason})", why=said, by=by)
-        answer = _answer(said, 0, sent=False)
-        self._record("STOP", said, 0, sent=False, by=by, source=source, reason=reason)
+        result = codes.STOP_READ_ONLY(why)
+        context.journal.report(_S.ERROR, "stop.not_sent", f"{result} ({by}: {reason})", why=result, by=by)
+        answer = _answer(result, 0, sent=False)
+        self._record("STOP", result, 0, sent=False, by=by, source=source, reason=reason)
         return answer
 
     def send_latched_stop(self) -> None:
@@ -180,9 +182,9 @@ class StopHandler:
                 context.authority, latched.id, read_clocks().monotonic_s, first=True
             )
             context.on_change()
-            said = codes.STOP_SENT_AGAIN(id=latched.id)
-            context.journal.report(_S.WARNING, "stop.sent", said.text, why=said, stop_id=latched.id)
-            self._record_repeat(said, latched.id, sent=True)
+            result = codes.STOP_SENT_AGAIN(id=latched.id)
+            context.journal.report(_S.WARNING, "stop.sent", result.text, why=result, stop_id=latched.id)
+            self._record_repeat(result, latched.id, sent=True)
 
     def check_heeded(self, *, moving: bool, now: Now) -> None:
         """Report a robot that still moves after its stop, and send the stop again."""
@@ -194,16 +196,24 @@ class StopHandler:
             return
         self._disobeyed_reported_s = now.monotonic_s
         problem = self._send()
-        said = codes.STOP_DISOBEYED(problem or codes.STOP_UNIT_REPEATED(), id=latched.id)
-        context.journal.report(_S.CRITICAL, "stop.disobeyed", said.text, why=said, stop_id=latched.id)
-        self._record_repeat(said, latched.id, sent=problem is None)
+        result = codes.STOP_DISOBEYED(problem or codes.STOP_UNIT_REPEATED(), id=latched.id)
+        context.journal.report(_S.CRITICAL, "stop.disobeyed", result.text, why=result, stop_id=latched.id)
+        self._record_repeat(result, latched.id, sent=problem is None)
 
-    def _record_repeat(self, said: Reason, stop_id: int, *, sent: bool) -> None:
+    def _record_repeat(self, result: Reason, stop_id: int, *, sent: bool) -> None:
         # A different request name, because a restart must not read it as a new stop.
-        self._record("STOP_AGAIN", said, stop_id, sent=sent, by=GATEWAY, source=GATEWAY)
+        self._record("STOP_AGAIN", result, stop_id, sent=sent, by=GATEWAY, source=GATEWAY)
 
     def _record(
-        self, request: str, said: Reason, stop_id: int, *, sent: bool, by: str, source: str, reason: str = ""
+        self,
+        request: str,
+        result: Reason,
+        stop_id: int,
+        *,
+        sent: bool,
+        by: str,
+        source: str,
+        reason: str = "",
     ) -> None:
         self._context.audit_trail.write_later(
             entry_of(
@@ -211,8 +221,8 @@ class StopHandler:
                 operator=by,
                 source=source,
                 outcome=Outcome.ACCEPTED if sent else Outcome.FAILED,
-                text=said.text,
-                why=said,
+                text=result.text,
+                why=result,
                 stop_id=stop_id,
                 reason=reason,
             )
@@ -238,5 +248,5 @@ class StopHandler:
         return None
 
 
-def _answer(said: Reason, stop_id: int, *, sent: bool) -> schema.StopAnswer:
-    return schema.StopAnswer(stop_id=stop_id, sent=sent, text=said.text, reason=reason_message(said))
+def _answer(result: Reason, stop_id: int, *, sent: bool) -> schema.StopAnswer:
+    return schema.StopAnswer(stop_id=stop_id, sent=sent, text=result.text, reason=reason_message(result))

@@ -1,7 +1,7 @@
 """Table of numeric record types.
 
-The paper carries the type "for simplicity, directly as a 32-bit integer", which tells "data or command,
-and which command". So a code means a type, or one command. A site file gives a controller's own table,
+The paper carries the type "for simplicity, directly as a 32-bit integer", for "data or command, and which
+command". So a code means a type, or one command. A site file gives a controller's own table,
 `codes = { 2 = "ABSOLUTE.DEG", 101 = "COMMAND:home" }`. It replaces the default table, because a number
 must not have a meaning that the site file does not give.
 """

@@ -211,7 +211,7 @@ def _read(record: RawRecord, table: CodeTable) -> Record:
 
 
 def _command(word: str, items: Sequence[str]) -> Command:
-    """Return the command that a code means by itself; only a speed has a datum."""
+    """Return the command that a code means; only a speed has a datum."""
     if word == "speed":
         if len(items) != 1:
             raise UnitError(f"{len(items)} items, expected one percentage")

@@ -55,6 +55,11 @@ class StatusReceived:
     trace: bool | None = None
     controller_time_s: float | None = None
 
+    @property
+    def values(self) -> tuple[Activity | Mode | bool | None, ...]:
+        """All values without the time."""
+        return self.activity, self.mode, self.homed, self.trace
+
 
 @dataclass(frozen=True, slots=True)
 class Refused:

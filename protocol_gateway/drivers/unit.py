@@ -47,7 +47,7 @@ from protocol_gateway.drivers.driver import (
     UnknownReceived,
 )
 from protocol_gateway.errors import CommandError, UnitFormatError
-from protocol_gateway.foreign_text import one_line
+from robomesh.texts import one_line
 from robots.joints import JointType
 
 _ACTIVITIES = {activity.value: activity for activity in Activity}

@@ -212,7 +212,7 @@ class LegacyClients:
     # ------------------------------------------------------------------------ internal
 
     def _operator(self, client: Client) -> str:
-        """Return the operator in whose name a client may command; empty: it may not."""
+        """Return the operator name under which a client may command; empty: it may not."""
         host, _ = client.address
         return self._settings.commanders.get(plain_address(host), "")
 

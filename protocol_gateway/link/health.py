@@ -120,11 +120,7 @@ class ResponseTimer:
             self._status = event
         if self._sent_s is None:
             return
-        if isinstance(event, Refused) or (before and self._status and _said(before) != _said(self._status)):
+        if isinstance(event, Refused) or (before and self._status and before.values != self._status.values):
             if now_s - self._sent_s < _ANSWERS_WITHIN_S:
                 self.answer_s = now_s - self._sent_s
             self._sent_s = None
-
-
-def _said(status: StatusReceived) -> tuple[object, ...]:
-    return status.activity, status.mode, status.homed, status.trace

@@ -134,7 +134,7 @@ class Timestamper:
         return stamps
 
     def _run(self, times_ns: Sequence[int | None], now_ns: int) -> list[int]:
-        """Return stamps of moments whose TIME does not go back."""
+        """Return stamps of moments with a TIME that does not go back."""
         before_ns = self._line.time_ns
         new_ns = [each for each in times_ns if each is not None and (before_ns is None or each > before_ns)]
         if new_ns and not self._line.take(new_ns[0], new_ns[-1], now_ns):
@@ -313,7 +313,7 @@ def _ns(seconds: float | None) -> int | None:
 
 
 def _end_of_run(times_ns: Sequence[int | None], begin: int, before_ns: int | None) -> int:
-    """Return the end of the moments whose TIME does not go back; `begin` itself if the first one does."""
+    """Return the end of the moments before TIME goes back; `begin` itself if it does so first."""
     for number in range(begin, len(times_ns)):
         time_ns = times_ns[number]
         if time_ns is None:

@@ -4,8 +4,8 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, StrictBool, field_validator, model_validator
 
-from protocol_gateway.foreign_text import LONGEST
 from protocol_gateway.legacy.settings import LegacySettings, plain_address
+from protocol_gateway.text_limits import LONGEST_TEXT
 from robomesh import keys
 from robomesh.errors import KeyNameError
 from services.errors import ListenError
@@ -36,8 +36,8 @@ class Commander(BaseModel):
     @field_validator("operator")
     @classmethod
     def _operator(cls, operator: str) -> str:
-        if len(operator) > LONGEST:
-            raise ValueError(f"a name has at most {LONGEST} characters")
+        if len(operator) > LONGEST_TEXT:
+            raise ValueError(f"a name has at most {LONGEST_TEXT} characters")
         try:
             return keys.check_chunk(operator) if operator else operator
         except KeyNameError as error:

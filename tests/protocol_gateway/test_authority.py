@@ -123,8 +123,8 @@ def test_however_a_lease_ends_its_holders_motion_is_stopped(end):
 
 
 def test_motion_is_over_when_the_robot_has_been_still_for_half_a_second():
-    state, foreign = see(moving(), True, 0.1)
-    assert not foreign
+    state, uncommanded = see(moving(), True, 0.1)
+    assert not uncommanded
     state, _ = see(state, False, 0.5)
     assert state.lease.motion is not None
     state, _ = see(state, False, 0.6)
@@ -142,17 +142,17 @@ def test_motion_that_has_not_begun_is_the_holders_until_it_is_there_or_long_afte
 
 def test_motion_that_begins_late_is_its_holders_and_is_stopped_with_his_lease():
     state, _ = see(moving(), False, 2.5)
-    state, foreign = see(state, True, 2.6)
-    assert not foreign
+    state, uncommanded = see(state, True, 2.6)
+    assert not uncommanded
     assert expire(state, at(2.7))[1].stop
 
 
 def test_motion_that_begins_after_all_patience_is_stopped_because_it_may_be_the_holders():
     state, _ = see(moving(), False, 31.0)
-    state, foreign = see(state, True, 32.0)
-    assert foreign
-    assert end_lease(state, codes.ENDED_FOREIGN_MOTION(), foreign=True)[1].stop
-    assert not end_lease(held(), codes.ENDED_FOREIGN_MOTION(), foreign=True)[1].stop
+    state, uncommanded = see(state, True, 32.0)
+    assert uncommanded
+    assert end_lease(state, codes.ENDED_FOREIGN_MOTION(), uncommanded=True)[1].stop
+    assert not end_lease(held(), codes.ENDED_FOREIGN_MOTION(), uncommanded=True)[1].stop
 
 
 def test_what_the_controller_refused_does_not_begin():
@@ -183,12 +183,12 @@ def test_a_held_motion_stays_the_holders_until_the_controller_says_that_there_is
 
 
 def test_motion_that_nobody_commanded_is_seen_when_it_begins():
-    state, foreign = see(held(), False, 0.0)
-    assert not foreign
-    state, foreign = see(state, True, 1.0)
-    assert foreign
-    state, foreign = see(state, True, 1.05)
-    assert not foreign
+    state, uncommanded = see(held(), False, 0.0)
+    assert not uncommanded
+    state, uncommanded = see(state, True, 1.0)
+    assert uncommanded
+    state, uncommanded = see(state, True, 1.05)
+    assert not uncommanded
     assert not state.lease.tolerates_motion
 
 
@@ -206,18 +206,18 @@ def test_a_robot_that_was_moving_by_itself_may_go_on_until_it_is_commanded_to_mo
 def test_a_robot_slowing_down_from_a_stop_is_not_moved_by_somebody_else():
     state, _ = see(moving(), True, 0.1)
     state, _ = stop(state, by="wang", reason="", now=at(0.2))
-    state, foreign = see(state, True, 0.25)
-    assert not foreign
-    assert state.foreign_s is None
+    state, uncommanded = see(state, True, 0.25)
+    assert not uncommanded
+    assert state.uncommanded_s is None
 
 
 def test_a_motion_that_is_seen_only_behind_its_stop_is_not_somebody_elses():
     state, latched = stop(moving(), by="li", reason="", now=at(0.1))
-    state, foreign = see(stop_sent(state, latched.id, 1000.1), True, 0.2)
-    assert not foreign
+    state, uncommanded = see(stop_sent(state, latched.id, 1000.1), True, 0.2)
+    assert not uncommanded
     state, _ = see(state, False, 0.5)
-    _, foreign = see(state, True, 2.2)
-    assert foreign
+    _, uncommanded = see(state, True, 2.2)
+    assert uncommanded
 
 
 def test_every_stop_has_a_number_and_only_its_own_reset_clears_it():

@@ -147,15 +147,15 @@ class Machine(RuleBasedStateMachine):
     @rule(moving=st.booleans(), pending=st.booleans(), arrived=st.booleans())
     def observe(self, moving, pending, arrived):
         commanded = self.authority.lease is not None and self.authority.lease.motion is not None
-        self.authority, foreign = observe(
+        self.authority, uncommanded = observe(
             self.authority, moving=moving, pending=pending, arrived=arrived, now=self.now
         )
-        assert not (foreign and commanded)
+        assert not (uncommanded and commanded)
         if moving:
             self.rests = 0
-        if foreign and self.authority.lease is not None and not self.authority.lease.tolerates_motion:
+        if uncommanded and self.authority.lease is not None and not self.authority.lease.tolerates_motion:
             lease = self.authority.lease
-            authority, ended = end_lease(self.authority, codes.ENDED_FOREIGN_MOTION(), foreign=True)
+            authority, ended = end_lease(self.authority, codes.ENDED_FOREIGN_MOTION(), uncommanded=True)
             assert ended.stop == lease.commanded
             self.authority = authority
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol_gateway.foreign_text import one_line
+from robomesh.texts import one_line
 
 
 @pytest.mark.parametrize(
